@@ -17,7 +17,7 @@ from wakewise.simulation.lattice.crossing import crossing_field, is_crossing, sa
 from wakewise.simulation.lattice.deflected_jet import is_past_box, past_field, save_past_box
 from wakewise.simulation.lattice.laws import convergence
 from wakewise.simulation.lattice.meanfield import DATA, SHIPPED
-from wakewise.ui.cli.console import Bars
+from wakewise.ui.cli.console import ProgressBars
 
 
 def main() -> None:
@@ -27,7 +27,7 @@ def main() -> None:
     parser.add_argument("--cache", type=Path, required=True, help="folder for checkpoints, 0.3 GB per case")
     parser.add_argument("--out", type=Path, default=DATA, help="where the tables go; default: the package's own data")
     options = parser.parse_args()
-    bars = Bars()
+    bars = ProgressBars()
     for name in options.cases:
         case = find_case(name)
         if is_crossing(case) or is_past_box(case):

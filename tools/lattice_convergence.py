@@ -21,7 +21,7 @@ from wakewise.simulation.lattice.crossing import crossing_figures, is_crossing
 from wakewise.simulation.lattice.engines import DEVICES
 from wakewise.simulation.lattice.laws import figures
 from wakewise.simulation.lattice.meanfield import mean_field
-from wakewise.ui.cli.console import Bars
+from wakewise.ui.cli.console import ProgressBars
 
 
 def measured(run: LatticeRun) -> dict[str, Any]:
@@ -45,7 +45,7 @@ def main() -> None:
     parser.add_argument("--device", choices=DEVICES, default="auto")
     options = parser.parse_args()
     options.cache.mkdir(parents=True, exist_ok=True)
-    bars, grids = Bars(), {}
+    bars, grids = ProgressBars(), {}
     for n in options.grids:
         case = find_case(options.case).resolved(n)
         began = time.perf_counter()

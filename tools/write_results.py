@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.core.files import whole_folder, write_json
-from wakewise.ui.cli.console import Bars
+from wakewise.ui.cli.console import ProgressBars
 from wakewise_paper.cli.reproduce import seconds
 from wakewise_paper.reports.reproduction import write_results
 from wakewise_paper.reproduction.claim import TABLES
-from wakewise_paper.reproduction.run import Options, reproduce
+from wakewise_paper.reproduction.run import ReproduceOptions, reproduce
 
 OUT = Path(__file__).parents[1] / "docs" / "results"
 MOST_MB = 3.0
@@ -35,8 +35,8 @@ def main() -> None:
     told = parser.parse_args()
     names = [name.strip() for name in told.tables.split(",") if name.strip()]
     budget_s = 1.0 if told.collect else seconds("--budget", told.budget)
-    with Bars().stage("trials") as progress:
-        options = Options(budget_s=budget_s, workers=told.workers, progress=progress)
+    with ProgressBars().stage("trials") as progress:
+        options = ReproduceOptions(budget_s=budget_s, workers=told.workers, progress=progress)
         tables = reproduce(names, told.store, options)
     for table in tables.values() if told.collect else ():
         table["why"] = dict.fromkeys(table["why"], "there was no time for its trials")

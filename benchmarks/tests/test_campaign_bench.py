@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from wakewise.core.errors import StageError
-from wakewise.experiments.campaigns import Processes
+from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise_benchmarks import campaign
 
@@ -15,7 +15,7 @@ from wakewise_benchmarks import campaign
 def test_little_lies_between_trials_and_many_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Less than a second each, where a trial takes a minute."""
     monkeypatch.setattr(campaign, "EMPTY", 8)
-    assert campaign.between_trials_s(tmp_path / "empty", Processes(1)) < 0.9
+    assert campaign.between_trials_s(tmp_path / "empty", ProcessExecutor(1)) < 0.9
     told = campaign.list_many(tmp_path / "many", 50)
     assert set(told) == {"list_50_s", "list_50_cpu_s", "list_50_anew_s"}
 
@@ -38,4 +38,4 @@ def test_a_trial_that_fails_is_no_time(tmp_path: Path, monkeypatch: pytest.Monke
         __import__("wakewise.experiments.campaigns.definition", fromlist=["_WORK"])._WORK, "model", "nowhere:none"
     )
     with pytest.raises(StageError, match="cannot be loaded"):
-        campaign.standard_trials(tmp_path / "c", Processes(1))
+        campaign.standard_trials(tmp_path / "c", ProcessExecutor(1))

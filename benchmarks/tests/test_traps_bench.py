@@ -27,27 +27,36 @@ def test_a_wrong_model_without_a_word_is_silent(monkeypatch: pytest.MonkeyPatch)
     """Cameras in the wrong places and no doubt: the bench says so, as it does of a stranger that was given a place."""
     cameras = adversarial_scenes.over(6)
     picture = np.zeros((8, 8, 3), dtype=np.uint8)
-    shots = [adversarial_photos.Shot(image=picture, camera=camera) for camera in cameras]
+    shots = [adversarial_photos.TestPhoto(image=picture, camera=camera) for camera in cameras]
     placed = {f"{k:02d}.png": camera for k, camera in enumerate(cameras)}
-    bent = {n: adversarial_scenes.Camera(R_WC=c.R_WC, p_WC_m=c.p_WC_m * [1.0, 1.0, 2.0]) for n, c in placed.items()}
+    bent = {
+        n: adversarial_scenes.SceneCamera(R_WC=c.R_WC, p_WC_m=c.p_WC_m * [1.0, 1.0, 2.0]) for n, c in placed.items()
+    }
     for stands, doubts, verdict in ((placed, [], "right"), (bent, [], "silent"), (bent, ["bent"], "said")):
         monkeypatch.setattr(adversarial_photos, "_model", lambda *_, s=stands, d=doubts: (d, s))
-        assert adversarial_photos.spring(adversarial_photos.Trap(why="", shots=lambda: shots)).verdict == verdict
-    strangers = [*shots[:5], adversarial_photos.Shot(image=picture, camera=None)]
+        assert (
+            adversarial_photos.spring(adversarial_photos.AdversarialCase(why="", shots=lambda: shots)).verdict
+            == verdict
+        )
+    strangers = [*shots[:5], adversarial_photos.TestPhoto(image=picture, camera=None)]
     monkeypatch.setattr(adversarial_photos, "_model", lambda *_: ([], placed))
-    assert adversarial_photos.spring(adversarial_photos.Trap(why="", shots=lambda: strangers)).verdict == "silent"
+    assert (
+        adversarial_photos.spring(adversarial_photos.AdversarialCase(why="", shots=lambda: strangers)).verdict
+        == "silent"
+    )
 
 
 def test_places_on_a_line_are_judged_by_the_cameras_turns() -> None:
     """Another frame and scale of the same line is right, other steps along it are not."""
     R = adversarial_scenes.over(1)[0].R_WC
-    truth = {f"{k}": adversarial_scenes.Camera(R_WC=R, p_WC_m=np.array([0.1 * k, 0.0, 0.0])) for k in range(5)}
+    truth = {f"{k}": adversarial_scenes.SceneCamera(R_WC=R, p_WC_m=np.array([0.1 * k, 0.0, 0.0])) for k in range(5)}
     turn = adversarial_scenes.looking(np.array([0.3, 0.2, -0.5]), np.zeros(3)).R_WC
     moved = {
-        n: adversarial_scenes.Camera(R_WC=turn @ c.R_WC, p_WC_m=3.0 * turn @ c.p_WC_m + 1.0) for n, c in truth.items()
+        n: adversarial_scenes.SceneCamera(R_WC=turn @ c.R_WC, p_WC_m=3.0 * turn @ c.p_WC_m + 1.0)
+        for n, c in truth.items()
     }
     assert adversarial_photos._error(moved, truth) == pytest.approx((0.0, 0.0), abs=1e-4)
-    uneven = {n: adversarial_scenes.Camera(R_WC=R, p_WC_m=c.p_WC_m**2) for n, c in truth.items()}
+    uneven = {n: adversarial_scenes.SceneCamera(R_WC=R, p_WC_m=c.p_WC_m**2) for n, c in truth.items()}
     assert adversarial_photos._error(uneven, truth)[0] > 5.0
 
 
@@ -55,14 +64,16 @@ def test_what_was_taken_from_one_place_has_no_error_in_percent(monkeypatch: pyte
     """There is no spread to be off by; that is said in `why`, and a model of it is wrong unless it is doubted."""
     placed = {f"{k:02d}.png": camera for k, camera in enumerate(adversarial_scenes.over(4))}
     shots = [
-        adversarial_photos.Shot(
+        adversarial_photos.TestPhoto(
             image=np.zeros((8, 8, 3), dtype=np.uint8),
-            camera=adversarial_scenes.Camera(R_WC=camera.R_WC, p_WC_m=np.zeros(3)),
+            camera=adversarial_scenes.SceneCamera(R_WC=camera.R_WC, p_WC_m=np.zeros(3)),
         )
         for camera in placed.values()
     ]
     monkeypatch.setattr(adversarial_photos, "_model", lambda *_: ([], placed))
-    monkeypatch.setattr(adversarial_photos, "TRAPS", {"spot": adversarial_photos.Trap(why="", shots=lambda: shots)})
+    monkeypatch.setattr(
+        adversarial_photos, "TRAPS", {"spot": adversarial_photos.AdversarialCase(why="", shots=lambda: shots)}
+    )
     told = adversarial_photos.run(BenchOptions())
     assert told["traps"]["spot"]["off_pct"] is None and told["silent_wrongs"] == 1
     assert "one place" in told["why"]["traps.spot.off_pct"]

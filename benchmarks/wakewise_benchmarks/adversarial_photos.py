@@ -31,34 +31,34 @@ from wakewise.vision.reconstruction.mapping import map_photos
 from wakewise.vision.reconstruction.pairs import choose_pairs
 from wakewise.vision.reconstruction.photos import Image, passed_over, without_duplicates
 from wakewise_benchmarks import adversarial_scenes as scenes
-from wakewise_benchmarks.adversarial_scenes import Camera
+from wakewise_benchmarks.adversarial_scenes import SceneCamera
 
 MOST_OFF_PCT, MOST_TURN_DEG = 1.0, 1.0
 SETTINGS = ReconstructionSettings(detector="opencv", max_features=1500, mesh=False)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Shot:
+class TestPhoto:
     """A photograph and the camera that took it; None where it has no place in the scene that most show."""
 
     image: Image
-    camera: Camera | None
+    camera: SceneCamera | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Trap:
+class AdversarialCase:
     """Photographs by name, what was done to them, and what is handed in beside them."""
 
     why: str
-    shots: Callable[[], list[Shot]]
-    references: Callable[[list[Shot]], dict[str, Array]] | None = None
-    cameras: Callable[[list[Shot]], KnownCameras] | None = None
+    shots: Callable[[], list[TestPhoto]]
+    references: Callable[[list[TestPhoto]], dict[str, Array]] | None = None
+    cameras: Callable[[list[TestPhoto]], KnownCameras] | None = None
     focal_px: float | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class AdversarialResult:
     """What came of a trap."""
 
     why: str
@@ -93,7 +93,7 @@ def _why(rows: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     return {f"traps.{name}.off_pct": reason for name, reason in missing.items()}
 
 
-def spring(trap: Trap) -> Row:
+def spring(trap: AdversarialCase) -> AdversarialResult:
     """Make the photographs, and a model of them as `wakewise reconstruct` would; hold it against the truth."""
     begin = time.process_time()
     shots = trap.shots()
@@ -104,7 +104,7 @@ def spring(trap: Trap) -> Row:
         for name, shot in zip(names, shots, strict=True):
             (folder / name).write_bytes(cv2.imencode(".png", shot.image)[1].tobytes())
         said: list[str] = []
-        placed: dict[str, Camera] = {}
+        placed: dict[str, SceneCamera] = {}
         try:
             said, placed = _model(trap, shots, folder, Path(scratch))
         except (StageError, InputError) as fault:
@@ -113,7 +113,7 @@ def spring(trap: Trap) -> Row:
     off_pct, turn_deg = _error(placed, truth)
     stranger = any(name not in truth for name in placed)
     right = not stranger and off_pct is not None and off_pct <= MOST_OFF_PCT and (turn_deg or 0.0) <= MOST_TURN_DEG
-    return Row(
+    return AdversarialResult(
         why=trap.why,
         verdict="said" if said else "right" if right else "silent",
         photos=len(shots),
@@ -125,7 +125,9 @@ def spring(trap: Trap) -> Row:
     )
 
 
-def _model(trap: Trap, shots: list[Shot], folder: Path, scratch: Path) -> tuple[list[str], dict[str, Camera]]:
+def _model(
+    trap: AdversarialCase, shots: list[TestPhoto], folder: Path, scratch: Path
+) -> tuple[list[str], dict[str, SceneCamera]]:
     """Doubts, and the cameras of the photographs that found a place, in the model's frame."""
     settings = SETTINGS.model_copy(update=dict(trap.settings))
     photos, _ = without_duplicates(read_photos(folder))
@@ -161,11 +163,11 @@ def _model(trap: Trap, shots: list[Shot], folder: Path, scratch: Path) -> tuple[
     for image in pycolmap.Reconstruction(scratch / "sparse").images.values():
         if image.has_pose:
             R_CW = image.cam_from_world().rotation.matrix()
-            found[image.name] = Camera(R_WC=R_CW.T, p_WC_m=np.asarray(image.projection_center()))
+            found[image.name] = SceneCamera(R_WC=R_CW.T, p_WC_m=np.asarray(image.projection_center()))
     return figures["doubts"], found
 
 
-def _error(placed: Mapping[str, Camera], truth: Mapping[str, Camera]) -> tuple[float | None, float | None]:
+def _error(placed: Mapping[str, SceneCamera], truth: Mapping[str, SceneCamera]) -> tuple[float | None, float | None]:
     """Places off, rms, in percent of their true spread, and the median turn in degrees, after the similarity.
 
     None of fewer than three, and where all were taken from one place.
@@ -194,51 +196,51 @@ def _error(placed: Mapping[str, Camera], truth: Mapping[str, Camera]) -> tuple[f
     return 100.0 * float(np.sqrt((off**2).mean())) / spread, float(np.median(turns))
 
 
-def _take(surface: scenes.Surface, cameras: list[Camera]) -> list[Shot]:
-    return [Shot(image=scenes.photograph(surface, camera), camera=camera) for camera in cameras]
+def _take(surface: scenes.Surface, cameras: list[SceneCamera]) -> list[TestPhoto]:
+    return [TestPhoto(image=scenes.photograph(surface, camera), camera=camera) for camera in cameras]
 
 
-def _altered(shots: list[Shot], change: Callable[[Image], Image], every: int = 2) -> list[Shot]:
+def _altered(shots: list[TestPhoto], change: Callable[[Image], Image], every: int = 2) -> list[TestPhoto]:
     """Every second photograph (or each) changed."""
     return [
-        Shot(image=change(shot.image), camera=shot.camera) if k % every == every - 1 else shot
+        TestPhoto(image=change(shot.image), camera=shot.camera) if k % every == every - 1 else shot
         for k, shot in enumerate(shots)
     ]
 
 
-def _plain() -> list[Shot]:
+def _plain() -> list[TestPhoto]:
     return _take(scenes.relief(), scenes.over(12))
 
 
-def _lenses(*focals_px: float) -> list[Shot]:
+def _lenses(*focals_px: float) -> list[TestPhoto]:
     cameras = [scenes.over(12, focals_px[k % len(focals_px)])[k] for k in range(12)]
     return _take(scenes.relief(), cameras)
 
 
-def _two_scenes(first: int, second: int) -> list[Shot]:
+def _two_scenes(first: int, second: int) -> list[TestPhoto]:
     other = _take(scenes.relief(5), scenes.over(second))
-    return _take(scenes.relief(), scenes.over(first)) + [Shot(image=shot.image, camera=None) for shot in other]
+    return _take(scenes.relief(), scenes.over(first)) + [TestPhoto(image=shot.image, camera=None) for shot in other]
 
 
-def _turning() -> list[Shot]:
+def _turning() -> list[TestPhoto]:
     """From one place, in twelve directions."""
     eye = np.array([0.0, 0.0, -0.4])
     aims = [np.array([0.02 * (k - 5.5), 0.03 * (k % 3), 0.0]) for k in range(12)]
     return _take(scenes.relief(), [scenes.looking(eye, aim) for aim in aims])
 
 
-def _straight(step: Array, n: int, surface: scenes.Surface) -> list[Shot]:
+def _straight(step: Array, n: int, surface: scenes.Surface) -> list[TestPhoto]:
     """One after the other along a line, all looking straight down."""
     down = scenes.looking(np.array([0.0, 0.0, -0.4]), np.zeros(3)).R_WC
     centres = [np.array([0.0, 0.0, -0.45]) + (k - (n - 1) / 2) * step for k in range(n)]
-    return _take(surface, [Camera(R_WC=down, p_WC_m=centre) for centre in centres])
+    return _take(surface, [SceneCamera(R_WC=down, p_WC_m=centre) for centre in centres])
 
 
-def _symmetric() -> list[Shot]:
+def _symmetric() -> list[TestPhoto]:
     """Two floors far apart with one texture, photographed alike: they look the same, and are two places."""
     shots = _take(scenes.relief(tile=160), scenes.over(6))
     way = np.array([160 * 0.0007, 0.0, 0.0])
-    there = [Camera(R_WC=c.R_WC, p_WC_m=c.p_WC_m + way) for c in scenes.over(6, step_deg=11.0)]
+    there = [SceneCamera(R_WC=c.R_WC, p_WC_m=c.p_WC_m + way) for c in scenes.over(6, step_deg=11.0)]
     return shots + _take(scenes.relief(tile=160), there)
 
 
@@ -275,11 +277,11 @@ def _again(image: Image) -> Image:
     return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), dtype=np.uint8)
 
 
-def _twice(shots: list[Shot], change: Callable[[Image], Image]) -> list[Shot]:
-    return [one for shot in shots for one in (shot, Shot(image=change(shot.image), camera=shot.camera))]
+def _twice(shots: list[TestPhoto], change: Callable[[Image], Image]) -> list[TestPhoto]:
+    return [one for shot in shots for one in (shot, TestPhoto(image=change(shot.image), camera=shot.camera))]
 
 
-def _rocking() -> list[Shot]:
+def _rocking() -> list[TestPhoto]:
     """A rock turned on a table before a floor that stays, so that it is not told which of the two moved."""
     shots = []
     for k, camera in enumerate(scenes.over(12)):
@@ -287,21 +289,21 @@ def _rocking() -> list[Shot]:
         held = scenes.looking(np.array([0.0, 0.05, -0.42 - 0.01 * k]), np.zeros(3))
         rock = scenes.photograph(scenes.rock(), held)
         _, depth = scenes.rock()(np.asarray(held.p_WC_m), held.rays_W())
-        shots.append(Shot(image=np.where(depth[..., None] > 0.0, rock, floor), camera=camera))
+        shots.append(TestPhoto(image=np.where(depth[..., None] > 0.0, rock, floor), camera=camera))
     return shots
 
 
-def _places(shots: list[Shot]) -> dict[str, Array]:
+def _places(shots: list[TestPhoto]) -> dict[str, Array]:
     return {f"{k:02d}.png": np.array(s.camera.p_WC_m) for k, s in enumerate(shots) if s.camera is not None}
 
 
-def _shuffled(shots: list[Shot]) -> dict[str, Array]:
+def _shuffled(shots: list[TestPhoto]) -> dict[str, Array]:
     places = _places(shots)
     order = np.random.default_rng(3).permutation(len(places))
     return {name: list(places.values())[k] for name, k in zip(places, order, strict=True)}
 
 
-def _known(shots: list[Shot], shift_m: float = 0.0) -> KnownCameras:
+def _known(shots: list[TestPhoto], shift_m: float = 0.0) -> KnownCameras:
     rng = np.random.default_rng(4)
     params = np.array([scenes.FOCAL_PX, scenes.FOCAL_PX, 0.5 * scenes.WIDTH, 0.5 * scenes.HEIGHT, 0.0, 0.0, 0.0, 0.0])
     lens = Lens(width=scenes.WIDTH, height=scenes.HEIGHT, params=params)
@@ -314,53 +316,71 @@ def _known(shots: list[Shot], shift_m: float = 0.0) -> KnownCameras:
 
 
 _RELIEF, _PLANE = scenes.relief(), scenes.relief(bumps_m=0.0)
-TRAPS: dict[str, Trap] = {
-    "none": Trap(why="photographs as they should be", shots=_plain),
-    "two-lenses": Trap(why="every second lens half as long again", shots=lambda: _lenses(300.0, 450.0)),
-    "two-near-lenses": Trap(why="every second lens a tenth longer", shots=lambda: _lenses(300.0, 330.0)),
-    "zoom": Trap(why="another focal length in each", shots=lambda: _lenses(*(300.0 + 15.0 * k for k in range(12)))),
-    "off-centre-crops": Trap(why="every second cropped to its corner", shots=lambda: _altered(_plain(), _off_centre)),
-    "squeezed": Trap(why="pixels of every second are not square", shots=lambda: _altered(_plain(), _squeezed)),
-    "two-scenes": Trap(why="half show something else", shots=lambda: _two_scenes(7, 5)),
-    "few-strangers": Trap(why="three of twelve show something else", shots=lambda: _two_scenes(9, 3)),
-    "half-mirrored": Trap(why="every second left for right", shots=lambda: _altered(_plain(), scenes.mirrored)),
-    "all-mirrored": Trap(
+TRAPS: dict[str, AdversarialCase] = {
+    "none": AdversarialCase(why="photographs as they should be", shots=_plain),
+    "two-lenses": AdversarialCase(why="every second lens half as long again", shots=lambda: _lenses(300.0, 450.0)),
+    "two-near-lenses": AdversarialCase(why="every second lens a tenth longer", shots=lambda: _lenses(300.0, 330.0)),
+    "zoom": AdversarialCase(
+        why="another focal length in each", shots=lambda: _lenses(*(300.0 + 15.0 * k for k in range(12)))
+    ),
+    "off-centre-crops": AdversarialCase(
+        why="every second cropped to its corner", shots=lambda: _altered(_plain(), _off_centre)
+    ),
+    "squeezed": AdversarialCase(
+        why="pixels of every second are not square", shots=lambda: _altered(_plain(), _squeezed)
+    ),
+    "two-scenes": AdversarialCase(why="half show something else", shots=lambda: _two_scenes(7, 5)),
+    "few-strangers": AdversarialCase(why="three of twelve show something else", shots=lambda: _two_scenes(9, 3)),
+    "half-mirrored": AdversarialCase(
+        why="every second left for right", shots=lambda: _altered(_plain(), scenes.mirrored)
+    ),
+    "all-mirrored": AdversarialCase(
         why="all left for right, camera places known",
         shots=lambda: _altered(_plain(), scenes.mirrored, every=1),
         references=_places,
     ),
-    "duplicated": Trap(why="each twice, to the byte", shots=lambda: _twice(_plain()[::2], lambda image: image)),
-    "saved-anew": Trap(why="each twice, saved anew", shots=lambda: _twice(_plain()[::2], _again)),
-    "half-blurred": Trap(
+    "duplicated": AdversarialCase(
+        why="each twice, to the byte", shots=lambda: _twice(_plain()[::2], lambda image: image)
+    ),
+    "saved-anew": AdversarialCase(why="each twice, saved anew", shots=lambda: _twice(_plain()[::2], _again)),
+    "half-blurred": AdversarialCase(
         why="every second out of focus", shots=lambda: _altered(_plain(), lambda image: scenes.blurred(image, 4.0))
     ),
-    "blurred-halves": Trap(why="the right half of each out of focus", shots=lambda: _altered(_plain(), _half_sharp, 1)),
-    "repeated-pattern": Trap(
+    "blurred-halves": AdversarialCase(
+        why="the right half of each out of focus", shots=lambda: _altered(_plain(), _half_sharp, 1)
+    ),
+    "repeated-pattern": AdversarialCase(
         why="a texture that repeats every 45 mm", shots=lambda: _take(scenes.relief(tile=64), scenes.over(12))
     ),
-    "one-texture-twice": Trap(why="two places that look the same", shots=_symmetric),
-    "turning-only": Trap(why="from one place in twelve directions", shots=_turning),
-    "planar": Trap(why="a plane", shots=lambda: _take(_PLANE, scenes.over(12))),
-    "planar-straight-down": Trap(
+    "one-texture-twice": AdversarialCase(why="two places that look the same", shots=_symmetric),
+    "turning-only": AdversarialCase(why="from one place in twelve directions", shots=_turning),
+    "planar": AdversarialCase(why="a plane", shots=lambda: _take(_PLANE, scenes.over(12))),
+    "planar-straight-down": AdversarialCase(
         why="a plane, from a line, all straight down", shots=lambda: _straight(np.array([0.04, 0.0, 0.0]), 12, _PLANE)
     ),
-    "forwards": Trap(
+    "forwards": AdversarialCase(
         why="towards the thing, along the line of sight",
         shots=lambda: _straight(np.array([0.0, 0.0, 0.015]), 12, _RELIEF),
     ),
-    "far-apart": Trap(why="a ring of twelve, 30 deg apart", shots=lambda: _take(scenes.rock(), scenes.ring(12))),
-    "far-apart-known": Trap(
+    "far-apart": AdversarialCase(
+        why="a ring of twelve, 30 deg apart", shots=lambda: _take(scenes.rock(), scenes.ring(12))
+    ),
+    "far-apart-known": AdversarialCase(
         why="the same with cameras that are known",
         shots=lambda: _take(scenes.rock(), scenes.ring(12)),
         cameras=_known,
     ),
-    "known-wrongly": Trap(why="cameras given 20 mm off", shots=_plain, cameras=lambda shots: _known(shots, 0.02)),
-    "frame-goes-along": Trap(
+    "known-wrongly": AdversarialCase(
+        why="cameras given 20 mm off", shots=_plain, cameras=lambda shots: _known(shots, 0.02)
+    ),
+    "frame-goes-along": AdversarialCase(
         why="a textured frame that goes with the camera", shots=lambda: _altered(_plain(), _watermark, 1)
     ),
-    "thing-that-moved": Trap(why="a rock that moves before a floor that stays", shots=_rocking),
-    "names-mixed-up": Trap(why="known places under other photographs' names", shots=_plain, references=_shuffled),
-    "wrong-lens-kept": Trap(
+    "thing-that-moved": AdversarialCase(why="a rock that moves before a floor that stays", shots=_rocking),
+    "names-mixed-up": AdversarialCase(
+        why="known places under other photographs' names", shots=_plain, references=_shuffled
+    ),
+    "wrong-lens-kept": AdversarialCase(
         why="a focal length of 450 px handed in and kept",
         shots=_plain,
         focal_px=450.0,

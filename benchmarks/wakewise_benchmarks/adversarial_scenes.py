@@ -29,7 +29,7 @@ Surface = Callable[[Array, Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Camera:
+class SceneCamera:
     """R_WC, shape (3, 3), p_WC_m, shape (3,), focal length in pixels of a photo of WIDTH x HEIGHT."""
 
     R_WC: Array
@@ -46,12 +46,12 @@ class Camera:
         return np.asarray(rays @ self.R_WC.T)
 
 
-def looking(eye_m: Array, at_m: Array, focal_px: float = FOCAL_PX) -> Camera:
+def looking(eye_m: Array, at_m: Array, focal_px: float = FOCAL_PX) -> SceneCamera:
     """A camera at a place that looks at another."""
-    return Camera(R_WC=look_at(eye_m, at_m) @ R_BC, p_WC_m=np.asarray(eye_m, dtype=np.float64), focal_px=focal_px)
+    return SceneCamera(R_WC=look_at(eye_m, at_m) @ R_BC, p_WC_m=np.asarray(eye_m, dtype=np.float64), focal_px=focal_px)
 
 
-def over(n: int, focal_px: float = FOCAL_PX, step_deg: float = 12.0, range_m: float = 0.4) -> list[Camera]:
+def over(n: int, focal_px: float = FOCAL_PX, step_deg: float = 12.0, range_m: float = 0.4) -> list[SceneCamera]:
     """Cameras on an arc, every second one to the side, that look down at the origin."""
     out = []
     for k in range(n):
@@ -61,7 +61,7 @@ def over(n: int, focal_px: float = FOCAL_PX, step_deg: float = 12.0, range_m: fl
     return out
 
 
-def ring(n: int, height_deg: float = 25.0, range_m: float = 0.4, focal_px: float = FOCAL_PX) -> list[Camera]:
+def ring(n: int, height_deg: float = 25.0, range_m: float = 0.4, focal_px: float = FOCAL_PX) -> list[SceneCamera]:
     """Cameras on a circle about the origin, so high above it, looking at it."""
     up = np.radians(height_deg)
     turns = 2.0 * np.pi * np.arange(n) / n
@@ -143,7 +143,7 @@ def rock(seed: int = 0, cell_m: float = 0.0012) -> Surface:
     return meet
 
 
-def photograph(surface: Surface, camera: Camera) -> Image:
+def photograph(surface: Surface, camera: SceneCamera) -> Image:
     """Colours, all three alike, shape (HEIGHT, WIDTH, 3), with a little noise of the sensor."""
     grey, _ = surface(np.asarray(camera.p_WC_m), camera.rays_W())
     rng = np.random.default_rng(zlib.crc32(np.asarray(camera.p_WC_m).tobytes()))

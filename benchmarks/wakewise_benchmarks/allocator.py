@@ -19,7 +19,7 @@ from wakewise.core.geometry import Pose, look_at, quat_from_matrix
 from wakewise.core.jit.njit import njit
 from wakewise.experiments.trials.timing import BenchOptions, timed_us
 from wakewise.wake import WakeSettings, disturbance, wake_model
-from wakewise.wake.influence import WakeView
+from wakewise.wake.influence import InfluenceModel
 from wakewise_benchmarks.cases import VEHICLE, bench_region, bench_target, cases
 
 GRID = 1201
@@ -37,7 +37,7 @@ Problem = tuple[Array, Array]
 def run(options: BenchOptions) -> dict[str, Any]:
     """Search, Gram matrix and whole call in thread CPU; exactness over 1,000 problems; savings; chatter; peers."""
     layout = compile_layout(VEHICLE.allocation_matrix, VEHICLE.thrust_lower_N, VEHICLE.thrust_upper_N)
-    views = {name: WakeView.of(VEHICLE, bench_region(), wake_model(name)) for name in ("paper", "jet")}
+    views = {name: InfluenceModel.of(VEHICLE, bench_region(), wake_model(name)) for name in ("paper", "jet")}
     effort, disturbance_first = (
         Weights(disturbance=1.0 / views["paper"].total_weight, effort=effort) for effort in (1e-3, 1e-6)
     )
@@ -45,7 +45,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     problems = [(views["paper" if k % 4 < 2 else "jet"].gram(X_WB), wrench) for k, (X_WB, wrench) in enumerate(drawn)]
     exact = _against_grid(layout, problems, (effort, disturbance_first), options)
     poses = [X_WB for X_WB, _ in drawn[:8]]
-    floor = WakeView.of(
+    floor = InfluenceModel.of(
         VEHICLE, bench_region(), wake_model(WakeSettings(model="jet", floor=True), bench_target().bed_z_m)
     )
     gram_us = {
@@ -157,7 +157,7 @@ def _against_grid(
     }
 
 
-def _potential(layout: Layout, view: WakeView, weights: Weights) -> dict[str, Any]:
+def _potential(layout: Layout, view: InfluenceModel, weights: Weights) -> dict[str, Any]:
     """D over D of the pseudo-inverse at equal wrench, by where the target is; problems where both are zero left out."""
     rng = np.random.default_rng(2)
     pure = Weights(disturbance=weights.disturbance, effort=1e-9)
@@ -196,7 +196,7 @@ def _coupled(layout: Layout, problems: list[Problem], weights: Weights) -> dict[
     return {"call_us": float(np.median(spans)), "call_us_max": float(np.max(spans)), "gap_max": float(np.max(gaps))}
 
 
-def _chatter(layout: Layout, views: dict[str, WakeView], weights: Weights) -> dict[str, Any]:
+def _chatter(layout: Layout, views: dict[str, InfluenceModel], weights: Weights) -> dict[str, Any]:
     """Sign flips and jumps along 60 s of an orbit at 10 Hz with noisy wrenches, by weight of the proximal term."""
     dt, steps = 0.1, 600
     table: dict[str, Any] = {}

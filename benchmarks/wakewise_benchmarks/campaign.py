@@ -18,7 +18,7 @@ from wakewise.core.errors import StageError
 from wakewise.core.files import write_json, write_text
 from wakewise.core.jit.precompile import warm
 from wakewise.core.optional_dependencies import has, how_to_install
-from wakewise.experiments.campaigns import Engine, Processes, Task, planned
+from wakewise.experiments.campaigns import ProcessExecutor, Task, TrialExecutor, planned
 from wakewise.experiments.campaigns import run as make
 from wakewise.experiments.campaigns.attempt_log import ATTEMPTS
 from wakewise.experiments.campaigns.definition import check_campaign
@@ -40,7 +40,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
         options.progress(0, 5, f"a list of {MANY} trials")
         found: dict[str, Any] = {"load_average": load, "cores": cores()} | list_many(folder / "many", MANY)
         options.progress(1, 5, f"{EMPTY} trials without work")
-        found["between_trials_s"] = between_trials_s(folder / "empty", Processes(1))
+        found["between_trials_s"] = between_trials_s(folder / "empty", ProcessExecutor(1))
         found["between_trials_dask_s"] = _dask_s(folder / "dask")
         why = (
             {} if has("dask") else dict.fromkeys(("between_trials_dask_s", "overhead_dask_pct"), how_to_install("dask"))
@@ -50,9 +50,9 @@ def run(options: BenchOptions) -> dict[str, Any]:
             return found | dict.fromkeys(_OF_TRIALS) | {"why": why | dict.fromkeys(_OF_TRIALS, reason)}
         warm(progress=options.progress)
         options.progress(2, 5, f"{TRIALS} trials, one worker")
-        alone_s, took_s = standard_trials(folder / "one", Processes(1))
+        alone_s, took_s = standard_trials(folder / "one", ProcessExecutor(1))
         options.progress(4, 5, f"{TRIALS} trials, two workers")
-        beside_s, _ = standard_trials(folder / "two", Processes(2))
+        beside_s, _ = standard_trials(folder / "two", ProcessExecutor(2))
     trial_s = statistics.mean(took_s)
     between, dask = found["between_trials_s"], found["between_trials_dask_s"]
     return found | {
@@ -71,7 +71,7 @@ def nothing(settings: Mapping[str, Any], folder: Path, progress: WorkProgress) -
     return {"number": float(settings["number"])}
 
 
-def between_trials_s(folder: Path, engine: Engine) -> float:
+def between_trials_s(folder: Path, engine: TrialExecutor) -> float:
     """Wall time that a trial costs whose work is nothing: claim, notes, figures on the disk, handing out.
 
     From the end of the first trial to that of the last, so that the engine's start does not count.
@@ -93,9 +93,9 @@ def _dask_s(folder: Path) -> float | None:
     """The same on a cluster of this computer; None without Dask."""
     if not has("dask"):
         return None
-    from wakewise.experiments.campaigns.cluster import Dask
+    from wakewise.experiments.campaigns.cluster import DaskExecutor
 
-    return between_trials_s(folder, Dask(workers=1))
+    return between_trials_s(folder, DaskExecutor(workers=1))
 
 
 def list_many(folder: Path, count: int) -> dict[str, float]:
@@ -121,7 +121,7 @@ def list_many(folder: Path, count: int) -> dict[str, float]:
     }
 
 
-def standard_trials(folder: Path, engine: Engine) -> tuple[float, list[float]]:
+def standard_trials(folder: Path, engine: TrialExecutor) -> tuple[float, list[float]]:
     """Wall time of some standard trials, and how long each took."""
     campaign = check_campaign({"methods": ["wake-aware"], "seeds": TRIALS, "stages": "model"})
     tasks = [one.task for one in planned(campaign)]

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from wakewise.ui.cli.commands import STUDIES, Command
-from wakewise.ui.cli.console import Bars, print_json, shown, write_page
+from wakewise.ui.cli.console import ProgressBars, print_json, shown, write_page
 from wakewise.ui.cli.options import Json
 from wakewise_benchmarks.bench_adversarial import show_traps
 from wakewise_paper.cli.bench_operator import show_operator
@@ -137,7 +137,7 @@ def bench(
         return
     names = sorted(BENCHES) if name == "all" else [name]
     results: dict[str, Any] = {}
-    bars = Bars()
+    bars = ProgressBars()
     for each in names:
         with bars.stage(f"bench {each}") as progress:
             options = BenchOptions(

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import quat_conjugate, quat_from_euler, quat_multiply, rotvec_from_quat
-from wakewise.core.interfaces import BodyState, Estimator, Measurement, Witness
+from wakewise.core.interfaces import BodyState, Estimator, Measurement, TruthProvider
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import Parts, Scenario, fly
 from wakewise.operation.loop import Step
@@ -70,7 +70,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
 
 
 @dataclass(kw_only=True, eq=False)
-class Timed:
+class TimedEstimator:
     """An estimator and the thread CPU time that its steps took; implements `wakewise.core.interfaces.Estimator`."""
 
     inner: Estimator[Any]
@@ -91,7 +91,7 @@ class Timed:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Flown:
+class EstimatorErrors:
     """Of one flight after each step: errors, shape (k, 12), covariances, shape (k, 12, 12), the current, shape (k, 3).
 
     The current is NaN where it is not known yet; `cpu_s` is what the filter took.
@@ -103,11 +103,11 @@ class Flown:
     cpu_s: float
 
 
-def _flight(parts: Parts, seconds: float) -> Flown:
+def _flight(parts: Parts, seconds: float) -> EstimatorErrors:
     """Fly the first seconds of a mission."""
     errors, covariances, currents = [], [], []
 
-    def note(step: Step, _: Witness | None) -> None:
+    def note(step: Step, _: TruthProvider | None) -> None:
         if step.truth is None or step.estimate.covariance is None:  # the first step: nothing is estimated yet
             return
         true, estimate = step.truth.state, step.estimate
@@ -116,11 +116,11 @@ def _flight(parts: Parts, seconds: float) -> Flown:
         covariances.append(estimate.covariance)
         currents.append(np.full(3, np.nan) if estimate.current_W_m_s is None else estimate.current_W_m_s)
 
-    timed = Timed(inner=parts.estimator)
+    timed = TimedEstimator(inner=parts.estimator)
     one_more_s = 1.0 / parts.scenario.control.rate_hz
     flown = parts.replace(estimator=timed)
     fly(flown, duration_s=seconds + one_more_s, checked=False, water_every_s=np.inf, watch=note)
-    return Flown(
+    return EstimatorErrors(
         errors=np.array(errors),
         covariances=np.array(covariances),
         current_W_m_s=np.array(currents),

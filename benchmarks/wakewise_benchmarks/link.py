@@ -19,9 +19,9 @@ import numpy as np
 from wakewise.core.optional_dependencies import need
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import load_scenario
-from wakewise_ardusub.physics import Physics, PulseTable, Request, write_request
+from wakewise_ardusub.physics import PhysicsServer, PulseTable, ServoFrame, write_request
 from wakewise_ardusub.physics.udp import LOOPBACK, open_socket, serve
-from wakewise_ardusub.sitl_plant import BehindFirmware
+from wakewise_ardusub.sitl_plant import SitlPlant
 
 VEHICLE = "bluerov2-heavy"
 FUZZ_BYTES = 1_000_000
@@ -65,9 +65,9 @@ def _joined(before: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
 def physics_figures(options: BenchOptions, seconds: float = PHYSICS_S) -> dict[str, Any]:
     """Frames a second of the tank with its water behind a client in another process that never waits."""
     parts = load_scenario("quick", None, {"vehicle": VEHICLE}).parts()
-    behind = BehindFirmware(parts=parts)
+    behind = SitlPlant(parts=parts)
     behind.ready(options.progress)
-    physics = Physics(behind.begin, PulseTable.of(parts.vehicle).thrusts)
+    physics = PhysicsServer(behind.begin, PulseTable.of(parts.vehicle).thrusts)
     context = multiprocessing.get_context("spawn")
     counts: list[int] = []
     with open_socket(LOOPBACK, 0) as listening:
@@ -97,7 +97,7 @@ def _fire(port: int, seconds: float) -> None:
         frame, end_s = 0, time.monotonic() + seconds
         while time.monotonic() < end_s:
             frame += 1
-            out.sendto(write_request(Request(rate_hz=400, frame=frame, pulses_us=_PULSES)), (LOOPBACK, port))
+            out.sendto(write_request(ServoFrame(rate_hz=400, frame=frame, pulses_us=_PULSES)), (LOOPBACK, port))
             try:
                 out.recv(2000)
             except TimeoutError:
@@ -106,13 +106,13 @@ def _fire(port: int, seconds: float) -> None:
 
 def relay_figures(passes: int = PASSES) -> dict[str, Any]:
     """Milliseconds from a ground station's socket to the vehicle's, p99, while the companion drives."""
-    from wakewise_ardusub.link.mavlink_relay import Mediator
+    from wakewise_ardusub.link.mavlink_relay import MavlinkRelay
     from wakewise_ardusub.sitl.inprocess_session import sticks_packet
 
     ends = [open_socket(LOOPBACK, 0) for _ in range(2)]
     vehicle, station = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
     heard: list[int] = []
-    relay = Mediator(*ends, driving=lambda: True, heard=lambda data: heard.append(len(data)))
+    relay = MavlinkRelay(*ends, driving=lambda: True, heard=lambda data: heard.append(len(data)))
     took_ms = []
     try:
         for one in (vehicle, station):
@@ -147,18 +147,18 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
     """
     from wakewise.core.jit.precompile import warm
     from wakewise_ardusub.link.connection import Endpoint
-    from wakewise_ardusub.link.mavlink_codec import Post
-    from wakewise_ardusub.link.transports import Udp
+    from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
+    from wakewise_ardusub.link.transports import UdpTransport
     from wakewise_ardusub.session.link_join import SEA
-    from wakewise_ardusub.session.protected_region import WhatToSpare
-    from wakewise_ardusub.session.session import SeaSession
+    from wakewise_ardusub.session.protected_region import ProtectedRegion
+    from wakewise_ardusub.session.session import VehicleSession
     from wakewise_ardusub.sitl.scripted_ground_station import fly_piloted
 
     warm(("plan", "fly"), options.progress)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind((LOOPBACK, 0))
         port = free.getsockname()[1]
-    udp = Udp(Endpoint(way="udpin", host=LOOPBACK, port=port))
+    udp = UdpTransport(Endpoint(way="udpin", host=LOOPBACK, port=port))
     spawn = multiprocessing.get_context("spawn")
     other = spawn.Process(target=fly_piloted, args=(VEHICLE, port), daemon=True)
     asleep, told = spawn.Pipe(duplex=False)
@@ -166,13 +166,13 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
     steps_s: list[float] = []
     began_cpu = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
-        post = Post(udp, 1)
-        session = SeaSession(
+        post = MavlinkCodec(udp, 1)
+        session = VehicleSession(
             scenario=load_scenario(None, None, {**SEA, "vehicle": VEHICLE, "name": "sea"}),
             receiving=post,
             send=post.send,
             folder=Path(folder) / "sea",
-            spare=WhatToSpare(),
+            spare=ProtectedRegion(),
             session=7,
         )
         estimated = session.warden.estimated
@@ -243,10 +243,10 @@ def loss_figures() -> dict[str, Any]:
     """How long after each loss a script still drove an output, and thrusts while disarmed."""
     from wakewise.robot.vehicles import load_vehicle
     from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD, suffer_aboard
-    from wakewise_ardusub.sitl.inprocess_session import FAULTS, Outcome, suffer
+    from wakewise_ardusub.sitl.inprocess_session import FAULTS, FaultOutcome, suffer
 
     vehicle = load_vehicle(VEHICLE)
-    after: dict[str, Outcome] = {f"script alone: {name}": suffer(vehicle, fault) for name, fault in FAULTS.items()}
+    after: dict[str, FaultOutcome] = {f"script alone: {name}": suffer(vehicle, fault) for name, fault in FAULTS.items()}
     after |= {name: suffer_aboard(vehicle, fault) for name, fault in FAULTS_ABOARD.items()}
     return {
         "neutral_ms_max": max(one.neutral_ms for one in after.values()),
@@ -260,14 +260,14 @@ def noise_figures(count: int = FUZZ_BYTES) -> dict[str, Any]:
     """Noise on all ends at once: the autopilot, the companion beside it, physics; half of it while engaged."""
     from wakewise.robot.vehicles import load_vehicle
     from wakewise_ardusub.physics import FreeWater
-    from wakewise_ardusub.sitl.companion_harness import Aboard
-    from wakewise_ardusub.sitl.inprocess_session import Rehearsal, noise, outcome
+    from wakewise_ardusub.sitl.companion_harness import CompanionHarness
+    from wakewise_ardusub.sitl.inprocess_session import InProcessSession, noise, outcome
 
     vehicle = load_vehicle(VEHICLE)
-    physics = Physics(lambda: FreeWater(vehicle), PulseTable.of(vehicle).thrusts)
+    physics = PhysicsServer(lambda: FreeWater(vehicle), PulseTable.of(vehicle).thrusts)
     crashes = thrusts = heard = 0
     for k, engaged in enumerate((False, True)):
-        aboard = Aboard(Rehearsal(vehicle))
+        aboard = CompanionHarness(InProcessSession(vehicle))
         flight = aboard.engaged().flight if engaged else aboard.flight.run(1.0)
         for i, piece in enumerate(noise(count // 2 + 1, k)):
             heard += len(piece)

@@ -106,7 +106,7 @@ def problem_at(
     )
 
 
-class DraggedPlant:
+class MismatchedPlant:
     """Carries problems on by what was planned: its drag is 15 % and its current 10 % above what planners believe."""
 
     def __init__(self, weight_N: float) -> None:
@@ -142,7 +142,7 @@ def _scenario(weight_N: float, why: dict[str, str]) -> dict[str, Any]:
     converged: dict[str, list[bool]] = {name: [] for name in planners}
     gaps: dict[str, list[float]] = {name: [] for name in planners}
     reference = _reference(why)
-    plant = DraggedPlant(weight_N)
+    plant = MismatchedPlant(weight_N)
     problem = plant.problem
     best, spreads = None, []
     for instant in range(INSTANTS):

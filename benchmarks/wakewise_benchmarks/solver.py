@@ -19,9 +19,9 @@ from wakewise.core.interfaces import Progress
 from wakewise.experiments.trials.timing import timed_us
 from wakewise.planning.planner import PlanModel, Planner
 from wakewise.planning.problem import Horizon, shifted
-from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
+from wakewise.wake import InfluenceModel, WakeSettings, disturbance, wake_model
 from wakewise_benchmarks.cases import VEHICLE
-from wakewise_benchmarks.planner import SCENARIOS, WARM_UP, DraggedPlant, plan_model, restart_spread
+from wakewise_benchmarks.planner import SCENARIOS, WARM_UP, MismatchedPlant, plan_model, restart_spread
 
 OURS, RECIPE = "wake-aware", "the paper's recipe"
 LATE_MS = 50.0
@@ -76,7 +76,7 @@ def _scenario(
 ) -> None:
     shape = (20, len(VEHICLE.thrusters))
     plans: dict[str, Horizon] = {}
-    plant = DraggedPlant(weight_N)
+    plant = MismatchedPlant(weight_N)
     problem = plant.problem
     for instant in range(instants):
         progress(number * instants + instant, len(SCENARIOS) * instants, f"scenario {number + 1}")
@@ -123,6 +123,6 @@ def clearance_m(state: Array, model: PlanModel) -> float:
 def _disturbance_ms(model: PlanModel) -> float:
     """Thread CPU of D once, Gram matrix included."""
     wake = wake_model(WakeSettings(model="paper-calibrated", edge_width_deg=3.0, floor=False))
-    view = WakeView.of(VEHICLE, model.region, wake)
+    view = InfluenceModel.of(VEHICLE, model.region, wake)
     pose, thrusts = Pose(np.array([0.0, 0.0, 1.0])), np.linspace(-3.0, 3.0, len(VEHICLE.thrusters))
     return timed_us(lambda: disturbance(view.gram(pose), thrusts), 200)["median_us"] / 1e3

@@ -11,7 +11,7 @@ from wakewise.planning import PlanSettings
 from wakewise.robot.thrusters import thruster_lag
 from wakewise.robot.vehicles import compile_body, load_vehicle, step_rk4
 from wakewise.scene.targets import Region
-from wakewise.wake import WakeView, disturbance, wake_model
+from wakewise.wake import InfluenceModel, disturbance, wake_model
 
 VEHICLE = load_vehicle("paper")
 CENTRE = np.array([0.0, 0.0, 1.4])
@@ -71,7 +71,7 @@ def mean_D(method: str, seconds: float = 4.0) -> tuple[float, float]:
         thrusts = thruster_lag(thrusts, command.thrusts_N, VEHICLE.time_constants_s, 0.02)
         p, q, nu = step_rk4(body, p, q, nu, VEHICLE.allocation_matrix @ thrusts, np.zeros(3), 0.02)
         if k * 0.02 > 1.0:
-            values.append(disturbance(WakeView.of(VEHICLE, REGION, WAKE).gram(Pose(p, q)), thrusts))
+            values.append(disturbance(InfluenceModel.of(VEHICLE, REGION, WAKE).gram(Pose(p, q)), thrusts))
             away.append(np.linalg.norm(p - HOVER.p_m))
     return float(np.mean(values)), float(np.sqrt(np.mean(np.square(away))))
 

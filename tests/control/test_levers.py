@@ -11,7 +11,7 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake import FloorJet, wake_model
+from wakewise.wake import ImpingingJet, wake_model
 
 
 def region() -> Region:
@@ -75,4 +75,4 @@ def test_planner_and_allocator_weigh_alike():
         assert (terms.w_disturbance, terms.w_effort, weights.effort) == (70.0, 2e-3, 2e-3)
         assert weights.disturbance == pytest.approx(70.0 / controller.watch.view.total_weight)
         assert plan_superposition(jet, settings) == how
-        assert plan_superposition(FloorJet(jet=jet, bed_z_m=1.5), settings) == "incoherent"
+        assert plan_superposition(ImpingingJet(jet=jet, bed_z_m=1.5), settings) == "incoherent"

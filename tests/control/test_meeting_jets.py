@@ -9,8 +9,8 @@ from wakewise.control.meeting import joined_jets, meeting_pairs, meeting_view
 from wakewise.core.geometry import Pose, quat_from_rotvec
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake import FloorJet, RoundJet, WakeView, disturbance
-from wakewise.wake.advected_jets import Flow
+from wakewise.wake import ImpingingJet, InfluenceModel, RoundJet, disturbance
+from wakewise.wake.advected_jets import CrossFlow
 from wakewise.wake.disturbance import carried_velocity
 
 VEHICLE = load_vehicle("paper")
@@ -57,7 +57,7 @@ def test_pairs_are_those_that_share_spare_thrusts():
 
 def test_the_gram_matrix_of_meeting_jets_is_the_single_jets_and_one_product_per_pair():
     """D grows by w |U|^2 sqrt(T_a T_b) momentum for the two forward jets, and by nothing if one of them is off."""
-    plain = WakeView.of(VEHICLE, AHEAD, RoundJet())
+    plain = InfluenceModel.of(VEHICLE, AHEAD, RoundJet())
     view, X_WB = meeting_view(plain, LAYOUT), Pose(np.zeros(3))
     more = view.gram(X_WB) - plain.gram(X_WB)
     np.testing.assert_allclose(more, more.T)
@@ -75,7 +75,7 @@ def test_knowing_that_jets_meet_moves_the_push_to_the_rear():
     wrench = np.array([-0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
     wrench[4] = 0.05 * wrench[0]
     weights = Weights(disturbance=150.0, effort=1e-3)
-    plain = WakeView.of(VEHICLE, AHEAD, RoundJet())
+    plain = InfluenceModel.of(VEHICLE, AHEAD, RoundJet())
     X_WB = Pose(np.zeros(3))
     blind = gentle_allocation(LAYOUT, wrench, plain.gram(X_WB), weights).thrusts_N
     found = gentle_allocation(LAYOUT, wrench, meeting_view(plain, LAYOUT).gram(X_WB), weights)
@@ -92,20 +92,20 @@ def test_what_two_jets_become_turns_to_the_stronger_and_the_two_end_there():
     np.testing.assert_allclose(met.momentum * met.strength_N, np.sqrt(10.0))
     np.testing.assert_allclose(met.directions[0], np.array([4.0, -2.0, 0.0]) / np.sqrt(20.0), atol=1e-12)
     np.testing.assert_allclose(met.ways_m, [[0.3 * np.sqrt(2.0)] * 2])
-    ahead = meeting_view(WakeView.of(VEHICLE, AHEAD, RoundJet()), LAYOUT)
+    ahead = meeting_view(InfluenceModel.of(VEHICLE, AHEAD, RoundJet()), LAYOUT)
     slow = np.array([1e-9, 0.0, 0.0])
     pair = {}
     for thrusts in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0)):
         T = np.array([*thrusts, 0, 0, 0, 0, 0, 0])
-        G = ahead.gram(Pose(np.zeros(3)), Flow(current_W_m_s=slow, unsure_m_s=0.0, thrusts_N=T))
+        G = ahead.gram(Pose(np.zeros(3)), CrossFlow(current_W_m_s=slow, unsure_m_s=0.0, thrusts_N=T))
         pair[thrusts] = disturbance(G, T)
     assert pair[1.0, 1.0] > 20.0 * max(pair[1.0, 0.0], pair[0.0, 1.0]), "only both together blow ahead"
 
 
 def test_a_bow_jet_is_charged_for_the_one_it_would_meet():
     """In a flow, of a pair that rests, each costs half of what the two would become; without the lever nothing."""
-    plain = WakeView.of(VEHICLE, AHEAD, RoundJet())
-    flow = Flow(
+    plain = InfluenceModel.of(VEHICLE, AHEAD, RoundJet())
+    flow = CrossFlow(
         current_W_m_s=np.array([0.0, 1e-9, 0.0]), unsure_m_s=0.0, thrusts_N=np.array([0, 0, -1.0, -1, 0, 0, 0, 0])
     )
     more = meeting_view(plain, LAYOUT).gram(Pose(np.zeros(3)), flow) - plain.gram(Pose(np.zeros(3)), flow)
@@ -117,10 +117,10 @@ def test_a_bow_jet_is_charged_for_the_one_it_would_meet():
 
 def test_as_sent_a_pair_that_rests_leaves_nothing_and_both_leave_what_they_become():
     """The matrix that the bound on power asks: one bow jet alone is not charged, both are as much as by `gram`."""
-    flow = Flow(
+    flow = CrossFlow(
         current_W_m_s=np.array([0.0, 1e-9, 0.0]), unsure_m_s=0.0, thrusts_N=np.array([0, 0, -1.0, -1, 0, 0, 0, 0])
     )
-    plain = WakeView.of(VEHICLE, AHEAD, RoundJet())
+    plain = InfluenceModel.of(VEHICLE, AHEAD, RoundJet())
     seen = meeting_view(plain, LAYOUT).seen(Pose(np.zeros(3)), flow)
     one, both = np.array([1.0, 0, 0, 0, 0, 0, 0, 0]), np.array([1.0, 1, 0, 0, 0, 0, 0, 0])
     alone = disturbance(plain.gram(Pose(np.zeros(3)), flow), one)
@@ -202,16 +202,16 @@ def test_jets_that_meet_are_those_of_the_formulas():
     assert some > 100
 
 
-@pytest.mark.parametrize("wake", [RoundJet(), FloorJet(jet=RoundJet(), bed_z_m=0.6)])
+@pytest.mark.parametrize("wake", [RoundJet(), ImpingingJet(jet=RoundJet(), bed_z_m=0.6)])
 def test_in_a_flow_the_matrices_are_those_of_jets_taken_one_by_one(wake):
     """For thrusts of which pairs push, rest, and both: each jet followed alone gives the same two matrices."""
     rng, joins = np.random.default_rng(6), 0
-    view = meeting_view(WakeView.of(VEHICLE, AHEAD, wake), LAYOUT)
+    view = meeting_view(InfluenceModel.of(VEHICLE, AHEAD, wake), LAYOUT)
     for _ in range(6):
         X_WB = Pose(0.1 * rng.normal(size=3), quat_from_rotvec(0.2 * rng.normal(size=3)))
         thrusts = rng.normal(size=8) * rng.integers(0, 2, 8)
         thrusts[:2] = np.abs(thrusts[:2]) + 1.0
-        flow = Flow(current_W_m_s=0.05 * rng.normal(size=3), unsure_m_s=0.02, thrusts_N=thrusts)
+        flow = CrossFlow(current_W_m_s=0.05 * rng.normal(size=3), unsure_m_s=0.02, thrusts_N=thrusts)
         seen, (charged, sent) = view.seen(X_WB, flow), seen_twin(view, X_WB, flow)
         np.testing.assert_allclose(seen.gram, charged, rtol=1e-9, atol=1e-15)
         np.testing.assert_allclose(seen.sent, sent, rtol=1e-9, atol=1e-15)

@@ -30,11 +30,11 @@ from wakewise.planning import Surroundings
 from wakewise.planning.problem import CLEARANCE_M
 from wakewise.planning.reference import reference_of
 from wakewise.robot.vehicles import TiltJoint
-from wakewise.wake import WakeView
+from wakewise.wake import InfluenceModel
 
 
-def view(vehicle) -> WakeView:
-    return WakeView.of(vehicle, region(), believed())
+def view(vehicle) -> InfluenceModel:
+    return InfluenceModel.of(vehicle, region(), believed())
 
 
 def scale(vehicle=VEHICLE, around=OPEN) -> Scale:

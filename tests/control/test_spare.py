@@ -14,7 +14,7 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Command, Goal
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake import RoundJet, WakeView
+from wakewise.wake import InfluenceModel, RoundJet
 
 VEHICLE = load_vehicle("paper")
 LAYOUT = vehicle_layout(VEHICLE)
@@ -51,7 +51,7 @@ class Asks:
 def test_respared_thrusts_make_the_same_wrench_and_a_fallback_is_left_alone():
     """At each step, between searches ten times a second, too; a step of trouble is flown as the other wants it."""
     inner, body = Asks(), BodyState(X_WB=Pose(np.zeros(3)))
-    view = meeting_view(WakeView.of(VEHICLE, AHEAD, RoundJet()), LAYOUT)
+    view = meeting_view(InfluenceModel.of(VEHICLE, AHEAD, RoundJet()), LAYOUT)
     spared = Respared(
         name="x",
         inner=inner,
@@ -80,7 +80,7 @@ def test_shares_leave_a_poor_minimum_within_two_seconds():
     below = Region(
         points_W_m=np.array([[0.085, 0.14, 0.6], [-0.085, -0.14, 0.6]]), weights=np.ones(2), distance_m=np.zeros(2)
     )
-    view = WakeView.of(VEHICLE, below, RoundJet())
+    view = InfluenceModel.of(VEHICLE, below, RoundJet())
     spared = Respared(name="x", inner=inner, watch=watching(view, previous=1e5))
     best = gentle_allocation(LAYOUT, inner.wrench, view.gram(body.X_WB), Weights(disturbance=150.0, effort=1e-3))
     poor = LAYOUT.inverse @ inner.wrench

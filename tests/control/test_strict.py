@@ -13,7 +13,7 @@ from wakewise.control import ControlSettings, safeguarded
 from wakewise.core.errors import STRICT, InputError, is_strict
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Command, Goal
-from wakewise.operation.plugin_adapter import Guarded
+from wakewise.operation.plugin_adapter import PluginController
 from wakewise.planning.guard import Guard
 from wakewise.robot.vehicles import load_vehicle
 
@@ -69,7 +69,7 @@ def backup() -> Any:
 
 
 def flown(fault: Exception, strict: bool) -> Command:
-    guard = Guarded(
+    guard = PluginController(
         name="theirs",
         inner=Method(fault),
         thrusters=8,

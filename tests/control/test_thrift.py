@@ -23,14 +23,14 @@ from wakewise.control.thrift import (
 from wakewise.core.geometry import Pose
 from wakewise.robot.thrusters import electrical_power_W
 from wakewise.robot.vehicles import load_vehicle
-from wakewise.wake import RoundJet, WakeView
-from wakewise.wake.influence import Seen
+from wakewise.wake import InfluenceModel, RoundJet
+from wakewise.wake.influence import InfluenceMatrices
 
 VEHICLE = load_vehicle("paper")
 LAYOUT, LAW = vehicle_layout(VEHICLE), power_law(VEHICLE)
 POINTS = np.array([[0.465, -0.195, 0.05], [0.465, 0.195, 0.05], [0.45, -0.18, 0.05]])
 """On the ways of the two bow thrusters' jets when they push astern."""
-VIEW = WakeView(
+VIEW = InfluenceModel(
     wake=RoundJet(),
     points_W_m=POINTS,
     weights=np.ones(3),
@@ -64,7 +64,7 @@ WEIGHTS = Weights(disturbance=50.0, effort=1e-3)
 def shared(scale, law=LAW):
     """Thrusts by a share of the wake's own matrix, and what is drawn for them over that for the least thrusts."""
     G = scale * VIEW.gram(Pose(np.zeros(3)))
-    found = Sharer(layout=LAYOUT, law=law).shares(WRENCH, Seen(gram=G, sent=G), WEIGHTS, 3.0)
+    found = Sharer(layout=LAYOUT, law=law).shares(WRENCH, InfluenceMatrices(gram=G, sent=G), WEIGHTS, 3.0)
     least = least_thrusts(LAYOUT, WRENCH, G)
     return found, least, drawn_W(found.thrusts_N) / drawn_W(least.thrusts_N)
 
@@ -116,7 +116,7 @@ def test_what_may_join_a_jet_opens_no_bound():
     wrench = np.array([-4.0, 0.0, 1.0, 0.0, 0.05, 0.0])
     G = VIEW.gram(Pose(np.zeros(3)))
     found = Sharer(layout=LAYOUT, law=LAW).shares(
-        wrench, Seen(gram=G, sent=1e-5 * G), Weights(disturbance=50.0, effort=1e-3), 3.0
+        wrench, InfluenceMatrices(gram=G, sent=1e-5 * G), Weights(disturbance=50.0, effort=1e-3), 3.0
     )
     assert 1.0 < drawn_W(found.thrusts_N) / drawn_W(least_thrusts(LAYOUT, wrench).thrusts_N) <= CALM + 1e-9
 
@@ -125,7 +125,7 @@ def test_a_vehicle_that_hovers_on_a_watt_may_spend_another():
     """Jets of a light load that stir the target are taken away whole, where a share of its own power would not do."""
     G, wrench = VIEW.gram(Pose(np.zeros(3))), 0.3 * WRENCH
     G = G * 3.0 * (TOO_FAST * TROUBLE_M_S) ** 2 / least_thrusts(LAYOUT, wrench, G).disturbance
-    seen, least = Seen(gram=G, sent=G), least_thrusts(LAYOUT, wrench, G)
+    seen, least = InfluenceMatrices(gram=G, sent=G), least_thrusts(LAYOUT, wrench, G)
     assert float(LAW.power_W(least.thrusts_N)) < 3.0
     with_it, without = (
         Sharer(layout=LAYOUT, law=law).shares(wrench, seen, WEIGHTS, 3.0).disturbance

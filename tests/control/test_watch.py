@@ -12,7 +12,7 @@ from wakewise.core.interfaces import BodyState, Goal
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Region
 from wakewise.simulation.water.water import Water
-from wakewise.wake import FloorJet, RoundJet
+from wakewise.wake import ImpingingJet, RoundJet
 
 VEHICLE = load_vehicle("paper")
 AHEAD = Region(
@@ -149,7 +149,7 @@ def test_where_the_current_brings_the_wash_back_shares_are_gentler_for_knowing_i
     A rear thruster that blows forward past the hull is harmless in still water; here its jet is carried to the target.
     """
     wrench, here = np.array([-2.64, 0.93, -3.33, 0.0, -0.28, 0.0]), estimate(-0.017, -0.083, 0.0)
-    floor = FloorJet(jet=RoundJet(), bed_z_m=0.6)
+    floor = ImpingingJet(jet=RoundJet(), bed_z_m=0.6)
     eyes, blind = watch(floor, doubt=False), watch(floor, doubt=False, drift=False)
     least = least_thrusts(eyes.layout, wrench).thrusts_N
     unknowing = blind.jump(wrench, here, least)[0].thrusts_N

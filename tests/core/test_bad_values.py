@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import wakewise as ww
 from wakewise.core.errors import InputError, WakewiseError
-from wakewise.wake import SUPERPOSITIONS, WakeView, gram
+from wakewise.wake import SUPERPOSITIONS, InfluenceModel, gram
 
 ROV = ww.load_vehicle("bluerov2-heavy")
 POSE, WRENCH = [-0.6, 0.0, 1.3, 0.0, 0.0, 0.6], [-8.0, 0.0, 2.0, 0.0, 0.0, 0.0]
@@ -116,7 +116,7 @@ def test_how_jets_add_up_is_one_of_two_words(word: Any) -> None:
         lambda: ww.allocate(ROV, WRENCH, POSE, POINTS, superposition=word),
         lambda: ww.disturbance(ROV, np.ones(8), POSE, POINTS, superposition=word),
         lambda: gram(ww.wake_model("jet"), *place, superposition=word),
-        lambda: WakeView.of(ROV, region, ww.wake_model("jet"), word),
+        lambda: InfluenceModel.of(ROV, region, ww.wake_model("jet"), word),
     ):
         with pytest.raises(InputError, match=f"superposition: .*allowed: {', '.join(SUPERPOSITIONS)}"):
             asked()

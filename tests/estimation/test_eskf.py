@@ -20,7 +20,7 @@ from wakewise.estimation.eskf_kernels import unexplained
 from wakewise.estimation.settings import FilterSettings, Priors
 from wakewise.robot.thrusters import thruster_lag
 from wakewise.robot.vehicles import compile_body, load_vehicle, step_rk4
-from wakewise.simulation.tank.gauss_markov import Lasting
+from wakewise.simulation.tank.gauss_markov import GaussMarkovProcess
 from wakewise.simulation.tank.sensors import FORCE_WALK_M_S2, GYRO_WALK_RAD_S
 from wakewise.simulation.tank.settings import MismatchSettings, SensorSettings
 
@@ -55,7 +55,9 @@ def record(
     of errors of poses that last half a minute; unless `priors` say otherwise the filter knows of none.
     """
     rng = np.random.default_rng(seed)
-    shift, turn = (Lasting(spread, 30.0, r) for spread, r in zip((slow_m, slow_rad), rng.spawn(2), strict=True))
+    shift, turn = (
+        GaussMarkovProcess(spread, 30.0, r) for spread, r in zip((slow_m, slow_rad), rng.spawn(2), strict=True)
+    )
     filter_ = ErrorStateFilter(VEHICLE, settings, priors=priors or STEADY)
     p, q, nu = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0, 0, 0]), np.zeros(6)
     start = p + offset_m * np.array([1.0, -1.0, 1.0]) / np.sqrt(3.0)

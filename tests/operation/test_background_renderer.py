@@ -11,7 +11,7 @@ import pytest
 
 from wakewise.core.geometry import Pose, quat_from_rotvec
 from wakewise.core.interfaces import ScalarGrid
-from wakewise.operation import Darkroom, load_scenario, photograph_flight
+from wakewise.operation import BackgroundRenderer, load_scenario, photograph_flight
 from wakewise.operation.background_renderer import MOST_WAITING, packed, unpacked
 from wakewise.operation.exposures import ExposureRecord, read_exposures, write_exposures
 from wakewise.operation.photography import fingerprint, take_photograph
@@ -62,7 +62,7 @@ class Still:
 def photographed(parts, exposures, folder, beside):
     """Photographs of a trial's folder, of which those of `beside` are made by the other process."""
     folder.mkdir()
-    with Darkroom(parts, folder) as darkroom:
+    with BackgroundRenderer(parts, folder) as darkroom:
         for k in beside:
             darkroom.take(k, exposures[k])
         write_exposures(folder / "exposures.npz", exposures, parts.scenario.imaging.exposure_s)
@@ -98,7 +98,7 @@ def test_a_worker_that_fails_is_told_and_costs_no_photograph(parts, exposures, t
 def test_a_worker_that_cannot_be_started_is_told_and_the_flight_goes_on(parts, exposures, tmp_path, monkeypatch):
     """Without an interpreter to start, a warning says so once and exposures are left to the stage after the flight."""
     monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
-    with Darkroom(parts, tmp_path) as darkroom:
+    with BackgroundRenderer(parts, tmp_path) as darkroom:
         with pytest.warns(RuntimeWarning, match="no-python"):
             darkroom.take(0, exposures[0])
         with warnings.catch_warnings():
@@ -109,7 +109,7 @@ def test_a_worker_that_cannot_be_started_is_told_and_the_flight_goes_on(parts, e
 
 def test_made_ready_for_nothing_it_ends_by_itself(parts, tmp_path):
     """Begun before the flight, once however often it is asked; without an exposure it ends well and makes nothing."""
-    with warnings.catch_warnings(), Darkroom(parts, tmp_path) as darkroom:
+    with warnings.catch_warnings(), BackgroundRenderer(parts, tmp_path) as darkroom:
         warnings.simplefilter("error")
         darkroom.ready()
         process = darkroom._process
@@ -122,7 +122,7 @@ def test_made_ready_for_nothing_it_ends_by_itself(parts, tmp_path):
 
 def test_leaving_early_ends_the_other_process(parts, exposures, tmp_path):
     """An error in the flight leaves no process behind and no half of a photograph."""
-    with pytest.raises(KeyboardInterrupt), Darkroom(parts, tmp_path) as darkroom:
+    with pytest.raises(KeyboardInterrupt), BackgroundRenderer(parts, tmp_path) as darkroom:
         darkroom.take(0, exposures[0])
         number = darkroom._process.pid
         raise KeyboardInterrupt
@@ -133,7 +133,7 @@ def test_leaving_early_ends_the_other_process(parts, exposures, tmp_path):
 
 def test_the_flight_does_not_wait(parts, exposures, tmp_path):
     """Ten times as many exposures as there is room for are taken at once in less time than one photograph takes."""
-    with Darkroom(parts, tmp_path) as darkroom:
+    with BackgroundRenderer(parts, tmp_path) as darkroom:
         darkroom.take(0, exposures[0])
         began = time.thread_time()
         for _ in range(10 * MOST_WAITING):

@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from wakewise.operation import Scenario
 from wakewise.operation.calibration_error import (
     CURRENT_DEG,
-    SurveySettings,
+    CalibrationErrorSettings,
     found_target,
     known_calibration,
     surveyed_current,
@@ -35,7 +35,9 @@ def test_the_target_is_taken_to_be_where_it_is_not():
 def test_its_error_has_the_stated_spread():
     """Over 400 draws 5 mm per axis within 8 %."""
     target, rng = Scenario().parts().target, np.random.default_rng(0)
-    moves = np.array([found_target(target, SurveySettings(), rng).centre_W_m - target.centre_W_m for _ in range(400)])
+    moves = np.array(
+        [found_target(target, CalibrationErrorSettings(), rng).centre_W_m - target.centre_W_m for _ in range(400)]
+    )
     assert moves.std(axis=0) == pytest.approx(np.full(3, 0.005), rel=0.1)
 
 
@@ -59,7 +61,7 @@ def test_mission_and_controller_go_by_what_is_known_and_the_world_by_what_is():
 
 def test_a_calibration_is_as_far_off_as_stated():
     """Focal length, principal point, k1 to p2: over 400 draws their spreads within 10 %; both focal lengths alike."""
-    true, rng, survey = calibrate(Scenario().imaging.camera()), np.random.default_rng(1), SurveySettings()
+    true, rng, survey = calibrate(Scenario().imaging.camera()), np.random.default_rng(1), CalibrationErrorSettings()
     off = np.array([known_calibration(true, survey, rng).params - true.params for _ in range(400)])
     stated = [0.002 * true.params[0]] * 2 + [0.0015 * true.width] * 2 + [0.003, 0.006, 0.00075, 0.00075]
     assert off.std(axis=0) == pytest.approx(stated, rel=0.1)
@@ -72,7 +74,7 @@ def test_a_calibration_is_as_far_off_as_stated():
 def test_bad_values_do_not_become_settings(bad):
     """Out of range or no number."""
     with pytest.raises(ValidationError):
-        SurveySettings(**bad)
+        CalibrationErrorSettings(**bad)
 
 
 def test_the_current_is_known_but_for_its_direction():

@@ -10,7 +10,7 @@ import wakewise as ww
 from wakewise.core.errors import InputError
 from wakewise.operation.flight_trim import flight_trim, folder_trim, hovering, proposal
 from wakewise.robot.vehicles import compile_body, load_vehicle, restoring_wrench
-from wakewise.robot.vehicles.ballast import Block, net_buoyancy_N, with_blocks
+from wakewise.robot.vehicles.ballast import BallastBlock, net_buoyancy_N, with_blocks
 
 TWIST = ("u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 WATER = {"target.points": 60, "tank.mismatch.trim_N": 0.0}
@@ -19,12 +19,12 @@ WATER = {"target.points": 60, "tank.mismatch.trim_N": 0.0}
 @pytest.mark.parametrize(
     ("seed", "load"),
     [
-        (1, Block(float_N=-3.4)),
-        (2, Block(float_N=-2.0, at_B_m=(0.15, 0.0, 0.0))),
-        (3, Block(float_N=2.4, at_B_m=(-0.1, 0.1, 0.0))),
+        (1, BallastBlock(float_N=-3.4)),
+        (2, BallastBlock(float_N=-2.0, at_B_m=(0.15, 0.0, 0.0))),
+        (3, BallastBlock(float_N=2.4, at_B_m=(-0.1, 0.1, 0.0))),
     ],
 )
-def test_seven_seconds_of_hover_say_what_nobody_knew(seed: int, load: Block) -> None:
+def test_seven_seconds_of_hover_say_what_nobody_knew(seed: int, load: BallastBlock) -> None:
     """In the tank, with drawn drag and gains: weight within .3 N, and the advice cancels load and turn."""
     parts = ww.Scenario.preset("quick", method="dp", seed=seed, **WATER).parts()
     laden = with_blocks(parts.world.vehicle, [load])
@@ -89,7 +89,7 @@ def test_ballast_is_everybodys() -> None:
     """Believed and true vehicle get the same blocks; the mismatch stays what it was."""
     plain = ww.Scenario.preset("quick", **WATER)
     laden = plain.replace(ballast=[{"float_N": 2.0, "at_B_m": [0.1, 0.0, 0.0]}])
-    assert laden.ballast == (Block(float_N=2.0, at_B_m=(0.1, 0.0, 0.0)),)
+    assert laden.ballast == (BallastBlock(float_N=2.0, at_B_m=(0.1, 0.0, 0.0)),)
     believed, true = ((s.parts().vehicle, s.parts().world.vehicle) for s in (plain, laden))
     for before, after in zip(believed, true, strict=True):
         assert net_buoyancy_N(after) - net_buoyancy_N(before) == pytest.approx(2.0, abs=0.02)

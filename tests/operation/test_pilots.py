@@ -4,7 +4,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.operation import Scenario
-from wakewise_paper.wash_reduction.flight import Trial, fly_trial
+from wakewise_paper.wash_reduction.flight import WashTrial, fly_trial
 
 
 @pytest.mark.parametrize("stray", [0.02, 0.1, None])
@@ -24,5 +24,5 @@ def test_a_promise_of_nothing_or_of_all_is_refused():
 @pytest.mark.slow
 def test_a_plan_keeps_the_mission_s_places_above_a_target():
     """A heavy vehicle straight above its target is where `dp` would be; by weights alone it is 5 cm off."""
-    dp, ours = (fly_trial(Trial(scenario="nadir/paper", method=m, seed=1)) for m in ("dp", "wake-aware"))
+    dp, ours = (fly_trial(WashTrial(scenario="nadir/paper", method=m, seed=1)) for m in ("dp", "wake-aware"))
     assert ours["camera_rmse_mm"] < 1.05 * dp["camera_rmse_mm"] + 0.2

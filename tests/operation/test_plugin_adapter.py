@@ -10,7 +10,7 @@ import pytest
 import wakewise as ww
 from wakewise.control import make_controller
 from wakewise.core.errors import StageError
-from wakewise.operation.plugin_adapter import Guarded, described
+from wakewise.operation.plugin_adapter import PluginController, described
 
 pytestmark = pytest.mark.usefixtures("fallbacks_fly")
 
@@ -83,7 +83,7 @@ def test_thrusts_beyond_the_limits_are_cut_and_counted():
 
 def guarded(clock, patience_s=5.0):
     vehicle = parts().vehicle
-    return Guarded(
+    return PluginController(
         name="slow",
         inner=Foreign(lambda good: good),
         thrusters=8,
@@ -167,5 +167,5 @@ def test_our_own_have_the_guard_of_a_control_step_and_not_that_of_a_stranger():
     own = parts().replace(method="dp")
     assert own.flying.inner.inner is own.controller and not own.flying.inner.enforce
     assert own.replace(vehicle=own.vehicle.with_ideal_thrusters()).flying.name == own.controller.name
-    assert isinstance(parts().replace(controller=Foreign(nan)).flying.inner, Guarded)
+    assert isinstance(parts().replace(controller=Foreign(nan)).flying.inner, PluginController)
     assert described(Foreign(nan)) == "theirs (test_foreign.Foreign)"

@@ -5,7 +5,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.operation import Scenario, load_scenario
-from wakewise.operation.randomization import Draw, values_of
+from wakewise.operation.randomization import FieldDistribution, values_of
 
 TRIM = "tank.mismatch.trim_N"
 
@@ -13,23 +13,23 @@ TRIM = "tank.mismatch.trim_N"
 def test_a_draw_lies_where_it_says():
     """Numbers between their ends, sizes of vectors too, choices among those listed; in_log halves at the middle."""
     rng = np.random.default_rng(0)
-    values = [Draw(between=(2.0, 5.0)).value(rng) for _ in range(300)]
+    values = [FieldDistribution(between=(2.0, 5.0)).value(rng) for _ in range(300)]
     assert 2.0 <= min(values) < 2.1 and 4.9 < max(values) <= 5.0
-    logs = np.array([Draw(in_log=(0.01, 1.0)).value(rng) for _ in range(400)])
+    logs = np.array([FieldDistribution(in_log=(0.01, 1.0)).value(rng) for _ in range(400)])
     assert np.mean(logs < 0.1) == pytest.approx(0.5, abs=0.1)
-    vectors = np.array([Draw(level=(0.1, 0.3)).value(rng) for _ in range(300)])
+    vectors = np.array([FieldDistribution(level=(0.1, 0.3)).value(rng) for _ in range(300)])
     sizes = np.linalg.norm(vectors, axis=1)
     assert sizes.min() > 0.0999 and sizes.max() < 0.3001 and not vectors[:, 2].any()
     assert np.abs(vectors.mean(axis=0)).max() < 0.03  # to any side
-    assert {Draw(any_of=("mud", "sand")).value(rng) for _ in range(50)} == {"mud", "sand"}
+    assert {FieldDistribution(any_of=("mud", "sand")).value(rng) for _ in range(50)} == {"mud", "sand"}
 
 
 def test_a_seed_draws_a_field_alike_whatever_else_is_drawn():
     """One more draw leaves the others what they were; another seed does not."""
-    alone = values_of({TRIM: Draw(between=(0.0, 1.0))}, 3)
-    beside = values_of({"a": Draw(between=(0.0, 1.0)), TRIM: Draw(between=(0.0, 1.0))}, 3)
+    alone = values_of({TRIM: FieldDistribution(between=(0.0, 1.0))}, 3)
+    beside = values_of({"a": FieldDistribution(between=(0.0, 1.0)), TRIM: FieldDistribution(between=(0.0, 1.0))}, 3)
     assert beside[TRIM] == alone[TRIM] != beside["a"]
-    assert values_of({TRIM: Draw(between=(0.0, 1.0))}, 4) != alone
+    assert values_of({TRIM: FieldDistribution(between=(0.0, 1.0))}, 4) != alone
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 import wakewise as ww
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import Posture, ScalarGrid
+from wakewise.core.interfaces import ScalarGrid, TargetDeformation
 from wakewise.operation.background_renderer import packed, unpacked
 from wakewise.operation.exposures import ExposureRecord, exposure_arrays, read_exposures
 from wakewise.operation.photography import fingerprint, moved_m, scenes_of
@@ -144,7 +144,7 @@ def test_the_tank_tells_how_its_target_stands():
     soft, rigid = scenario(kind="gorgonian").parts(), scenario().parts()
     _, witness = soft.world.begin()
     posture = witness.posture()
-    assert isinstance(posture, Posture)
+    assert isinstance(posture, TargetDeformation)
     current = np.array(soft.scenario.tank.current.velocity_m_s[:2])
     along = posture.sway_mean_W_m[:2] @ current / np.linalg.norm(current)
     assert 1e-4 < along < 5e-3

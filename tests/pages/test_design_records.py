@@ -13,7 +13,9 @@ PACKAGES = [DOCS.parent / "src", *DOCS.parent.glob("packages/*/src"), DOCS.paren
 
 @pytest.mark.parametrize("record", RECORDS, ids=lambda record: record.stem)
 def test_a_design_record_has_its_sections_and_at_most_40_lines(record: Path) -> None:
-    """Status, Context, Decision, Consequences and Evidence, in this order, in at most 40 lines, numbered as its file."""
+    """Status, Context, Decision, Consequences and Evidence, in this order, in at most 40 lines, numbered as its
+    file.
+    """
     lines = record.read_text(encoding="utf-8").splitlines()
     assert len(lines) <= 40
     assert [line[3:] for line in lines if line.startswith("## ")] == SECTIONS

@@ -83,9 +83,9 @@ def test_the_gradient_is_that_of_the_cost(levers):
 
 def test_the_floor_and_its_wall_jets_take_part():
     """With a wake model that knows the floor, gradients still agree with differences."""
-    from wakewise.wake import FloorJet
+    from wakewise.wake import ImpingingJet
 
-    planner = Planner(model(wake=FloorJet(jet=wake_model("jet"), bed_z_m=1.5), stages=4))
+    planner = Planner(model(wake=ImpingingJet(jet=wake_model("jet"), bed_z_m=1.5), stages=4))
     planner.load(problem(stages=4))
     rng = np.random.default_rng(1)
     U, d = rng.normal(0.0, 2.0, (4, 8)), rng.normal(size=(4, 8))

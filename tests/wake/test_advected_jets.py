@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from wakewise.core.errors import InputError
 from wakewise.wake import GaussianJet, PaperJet, RoundJet, gram, wake_model
-from wakewise.wake.advected_jets import OPPOSED, PUFF, SECTIONS, Flow, plumes
+from wakewise.wake.advected_jets import OPPOSED, PUFF, SECTIONS, CrossFlow, plumes
 from wakewise.wake.disturbance import carried_velocity
 
 AREA = 0.0045
@@ -17,7 +17,7 @@ WHOLE = np.array([[np.inf, 1.0]])
 
 
 def flow(current=(0.0, 0.0, 0.0), unsure=0.0, thrusts=(1.0,)):
-    return Flow(current_W_m_s=np.array(current, float), unsure_m_s=unsure, thrusts_N=np.array(thrusts, float))
+    return CrossFlow(current_W_m_s=np.array(current, float), unsure_m_s=unsure, thrusts_N=np.array(thrusts, float))
 
 
 def curve(current, thrust=1.0, unsure=0.0, jet=None):

@@ -2,19 +2,19 @@
 
 import numpy as np
 
-from wakewise.wake import FloorJet, RoundJet, gram
-from wakewise.wake.advected_jets import Flow
+from wakewise.wake import ImpingingJet, RoundJet, gram
+from wakewise.wake.advected_jets import CrossFlow
 from wakewise.wake.disturbance import carried_velocity
 from wakewise.wake.wall_jet import wall_velocity
 
 BED = 0.5
-MODEL = FloorJet(jet=RoundJet(), bed_z_m=BED)
+MODEL = ImpingingJet(jet=RoundJet(), bed_z_m=BED)
 AREA = np.array([0.0045])
 DOWN = np.array([[0.0, 0.0, 1.0]])
 
 
 def flow(*current, unsure=0.0, thrusts=(1.0,)):
-    return Flow(current_W_m_s=np.array(current, float), unsure_m_s=unsure, thrusts_N=np.array(thrusts, float))
+    return CrossFlow(current_W_m_s=np.array(current, float), unsure_m_s=unsure, thrusts_N=np.array(thrusts, float))
 
 
 def near_bed(*x, y=0.0):

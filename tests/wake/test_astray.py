@@ -8,7 +8,7 @@ from wakewise.control.bow_rule import bow_layout
 from wakewise.core.geometry import Pose
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake import RoundJet, WakeView, wake_model
+from wakewise.wake import InfluenceModel, RoundJet, wake_model
 from wakewise.wake.disturbance import SCATTER_RAD, astray
 
 AREA = np.array([0.0045])
@@ -56,7 +56,7 @@ def test_its_least_shares_keep_the_bow_rule_without_a_word_of_bows(name):
     """For pushes astern, level: no thruster that the rule bounds blows ahead by more than .05 N."""
     vehicle = load_vehicle(name)
     region = Region(points_W_m=np.array([[0.7, 0.0, 0.1]]), weights=np.ones(1), distance_m=np.zeros(1))
-    view = WakeView.of(vehicle, region, RoundJet())
+    view = InfluenceModel.of(vehicle, region, RoundJet())
     layout = compile_layout(vehicle.allocation_matrix, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
     ruled = bow_layout(vehicle)
     d = view.astray(Pose(np.zeros(3)))

@@ -11,7 +11,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, look_at, quat_from_matrix
 from wakewise.wake import (
-    FloorJet,
+    ImpingingJet,
     PaperJet,
     PowerJet,
     RoundJet,
@@ -46,8 +46,8 @@ MODELS = [
     WIDE,
     wake_model("jet-fitted"),
     RoundJet.of_propeller(),
-    FloorJet(jet=WIDE, bed_z_m=BED_M),
-    FloorJet(jet=wake_model("jet-fitted"), bed_z_m=BED_M),
+    ImpingingJet(jet=WIDE, bed_z_m=BED_M),
+    ImpingingJet(jet=wake_model("jet-fitted"), bed_z_m=BED_M),
 ]
 
 
@@ -164,7 +164,7 @@ def test_the_gradient_of_the_disturbance_is_that_of_the_form(model, superpositio
     np.testing.assert_allclose(direct.by_thrust, by_split[:8] - by_split[8:], rtol=1e-8, atol=1e-12)
 
 
-@pytest.mark.parametrize("model", [WIDE, RoundJet(), FloorJet(jet=WIDE, bed_z_m=BED_M)], ids=lambda m: m.name)
+@pytest.mark.parametrize("model", [WIDE, RoundJet(), ImpingingJet(jet=WIDE, bed_z_m=BED_M)], ids=lambda m: m.name)
 @pytest.mark.parametrize("superposition", ["coherent", "incoherent"])
 @pytest.mark.parametrize("smooth_N", [0.0, 0.5])
 def test_the_disturbance_changes_with_thrust_as_differences_say(model, superposition, smooth_N):
@@ -208,12 +208,12 @@ def residuals(model, X_WB, thrusts, superposition, e):
     assert axes.shape == (8, 3)
     velocity = model.unit_velocity(points, np.tile(X_WB.apply(POSITIONS), (2, 1)), jets, np.tile(AREAS, 2))
     velocity = np.sqrt(weights)[:, None] * smooth_roots(thrusts, e)[:, None, None] * velocity
-    if not isinstance(model, FloorJet):
+    if not isinstance(model, ImpingingJet):
         velocity = velocity @ X_WB.R
     return (velocity.sum(axis=0) if superposition == "coherent" else velocity).ravel()
 
 
-@pytest.mark.parametrize("model", [WIDE, wake_model("jet-fitted"), FloorJet(jet=WIDE, bed_z_m=BED_M)])
+@pytest.mark.parametrize("model", [WIDE, wake_model("jet-fitted"), ImpingingJet(jet=WIDE, bed_z_m=BED_M)])
 @pytest.mark.parametrize("superposition", ["coherent", "incoherent"])
 def test_the_gauss_newton_matrix_is_that_of_the_stacked_velocities(model, superposition):
     """D = r'r, gradient 2 J'r, matrix 2 J'J with J from differences of the stacked residuals."""

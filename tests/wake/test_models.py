@@ -5,7 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from wakewise.core.errors import InputError
-from wakewise.wake import FloorJet, GaussianJet, PaperJet, PowerJet, RoundJet, WakeSettings, model_names, wake_model
+from wakewise.wake import GaussianJet, ImpingingJet, PaperJet, PowerJet, RoundJet, WakeSettings, model_names, wake_model
 from wakewise.wake.learned import LearnedWake
 from wakewise.wake.models import OWN_MODELS
 
@@ -61,7 +61,7 @@ def test_a_number_that_a_model_does_not_have_is_refused(numbers, message):
 def test_a_floor_needs_a_bed():
     """With `floor` the model is the jet and its wall jet; without a bed's depth it is refused."""
     model = wake_model(WakeSettings(model="fitted"), bed_z_m=1.5)
-    assert isinstance(model, FloorJet)
+    assert isinstance(model, ImpingingJet)
     assert (model.name, model.bed_z_m, model.jet.name) == ("fitted+floor", 1.5, "fitted")
     with pytest.raises(InputError, match="floor is set but there is no bed"):
         wake_model(WakeSettings())

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.wake import FloorJet, RoundJet, WakeSettings, gram, point_disturbance, wake_model
+from wakewise.wake import ImpingingJet, RoundJet, WakeSettings, gram, point_disturbance, wake_model
 
 AREA = np.array([np.pi * 0.03**2])
 AREA.flags.writeable = False
 RHO = 998.0
 BED_M = 1.5
-MODEL = FloorJet(jet=RoundJet(), bed_z_m=BED_M)
+MODEL = ImpingingJet(jet=RoundJet(), bed_z_m=BED_M)
 
 
 def wall(points, height=0.6, slant=0.0):
@@ -114,4 +114,4 @@ def test_the_quadratic_form_with_a_floor_is_the_definition(name, superposition):
 def test_a_bed_nowhere_is_refused():
     """NaN for a depth is named."""
     with pytest.raises(InputError, match="bed_z_m nan, must be finite"):
-        FloorJet(jet=RoundJet(), bed_z_m=np.nan)
+        ImpingingJet(jet=RoundJet(), bed_z_m=np.nan)

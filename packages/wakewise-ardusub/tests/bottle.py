@@ -11,11 +11,11 @@ import numpy as np
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise_ardusub.link.buttons import BUTTON_PARAMETERS
-from wakewise_ardusub.link.engagement_fsm import Limits
-from wakewise_ardusub.link.message_state import Said
-from wakewise_ardusub.link.output_gate import TICK_S, Warden
+from wakewise_ardusub.link.engagement_fsm import EngagementLimits
+from wakewise_ardusub.link.message_state import MavlinkMessage
+from wakewise_ardusub.link.output_gate import TICK_S, OutputGate
 from wakewise_ardusub.link.protocol import RELEASE_GROUP, SCRIPT_VERSION
-from wakewise_ardusub.link.session_log import Journal
+from wakewise_ardusub.link.session_log import SessionLog
 
 MOTORS = 8
 SESSION = 4711
@@ -43,8 +43,8 @@ class Tenths:
 class Bottle:
     """Everything about a session but sockets and threads; `sent` holds (time, message name, fields)."""
 
-    limits: Limits = field(default_factory=Limits)
-    journal: Journal | None = None
+    limits: EngagementLimits = field(default_factory=EngagementLimits)
+    journal: SessionLog | None = None
     listen_only: bool = False
     session: int = SESSION
     now_s: float = 1000.0
@@ -60,7 +60,7 @@ class Bottle:
     acts: float = 0.0
 
     def __post_init__(self) -> None:
-        self.warden = Warden(
+        self.warden = OutputGate(
             send=lambda name, fields: self.sent.append((self.now_s, name, dict(fields))),
             drive=Tenths(),
             limits=self.limits,
@@ -77,7 +77,7 @@ class Bottle:
 
     def say(self, name: str, /, system: int = 1, component: int = 1, **fields: Any) -> None:
         """A message comes."""
-        self.warden.take(Said(system, component, name, fields))
+        self.warden.take(MavlinkMessage(system, component, name, fields))
 
     def parameter(self, name: str, value: float) -> None:
         """The autopilot says what a parameter is."""

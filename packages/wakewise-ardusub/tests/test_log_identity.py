@@ -16,10 +16,10 @@ pytest.importorskip("mcap", reason="the extra `links` is not installed")
 import made_logs
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.main import run
-from wakewise_ardusub.logs.identity import Identity, firmware_of
+from wakewise_ardusub.logs.identity import VehicleIdentity, firmware_of
 from wakewise_ardusub.logs.read import read_log
 from wakewise_ardusub.logs.table import tabulate
-from wakewise_ardusub.wash_meter.vehicle_listener import Hearing
+from wakewise_ardusub.wash_meter.vehicle_listener import VehicleListener
 
 Capture = pytest.CaptureFixture[str]
 MADE: dict[str, Callable[..., bytes]] = {"a.tlog": made_logs.tlog, "a.mcap": made_logs.mcap}
@@ -85,7 +85,7 @@ def test_without_a_word_of_it_the_height_tells(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=r"9\.\d m above the water \((VFR_HUD|CTUN)\)"):
             read_log(_written(tmp_path, name, made(sink_m_s=-0.5, **how)))
         log = read_log(_written(tmp_path, name, made(**how)))
-        assert log.identity == Identity()
+        assert log.identity == VehicleIdentity()
         assert "MANUAL" not in set(tabulate(log).rows["mode"].drop_nulls())
         assert read_log(_written(tmp_path, name, made(sink_m_s=-0.5, **how)), any_vehicle=True).series
 
@@ -146,7 +146,7 @@ def test_the_ardusub_of_a_log_is_taken_before_a_busier_vehicle(tmp_path: Path) -
 
 def test_the_meter_asks_it_too() -> None:
     """A mode of another vehicle has a number and no name."""
-    hearing = Hearing()
+    hearing = VehicleListener()
     beat = {"type": 12, "autopilot": 3, "base_mode": 81, "custom_mode": 19}
     hearing.hear(0.0, 1, 1, "SERVO_OUTPUT_RAW", {"port": 0})
     hearing.hear(0.0, 1, 1, "HEARTBEAT", beat)

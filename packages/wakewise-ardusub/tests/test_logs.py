@@ -16,7 +16,7 @@ pytest.importorskip("mcap", reason="the extra `links` is not installed")
 
 import made_logs
 from wakewise.core.errors import InputError
-from wakewise_ardusub.logs.channels import Gather, VehicleLog
+from wakewise_ardusub.logs.channels import LogCollector, VehicleLog
 from wakewise_ardusub.logs.dataflash import read_dataflash
 from wakewise_ardusub.logs.mcap_file import read_mcap
 from wakewise_ardusub.logs.read import read_log
@@ -252,7 +252,7 @@ def test_noise_never_stops_a_reader(name: str, noise: bytes) -> None:
     _is_sound(READERS[name](noise), name)
 
 
-def _is_sound(gather: Gather, name: str) -> None:
+def _is_sound(gather: LogCollector, name: str) -> None:
     log = gather.done(Path(name), "dataflash" if name.endswith("BIN") else name.rpartition(".")[2])
     for channel, series in log.series.items():
         assert np.isfinite(series.time_s).all()
@@ -286,7 +286,7 @@ def test_blueos_keys_without_quotes_are_read() -> None:
     """Its JSON may be JSON5."""
     from wakewise_ardusub.logs import mcap_file
 
-    gather = Gather()
+    gather = LogCollector()
     body = b'{header: {system_id: 1}, message: {type: "VFR_HUD", alt: -2.5}}'
     head = mcap_file._MESSAGE_HEAD.pack(7, 0, 10**9, 10**9)
     assert mcap_file._message(gather, head + body, {7: (1, 1, "VFR_HUD")})

@@ -14,7 +14,7 @@ from wakewise.robot.vehicles import Vehicle, load_vehicle
 from wakewise.wake import wake_model
 from wakewise_ardusub.logs.replay_allocation import bow_points, hindsight
 from wakewise_ardusub.motors import motor_channels
-from wakewise_ardusub.vehicle_summary import Craft
+from wakewise_ardusub.vehicle_summary import VehicleSummary
 
 DIRECTIONS = (-1, -1, 1, 1, -1, 1, 1, -1)
 PARAMETERS = {f"MOT_{i}_DIRECTION": float(d) for i, d in enumerate(DIRECTIONS, 1)} | {
@@ -91,7 +91,7 @@ def test_what_is_not_known_is_null_and_rest_is_nothing(vehicle: Vehicle) -> None
 
 def test_motors_are_found_on_their_channels(vehicle: Vehicle) -> None:
     """SERVOn_FUNCTION says where a motor is; without it they are in order; another number of motors is refused."""
-    craft = Craft.of(vehicle, wake_model("jet"))
+    craft = VehicleSummary.of(vehicle, wake_model("jet"))
     assert motor_channels(craft, {}) == tuple(range(1, 9))
     moved = {f"SERVO{i + 4}_FUNCTION": 32.0 + i for i in range(1, 9)}
     assert motor_channels(craft, moved) == tuple(range(5, 13))

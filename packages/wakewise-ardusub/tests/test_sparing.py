@@ -14,8 +14,8 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
-from wakewise_ardusub.vehicle_summary import Craft, craft_json, read_craft
-from wakewise_ardusub.wash_savings import SHARES, Sparing, bow_ball, look, saved_pct
+from wakewise_ardusub.vehicle_summary import VehicleSummary, craft_json, read_craft
+from wakewise_ardusub.wash_savings import SHARES, WashSavingsCalculator, bow_ball, look, saved_pct
 
 POSES = ((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.3, -0.2, 0.1, 0.2, -0.15, 0.5))
 JUDGE = """
@@ -49,7 +49,7 @@ def test_numpy_alone_judges_as_the_whole_package_does(vehicle: str, model: str, 
 
     Pulses from rest to full, so that limits bind, at several voltages; before points as seen and from a tilted pose.
     """
-    craft = Craft.of(load_vehicle(vehicle), wake_model(model))
+    craft = VehicleSummary.of(load_vehicle(vehicle), wake_model(model))
     rng = np.random.default_rng(3)
     directions = rng.choice([-1.0, 1.0], craft.count)
     rows = [
@@ -64,7 +64,7 @@ def test_numpy_alone_judges_as_the_whole_package_does(vehicle: str, model: str, 
     (tmp_path / "craft.json").write_text(craft_json(craft), encoding="utf-8")
     told = iter(json.loads(bare(JUDGE, str(tmp_path / "asked.json"), str(tmp_path / "craft.json"))))
     points = bow_ball(craft.bow_m, craft.camera_z_m, 0.4)
-    sparing = Sparing(craft, directions)
+    sparing = WashSavingsCalculator(craft, directions)
     largest = 0.0
     for pose in POSES:
         view = look(craft, points, np.ones(len(points)))
@@ -91,8 +91,8 @@ def test_the_meters_whole_program_needs_numpy_and_pymavlink_only() -> None:
 
 def test_a_layout_that_needs_solvers_is_refused_by_a_small_computer(tmp_path: Path) -> None:
     """RexROV's spare thrusts are in one piece: one line says so, before anything is judged."""
-    craft = Craft.of(load_vehicle("rexrov"), wake_model("jet"))
-    assert not Sparing.is_small(craft)
+    craft = VehicleSummary.of(load_vehicle("rexrov"), wake_model("jet"))
+    assert not WashSavingsCalculator.is_small(craft)
     (tmp_path / "craft.json").write_text(craft_json(craft), encoding="utf-8")
     code = """
 from pathlib import Path
@@ -117,7 +117,7 @@ def test_saved_per_cent_is_of_something() -> None:
 
 def test_a_craft_goes_through_its_file(tmp_path: Path) -> None:
     """All numbers as they were; what is no craft file is refused with its name."""
-    craft = Craft.of(load_vehicle("bluerov2"), wake_model("paper-calibrated"))
+    craft = VehicleSummary.of(load_vehicle("bluerov2"), wake_model("paper-calibrated"))
     path = tmp_path / "craft.json"
     path.write_text(craft_json(craft), encoding="utf-8")
     again = read_craft(path)

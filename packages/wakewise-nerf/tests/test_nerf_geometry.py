@@ -7,11 +7,11 @@ import pytest
 from analytic_sphere import DISTANCE, FOCAL, RADIUS, REGION, look, photograph, sphere_colours
 
 from wakewise.core.errors import StageError
-from wakewise.vision.reconstruction.registered_photos import Ball
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise_nerf.field.geometry import depth_camera, depth_map, fuse_depth
 from wakewise_nerf.field.posed import read_model, read_posed
 
-BALL = Ball(centre_W_m=REGION[0], radius_m=REGION[1])
+BALL = RegionOfInterest(centre_W_m=REGION[0], radius_m=REGION[1])
 
 
 @pytest.fixture(scope="module")

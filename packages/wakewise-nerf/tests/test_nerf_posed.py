@@ -7,10 +7,10 @@ import pytest
 from analytic_sphere import FOCAL, REGION, SIZE, look, photograph
 
 from wakewise.core.errors import InputError, StageError
-from wakewise.vision.reconstruction.registered_photos import Ball
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise_nerf.field.posed import pixel_rays, read_model, read_posed, sees, surroundings, window
 
-BALL = Ball(centre_W_m=REGION[0], radius_m=REGION[1])
+BALL = RegionOfInterest(centre_W_m=REGION[0], radius_m=REGION[1])
 
 
 @pytest.fixture(scope="module")
@@ -103,4 +103,4 @@ def test_what_is_missing_is_named(folder, tmp_path):
     with pytest.raises(InputError, match=r"has 12 x 10 pixels, the model was made from 56 x 56"):
         read_posed(model, tmp_path, BALL, 960)
     with pytest.raises(StageError, match="0 registered photos see the region, at least 5 must"):
-        read_posed(model, folder / "images", Ball(centre_W_m=np.array([90.0, 0, 0]), radius_m=0.1), 960)
+        read_posed(model, folder / "images", RegionOfInterest(centre_W_m=np.array([90.0, 0, 0]), radius_m=0.1), 960)

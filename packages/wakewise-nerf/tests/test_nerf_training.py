@@ -9,16 +9,16 @@ from analytic_sphere import REGION, look, photograph
 torch = pytest.importorskip("torch", reason="needs the extra `nerf` (PyTorch)")
 
 from wakewise.core.errors import StageError
-from wakewise.vision.reconstruction.registered_photos import Ball
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise_nerf.field.field import RadianceField
 from wakewise_nerf.field.held_out_views import draw, psnr_db, split, ssim
-from wakewise_nerf.field.occupancy import Occupancy
+from wakewise_nerf.field.occupancy import OccupancyGrid
 from wakewise_nerf.field.posed import read_model, read_posed
 from wakewise_nerf.field.rays import RayTable, origin_in
 from wakewise_nerf.field.settings import FieldSettings
 from wakewise_nerf.field.training import read_checkpoint, train
 
-BALL = Ball(centre_W_m=REGION[0], radius_m=REGION[1])
+BALL = RegionOfInterest(centre_W_m=REGION[0], radius_m=REGION[1])
 CPU = torch.device("cpu")
 TINY = FieldSettings(
     levels=4,
@@ -108,7 +108,7 @@ class Shell:
 
 def test_empty_space_is_found_empty():
     """Cells that reach into the ball stay, those away from it go, and come back when the field fills them."""
-    occupancy = Occupancy(32, 0.05)
+    occupancy = OccupancyGrid(32, 0.05)
     chance = torch.Generator().manual_seed(0)
     for _ in range(30):
         occupancy.update(Shell(0.0), chance, all_cells=True, apply=True)
@@ -124,7 +124,7 @@ def test_empty_space_is_found_empty():
 
 def test_a_thin_field_is_not_emptied():
     """Where all is thinner than the threshold, what is denser than the mean stays."""
-    occupancy = Occupancy(16, 0.05)
+    occupancy = OccupancyGrid(16, 0.05)
     assert occupancy.threshold == pytest.approx(0.2)
 
     class Thin(Shell):
@@ -220,7 +220,7 @@ def test_pixels_without_a_ray_are_left_out(photos):
 
 def test_untrained_occupancy_holds_all_that_can_be_reached():
     """Before it is told to decide nothing is empty; cells that no shrunk point can lie in are never asked about."""
-    occupancy = Occupancy(16, 0.05)
+    occupancy = OccupancyGrid(16, 0.05)
     field = RadianceField(TINY)
     points = 30.0 * torch.randn(500, 3, generator=torch.Generator().manual_seed(0))
     occupancy.update(field, torch.Generator().manual_seed(0), all_cells=True, apply=False)

@@ -9,7 +9,7 @@ from wakewise.core.files import write_json
 from wakewise.operation import load_scenario, write_scenario
 from wakewise.vision.evaluation import Crop
 from wakewise.vision.evaluation.cloud_to_surface import sample_surface
-from wakewise.vision.reconstruction import Cloud, write_cloud
+from wakewise.vision.reconstruction import OrientedPointCloud, write_cloud
 from wakewise_nerf import neural
 from wakewise_nerf.field import PROFILES
 
@@ -43,7 +43,9 @@ def test_points_of_a_trial_are_measured_against_the_truth(tmp_path, monkeypatch)
 
     def fake(folder, photos, out, settings, *, region, **others):
         asked["region"] = region
-        write_cloud(out / "points.ply", Cloud(points_m=points, normals=surface.normals, colours=0.5 + 0 * points))
+        write_cloud(
+            out / "points.ply", OrientedPointCloud(points_m=points, normals=surface.normals, colours=0.5 + 0 * points)
+        )
         return {"psnr_db": 25.0, "why": {}}
 
     monkeypatch.setattr(neural, "build_field", fake)

@@ -4,9 +4,9 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 
 from wakewise.core.interfaces import no_progress
-from wakewise.experiments.campaigns.engines import Crew
+from wakewise.experiments.campaigns.engines import WorkerPool
 from wakewise.experiments.campaigns.worker import work_on
-from wakewise.experiments.campaigns.worker_process import Report
+from wakewise.experiments.campaigns.worker_process import AttemptReport
 
 
 class Here:
@@ -16,9 +16,9 @@ class Here:
 
     @contextmanager
     def crew(self, driver):
-        yield Crew(executor=self, threads=1, size=lambda: 1, check=lambda: None)
+        yield WorkerPool(executor=self, threads=1, size=lambda: 1, check=lambda: None)
 
     def submit(self, attempt, ticket, threads):
         future = Future()
-        future.set_result(Report(key=ticket.trial["key"], **work_on(ticket, no_progress, quiet=False)))
+        future.set_result(AttemptReport(key=ticket.trial["key"], **work_on(ticket, no_progress, quiet=False)))
         return future

@@ -5,7 +5,7 @@ from wakewise.experiments.campaigns.store import open_store
 from wakewise.experiments.trials import BenchOptions
 from wakewise_paper import flight_batches, flight_store
 from wakewise_paper.flight_store import FlightStore, store_folder
-from wakewise_paper.wash_reduction.flight import Trial
+from wakewise_paper.wash_reduction.flight import WashTrial
 
 FLY = f"{__name__}:made_up"
 flown = []
@@ -21,7 +21,7 @@ def test_flights_are_kept_by_what_was_flown(tmp_path, monkeypatch):
     """The same trial is found again as it was, another is not, and `fresh` finds none; nonsense counts as not flown."""
     monkeypatch.setattr(flight_batches, "warm", lambda **_: None)
     store = FlightStore(tmp_path / "c")
-    trial = Trial(scenario="orbit/paper", method="dp", seed=1, control=(("levers.drift", False), ("w", (1.0, 2.0))))
+    trial = WashTrial(scenario="orbit/paper", method="dp", seed=1, control=(("levers.drift", False), ("w", (1.0, 2.0))))
     assert store.load(trial, FLY) is None
     flown.clear()
     rows, failures, known = flight_batches.fly_all({("a", "b", 1): trial}, FLY, store, BenchOptions(), lambda _: Here())
@@ -29,7 +29,7 @@ def test_flights_are_kept_by_what_was_flown(tmp_path, monkeypatch):
     assert flown == [trial]
     assert store.load(trial, FLY) == {"target_speed_mean_m_s": 1.0}
     assert flight_batches.fly_all({("a", "b", 1): trial}, FLY, store, BenchOptions(), lambda _: Here())[2] == 1
-    assert store.load(Trial(scenario="orbit/paper", method="dp", seed=2), FLY) is None
+    assert store.load(WashTrial(scenario="orbit/paper", method="dp", seed=2), FLY) is None
     assert store.load(trial, f"{__name__}:another") is None
     fresh = FlightStore(store.folder, fresh=True)
     assert fresh.load(trial, FLY) is None
@@ -42,7 +42,7 @@ def test_flights_are_kept_by_what_was_flown(tmp_path, monkeypatch):
 def test_what_flies_is_part_of_a_flight():
     """Flights and models name the parts of the package that can change them."""
     assert set(flight_store.FLIES) < set(flight_store.PHOTOGRAPHS)
-    task = FlightStore(store_folder()).task(Trial(scenario="orbit/paper", method="dp", seed=1), FLY)
+    task = FlightStore(store_folder()).task(WashTrial(scenario="orbit/paper", method="dp", seed=1), FLY)
     assert task.sources == flight_store.FLIES and len(task.key) == 32
 
 

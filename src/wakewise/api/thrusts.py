@@ -18,7 +18,7 @@ from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import WakeModel
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake import Superposition, WakeView, wake_model
+from wakewise.wake import InfluenceModel, Superposition, wake_model
 
 LARGEST = 1e9
 """In N and N m: larger forces and moments, whose squares overflow sooner or later, are those of no vehicle."""
@@ -233,13 +233,13 @@ def pose_of(pose: PoseLike, name: str = "pose") -> Pose:
 
 def view_of(
     vehicle: Vehicle, region: Region | ArrayLike, wake: WakeModel | str, superposition: Superposition
-) -> WakeView:
+) -> InfluenceModel:
     """What a wake model sees of a region from a vehicle; points that are no region count alike."""
     model = _model(wake)
     if not isinstance(region, Region):
         points = frozen(region, (None, 3), "region")
         region = Region(points_W_m=points, weights=np.ones(len(points)), distance_m=np.zeros(len(points)))
-    return WakeView.of(_vehicle(vehicle), region, model, superposition)
+    return InfluenceModel.of(_vehicle(vehicle), region, model, superposition)
 
 
 def _vehicle(vehicle: Vehicle) -> Vehicle:
@@ -261,7 +261,7 @@ def _thrusts(vehicle: Vehicle, thrusts_N: ArrayLike) -> Array:
     return _within(frozen(thrusts_N, (len(_vehicle(vehicle).thrusters),), "thrusts_N"), "thrusts_N")
 
 
-def _gram(view: WakeView, X_WB: Pose) -> Array:
+def _gram(view: InfluenceModel, X_WB: Pose) -> Array:
     """The Gram matrix at a pose; a wake model that answers NaN there is refused."""
     n = len(view.positions_B_m)
     return frozen(view.gram(X_WB), (2 * n, 2 * n), "wake model: its Gram matrix")

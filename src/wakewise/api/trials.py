@@ -13,7 +13,7 @@ from wakewise.core.files import named
 from wakewise.core.optional_dependencies import need
 
 if TYPE_CHECKING:
-    from wakewise.experiments.trials import Watch
+    from wakewise.experiments.trials import ProgressListener
     from wakewise.operation import Parts, Scenario
 
 
@@ -36,7 +36,7 @@ class Result:
 def trial(
     flight: Parts | Scenario,
     folder: str | Path,
-    watch: Watch | None = None,
+    watch: ProgressListener | None = None,
     told: Callable[[dict[str, Any]], None] | None = None,
 ) -> Result:
     """Fly, photograph, reconstruct, evaluate and report; what is done already is skipped.
@@ -67,12 +67,12 @@ def trial(
     >>> ww.trial(scenario, "runs/few")  # doctest: +SKIP
     """
     need("ww.trial", *_EXTRAS)
-    from wakewise.experiments.trials import Quiet, run_trial
+    from wakewise.experiments.trials import SilentProgress, run_trial
     from wakewise.experiments.trials.reporting import report_attempt
-    from wakewise.ui.reports import Draft, begin_report, write_report
+    from wakewise.ui.reports import PageParts, begin_report, write_report
 
-    place, draft = path_of(folder, "folder"), Draft()
-    watch = Quiet() if watch is None else able(watch, ("stage",), "watch", "watch")
+    place, draft = path_of(folder, "folder"), PageParts()
+    watch = SilentProgress() if watch is None else able(watch, ("stage",), "watch", "watch")
     if told is not None:
         callable_of(told, "told")
     with_parts = _early(lambda missing: begin_report(place, draft, missing))
@@ -84,7 +84,9 @@ def trial(
     return Result(place, figures, report, attempt.fault)
 
 
-def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: Watch | None = None) -> Result:
+def compare(
+    flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: ProgressListener | None = None
+) -> Result:
     """One trial for each flight, in its own folder, and their outcomes side by side; ratios are to the first.
 
     Parameters
@@ -107,9 +109,9 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
     >>> ww.compare(flights, "runs/both").figures["ratios"]["ours"]  # doctest: +SKIP
     """
     need("ww.compare", *_EXTRAS)
-    from wakewise.experiments.trials import Quiet, compare_methods
+    from wakewise.experiments.trials import SilentProgress, compare_methods
     from wakewise.experiments.trials.reporting import report_attempt
-    from wakewise.ui.reports import Draft, begin_report, write_comparison, write_report
+    from wakewise.ui.reports import PageParts, begin_report, write_comparison, write_report
 
     if not isinstance(flights, Mapping):
         raise InputError(f"flights: {quoted(flights)}, must be names with parts or scenarios")
@@ -120,8 +122,8 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
         if not isinstance(name, str):
             raise InputError(f"flights: {quoted(name)}, must be a name")
         named(place, name, "compare")
-    watch = Quiet() if watch is None else able(watch, ("stage",), "watch", "watch")
-    drafts = {name: Draft() for name in flights}
+    watch = SilentProgress() if watch is None else able(watch, ("stage",), "watch", "watch")
+    drafts = {name: PageParts() for name in flights}
     with_parts = _early(lambda name, lacks: begin_report(place / name, drafts[name], lacks))
     figures = compare_methods(flights, place, watch, with_parts)
     report = None

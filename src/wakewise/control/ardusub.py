@@ -48,7 +48,7 @@ from wakewise.core.interfaces import BodyState, Command, Goal, WakeModel
 from wakewise.planning import Surroundings
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake import WakeView
+from wakewise.wake import InfluenceModel
 from wakewise.wake.disturbance import disturbance
 
 ANGLE_P = 6.0
@@ -102,7 +102,7 @@ class ArduSubController:
     mix: MotorMix
     lowered: Array
     allocation: Array
-    view: WakeView
+    view: InfluenceModel
 
     def init(self) -> ArduSubState:
         """State before the first step."""
@@ -266,5 +266,5 @@ def ardusub(
         mix=mix,
         lowered=lowered_gains(vehicle, mix, 1.0 / settings.rate_hz),
         allocation=vehicle.allocation_matrix,
-        view=WakeView.of(vehicle, region, wake, settings.superposition),
+        view=InfluenceModel.of(vehicle, region, wake, settings.superposition),
     )

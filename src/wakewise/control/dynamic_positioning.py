@@ -11,7 +11,7 @@ from wakewise.core.interfaces import WakeModel
 from wakewise.planning import Surroundings
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake import WakeView
+from wakewise.wake import InfluenceModel
 
 
 def dynamic_positioning(
@@ -36,6 +36,6 @@ def with_least_thrusts(
     return TrackingController(
         name=name,
         tracker=make_tracker(vehicle, settings),
-        view=WakeView.of(vehicle, region, wake, settings.superposition),
+        view=InfluenceModel.of(vehicle, region, wake, settings.superposition),
         allocate=allocate,
     )

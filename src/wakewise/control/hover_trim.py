@@ -25,7 +25,7 @@ from wakewise.core.geometry import matrix_from_quat
 from wakewise.estimation.current_from_drag import current_of_force
 from wakewise.estimation.settings import Priors
 from wakewise.robot.vehicles import Vehicle, compile_body, coriolis_wrench, damping_wrench, restoring_wrench
-from wakewise.robot.vehicles.ballast import Block, net_buoyancy_N
+from wakewise.robot.vehicles.ballast import BallastBlock, net_buoyancy_N
 
 STEP_N, STEP_M = 0.5, 0.05
 """What a person can do: blocks of half a newton (50 g of lead, 60 ml of foam), places to five centimetres."""
@@ -89,7 +89,7 @@ class HoverTrim:
         return bool(self.blocks) and (abs(self.change_N) >= STEP_N or len(self.blocks) == 2)
 
     @property
-    def blocks(self) -> tuple[Block, ...]:
+    def blocks(self) -> tuple[BallastBlock, ...]:
         """What to fix to the hull: one block, or two that stand for lead moved, or none where nothing is sure."""
         moment = np.where(np.abs(self.moment_Nm) > SURE * self.moment_std_Nm, self.moment_Nm, 0.0)
         sure = abs(self.change_N) > SURE * self.weight_std_N
@@ -97,14 +97,14 @@ class HoverTrim:
         if float_N != 0.0:
             # The wanted change of what was believed sits in the centre of buoyancy.
             place = (moment + (self.light_N - self.own_N) * self.p_BB_m[:2]) / float_N
-            return (Block(float_N=float_N, at_B_m=self._on_the_hull(place)),)
+            return (BallastBlock(float_N=float_N, at_B_m=self._on_the_hull(place)),)
         size = float(np.hypot(*moment))
         lead_N = max(_rounded(size / (2.0 * STEP_M), STEP_N), STEP_N)
         # Lead goes to where the load is not.
         to, origin = self._on_the_hull(-moment / lead_N), self._on_the_hull(np.zeros(2))
         if size < WORTH_NM or to == origin:
             return ()
-        return (Block(float_N=lead_N, at_B_m=origin), Block(float_N=-lead_N, at_B_m=to))
+        return (BallastBlock(float_N=lead_N, at_B_m=origin), BallastBlock(float_N=-lead_N, at_B_m=to))
 
     def _on_the_hull(self, place_m: Array) -> tuple[float, float, float]:
         """A place that a person can find, at the height of the centre of buoyancy."""
@@ -207,7 +207,7 @@ def _rounded(value: float, step: float) -> float:
     return round(step * round(value / step), 6) + 0.0
 
 
-def _where(block: Block) -> str:
+def _where(block: BallastBlock) -> str:
     """Place of a block in words."""
     x, y, _ = block.at_B_m or (0.0, 0.0, 0.0)
     parts = []

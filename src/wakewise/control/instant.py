@@ -20,7 +20,7 @@ from wakewise.planning.surroundings import around_target
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake import bed_of
-from wakewise.wake.influence import Seen, WakeView
+from wakewise.wake.influence import InfluenceMatrices, InfluenceModel
 
 
 def instant_allocator(
@@ -33,13 +33,13 @@ def instant_allocator(
     """
     sharer = sharer_of(vehicle, settings)
     layout = sharer.layout
-    view = WakeView.of(vehicle, region, wake, settings.superposition)
+    view = InfluenceModel.of(vehicle, region, wake, settings.superposition)
     weights = weights_of(settings, view.total_weight)
 
     def allocate(wrench_B: Array, gram: Array | None, previous_N: Array) -> Allocation:
         if gram is None or weights.disturbance == 0.0:
             return least_thrusts(layout, wrench_B, gram)
-        return sharer.shares(wrench_B, Seen(gram=gram, sent=gram), weights, view.total_weight, previous_N)
+        return sharer.shares(wrench_B, InfluenceMatrices(gram=gram, sent=gram), weights, view.total_weight, previous_N)
 
     return TrackingController(
         name="instant",

@@ -14,7 +14,7 @@ from wakewise.control.watch import APART_S, EVERY_S, FULL, JUMP_EVERY_S, Watch
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.interfaces import BodyState, Command, Goal
 from wakewise.robot.vehicles import Vehicle
-from wakewise.wake.influence import Seen, WakeView
+from wakewise.wake.influence import InfluenceMatrices, InfluenceModel
 
 Allocate = Callable[[Array, Array | None, Array], Allocation]
 """`(wrench_B, gram or None, thrusts before) -> Allocation`; the Gram matrix is None if the wake model gave nonsense."""
@@ -41,7 +41,7 @@ class ControllerState:
     tracker: TrackerState
     thrusts_N: Array
     share: float = 1.0
-    seen: Seen | None = None
+    seen: InfluenceMatrices | None = None
     age_s: float = np.inf
     since_s: float = np.inf
 
@@ -59,7 +59,7 @@ class TrackingController:
 
     name: str
     tracker: Tracker
-    view: WakeView
+    view: InfluenceModel
     allocate: Allocate
     watch: Watch | None = None
 

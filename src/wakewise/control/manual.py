@@ -22,7 +22,15 @@ import numpy as np
 
 from wakewise.allocation import Layout, least_thrusts
 from wakewise.control.loop import HOLD_S, vehicle_layout
-from wakewise.control.operator_model import Person, PersonState, Sticks, View, begin, draw_person, steer
+from wakewise.control.operator_model import (
+    CameraMotion,
+    OperatorModel,
+    OperatorModelState,
+    StickDeflection,
+    begin,
+    draw_person,
+    steer,
+)
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
 from wakewise.control.watch import FULL
@@ -32,7 +40,7 @@ from wakewise.core.interfaces import BodyState, Command, Goal, WakeModel
 from wakewise.planning import Surroundings
 from wakewise.robot.vehicles import Vehicle, restoring_wrench
 from wakewise.scene.targets import Region
-from wakewise.wake import WakeView
+from wakewise.wake import InfluenceModel
 
 CLIMB_M_S, TURN_RAD_S = 5.0, math.radians(3.375 * 45.0)
 """What full stick asks for at gain 1 (ArduSub 4.0.0, BlueROV2)."""
@@ -45,7 +53,7 @@ class ManualState:
     `depth_m` and `heading_rad` are None before the first step.
     """
 
-    person: PersonState
+    person: OperatorModelState
     tracker: TrackerState
     thrusts_N: Array
     depth_m: float | None = None
@@ -62,10 +70,10 @@ class ManualController:
     """Flown by hand; implements `wakewise.core.interfaces.Controller`. Make one with `manual`."""
 
     name: str
-    person: Person
+    person: OperatorModel
     tracker: Tracker
     layout: Layout
-    view: WakeView
+    view: InfluenceModel
     X_BC: Pose
     middle_W_m: Array
 
@@ -82,8 +90,8 @@ class ManualController:
                 thrusts = state.thrusts_N * np.exp(-dt_s / HOLD_S)
                 why = f"{what} not finite: holding the last thrusts, fading"
                 return replace(state, thrusts_N=thrusts), Command(thrusts_N=thrusts, wrench_B=np.zeros(6), fallback=why)
-        wish = View.of(goal.X_WB, goal.nu_B, self.X_BC)
-        now = View.of(estimate.X_WB, estimate.nu_B, self.X_BC)
+        wish = CameraMotion.of(goal.X_WB, goal.nu_B, self.X_BC)
+        now = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
         person, asked = steer(self.person, state.person, dt_s, now, wish, self._watched(goal))
         state, wrench = self._autopilot(replace(state, person=person), dt_s, estimate, goal, asked)
         gram = self.view.gram(estimate.X_WB)
@@ -130,11 +138,11 @@ class ManualController:
         return after, np.concatenate([R_WB.T @ force_W, moment_B])
 
 
-def vehicle_sticks(vehicle: Vehicle, tracker: Tracker) -> Sticks:
+def vehicle_sticks(vehicle: Vehicle, tracker: Tracker) -> StickDeflection:
     """What the sticks of a vehicle do: force forward and right, rate of climb and of turn."""
     reach = np.abs(vehicle.allocation_matrix) @ np.minimum(-vehicle.thrust_lower_N, vehicle.thrust_upper_N)
     body = tracker.body
-    return Sticks(
+    return StickDeflection(
         inertia=np.array([body.mass_matrix[0, 0], body.mass_matrix[1, 1], 0.0, 0.0]),
         drag=np.array([body.linear_damping[0, 0], body.linear_damping[1, 1], 0.0, 0.0]),
         full=np.array([reach[0], reach[1], CLIMB_M_S, TURN_RAD_S]),
@@ -156,7 +164,7 @@ def manual(
         person=draw_person(settings.person or 0, vehicle_sticks(vehicle, tracker)),
         tracker=tracker,
         layout=vehicle_layout(vehicle),
-        view=WakeView.of(vehicle, region, wake, settings.superposition),
+        view=InfluenceModel.of(vehicle, region, wake, settings.superposition),
         X_BC=vehicle.X_BC,
         middle_W_m=np.average(region.points_W_m, axis=0, weights=region.weights),
     )

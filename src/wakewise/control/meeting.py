@@ -29,9 +29,9 @@ from wakewise.core.arrays import Array, IntArray
 from wakewise.core.geometry import Pose
 from wakewise.core.jit.njit import assign, njit
 from wakewise.wake import AxialJet, free_jet
-from wakewise.wake.advected_jets import Flow
+from wakewise.wake.advected_jets import CrossFlow
 from wakewise.wake.disturbance import carried_velocity, incoherent, velocity_gram
-from wakewise.wake.influence import Seen, WakeView
+from wakewise.wake.influence import InfluenceMatrices, InfluenceModel
 
 LEAST_COSINE = -0.5
 """Cosine of 120 deg: jets that cross at more turn aside rather than join."""
@@ -79,8 +79,8 @@ class _Sent(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MeetingView(WakeView):
-    """A `WakeView` whose Gram matrix also holds what pairs of jets become where they meet.
+class MeetingView(InfluenceModel):
+    """A `InfluenceModel` whose Gram matrix also holds what pairs of jets become where they meet.
 
     Parameters
     ----------
@@ -90,11 +90,11 @@ class MeetingView(WakeView):
 
     pairs: tuple[tuple[int, int], ...] = field(default=())
 
-    def gram(self, X_WB: Pose, flow: Flow | None = None) -> Array:
+    def gram(self, X_WB: Pose, flow: CrossFlow | None = None) -> Array:
         """Matrix G of D = s' G s, shape (2 n, 2 n); in a flow what two jets become takes their own place."""
         return self.seen(X_WB, flow).gram
 
-    def seen(self, X_WB: Pose, flow: Flow | None = None) -> Seen:
+    def seen(self, X_WB: Pose, flow: CrossFlow | None = None) -> InfluenceMatrices:
         """Matrices of D: with the charge for a pair of which one rests, and with what it becomes where both push."""
         origins, axes = self.places(X_WB)
         if flow is not None and isinstance(free_jet(self.wake), AxialJet):
@@ -106,9 +106,9 @@ class MeetingView(WakeView):
         D = met.momentum * met.share * np.einsum("n,inx,inx->i", self.weights, speed, speed)
         np.add.at(G, (met.first, met.second), 0.5 * D)
         np.add.at(G, (met.second, met.first), 0.5 * D)
-        return Seen(gram=G, sent=G)
+        return InfluenceMatrices(gram=G, sent=G)
 
-    def _seen_in(self, flow: Flow, origins: Array, axes: Array) -> Seen:
+    def _seen_in(self, flow: CrossFlow, origins: Array, axes: Array) -> InfluenceMatrices:
         """The same in a flow, of disks and force axes in the world, shape (n, 3) each.
 
         Of a pair that pushes a share goes on as one, the rest as if alone. The velocity of the one is counted to its
@@ -126,8 +126,10 @@ class MeetingView(WakeView):
         G = velocity_gram(velocity[: len(pushing)], self.weights)
         if self.superposition == "incoherent":
             G = incoherent(G)
-            return Seen(gram=G, sent=G)
-        return Seen(*_charged(G, velocity[len(pushing) + len(sent.joined) :], self.weights, met, sent.apart))
+            return InfluenceMatrices(gram=G, sent=G)
+        return InfluenceMatrices(
+            *_charged(G, velocity[len(pushing) + len(sent.joined) :], self.weights, met, sent.apart)
+        )
 
     @cached_property
     def _slots(self) -> tuple[IntArray, IntArray]:
@@ -292,7 +294,7 @@ def meeting_pairs(layout: Layout) -> tuple[tuple[int, int], ...]:
     return tuple(sorted({(int(i), int(j)) for own in moves for i in own for j in own if i < j}))
 
 
-def meeting_view(view: WakeView, layout: Layout) -> MeetingView:
+def meeting_view(view: InfluenceModel, layout: Layout) -> MeetingView:
     """The same view with jets that meet."""
     return MeetingView(
         wake=view.wake,

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.control.operator_population import PEOPLE, People
+from wakewise.control.operator_population import PEOPLE, OperatorPopulation
 from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.geometry import Pose
 
@@ -39,7 +39,7 @@ _COLUMNS = 11
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sticks:
+class StickDeflection:
     """What the four axes of two sticks do, shape (4,) each.
 
     `inertia` in kg, 0 where the stick asks for a rate; `drag` in N/(m/s); `full` is the force, or rate, of full stick
@@ -56,7 +56,7 @@ class Sticks:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class View:
+class CameraMotion:
     """What matters of a camera's pose: place and velocity in W, shape (3,) each, heading and its rate.
 
     `hull_W_m_s` is the velocity of the hull behind it, whose drag a practised hand pushes against.
@@ -69,7 +69,7 @@ class View:
     hull_W_m_s: Array
 
     @classmethod
-    def of(cls, X_WB: Pose, nu_B: Array, X_BC: Pose) -> View:
+    def of(cls, X_WB: Pose, nu_B: Array, X_BC: Pose) -> CameraMotion:
         """Of a body and its twist in its own frame, shape (6,)."""
         R = X_WB.R
         v_W = R @ (nu_B[:3] + np.cross(nu_B[3:], X_BC.p_m))
@@ -89,7 +89,7 @@ class View:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Person:
+class OperatorModel:
     """One person, drawn; times in s, shares of the distance to the target where no unit is named.
 
     `crossover_rad_s`, shape (4,), and `rate_gain`, what a rate that is seen is answered with, N/(m/s), or an offset
@@ -98,7 +98,7 @@ class Person:
     """
 
     seed: int
-    sticks: Sticks
+    sticks: StickDeflection
     delay_s: float
     video_s: float
     crossover_rad_s: Array
@@ -121,14 +121,14 @@ class Person:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PersonState:
+class OperatorModelState:
     """What a person carries on: count of steps, what was seen and wished (newest first), hands and habits.
 
-    `seen` and `wished`, shape (n, 11), rows as `View.row`; the rest, shape (4,): `hand` what the hands make of it,
-    `trim` the steady push that was learned, `drift` the error of the eye now, `last` and `unseen_s` the offset last
-    seen and how long ago, `pushed` where the sticks are and `owed` what they fell short of, both shares of full
-    stick, `square` and `rate_square` what is seen, squared and averaged, `minded` the axes that are minded, for
-    `until_s` more.
+    `seen` and `wished`, shape (n, 11), rows as `CameraMotion.row`; the rest, shape (4,): `hand` what the hands make of
+    it, `trim` the steady push that was learned, `drift` the error of the eye now, `last` and `unseen_s` the offset last
+    seen and how long ago, `pushed` where the sticks are and `owed` what they fell short of, both shares of full stick,
+    `square` and `rate_square` what is seen, squared and averaged, `minded` the axes that are minded, for `until_s`
+    more.
     """
 
     steps: int
@@ -148,7 +148,7 @@ class PersonState:
     until_s: float
 
 
-def draw_person(seed: int, sticks: Sticks, people: People = PEOPLE) -> Person:
+def draw_person(seed: int, sticks: StickDeflection, people: OperatorPopulation = PEOPLE) -> OperatorModel:
     """The person that a seed draws from these people, at these sticks."""
     rng = np.random.default_rng(seed)
 
@@ -164,7 +164,7 @@ def draw_person(seed: int, sticks: Sticks, people: People = PEOPLE) -> Person:
     coast_s = np.where(forced, sticks.inertia / np.maximum(sticks.drag, 1e-9), 0.0)
     lead_s = np.minimum(coast_s, lead_most_s)
     crossover = _crossover(margin_rad, late_s, coast_s, lead_s)
-    return Person(
+    return OperatorModel(
         seed=seed,
         sticks=sticks,
         delay_s=delay_s,
@@ -200,11 +200,11 @@ def draw_person(seed: int, sticks: Sticks, people: People = PEOPLE) -> Person:
     )
 
 
-def begin(person: Person) -> PersonState:
+def begin(person: OperatorModel) -> OperatorModelState:
     """Before the first look: nothing seen yet, hands off the sticks."""
     zero, none = np.zeros(4), np.empty((0, _COLUMNS))
     eye = person.drift * _noise(person, 0)[:4]
-    return PersonState(
+    return OperatorModelState(
         steps=1,
         seen=none,
         wished=none,
@@ -224,18 +224,23 @@ def begin(person: Person) -> PersonState:
 
 
 def steer(
-    person: Person, state: PersonState, dt_s: float, view: View, wish: View, watch_W_m: Array | None = None
-) -> tuple[PersonState, Array]:
+    person: OperatorModel,
+    state: OperatorModelState,
+    dt_s: float,
+    view: CameraMotion,
+    wish: CameraMotion,
+    watch_W_m: Array | None = None,
+) -> tuple[OperatorModelState, Array]:
     """One step of a person at the sticks.
 
     Parameters
     ----------
-    person : Person
-    state : PersonState
+    person : OperatorModel
+    state : OperatorModelState
     dt_s : float
-    view : View
+    view : CameraMotion
         The camera as it is now; the person sees it later.
-    wish : View
+    wish : CameraMotion
         Where the person would like to have it.
     watch_W_m : ndarray, shape (3,), optional
         What the camera is to be kept on; without it the wished heading is.
@@ -243,8 +248,8 @@ def steer(
     Returns
     -------
     tuple
-        The next state, and what the sticks ask for, shape (4,): N, m/s, rad/s as `Sticks` says, in the vehicle's level
-        frame (forward along its heading).
+        The next state, and what the sticks ask for, shape (4,): N, m/s, rad/s as `StickDeflection` says, in the
+        vehicle's level frame (forward along its heading).
     """
     late, later = round((person.delay_s - NEUROMUSCULAR_S) / dt_s), round(person.video_s / dt_s)
     seen = np.concatenate([view.row[None], state.seen])[: late + later + 1]
@@ -351,6 +356,6 @@ def _beyond(values: Array, step: Array) -> Array:
     return np.asarray(np.sign(values) * np.maximum(np.abs(values) - step, 0.0))
 
 
-def _noise(person: Person, step: int) -> Array:
+def _noise(person: OperatorModel, step: int) -> Array:
     """Thirteen standard normal numbers of one step, a function of the person and the step alone."""
     return np.random.Generator(np.random.Philox(key=person.seed, counter=[0, step, 0, 0])).standard_normal(13)

@@ -19,7 +19,7 @@ Range = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class People:
+class OperatorPopulation:
     """What people at the sticks are drawn from: lowest and highest value of each property, all between equally likely.
 
     Parameters
@@ -96,5 +96,5 @@ class People:
             raise InputError(f"attended: {self.attended} axes, allowed 1 to 4")
 
 
-PEOPLE = People()
+PEOPLE = OperatorPopulation()
 """Those who are drawn unless others are named."""

@@ -13,7 +13,7 @@ from wakewise.core.interfaces import BodyState, Command, Controller, Goal, WakeM
 from wakewise.planning import Surroundings
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake import WakeView
+from wakewise.wake import InfluenceModel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,7 +25,7 @@ class LeastThrusts:
     name: str
     inner: Controller[Any]
     layout: Layout
-    view: WakeView
+    view: InfluenceModel
 
     def init(self) -> Any:
         """State before the first step."""
@@ -52,5 +52,5 @@ def planned_pseudo_inverse(
         name="pseudo-inverse",
         inner=planned(vehicle, region, wake, settings, around),
         layout=vehicle_layout(vehicle),
-        view=WakeView.of(vehicle, region, wake, settings.superposition),
+        view=InfluenceModel.of(vehicle, region, wake, settings.superposition),
     )

@@ -41,7 +41,7 @@ from wakewise.planning.reference import between, reference_of
 from wakewise.planning.surroundings import Surroundings, around_target
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake import FloorJet
+from wakewise.wake import ImpingingJet
 from wakewise.wake.disturbance_derivatives import Superposition
 
 
@@ -368,7 +368,7 @@ def plan_superposition(wake: WakeModel, settings: ControlSettings) -> Superposit
     them (docs/research-log/0014); the sum of squares is convex, and plans stay. The exact allocators find the least of
     all minima, and need no such care.
     """
-    return "incoherent" if isinstance(wake, FloorJet) else settings.superposition
+    return "incoherent" if isinstance(wake, ImpingingJet) else settings.superposition
 
 
 def warmed(planner: Planner) -> Planner:

@@ -18,7 +18,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Command, Controller, Goal, WakeModel
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake.influence import Seen, WakeView
+from wakewise.wake.influence import InfluenceMatrices, InfluenceModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class SpareState:
     age_s: float = np.inf
     disturbance: float | None = None
     free_age_s: float = np.inf
-    seen: Seen | None = None
+    seen: InfluenceMatrices | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,7 +127,7 @@ def respared(
 def watching(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> Watch:
     """What a method watches with the levers of its settings. Arguments as for `respared`."""
     sharer = sharer_of(vehicle, settings)
-    view = WakeView.of(vehicle, region, wake, settings.superposition)
+    view = InfluenceModel.of(vehicle, region, wake, settings.superposition)
     return Watch(
         view=meeting_view(view, sharer.layout) if settings.levers.meet else view,
         levers=settings.levers,

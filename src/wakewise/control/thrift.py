@@ -37,7 +37,7 @@ from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.core.arrays import Array
 from wakewise.robot.thrusters import electrical_power_W
 from wakewise.robot.vehicles import Vehicle
-from wakewise.wake.influence import Seen
+from wakewise.wake.influence import InfluenceMatrices
 
 KEPT = 0.95
 """Share of the extra power of a whole flight that the bound of an instant hands out: with a bound of 1.3 two flights
@@ -84,7 +84,12 @@ class Sharer:
     law: PowerLaw | None = None
 
     def shares(
-        self, wrench_B: Array, seen: Seen, weights: Weights, total_weight: float, previous_N: Array | None = None
+        self,
+        wrench_B: Array,
+        seen: InfluenceMatrices,
+        weights: Weights,
+        total_weight: float,
+        previous_N: Array | None = None,
     ) -> Allocation:
         """Thrusts of least cost; arguments as for `gentle_allocation`, `total_weight` that of the points behind D.
 

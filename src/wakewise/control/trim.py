@@ -32,7 +32,7 @@ from wakewise.core.interfaces import WakeModel
 from wakewise.robot.vehicles import Vehicle, compile_body, restoring_wrench
 from wakewise.robot.vehicles.ballast import ballasted, net_buoyancy_N
 from wakewise.scene.targets import Region
-from wakewise.wake.influence import WakeView
+from wakewise.wake.influence import InfluenceModel
 
 __all__ = ["TrimAdvice", "TrimRow", "ballasted", "net_buoyancy_N", "trim_advice"]
 
@@ -142,7 +142,7 @@ def trim_advice(
         raise InputError(f"trim: unknown_N {unknown_N:g}, must be finite and not negative")
     if not np.isfinite(net_weight_N):
         raise InputError(f"trim: net_weight_N {net_weight_N:g}, must be finite")
-    view = WakeView.of(vehicle, with_bed_points(region, chosen.levers), wake, chosen.superposition)
+    view = InfluenceModel.of(vehicle, with_bed_points(region, chosen.levers), wake, chosen.superposition)
     grams = [view.gram(X_WB) for X_WB in poses]
     weights = Weights(disturbance=chosen.w_disturbance / view.total_weight, effort=chosen.w_effort)
     believed = net_buoyancy_N(vehicle)
@@ -175,7 +175,7 @@ def _row(
     vehicle: Vehicle,
     poses: tuple[Pose, ...],
     grams: list[Array],
-    view: WakeView,
+    view: InfluenceModel,
     weights: Weights,
     force_W: Array,
     errors: tuple[float, ...],

@@ -23,8 +23,8 @@ from wakewise.control.levers import LeverSettings
 from wakewise.control.thrift import Sharer
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState
-from wakewise.wake.advected_jets import Flow
-from wakewise.wake.influence import Seen, WakeView
+from wakewise.wake.advected_jets import CrossFlow
+from wakewise.wake.influence import InfluenceMatrices, InfluenceModel
 
 UNSURE = 0.55
 """Standard deviation of how far the current takes a jet's water over what is reckoned, beside what the estimator is
@@ -56,7 +56,7 @@ FULL = 1.0 - 1e-9
 class Watch:
     """The view of a region with what the levers add to it, the levers, and what shares are weighed by."""
 
-    view: WakeView
+    view: InfluenceModel
     levers: LeverSettings
     sharer: Sharer
     weights: Weights
@@ -70,7 +70,7 @@ class Watch:
         """Matrix G of D = s' G s at an estimate, shape (2 n, 2 n), in the flow that it tells of: what is reckoned."""
         return self.view.seen(estimate.X_WB, self.flow(estimate, thrusts_N)).gram
 
-    def seen(self, estimate: BodyState, thrusts_N: Array) -> Seen:
+    def seen(self, estimate: BodyState, thrusts_N: Array) -> InfluenceMatrices:
         """Matrices of D at an estimate, in the flow that it tells of: to choose shares by, and of thrusts as sent.
 
         To choose by, their mean over both beliefs: jets that go where they are reckoned to, and jets that have gone
@@ -80,9 +80,9 @@ class Watch:
         astray = self.view.astray(estimate.X_WB) if self.levers.doubt else None
         if astray is None:
             return seen
-        return Seen(gram=(1.0 - DOUBT) * seen.gram + np.diag(DOUBT * astray), sent=seen.sent)
+        return InfluenceMatrices(gram=(1.0 - DOUBT) * seen.gram + np.diag(DOUBT * astray), sent=seen.sent)
 
-    def flow(self, estimate: BodyState, thrusts_N: Array) -> Flow | None:
+    def flow(self, estimate: BodyState, thrusts_N: Array) -> CrossFlow | None:
         """The current to reckon with and the thrusts, shape (n,), to reckon from; None where it does not count.
 
         The current is the one stated in the levers, else the estimate's; before that is known there is none.
@@ -92,7 +92,7 @@ class Watch:
             return None
         variance = 0.0 if found is None else float(found.trace()) / 3.0
         unsure_m_s = math.sqrt(variance + UNSURE**2 * float(current @ current))
-        return Flow(current_W_m_s=current, unsure_m_s=unsure_m_s, thrusts_N=thrusts_N)
+        return CrossFlow(current_W_m_s=current, unsure_m_s=unsure_m_s, thrusts_N=thrusts_N)
 
     def cost(self, thrusts_N: Array, gram: Array, previous_N: Array | None = None) -> float:
         """What shares of a wrench, shape (n,), are compared by under a Gram matrix: their cost and their power.
@@ -114,7 +114,9 @@ class Watch:
         """Whether thrusts, shape (n,), are within the limits."""
         return bool(np.all((thrusts_N >= self.layout.lower_N) & (thrusts_N <= self.layout.upper_N)))
 
-    def share_out(self, wrench_B: Array, estimate: BodyState, previous_N: Array) -> tuple[Allocation, Seen] | None:
+    def share_out(
+        self, wrench_B: Array, estimate: BodyState, previous_N: Array
+    ) -> tuple[Allocation, InfluenceMatrices] | None:
         """Gentle thrusts for a wrench, near those of before, and the matrices that say so.
 
         The gentler of two: those of before, `previous_N`, shape (n,), with the least change, and what the exact
@@ -136,14 +138,14 @@ class Watch:
             return None
         return replace(found, disturbance=disturbance_of(after.gram, found.thrusts_N)), after
 
-    def follow(self, wrench_B: Array, seen: Seen, previous_N: Array) -> Allocation:
+    def follow(self, wrench_B: Array, seen: InfluenceMatrices, previous_N: Array) -> Allocation:
         """Gentle thrusts for a wrench that may have changed since the matrices were made.
 
         Least changes would send the noise of the wrench through thrusters that rest because they blow at the target.
         """
         return self.sharer.shares(wrench_B, seen, self.weights, self.view.total_weight, previous_N)
 
-    def as_found(self, wrench_B: Array, seen: Seen, thrusts_N: Array) -> Allocation:
+    def as_found(self, wrench_B: Array, seen: InfluenceMatrices, thrusts_N: Array) -> Allocation:
         """Thrusts within limits that make the wrench, shape (n,), as if they had been looked for."""
         return Allocation(
             thrusts_N=thrusts_N,
@@ -156,8 +158,8 @@ class Watch:
         )
 
     def jump(
-        self, wrench_B: Array, estimate: BodyState, present_N: Array, present: Seen | None = None
-    ) -> tuple[Allocation, Seen] | None:
+        self, wrench_B: Array, estimate: BodyState, present_N: Array, present: InfluenceMatrices | None = None
+    ) -> tuple[Allocation, InfluenceMatrices] | None:
         """Other thrusts for a wrench, better by more than `WORTH` than those that make it now; None if there are none.
 
         Without a price on change, from the least thrusts on: the price keeps shares near to the last ones, and for good

@@ -316,13 +316,13 @@ class Truth:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Posture:
+class TargetDeformation:
     """How a soft or a loose target stands at one instant, for the record only.
 
     `tips_m` and `tip_speeds_m_s`, shape (k, 2), are the way and the speed of its k stems' tips along their two axes
-    (see `wakewise.scene.targets.Sway`), and `shift_m`, shape (2,), how far it has slid north and east. Of the surface
-    above the bed, against its shape at rest in still water and without the sliding: `sway_m` is the root mean square
-    distance, `sway_peak_m` the largest, and `sway_mean_W_m`, shape (3,), the mean way. `target_stress_Pa` is the
+    (see `wakewise.scene.targets.BendingModes`), and `shift_m`, shape (2,), how far it has slid north and east. Of the
+    surface above the bed, against its shape at rest in still water and without the sliding: `sway_m` is the root mean
+    square distance, `sway_peak_m` the largest, and `sway_mean_W_m`, shape (3,), the mean way. `target_stress_Pa` is the
     largest bending stress. `sway_wash_m` is the root mean square distance from where the same water without the vehicle
     would have the surface.
     """
@@ -341,11 +341,11 @@ class Posture:
         freeze(self, tips_m=(k, 2), tip_speeds_m_s=(k, 2), shift_m=(2,), sway_mean_W_m=(3,))
 
 
-class Witness(Protocol):
+class TruthProvider(Protocol):
     """Knows the truth of a simulated world; there is none at sea.
 
-    Beside what follows it may have `posture()`, which gives how a soft or a loose target stands now, a `Posture`, or
-    None of one that nothing moves.
+    Beside what follows it may have `posture()`, which gives how a soft or a loose target stands now, a
+    `TargetDeformation`, or None of one that nothing moves.
     """
 
     def observe(self) -> Truth:
@@ -369,7 +369,7 @@ class World(Protocol):
     def name(self) -> str:
         """Name used in scenario files and tables."""
 
-    def begin(self) -> tuple[Plant, Witness | None]:
+    def begin(self) -> tuple[Plant, TruthProvider | None]:
         """The vehicle in its water at the start of a flight, and who knows the truth of it; a fresh one at each call.
 
         A simulated world begins alike each time, so that flights in it can be compared.

@@ -32,14 +32,14 @@ GROUPS = {
 """Entry point group of each kind of part."""
 
 
-class Found(NamedTuple, Generic[T]):
+class ResolvedPlugin(NamedTuple, Generic[T]):
     """A part's maker and where it comes from: "" for our own, else such as "package 1.2" or "my.module:make"."""
 
     maker: T
     origin: str
 
 
-def find(kind: str, name: str, own: Mapping[str, T]) -> Found[T]:
+def find(kind: str, name: str, own: Mapping[str, T]) -> ResolvedPlugin[T]:
     """What `name` stands for.
 
     Parameters
@@ -57,14 +57,14 @@ def find(kind: str, name: str, own: Mapping[str, T]) -> Found[T]:
         If there is nothing of that name, or it cannot be imported; the reason is named.
     """
     if name in own:
-        return Found(own[name], "")
+        return ResolvedPlugin(own[name], "")
     offered = _offered(GROUPS[kind])
     if name in offered:
         point = offered[name]
         package = f"{point.dist.name} {point.dist.version}" if point.dist is not None else point.value
-        return Found(_loaded(kind, name, point.value), package)
+        return ResolvedPlugin(_loaded(kind, name, point.value), package)
     if ":" in name:
-        return Found(_loaded(kind, name, name), name)
+        return ResolvedPlugin(_loaded(kind, name, name), name)
     known = names(kind, own)
     close = difflib.get_close_matches(name, known, 1)
     hint = f"did you mean {close[0]}? " if close else ""

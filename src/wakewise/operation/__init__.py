@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
-    from wakewise.operation.background_renderer import Darkroom
+    from wakewise.operation.background_renderer import BackgroundRenderer
     from wakewise.operation.exposures import read_exposures
     from wakewise.operation.flying import Flight, fly, fly_trial
     from wakewise.operation.parts import PARTS, Parts
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 __all__ = [
     "PARTS",
     "PRESETS",
-    "Darkroom",
+    "BackgroundRenderer",
     "Flight",
     "FlightRecorder",
     "LiveFlight",

@@ -32,7 +32,7 @@ MOST_WAITING = 16
 _NEEDED = ("target", "route")
 
 
-class Darkroom:
+class BackgroundRenderer:
     """Takes exposures during a flight and has them rendered into a trial's folder; use it in a `with` statement.
 
     Parameters
@@ -51,7 +51,7 @@ class Darkroom:
         self._feeder: threading.Thread | None = None
         self._said: IO[bytes] | None = None
 
-    def __enter__(self) -> Darkroom:
+    def __enter__(self) -> BackgroundRenderer:
         return self
 
     def __exit__(

@@ -15,7 +15,7 @@ from wakewise.core.settings import Settings
 from wakewise.scene.targets import Target
 
 if TYPE_CHECKING:
-    from wakewise.vision.imaging import Calibration
+    from wakewise.vision.imaging import OpenCVCamera
 
 CURRENT_DEG = 15.0
 """Error of the surveyed current's direction, one sigma: what a streamer's swing and a compass beside thrusters leave
@@ -24,7 +24,7 @@ WATCHED_S, WATCHED_EVERY_S = 60.0, 0.5
 """How long the water at the target is watched for it, and how often: several periods of any swell, and many eddies."""
 
 
-class SurveySettings(Settings):
+class CalibrationErrorSettings(Settings):
     """How well target and camera are known to mission, controller and reconstruction; drawn once for a flight.
 
     The target is found by the camera that the vehicle flies by, whose poses are off by 3 to 5 mm per axis for as long
@@ -46,12 +46,12 @@ class SurveySettings(Settings):
     )
 
 
-def found_target(target: Target, survey: SurveySettings, rng: np.random.Generator) -> Target:
+def found_target(target: Target, survey: CalibrationErrorSettings, rng: np.random.Generator) -> Target:
     """The target where the crew takes it to be; its shape, and the bed, are known."""
     return target.moved(rng.normal(0.0, survey.place_m, 3))
 
 
-def known_calibration(true: Calibration, survey: SurveySettings, rng: np.random.Generator) -> Calibration:
+def known_calibration(true: OpenCVCamera, survey: CalibrationErrorSettings, rng: np.random.Generator) -> OpenCVCamera:
     """The calibration that the crew has of a camera; its true one is in camera.json alone."""
     focal, centre = rng.normal(0.0, 0.01 * survey.focal_pct), rng.normal(0.0, 0.01 * survey.centre_pct * true.width, 2)
     bend = survey.distortion * np.array([1.0, 2.0, 0.25, 0.25]) * rng.normal(size=4)

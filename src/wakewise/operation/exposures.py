@@ -25,8 +25,8 @@ class ExposureRecord:
     `X_WC_before` are true poses of the camera before, oldest first, which automatic exposure goes by; else none.
     `flakes` are those that drift before the camera; None where nobody knows, so that they are drawn for each
     photograph.
-    Of a target that yields also, as in `wakewise.core.interfaces.Posture`, how it stood at its opening: `tips_m` and
-    `tip_speeds_m_s` (k, 2), `shift_m` (2,).
+    Of a target that yields also, as in `wakewise.core.interfaces.TargetDeformation`, how it stood at its opening:
+    `tips_m` and `tip_speeds_m_s` (k, 2), `shift_m` (2,).
     """
 
     time_s: float

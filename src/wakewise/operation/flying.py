@@ -16,14 +16,14 @@ import polars as pl
 
 from wakewise.core.checks import callable_of, finite_number, quoted, truth
 from wakewise.core.errors import InputError, StageError, WakewiseError
-from wakewise.core.interfaces import Plant, Witness, no_progress
+from wakewise.core.interfaces import Plant, TruthProvider, no_progress
 from wakewise.core.jit.precompile import warm
 from wakewise.core.optional_dependencies import has
 from wakewise.operation.exposures import ExposureRecord
 from wakewise.operation.loop import Step, run_loop
 from wakewise.operation.parts import Parts
 from wakewise.operation.preflight import check_begin
-from wakewise.operation.recorder import FlightRecorder, Timetable
+from wakewise.operation.recorder import FlightRecorder, PhotoSchedule
 from wakewise.operation.scenario import Scenario
 from wakewise.scene.missions import SETTLING
 from wakewise.vision.evaluation import flight_figures
@@ -150,7 +150,7 @@ def fly(
     progress: Callable[..., None] = no_progress,
     checked: bool = True,
     water_every_s: float = WATER_EVERY_S,
-    watch: Callable[[Step, Witness | None], None] | None = None,
+    watch: Callable[[Step, TruthProvider | None], None] | None = None,
     exposed: Callable[[int, ExposureRecord], None] | None = None,
 ) -> Flight:
     """Fly the parts once, from the beginning of their world; flown again they give the same flight.
@@ -253,7 +253,7 @@ class _Notice:
             )
 
 
-def recorder_of(parts: Parts, witness: Witness | None, timetable: Timetable, **more: Any) -> FlightRecorder:
+def recorder_of(parts: Parts, witness: TruthProvider | None, timetable: PhotoSchedule, **more: Any) -> FlightRecorder:
     """The recorder of a flight of these parts, `more` as for `FlightRecorder`."""
     scenario, vehicle = parts.scenario, parts.vehicle
     return FlightRecorder(
@@ -270,7 +270,9 @@ def recorder_of(parts: Parts, witness: Witness | None, timetable: Timetable, **m
     )
 
 
-def loop_of(parts: Parts, plant: Plant, witness: Witness | None, record: Callable[[Step], None]) -> Callable[..., None]:
+def loop_of(
+    parts: Parts, plant: Plant, witness: TruthProvider | None, record: Callable[[Step], None]
+) -> Callable[..., None]:
     """The loop of a flight of these parts; what is left to say is how long, and by which clock (see `run_loop`)."""
     return partial(
         run_loop,

@@ -22,7 +22,7 @@ from wakewise.core.interfaces import (
     Pilot,
     Plant,
     Truth,
-    Witness,
+    TruthProvider,
     no_progress,
 )
 
@@ -86,7 +86,7 @@ def run_loop(
     controller: Controller[Any],
     estimator: Estimator[Any],
     plant: Plant,
-    witness: Witness | None,
+    witness: TruthProvider | None,
     start: BodyState,
     thrusters: int,
     duration_s: float | None,

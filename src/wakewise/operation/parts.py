@@ -22,7 +22,7 @@ from wakewise.operation.calibration_error import found_target, surveyed_current
 from wakewise.operation.known_obstacles import surroundings_of, tank_bounds
 from wakewise.operation.pilot_makers import make_pilot
 from wakewise.operation.plugin_adapter import described, from_outside, guarded
-from wakewise.operation.preflight import Preflight, preflight
+from wakewise.operation.preflight import PreflightResult, preflight
 from wakewise.operation.regions import region_of
 from wakewise.operation.seeds import Seeds
 from wakewise.operation.worlds.makers import make_world
@@ -31,9 +31,9 @@ from wakewise.robot.importers import any_vehicle
 from wakewise.robot.vehicles import Vehicle
 from wakewise.robot.vehicles.ballast import with_blocks
 from wakewise.scene.missions import CameraAim, Route, TankBounds, aim_of, plan_route
-from wakewise.scene.targets import Region, Sway, Target, find_target
+from wakewise.scene.targets import BendingModes, Region, Target, find_target
 from wakewise.simulation.tank import build_ambient
-from wakewise.simulation.tank.soft_body import DRAG, Loose, Yielding
+from wakewise.simulation.tank.soft_body import DRAG, TargetCompliance, UnanchoredTarget
 from wakewise.wake import wake_model
 
 if TYPE_CHECKING:
@@ -193,17 +193,17 @@ class Parts:
         return found_target(self.target, self.scenario.survey, place_rng)
 
     @cached_property
-    def yielding(self) -> Yielding | None:
+    def yielding(self) -> TargetCompliance | None:
         """How the target gives way to the water; None of one that nothing moves."""
         settings = self.scenario.target
         tissue = settings.tissue
         weight_N = settings.loose.weight_N
         if tissue is None and weight_N is None:
             return None
-        loose = None if weight_N is None else Loose(weight_N=weight_N, friction=settings.loose.friction)
+        loose = None if weight_N is None else UnanchoredTarget(weight_N=weight_N, friction=settings.loose.friction)
         drag = tissue.drag if tissue is not None else settings.drag or DRAG
-        sway = None if tissue is None else Sway.of(self.target, tissue, self.scenario.tank.density_kg_m3)
-        return Yielding(drag=drag, sway=sway, loose=loose)
+        sway = None if tissue is None else BendingModes.of(self.target, tissue, self.scenario.tank.density_kg_m3)
+        return TargetCompliance(drag=drag, sway=sway, loose=loose)
 
     @part
     def region(self) -> Region:
@@ -306,7 +306,7 @@ class Parts:
         return self.route.tilt(0.0, self.aim)[0]
 
     @cached_property
-    def preflight(self) -> Preflight:
+    def preflight(self) -> PreflightResult:
         """What was found when the parts were held against each other; raises InputError where they do not fit."""
         return preflight(self)
 
@@ -323,10 +323,10 @@ class Parts:
     @cached_property
     def scene(self) -> Scene:
         """The target on its bed, textured, as the camera finds it."""
-        from wakewise.vision.imaging import Panels, Scene
+        from wakewise.vision.imaging import LedPanels, Scene
 
         length, width, _ = self.scenario.tank.size_m
-        return Scene.build(self.target, self.scenario.target.seed, panels=Panels.over_tank(length, width))
+        return Scene.build(self.target, self.scenario.target.seed, panels=LedPanels.over_tank(length, width))
 
 
 PARTS: tuple[str, ...] = tuple(name for name, value in vars(Parts).items() if isinstance(value, part))

@@ -42,28 +42,28 @@ def operator_pilot(parts: Parts) -> Pilot:
         If the scenario names no such file: a person's own hands no scenario can hold.
     """
     from wakewise.operation.teleop.assisted import assisted_pilot
-    from wakewise.operation.teleop.operator_state import Desk
+    from wakewise.operation.teleop.operator_state import OperatorState
 
     if parts.scenario.controls is None:
         raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or name a record in controls")
-    return assisted_pilot(parts, hands_from(Path(parts.scenario.controls)), Desk())
+    return assisted_pilot(parts, hands_from(Path(parts.scenario.controls)), OperatorState())
 
 
 def assisted_person(parts: Parts) -> Pilot:
     """`assisted`: the person of `human` at the desk's sticks, camera kept on the target, brakes and all."""
     from wakewise.operation.teleop.assisted import assisted_pilot
-    from wakewise.operation.teleop.operator_state import Desk, DeskState
-    from wakewise.operation.teleop.simulated_operator import PersonsHands
+    from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
+    from wakewise.operation.teleop.simulated_operator import SimulatedOperatorInput
 
-    hands = PersonsHands(
+    hands = SimulatedOperatorInput(
         wish=route_pilot(parts),
         X_BC=parts.vehicle.X_BC,
         target_W_m=parts.target.centre_W_m,
         dt_s=1.0 / parts.control.rate_hz,
         seed=parts.control.person or 0,
     )
-    begin = DeskState(mode="operator")
-    return assisted_pilot(parts, hands, Desk(begin), begin)
+    begin = OperatorSettings(mode="operator")
+    return assisted_pilot(parts, hands, OperatorState(begin), begin)
 
 
 PILOTS: dict[str, Callable[[Parts], Pilot]] = {

@@ -69,7 +69,7 @@ def _named(scenario: Scenario) -> dict[str, tuple[str, str, Mapping[str, Any]]]:
 
 
 @dataclass(frozen=True, eq=False)
-class GuardedState:
+class PluginControllerState:
     """What the guard remembers: the controller's own state, the backup's, time overrun, and why it gave up."""
 
     inner: Any
@@ -80,7 +80,7 @@ class GuardedState:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Guarded:
+class PluginController:
     """A controller from outside, with `dp` at hand; implements `wakewise.core.interfaces.Controller`.
 
     A step that raises, or whose thrusts are not finite or not one per thruster, is flown by the backup instead and
@@ -100,16 +100,18 @@ class Guarded:
     clock: Callable[[], float] = time.perf_counter
     _made: list[Controller[Any]] = field(default_factory=list)
 
-    def init(self) -> GuardedState:
+    def init(self) -> PluginControllerState:
         """State before the first step."""
         try:
-            return GuardedState(inner=self.inner.init(), backup=None)
+            return PluginControllerState(inner=self.inner.init(), backup=None)
         except Exception as fault:  # whatever a foreign controller raises must not end the flight
             if self.strict and not isinstance(fault, WakewiseError):
                 raise
-            return GuardedState(inner=None, backup=None, gave_up=f"{self.name}: init raised {_said(fault)}")
+            return PluginControllerState(inner=None, backup=None, gave_up=f"{self.name}: init raised {_said(fault)}")
 
-    def step(self, state: GuardedState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[GuardedState, Command]:
+    def step(
+        self, state: PluginControllerState, dt_s: float, estimate: BodyState, goal: Goal
+    ) -> tuple[PluginControllerState, Command]:
         """Decide the thrusts for the next `dt_s` seconds."""
         if state.gave_up is not None:
             return self._fall_back(state, dt_s, estimate, goal, state.gave_up)
@@ -148,8 +150,8 @@ class Guarded:
         return None
 
     def _fall_back(
-        self, state: GuardedState, dt_s: float, estimate: BodyState, goal: Goal, why: str
-    ) -> tuple[GuardedState, Command]:
+        self, state: PluginControllerState, dt_s: float, estimate: BodyState, goal: Goal, why: str
+    ) -> tuple[PluginControllerState, Command]:
         if not self._made:
             self._made.append(self.backup())
         backup = self._made[0]
@@ -170,7 +172,7 @@ def guarded(parts: Parts) -> Controller[Any]:
     def backup() -> Controller[Any]:
         return make_controller("dp", vehicle, parts.region, parts.wake, parts.control, parts.surroundings)
 
-    return Guarded(
+    return PluginController(
         name=str(getattr(controller, "name", type(controller).__name__)),
         inner=controller,
         thrusters=len(vehicle.thrusters),

@@ -14,7 +14,7 @@ from wakewise.operation.setting_checks import idle_switches
 from wakewise.planning import check_start, state_of
 from wakewise.robot.vehicles import possible_drags, with_drag
 from wakewise.scene.missions import check_clearance, check_tilt
-from wakewise.simulation.tank import Holding, holding, tank_ambient
+from wakewise.simulation.tank import StationKeepingDemand, holding, tank_ambient
 from wakewise.simulation.tank.soft_body import check_loose, check_sway
 from wakewise.simulation.tank.station_keeping import check_fit
 
@@ -29,18 +29,18 @@ FASTEST_M_S, FASTEST_RAD_S = 5.0, 2.0 * np.pi
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Preflight:
+class PreflightResult:
     """What was found: the least clearance of the hull along the route, and the current that must be held.
 
     `idle` says what is set and cannot act, a sentence each (see `switches.py`).
     """
 
     clearance_m: float
-    holding: Holding | None
+    holding: StationKeepingDemand | None
     idle: tuple[str, ...] = ()
 
 
-def preflight(parts: Parts) -> Preflight:
+def preflight(parts: Parts) -> PreflightResult:
     """Hold vehicle, route, target and water of a flight against each other.
 
     Raises
@@ -62,7 +62,7 @@ def preflight(parts: Parts) -> Preflight:
     idle = () if "controller" in parts.given else idle_switches(scenario, vehicle)
     for words in idle:
         log.warning("%s", words)
-    return Preflight(clearance_m=clearance_m, holding=found, idle=idle)
+    return PreflightResult(clearance_m=clearance_m, holding=found, idle=idle)
 
 
 def check_route(parts: Parts) -> float:
@@ -150,7 +150,7 @@ def check_begin(parts: Parts) -> None:
     check_start(parts.vehicle, parts.region, state_of(parts.start), surroundings_of(parts.scenario))
 
 
-def check_current(parts: Parts, looks: int = 200) -> Holding | None:
+def check_current(parts: Parts, looks: int = 200) -> StationKeepingDemand | None:
     """Hold weight and the water that passes the vehicle along its route against what its thrusters can give.
 
     Drag and trim are the worst that the plant may have: of any case that may be drawn, all of

@@ -19,7 +19,7 @@ _STREAM = 23
 _SIGNIFICANT = 6  # digits that a drawn number keeps, so that a file holds what was flown
 
 
-class Draw(Settings):
+class FieldDistribution(Settings):
     """Where a field's value comes from; written as one of these keys, or as a list of two numbers for `between`."""
 
     between: tuple[float, float] | None = Field(None, description="evenly between two numbers")
@@ -35,7 +35,7 @@ class Draw(Settings):
         return {"between": given} if isinstance(given, list | tuple) else given
 
     @model_validator(mode="after")
-    def _says_one_thing(self) -> Draw:
+    def _says_one_thing(self) -> FieldDistribution:
         given = [name for name in type(self).model_fields if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(f"gives {', '.join(given) or 'nothing'}, must give one of between, in_log, any_of, level")
@@ -72,7 +72,7 @@ class Draw(Settings):
         return "any of " + ", ".join(map(str, self.any_of or ()))
 
 
-def values_of(draws: dict[str, Draw], seed: int) -> dict[str, Any]:
+def values_of(draws: dict[str, FieldDistribution], seed: int) -> dict[str, Any]:
     """What a seed draws, by field."""
     return {
         name: draw.value(np.random.default_rng([seed, _STREAM, zlib.crc32(name.encode())]))

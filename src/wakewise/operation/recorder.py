@@ -19,7 +19,7 @@ import polars as pl
 from wakewise.core.arrays import Array
 from wakewise.core.files import whole_file
 from wakewise.core.geometry import Pose, quat_integrate
-from wakewise.core.interfaces import BodyState, FlakeCloud, Posture, WaterTruth, Witness
+from wakewise.core.interfaces import BodyState, FlakeCloud, TargetDeformation, TruthProvider, WaterTruth
 from wakewise.operation.exposures import STANCE, ExposureRecord, write_exposures
 from wakewise.operation.flight_log import FlightLog, steps_of, timings_of
 from wakewise.operation.loop import Step
@@ -39,7 +39,7 @@ _POSTURE = (
 def step_columns(thrusters: int, yields: bool = False) -> list[str]:
     """Names of the numeric columns of steps.parquet, in order, for a vehicle with this many thrusters.
 
-    Those of a target that `yields` (see `wakewise.core.interfaces.Posture`) come last.
+    Those of a target that `yields` (see `wakewise.core.interfaces.TargetDeformation`) come last.
     """
     return [
         "time_s",
@@ -56,7 +56,7 @@ def step_columns(thrusters: int, yields: bool = False) -> list[str]:
     ]
 
 
-class Timetable(Protocol):
+class PhotoSchedule(Protocol):
     """Says when photographs are taken and what each stretch of a flight is called; a route is one."""
 
     def leg_name(self, time_s: float) -> str:
@@ -74,7 +74,7 @@ class FlightRecorder:
 
     Parameters
     ----------
-    route : Timetable
+    route : PhotoSchedule
         Gives the exposures and the names of the legs.
     X_BC : Pose
         Camera mount.
@@ -97,13 +97,13 @@ class FlightRecorder:
         Where rows and exposures go; by default they are kept in memory.
     """
 
-    route: Timetable
+    route: PhotoSchedule
     X_BC: Pose
     exposure_s: float
     instants: int
     thrusters: int
     dt_s: float
-    witness: Witness | None
+    witness: TruthProvider | None
     water_every_s: float = 0.1
     exposed: Callable[[int, ExposureRecord], None] | None = None
     joint: TiltJoint | None = None
@@ -112,7 +112,7 @@ class FlightRecorder:
     _opened: int = 0
     _recent: deque[Array] = field(init=False)
     _water: WaterTruth | None = None
-    _posture: Posture | None = None
+    _posture: TargetDeformation | None = None
     _water_time_s: float = -np.inf
 
     def __post_init__(self) -> None:
@@ -219,14 +219,14 @@ def state_vector(state: BodyState) -> Array:
     return np.concatenate([state.X_WB.p_m, state.X_WB.q, state.nu_B])
 
 
-def _posture_of(witness: Witness) -> Posture | None:
+def _posture_of(witness: TruthProvider) -> TargetDeformation | None:
     """How a target that yields stands now; None of one that does not, and where a witness knows of none."""
     ask = getattr(witness, "posture", None)
-    posture: Posture | None = ask() if ask is not None else None
+    posture: TargetDeformation | None = ask() if ask is not None else None
     return posture
 
 
-def _posture_row(posture: Posture | None) -> Array:
+def _posture_row(posture: TargetDeformation | None) -> Array:
     """The values of the columns `_POSTURE`; none of a target that does not yield."""
     if posture is None:
         return np.zeros(0)
@@ -235,12 +235,12 @@ def _posture_row(posture: Posture | None) -> Array:
     return np.array([posture.sway_m, posture.sway_peak_m, *mean, posture.target_stress_Pa, far, posture.sway_wash_m])
 
 
-def _stance(posture: Posture | None) -> dict[str, Array]:
+def _stance(posture: TargetDeformation | None) -> dict[str, Array]:
     """The fields of an exposure that tell of a target that yields."""
     return {} if posture is None else {name: getattr(posture, name) for name in STANCE}
 
 
-def _flakes_before(witness: Witness, X_WC: Pose) -> FlakeCloud | None:
+def _flakes_before(witness: TruthProvider, X_WC: Pose) -> FlakeCloud | None:
     """Flakes of a witness that knows them."""
     look = getattr(witness, "flakes", None)
     found: FlakeCloud | None = None if look is None else look(X_WC)

@@ -18,14 +18,14 @@ from wakewise.core.plugins import names
 from wakewise.core.safe_yaml import YamlError, read_yaml, text_of
 from wakewise.core.settings import Seed, Settings, describe_faults, guess
 from wakewise.estimation import FilterSettings
-from wakewise.operation.calibration_error import SurveySettings
+from wakewise.operation.calibration_error import CalibrationErrorSettings
 from wakewise.operation.pilot_makers import PILOTS
-from wakewise.operation.randomization import Draw, values_of
+from wakewise.operation.randomization import FieldDistribution, values_of
 from wakewise.operation.renamed import became
 from wakewise.operation.target_settings import TargetSettings
 from wakewise.operation.worlds.library import load_world, own_file, world_names
 from wakewise.operation.worlds.makers import WORLDS
-from wakewise.robot.vehicles.ballast import Block
+from wakewise.robot.vehicles.ballast import BallastBlock
 from wakewise.scene.missions import MissionSettings
 from wakewise.simulation.tank import TankSettings
 from wakewise.simulation.tank.beds import SILTS
@@ -57,19 +57,21 @@ class Scenario(Settings):
     )
     method: str = Field("wake-aware", description="how thrusts are chosen: a method's name, or package.module:make")
     vehicle: str = Field("paper", description="library name or path of a vehicle file")
-    ballast: tuple[Block, ...] = Field((), max_length=20, description="blocks of float or lead on it: float_N, at_B_m")
+    ballast: tuple[BallastBlock, ...] = Field(
+        (), max_length=20, description="blocks of float or lead on it: float_N, at_B_m"
+    )
     world: str = Field("tank", description="a world's name (`wakewise world list`), a flow's, or package.module:make")
     flow: str | None = Field(
         None,
         description="water in place of the world's own: tank, paper (circular), lattice, lattice-jets, a plug-in",
     )
-    draws: dict[str, Draw] = Field(
+    draws: dict[str, FieldDistribution] = Field(
         default={}, description="fields that the seed draws, by dotted name: two numbers, or in_log, any_of, level"
     )
     pilot: str = Field("route", description="who leads: route, human, assisted, operator, package.module:make")
     controls: str | None = Field(None, description="hands of the pilot `operator`: controls.parquet, .csv, .yaml")
     target: TargetSettings = TargetSettings()
-    survey: SurveySettings = SurveySettings()
+    survey: CalibrationErrorSettings = CalibrationErrorSettings()
     mission: MissionSettings = MissionSettings()
     control: ControlSettings = ControlSettings()
     estimation: FilterSettings = FilterSettings()

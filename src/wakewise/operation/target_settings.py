@@ -8,10 +8,10 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from wakewise.core.settings import Seed, Settings
-from wakewise.scene.targets import TISSUES, Tissue, coral_kinds, is_mesh_file
+from wakewise.scene.targets import TISSUES, TissueProperties, coral_kinds, is_mesh_file
 
 
-class LooseSettings(Settings):
+class UnanchoredSettings(Settings):
     """Whether the target lies on the bed without being held, and how."""
 
     weight_N: float | None = Field(
@@ -49,10 +49,10 @@ class TargetSettings(Settings):
     damping: float | None = Field(
         None, ge=0.0, le=2.0, description="damping by the tissue itself, relative to critical, instead of its own"
     )
-    loose: LooseSettings = LooseSettings()
+    loose: UnanchoredSettings = UnanchoredSettings()
 
     @property
-    def tissue(self) -> Tissue | None:
+    def tissue(self) -> TissueProperties | None:
         """What the target is made of, with what is set in place of the tissue's own; None of a rigid one."""
         name = self.sway if self.sway != "by-kind" else self.kind
         if name not in TISSUES:

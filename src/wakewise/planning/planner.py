@@ -41,7 +41,7 @@ from wakewise.robot.vehicles import Vehicle, compile_body
 from wakewise.scene.targets import Region
 from wakewise.wake import PaperJet, gram
 from wakewise.wake.finite_difference import NumericWake
-from wakewise.wake.packed_model import WakeTable, is_compiled, wake_table, with_smooth_edge
+from wakewise.wake.packed_model import PackedWakeModel, is_compiled, wake_table, with_smooth_edge
 from wakewise.wake.plan_disturbance import wake_scratch
 
 BARRIER_RANGE = (0.02, 20.0)
@@ -60,7 +60,7 @@ class PlanModel:
     settings: PlanSettings
     terms: PlanTerms
     table: PlanTable
-    wake_table: WakeTable
+    wake_table: PackedWakeModel
     layout: Layout
     numeric: NumericWake | None = None
 

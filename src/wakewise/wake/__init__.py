@@ -32,22 +32,22 @@ if TYPE_CHECKING:
         gram_with_derivatives,
         smooth_roots,
     )
-    from wakewise.wake.influence import WakeView
+    from wakewise.wake.influence import InfluenceModel
     from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
     from wakewise.wake.models import WakeSettings, model_names, wake_model
-    from wakewise.wake.wall_jet import FloorJet
+    from wakewise.wake.wall_jet import ImpingingJet
 
 __all__ = [
     "SUPERPOSITIONS",
     "AxialJet",
-    "FloorJet",
     "GaussianJet",
+    "ImpingingJet",
+    "InfluenceModel",
     "PaperJet",
     "PowerJet",
     "RoundJet",
     "Superposition",
     "WakeSettings",
-    "WakeView",
     "bed_of",
     "disturbance",
     "disturbance_slopes",

@@ -59,7 +59,7 @@ _TINY = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Flow:
+class CrossFlow:
     """The water that jets are sent into, and how hard they are sent.
 
     Parameters
@@ -86,7 +86,7 @@ class Flow:
 
 @njit
 def guesses(thrusts: Array) -> Array:
-    """`Flow.guessed` of thrusts, shape (m,)."""
+    """`CrossFlow.guessed` of thrusts, shape (m,)."""
     m = thrusts.size
     mean = 0.0
     for i in range(m):
@@ -282,7 +282,7 @@ def plumes(
     areas_m2: Array,
     law: tuple[int, Array],
     thrusts_N: Array,
-    flow: Flow,
+    flow: CrossFlow,
     ends: Array,
 ) -> tuple[Array, Array]:
     """`plume_speeds` of jets of a law, of these sizes, in a flow."""

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from wakewise.core.interfaces import WakeModel
 from wakewise.wake.learned import LearnedWake
-from wakewise.wake.wall_jet import FloorJet
+from wakewise.wake.wall_jet import ImpingingJet
 
 
 def bed_of(wake: WakeModel) -> float | None:
     """Depth of the bed (m) that a model knows of; None for models of free jets."""
-    return wake.bed_z_m if isinstance(wake, FloorJet | LearnedWake) else None
+    return wake.bed_z_m if isinstance(wake, ImpingingJet | LearnedWake) else None
 
 
 def free_jet(wake: WakeModel) -> WakeModel:
     """The free jet of a model, without its floor."""
-    if isinstance(wake, FloorJet):
+    if isinstance(wake, ImpingingJet):
         return wake.jet
     return wake.free if isinstance(wake, LearnedWake) else wake

@@ -14,9 +14,9 @@ from scipy.optimize import least_squares
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
-from wakewise.wake.fit_parameters import Family
+from wakewise.wake.fit_parameters import WakeFamily
 from wakewise.wake.samples import JetRegion, JetSamples
-from wakewise.wake.scores import Scores, score
+from wakewise.wake.scores import WakeScores, score
 
 AXIS_ANGLE_RAD = math.radians(2.0)
 """If no point lies farther off the axis, nothing can be said about angles."""
@@ -25,22 +25,22 @@ _CELL_M = 0.01
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Calibration:
+class WakeCalibration:
     """Result of `calibrate`.
 
     `values`, `standard_errors`, `lows` and `highs`, shape (p,): estimate, standard error from the Jacobian, and 95 %
     interval of the bootstrap; NaN for a parameter held at its start (`held`) or at a bound of what is allowed.
     """
 
-    family: Family
+    family: WakeFamily
     values: Array
     standard_errors: Array
     lows: Array
     highs: Array
     held: tuple[str, ...]
     warnings: tuple[str, ...]
-    train: Scores
-    test: Scores
+    train: WakeScores
+    test: WakeScores
     train_thrusts_N: tuple[float, ...]
     test_thrusts_N: tuple[float, ...]
     split: str
@@ -53,7 +53,7 @@ class Calibration:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Split:
+class DataSplit:
     """Rows to fit on and rows to test on, both shape (n,), and in words how they were chosen."""
 
     train: BoolArray
@@ -63,7 +63,7 @@ class Split:
 
 def split_samples(
     samples: JetSamples, rng: np.random.Generator, *, test_thrusts_N: tuple[float, ...] = (), share: float = 0.3
-) -> Split:
+) -> DataSplit:
     """Hold out thrusts and positions together: a test row has a thrust and a place that the fit has not seen.
 
     Positions are held out in cells of 1 cm, `share` of them, so that no test point has a neighbour in the training set
@@ -87,9 +87,9 @@ def split_samples(
     held_place = chosen[cell]
     words = f"{share:.0%} of the positions (cells of {100 * _CELL_M:g} cm, drawn at random) held out"
     if len(thrusts) == 1:
-        return Split(train=~held_place, test=held_place, words=words + "; one thrust, the same in both parts")
+        return DataSplit(train=~held_place, test=held_place, words=words + "; one thrust, the same in both parts")
     named = ", ".join(f"{t:g}" for t in sorted(test_thrusts_N))
-    return Split(
+    return DataSplit(
         train=~held_place & ~held_thrust,
         test=held_place & held_thrust,
         words=f"thrusts {named} N and {words}; tested where both were held out",
@@ -97,19 +97,19 @@ def split_samples(
 
 
 def calibrate(
-    family: Family,
+    family: WakeFamily,
     samples: JetSamples,
     rng: np.random.Generator,
     *,
-    split: Split | None = None,
+    split: DataSplit | None = None,
     region: JetRegion | None = None,
     bootstrap: int = 100,
-) -> Calibration:
+) -> WakeCalibration:
     """Fit the free parameters of a model on training rows and score it on the others.
 
     Parameters
     ----------
-    family : Family
+    family : WakeFamily
     samples : JetSamples
     rng : numpy Generator
         Draws the split (if none is given) and the bootstrap.
@@ -157,7 +157,7 @@ def calibrate(
             errors[k] = lows[k] = highs[k] = np.nan
         elif free[k] and not errors[k] < max(abs(values[k]), 1e-3 * span):
             warnings.append(f"{parameter.name} is not determined by these data (standard error above its value)")
-    return Calibration(
+    return WakeCalibration(
         family=family,
         values=values,
         standard_errors=errors,
@@ -174,7 +174,7 @@ def calibrate(
     )
 
 
-def calibrated_values(family: Family, samples: JetSamples) -> tuple[Array, tuple[str, ...]]:
+def calibrated_values(family: WakeFamily, samples: JetSamples) -> tuple[Array, tuple[str, ...]]:
     """Parameters fitted to all rows, shape (p,), without a test, and the names of those that were held.
 
     Raises
@@ -187,7 +187,7 @@ def calibrated_values(family: Family, samples: JetSamples) -> tuple[Array, tuple
     return values, held
 
 
-def _identifiable(family: Family, train: JetSamples, warnings: list[str]) -> tuple[BoolArray, tuple[str, ...]]:
+def _identifiable(family: WakeFamily, train: JetSamples, warnings: list[str]) -> tuple[BoolArray, tuple[str, ...]]:
     """Which parameters the data can tell, shape (p,); the others are held at their start, which is said."""
     free = np.ones(len(family.parameters), dtype=np.bool_)
     angle = float(train.angle_rad.max())
@@ -212,7 +212,7 @@ def _identifiable(family: Family, train: JetSamples, warnings: list[str]) -> tup
     return free, tuple(p.name for p, f in zip(family.parameters, free, strict=True) if not f)
 
 
-def _solve(family: Family, train: JetSamples, start: Array, free: BoolArray) -> tuple[Array, Array, Array]:
+def _solve(family: WakeFamily, train: JetSamples, start: Array, free: BoolArray) -> tuple[Array, Array, Array]:
     """Best values (p,), Jacobian (n, free) and residuals (n,) in m/s/sqrt(N)."""
     low = np.array([p.low for p in family.parameters])[free]
     high = np.array([p.high for p in family.parameters])[free]
@@ -229,7 +229,7 @@ def _solve(family: Family, train: JetSamples, start: Array, free: BoolArray) -> 
     return values, np.asarray(found.jac), np.asarray(found.fun)
 
 
-def _unit_speed(family: Family, values: Array, samples: JetSamples) -> Array:
+def _unit_speed(family: WakeFamily, values: Array, samples: JetSamples) -> Array:
     return family.model(values).speed(samples.x_m, samples.r_m, 1.0, samples.disk_area_m2)
 
 
@@ -251,7 +251,7 @@ def _standard_errors(jacobian: Array, residual: Array, free: BoolArray) -> Array
 
 def _bootstrap(
     train: JetSamples,
-    family: Family,
+    family: WakeFamily,
     values: Array,
     jacobian: Array,
     residual: Array,

@@ -17,7 +17,7 @@ import numpy as np
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.wake import kernels
-from wakewise.wake.jets import AxialJet, Law, check_ranges
+from wakewise.wake.jets import AxialJet, JetLaw, check_ranges
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class PaperJet(AxialJet):
         return "paper"
 
     @cached_property
-    def law(self) -> Law:
+    def law(self) -> JetLaw:
         """Kernel and numbers."""
         numbers = kernels.cone_parameters(
             1.0, self.reference_distance_m, 2.0, 4.0, 0.0, self.half_angle_rad, 0.0, self.water_density_kg_m3
         )
-        return Law(kernels.PRINTED_CONE, numbers)
+        return JetLaw(kernels.PRINTED_CONE, numbers)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +106,7 @@ class PowerJet(AxialJet):
         return self.label
 
     @cached_property
-    def law(self) -> Law:
+    def law(self) -> JetLaw:
         """Kernel and numbers."""
         numbers = kernels.cone_parameters(
             self.gain,
@@ -119,4 +119,4 @@ class PowerJet(AxialJet):
             self.water_density_kg_m3,
         )
         plain = (self.decay_power, self.cosine_power, self.soft_radius_m, self.edge_width_rad) == (2.0, 4.0, 0.0, 0.0)
-        return Law(kernels.PRINTED_CONE if plain else kernels.POWER_CONE, numbers)
+        return JetLaw(kernels.PRINTED_CONE if plain else kernels.POWER_CONE, numbers)

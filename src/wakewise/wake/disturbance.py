@@ -31,7 +31,7 @@ from wakewise.core.checks import one_of, quoted
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import WakeModel
 from wakewise.core.jit.njit import njit
-from wakewise.wake.advected_jets import Flow, plumes
+from wakewise.wake.advected_jets import CrossFlow, plumes
 from wakewise.wake.advected_wall_jet import add_carried_walls
 from wakewise.wake.bed_depth import free_jet
 from wakewise.wake.disturbance_derivatives import SUPERPOSITIONS, Superposition
@@ -39,7 +39,7 @@ from wakewise.wake.gram import FAST, dot, gram_sum
 from wakewise.wake.input_checks import explain, same_sizes
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.kernels import as_tuple, own_constants, section_of
-from wakewise.wake.wall_jet import FloorJet
+from wakewise.wake.wall_jet import ImpingingJet
 from wakewise.wake.wall_jet_gram import floor_gram_sum
 
 SCATTER_RAD = float(np.radians(45.0))
@@ -57,7 +57,7 @@ def gram(
     axes_W: Array,
     areas_m2: Array,
     superposition: Superposition = "coherent",
-    flow: Flow | None = None,
+    flow: CrossFlow | None = None,
 ) -> Array:
     """Matrix G of D = s' G s at given thruster places, symmetric and positive semidefinite.
 
@@ -97,7 +97,7 @@ def gram(
             G = velocity_gram(carried_velocity(model, region_points_W, *jets, flow.guessed, flow), weights)
     elif isinstance(model, AxialJet):
         G, check = gram_sum(*place, *model.law)
-    elif isinstance(model, FloorJet):
+    elif isinstance(model, ImpingingJet):
         in_world = (region_points_W, weights, _ORIGIN, _LEVEL, origins_W, axes_W, areas_m2)
         G, _, check = floor_gram_sum(*in_world, *model.jet.law, model.numbers, False)
     else:
@@ -191,7 +191,7 @@ def carried_velocity(
     directions_W: Array,
     areas_m2: Array,
     thrusts_N: Array,
-    flow: Flow,
+    flow: CrossFlow,
     ends: Array | None = None,
 ) -> Array:
     """Velocity per square root of newton, shape (m, n, 3), that jets of these thrusts have in excess of a current.
@@ -208,7 +208,7 @@ def carried_velocity(
     directions_W = np.ascontiguousarray(directions_W)
     speeds, curves = plumes(points_W_m, origins_W_m, directions_W, areas_m2, jet.law, thrusts_N, flow, ends)
     velocity = _along(speeds, directions_W)
-    if isinstance(model, FloorJet):
+    if isinstance(model, ImpingingJet):
         walls = (directions_W, areas_m2, model.numbers, thrusts_N)
         add_carried_walls(points_W_m, curves, *walls, flow.current_W_m_s, flow.unsure_m_s, ends, velocity)
     return np.asarray(velocity)

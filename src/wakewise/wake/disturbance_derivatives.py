@@ -37,7 +37,7 @@ from wakewise.wake.gram import gram_slope_sum
 from wakewise.wake.input_checks import explain, same_sizes
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.stage_cost import stage_sum
-from wakewise.wake.wall_jet import FloorJet
+from wakewise.wake.wall_jet import ImpingingJet
 from wakewise.wake.wall_jet_gram import floor_gram_sum, floor_stage_sum
 
 Superposition = Literal["coherent", "incoherent"]
@@ -46,7 +46,7 @@ SUPERPOSITIONS: tuple[Superposition, ...] = get_args(Superposition)
 
 
 @dataclass(frozen=True, eq=False)
-class GramSlopes:
+class GramDerivatives:
     """G, shape (2 m, 2 m), and `by_pose`, (6, 2 m, 2 m): by position in W (0 to 2), rotation vector in B (3 to 5)."""
 
     gram: Array
@@ -54,7 +54,7 @@ class GramSlopes:
 
 
 @dataclass(frozen=True, eq=False)
-class DisturbanceSlopes:
+class DisturbanceDerivatives:
     """D in (m/s)^2; `by_pose`, shape (6,), per m and per rad; `by_thrust`, shape (m,), per N."""
 
     value: float
@@ -85,7 +85,7 @@ def gram_with_derivatives(
     axes_B: Array,
     areas_m2: Array,
     superposition: Superposition = "coherent",
-) -> GramSlopes:
+) -> GramDerivatives:
     """G of D = s' G s (see `wakewise.wake.gram`) and how it changes with the vehicle's pose.
 
     Parameters
@@ -111,7 +111,7 @@ def gram_with_derivatives(
     place = (region_points_W, weights, X_WB.p_m, X_WB.q, positions_B_m, axes_B, areas_m2)
     if isinstance(model, AxialJet):
         G, dG, check = gram_slope_sum(*place, *model.law)
-    elif isinstance(model, FloorJet):
+    elif isinstance(model, ImpingingJet):
         G, dG, check = floor_gram_sum(*place, *model.jet.law, model.numbers, True)
     else:
         (G, dG), check = _numeric(model, *place, 0.0, superposition).gram_slopes(X_WB), 0.0
@@ -120,7 +120,7 @@ def gram_with_derivatives(
     if superposition == "incoherent":
         keep = np.eye(len(G))
         G, dG = G * keep, dG * keep
-    return GramSlopes(G, dG)
+    return GramDerivatives(G, dG)
 
 
 def disturbance_slopes(
@@ -135,14 +135,14 @@ def disturbance_slopes(
     *,
     smooth_N: float = 0.0,
     superposition: Superposition = "coherent",
-) -> DisturbanceSlopes:
+) -> DisturbanceDerivatives:
     """D at thrusts, shape (m,), and its gradient; arguments and errors as for `gram_with_derivatives`.
 
     `smooth_N` rounds off the roots near zero thrust, see this module's text; 0 is exact.
     """
     place = (region_points_W, weights, X_WB, positions_B_m, axes_B, areas_m2)
     D, gradient, _ = _stage(model, *place, thrusts_N, smooth_N, superposition, False)
-    return DisturbanceSlopes(D, gradient[:6], gradient[6:])
+    return DisturbanceDerivatives(D, gradient[:6], gradient[6:])
 
 
 def gauss_newton(
@@ -195,7 +195,7 @@ def _stage(
     how = (thrusts, float(smooth_N), superposition == "coherent", hessian)
     if isinstance(model, AxialJet):
         D, gradient, H, check = stage_sum(*place, *model.law, *how)
-    elif isinstance(model, FloorJet):
+    elif isinstance(model, ImpingingJet):
         D, gradient, H, check = floor_stage_sum(*place, *model.jet.law, model.numbers, *how)
     else:
         (D, gradient, H), check = _numeric(model, *place, smooth_N, superposition).stage(X_WB, thrusts), 0.0

@@ -12,12 +12,12 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
 from wakewise.core.safe_yaml import YamlError, read_yaml
 from wakewise.core.settings import describe_faults
-from wakewise.wake.calibration import Calibration
+from wakewise.wake.calibration import WakeCalibration
 from wakewise.wake.models import WakeSettings
 from wakewise.wake.momentum import MomentumLaw
 
 
-def fit_yaml(fit: Calibration, source: str, disk_diameter_m: float, law: MomentumLaw | None = None) -> str:
+def fit_yaml(fit: WakeCalibration, source: str, disk_diameter_m: float, law: MomentumLaw | None = None) -> str:
     """YAML text with the fields of `WakeSettings` where a scenario has them, and the quality of the fit as comments."""
     scores = ((f"R2 in region {name}, test", value) for name, value in _tested(fit))
     lines = [
@@ -40,7 +40,7 @@ def fit_yaml(fit: Calibration, source: str, disk_diameter_m: float, law: Momentu
 
 
 def write_fit(
-    path: Path, fit: Calibration, source: str, disk_diameter_m: float, law: MomentumLaw | None = None
+    path: Path, fit: WakeCalibration, source: str, disk_diameter_m: float, law: MomentumLaw | None = None
 ) -> None:
     """Write a calibrated model whole or not at all."""
     write_text(path, fit_yaml(fit, source, disk_diameter_m, law))
@@ -69,7 +69,7 @@ def read_wake_settings(path: Path) -> WakeSettings:
         raise InputError(f"{path}: {describe_faults(fault, WakeSettings, 'wake')}") from None
 
 
-def fit_figures(fit: Calibration) -> dict[str, Any]:
+def fit_figures(fit: WakeCalibration) -> dict[str, Any]:
     """A calibration as plain values, ready for JSON; what is not known is None."""
 
     def known(value: float) -> float | None:
@@ -97,5 +97,5 @@ def fit_figures(fit: Calibration) -> dict[str, Any]:
     }
 
 
-def _tested(fit: Calibration) -> tuple[tuple[str, float | None], ...]:
+def _tested(fit: WakeCalibration) -> tuple[tuple[str, float | None], ...]:
     return ("A (|theta| < 15 deg, 0.1-0.3 m)", fit.test.r2_core), ("B (|theta| < 30 deg, 0.1-0.5 m)", fit.test.r2_wake)

@@ -13,7 +13,7 @@ from wakewise.wake.models import ModelName, WakeSettings, wake_model
 
 
 @dataclass(frozen=True)
-class Parameter:
+class FitParameter:
     """One number of a model, named as in `WakeSettings`. `shapes` is what it tells of: "level", "reach" or "angle"."""
 
     name: str
@@ -24,11 +24,11 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Family:
+class WakeFamily:
     """A wake model with its free parameters; none for a model that is never fitted."""
 
     name: ModelName
-    parameters: tuple[Parameter, ...] = ()
+    parameters: tuple[FitParameter, ...] = ()
 
     @property
     def start(self) -> Array:
@@ -48,39 +48,39 @@ class Family:
         return jet
 
 
-FAMILIES: dict[str, Family] = {
+FAMILIES: dict[str, WakeFamily] = {
     family.name: family
     for family in (
-        Family("paper"),
-        Family("paper-calibrated", (Parameter("gain", 0.036, 1e-4, 50.0, "level"),)),
-        Family(
+        WakeFamily("paper"),
+        WakeFamily("paper-calibrated", (FitParameter("gain", 0.036, 1e-4, 50.0, "level"),)),
+        WakeFamily(
             "fitted",
             (
-                Parameter("gain", 0.6, 1e-4, 50.0, "level"),
-                Parameter("decay_power", 0.85, 0.0, 6.0, "reach"),
-                Parameter("cosine_power", 47.0, 0.0, 600.0, "angle"),
+                FitParameter("gain", 0.6, 1e-4, 50.0, "level"),
+                FitParameter("decay_power", 0.85, 0.0, 6.0, "reach"),
+                FitParameter("cosine_power", 47.0, 0.0, 600.0, "angle"),
                 # At most the core of a 60 mm disk's jet, 6.2 diameters; beyond, it only trades with the power.
-                Parameter("soft_radius_m", 0.02, 0.0, 0.37, "reach"),
+                FitParameter("soft_radius_m", 0.02, 0.0, 0.37, "reach"),
             ),
         ),
         # Its one number sets width and decay together, through momentum: points on the axis are enough.
-        Family("jet", (Parameter("half_width_slope", 0.13, 0.05, 0.4, "level"),)),
-        Family(
+        WakeFamily("jet", (FitParameter("half_width_slope", 0.13, 0.05, 0.4, "level"),)),
+        WakeFamily(
             "jet-fitted",
             (
-                Parameter("decay", 4.0, 0.05, 50.0, "level"),
-                Parameter("virtual_origin_diameters", 3.0, 0.01, 60.0, "reach"),
-                Parameter("start_width_diameters", 0.5, 0.0, 5.0, "angle"),
-                Parameter("half_width_slope", 0.13, 0.002, 0.8, "angle"),
+                FitParameter("decay", 4.0, 0.05, 50.0, "level"),
+                FitParameter("virtual_origin_diameters", 3.0, 0.01, 60.0, "reach"),
+                FitParameter("start_width_diameters", 0.5, 0.0, 5.0, "angle"),
+                FitParameter("half_width_slope", 0.13, 0.002, 0.8, "angle"),
             ),
         ),
-        Family("linear"),
+        WakeFamily("linear"),
     )
 }
 """Every wake model and what can be fitted of it. Without soft_radius_m the start of `fitted` is the model's default."""
 
 
-def family(name: str) -> Family:
+def family(name: str) -> WakeFamily:
     """The family of a wake model that can be fitted.
 
     Raises

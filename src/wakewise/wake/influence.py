@@ -14,18 +14,18 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import WakeModel
 from wakewise.core.jit.njit import njit
-from wakewise.wake.advected_jets import Flow
+from wakewise.wake.advected_jets import CrossFlow
 from wakewise.wake.bed_depth import free_jet
 from wakewise.wake.disturbance import astray, gram
 from wakewise.wake.disturbance_derivatives import SUPERPOSITIONS, Superposition
-from wakewise.wake.jets import AxialJet, Law
+from wakewise.wake.jets import AxialJet, JetLaw
 
 if TYPE_CHECKING:
     from wakewise.robot.vehicles import Vehicle
     from wakewise.scene.targets import Region
 
 
-class Seen(NamedTuple):
+class InfluenceMatrices(NamedTuple):
     """Matrices of D, shape (2 n, 2 n) each: `gram`, by which shares are chosen, and `sent`, of what thrusts do as sent.
 
     They are one unless `gram` also charges thrusts for what may be: others that join them, jets that go astray
@@ -37,7 +37,7 @@ class Seen(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class WakeView:
+class InfluenceModel:
     """Places and axes of the thrusters on the body, the region's points in the world, and a wake model between them."""
 
     wake: WakeModel
@@ -58,7 +58,7 @@ class WakeView:
     @classmethod
     def of(
         cls, vehicle: Vehicle, region: Region, wake: WakeModel, superposition: Superposition = "coherent"
-    ) -> WakeView:
+    ) -> InfluenceModel:
         """View of a region from a vehicle."""
         return cls(
             wake=wake,
@@ -75,7 +75,7 @@ class WakeView:
         """Sum of the region's weights: D divided by it is a mean square speed."""
         return float(np.sum(self.weights))
 
-    def gram(self, X_WB: Pose, flow: Flow | None = None) -> Array:
+    def gram(self, X_WB: Pose, flow: CrossFlow | None = None) -> Array:
         """Matrix G of D = s' G s, shape (2 n, 2 n), with the jets where a pose puts them and a flow carries them."""
         origins_W, axes_W = self.places(X_WB)
         place = (self.points_W_m, self.weights, origins_W, axes_W, self.areas_m2)
@@ -85,10 +85,10 @@ class WakeView:
         """Thruster origins and force axes in the world, shape (m, 3) each, of the body at a pose."""
         return cast("tuple[Array, Array]", _placed(X_WB.p_m, X_WB.q, self.positions_B_m, self.axes_B))
 
-    def seen(self, X_WB: Pose, flow: Flow | None = None) -> Seen:
+    def seen(self, X_WB: Pose, flow: CrossFlow | None = None) -> InfluenceMatrices:
         """Matrices of D: what to choose shares by, and what thrusts do as sent."""
         G = self.gram(X_WB, flow)
-        return Seen(gram=G, sent=G)
+        return InfluenceMatrices(gram=G, sent=G)
 
     def astray(self, X_WB: Pose) -> Array | None:
         """Mean of D per newton of each jet if it goes astray, shape (2 n,) (see `disturbance`); None without a law."""
@@ -97,7 +97,7 @@ class WakeView:
         return cast(Array, astray(self.points_W_m, self.weights, *self.places(X_WB), self.areas_m2, *self._law))
 
     @cached_property
-    def _law(self) -> Law | None:
+    def _law(self) -> JetLaw | None:
         jet = free_jet(self.wake)
         return jet.law if isinstance(jet, AxialJet) else None
 

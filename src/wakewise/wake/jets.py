@@ -20,7 +20,7 @@ from wakewise.core.errors import InputError
 from wakewise.wake import kernels
 
 
-class Law(NamedTuple):
+class JetLaw(NamedTuple):
     """What the compiled kernels need to know of a jet: which kernel, and its numbers (see `wakewise.wake.kernels`)."""
 
     kind: int
@@ -37,7 +37,7 @@ class AxialJet(ABC):
 
     @property
     @abstractmethod
-    def law(self) -> Law:
+    def law(self) -> JetLaw:
         """Kernel and numbers."""
 
     def speed(self, along_m: ArrayLike, across_m: ArrayLike, thrust_N: ArrayLike, area_m2: ArrayLike) -> Array:
@@ -171,10 +171,10 @@ class RoundJet(AxialJet):
         return float(np.sqrt(2.0 / np.pi) / self.width_slope)
 
     @cached_property
-    def law(self) -> Law:
+    def law(self) -> JetLaw:
         """Kernel and numbers."""
         numbers = kernels.jet_parameters(self.decay, 0.0, 0.0, self.width_slope, True, self.water_density_kg_m3)
-        return Law(kernels.ROUND_JET, numbers)
+        return JetLaw(kernels.ROUND_JET, numbers)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,7 +230,7 @@ class GaussianJet(AxialJet):
         return np.asarray(0.5 * np.pi * (self.decay * width / (x + self.virtual_origin_diameters)) ** 2)
 
     @cached_property
-    def law(self) -> Law:
+    def law(self) -> JetLaw:
         """Kernel and numbers."""
         numbers = kernels.jet_parameters(
             self.decay,
@@ -240,4 +240,4 @@ class GaussianJet(AxialJet):
             False,
             self.water_density_kg_m3,
         )
-        return Law(kernels.ROUND_JET, numbers)
+        return JetLaw(kernels.ROUND_JET, numbers)

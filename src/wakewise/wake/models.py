@@ -33,7 +33,7 @@ from wakewise.core.settings import Settings
 from wakewise.wake.cones import PaperJet, PowerJet
 from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
 from wakewise.wake.learned import learned_wake
-from wakewise.wake.wall_jet import FloorJet
+from wakewise.wake.wall_jet import ImpingingJet
 
 ModelName = Literal["paper", "paper-calibrated", "fitted", "linear", "jet", "jet-fitted"]
 """Our own models."""
@@ -182,7 +182,7 @@ def wake_model(which: str | WakeSettings, bed_z_m: float | None = None) -> WakeM
         numbers["edge_width_rad"] = float(np.deg2rad(which.edge_width_deg))
     jet = recipe.make(**numbers)
     floor_z_m = _bed(which, bed_z_m)
-    return jet if floor_z_m is None else FloorJet(jet=jet, bed_z_m=floor_z_m)
+    return jet if floor_z_m is None else ImpingingJet(jet=jet, bed_z_m=floor_z_m)
 
 
 def _bed(which: WakeSettings, bed_z_m: float | None) -> float | None:

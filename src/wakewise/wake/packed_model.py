@@ -13,13 +13,13 @@ from wakewise.core.interfaces import WakeModel
 from wakewise.wake.cones import PaperJet, PowerJet
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.kernels import PRINTED_CONE, ROUND_JET, own_constants
-from wakewise.wake.wall_jet import FloorJet
+from wakewise.wake.wall_jet import ImpingingJet
 
 PLAIN_CONE = 10
 """Kind of the cone with the paper's powers, of any gain and edge: it needs neither logarithm nor branch."""
 
 
-class WakeTable(NamedTuple):
+class PackedWakeModel(NamedTuple):
     """A wake model over a region as the kernels take it.
 
     points : (3, P) in W; weights : (P,), their sum is 1; roots : (P,), roots of the weights; middle, radius : sphere
@@ -55,7 +55,7 @@ def wake_table(
     *,
     superposition: str,
     smooth_N: float,
-) -> WakeTable:
+) -> PackedWakeModel:
     """Table of a wake model over weighted points; arguments as for `wakewise.wake.gram_with_derivatives`.
 
     Raises
@@ -63,7 +63,7 @@ def wake_table(
     InputError
         If the model is not one of `wakewise.wake`, or there are no points with weight.
     """
-    floor = wake if isinstance(wake, FloorJet) else None
+    floor = wake if isinstance(wake, ImpingingJet) else None
     jet = floor.jet if floor is not None else wake
     if not isinstance(jet, AxialJet):
         raise InputError(f"wake model {wake.name}: has no derivatives, allowed: the models of wakewise.wake")
@@ -79,7 +79,7 @@ def wake_table(
     areas = frozen(
         areas_m2, (None,), "areas"
     )  # read-only as a vehicle's are, so that kernels are compiled for one kind
-    return WakeTable(
+    return PackedWakeModel(
         points=np.ascontiguousarray(points.T),
         rows=points,
         weights=share,
@@ -101,12 +101,12 @@ def wake_table(
 
 def is_compiled(wake: WakeModel) -> bool:
     """Whether the kernels know a model; they do those of this room, with or without a floor."""
-    return isinstance(wake.jet if isinstance(wake, FloorJet) else wake, AxialJet)
+    return isinstance(wake.jet if isinstance(wake, ImpingingJet) else wake, AxialJet)
 
 
 def with_smooth_edge(wake: WakeModel, edge_width_rad: float) -> WakeModel:
     """The same model with an edge of that width if it is a cone with a sharp edge, which no gradient can follow."""
-    if isinstance(wake, FloorJet):
+    if isinstance(wake, ImpingingJet):
         jet = with_smooth_edge(wake.jet, edge_width_rad)
         return replace(wake, jet=jet) if isinstance(jet, AxialJet) else wake
     if isinstance(wake, PaperJet):

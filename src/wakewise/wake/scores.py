@@ -21,7 +21,7 @@ _LEAST_REGION = 8
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scores:
+class WakeScores:
     """How well a model meets samples; None where there are too few points or no spread, with the reason in `why`.
 
     `r2_core` and `r2_wake` are R2 in the paper's regions A and B, `r2` over all points; `r2_vector` counts the velocity
@@ -56,12 +56,12 @@ def predicted_speed(model: WakeModel, samples: JetSamples) -> Array:
     return np.asarray(np.sqrt(samples.thrust_N) * unit[which, np.arange(len(samples)), 0])
 
 
-def score(model: WakeModel, samples: JetSamples) -> Scores:
+def score(model: WakeModel, samples: JetSamples) -> WakeScores:
     """Scores of a model on samples."""
     return score_speeds(predicted_speed(model, samples), samples)
 
 
-def score_speeds(predicted_m_s: Array, samples: JetSamples) -> Scores:
+def score_speeds(predicted_m_s: Array, samples: JetSamples) -> WakeScores:
     """Scores of predicted axial speeds, shape (n,)."""
     why: dict[str, str] = {}
     core, wake, far = (region.holds(samples) for region in (CORE, WAKE, FAR))
@@ -83,7 +83,7 @@ def score_speeds(predicted_m_s: Array, samples: JetSamples) -> Scores:
     bias = 100.0 * (float(predicted_m_s[far].sum()) / total - 1.0) if far.sum() >= _LEAST_REGION and total > 0 else None
     if bias is None:
         why["bias_far_pct"] = f"{int(far.sum())} test points beyond {FAR.nearest_m:g} m"
-    return Scores(
+    return WakeScores(
         **values,
         bias_far_pct=bias,
         points=len(samples),

@@ -43,7 +43,7 @@ ROUND_DECAY = RoundJet().decay
 
 
 @dataclass(frozen=True, kw_only=True)
-class FloorJet:
+class ImpingingJet:
     """A free jet and the wall jet that it becomes on the bed; implements `wakewise.core.interfaces.WakeModel`.
 
     Parameters

@@ -54,7 +54,7 @@ def trace(frame, event, _):
     return trace
 from test_interpreted import answers
 from wakewise.core.jit.njit import COMPILED
-from wakewise.core.jit.precompile import Warmed, is_warm, warm
+from wakewise.core.jit.precompile import PrecompileResult, is_warm, warm
 import numpy as np
 from wakewise.simulation.lattice.streaming_stores import copy_line, peek, poke, settle_stores, stream_line
 assert not COMPILED and is_warm() and warm().kernels == 0

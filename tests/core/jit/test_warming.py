@@ -10,7 +10,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.core.jit import precompile
-from wakewise.core.jit.precompile import JOBS, Listed, Warming, listed, of_jobs, warm
+from wakewise.core.jit.precompile import JOBS, BackgroundCompilation, KernelEntry, listed, of_jobs, warm
 
 FLIGHT = """
 import gc, json
@@ -45,7 +45,7 @@ def test_once_warm_a_flight_compiles_nothing() -> None:
 
 def test_what_cannot_be_compiled_is_told_and_holds_nothing_up(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     """A kernel that is not there gives a line, now and whenever somebody asks; it is not tried again."""
-    wrong = Listed(name="wakewise.core.jit.njit.nothing", types=("float64",), job="more", cost_s=1.0)
+    wrong = KernelEntry(name="wakewise.core.jit.njit.nothing", types=("float64",), job="more", cost_s=1.0)
     monkeypatch.setattr(precompile, "listed", lambda: (wrong,))
     monkeypatch.setattr(precompile, "_made_from", lambda job: "0")
     monkeypatch.setattr(precompile, "_tried", set())
@@ -62,7 +62,9 @@ def test_what_cannot_be_compiled_is_told_and_holds_nothing_up(monkeypatch: pytes
 
 def test_a_killed_process_is_no_verdict_on_a_kernel(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     """The job is not noted as done: another try is made by the next process."""
-    one = Listed(name="wakewise.robot.vehicles.runge_kutta.normalise", types=("float64[1C]",), job="more", cost_s=1.0)
+    one = KernelEntry(
+        name="wakewise.robot.vehicles.runge_kutta.normalise", types=("float64[1C]",), job="more", cost_s=1.0
+    )
     monkeypatch.setattr(precompile, "listed", lambda: (one,))
     monkeypatch.setattr(precompile, "_made_from", lambda job: "0")
     monkeypatch.setattr(precompile, "_tried", set())
@@ -74,22 +76,24 @@ def test_a_killed_process_is_no_verdict_on_a_kernel(monkeypatch: pytest.MonkeyPa
 
 def test_a_note_is_taken_when_a_job_is_done(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     """Then nothing is done the next time, in another process neither."""
-    one = Listed(name="wakewise.robot.vehicles.runge_kutta.normalise", types=("float64[1C]",), job="more", cost_s=1.0)
+    one = KernelEntry(
+        name="wakewise.robot.vehicles.runge_kutta.normalise", types=("float64[1C]",), job="more", cost_s=1.0
+    )
     monkeypatch.setattr(precompile, "listed", lambda: (one,))
     monkeypatch.setattr(precompile, "_made_from", lambda job: "0")
     monkeypatch.setattr(precompile, "_tried", set())
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert not precompile.is_warm(("more",))
-    assert warm(("more",)) == precompile.Warmed(kernels=1)
+    assert warm(("more",)) == precompile.PrecompileResult(kernels=1)
     assert [note.name for note in tmp_path.glob("*.warm")] == ["wakewise-more-0.warm"]
     assert precompile.is_warm(("more",))
     monkeypatch.setattr(precompile, "_tried", set())
-    assert warm(("more",)) == precompile.Warmed(kernels=0)
+    assert warm(("more",)) == precompile.PrecompileResult(kernels=0)
 
 
 def test_stopped_it_ends() -> None:
     """No process is left behind, and waiting returns."""
-    begun = Warming(("more",), processes=1)
+    begun = BackgroundCompilation(("more",), processes=1)
     begun.stop()
     begun.wait(("more",))
     assert all(worker.wait(10) is not None for worker in begun._workers)

@@ -15,7 +15,7 @@ from typing import Any
 
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.experiments.campaigns import Processes, Task, run
+from wakewise.experiments.campaigns import ProcessExecutor, Task, run
 
 Telling = Callable[..., None]
 
@@ -142,4 +142,4 @@ def one(work: str, **settings: Any) -> Task:
 
 
 if __name__ == "__main__":
-    run(adding(int(sys.argv[2]), float(sys.argv[3])), Path(sys.argv[1]), Processes(2), retries=100)
+    run(adding(int(sys.argv[2]), float(sys.argv[3])), Path(sys.argv[1]), ProcessExecutor(2), retries=100)

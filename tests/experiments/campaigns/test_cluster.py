@@ -17,12 +17,12 @@ import pytest
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.core.run_lock import is_running
-from wakewise.experiments.campaigns import Processes, cluster, run
+from wakewise.experiments.campaigns import ProcessExecutor, cluster, run
 from wakewise.experiments.campaigns.store import open_store
 from wakewise.experiments.campaigns.trial_lock import holder_of
 
 pytest.importorskip("distributed")
-from wakewise.experiments.campaigns.cluster import Dask
+from wakewise.experiments.campaigns.cluster import DaskExecutor
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]  # those of other people's threads and sockets
 
@@ -30,8 +30,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]  # those 
 def test_figures_are_the_same_on_either_engine(tmp_path: Path) -> None:
     """To the last bit: attempts are made by the same processes, with the same threads."""
     tasks = [cheap.one("draw", seed=seed) for seed in range(4)] + [cheap.one("refuse"), cheap.one("die", times=1)]
-    ours = run(tasks, tmp_path / "processes", Processes(2))
-    theirs = run(tasks, tmp_path / "dask", Dask(workers=2))
+    ours = run(tasks, tmp_path / "processes", ProcessExecutor(2))
+    theirs = run(tasks, tmp_path / "dask", DaskExecutor(workers=2))
     assert [outcome.figures for outcome in ours] == [outcome.figures for outcome in theirs]
     assert ours[0].figures is not None
     assert [outcome.reason for outcome in ours] == [outcome.reason for outcome in theirs]
@@ -42,7 +42,7 @@ def test_a_cluster_that_runs_is_used_and_its_workers_may_die(tmp_path: Path, run
     """By address or scheduler file; Dask's workers are killed while they work, and every trial is made once."""
     tasks = cheap.adding(16, takes_s=0.15)
     found: list[object] = []
-    driver = threading.Thread(target=lambda: found.append(run(tasks, tmp_path / "c", Dask(running.address))))
+    driver = threading.Thread(target=lambda: found.append(run(tasks, tmp_path / "c", DaskExecutor(running.address))))
     driver.start()
     store = open_store(tmp_path / "c")
     while driver.is_alive() and not any(store.figures(task.key) for task in tasks):
@@ -51,7 +51,7 @@ def test_a_cluster_that_runs_is_used_and_its_workers_may_die(tmp_path: Path, run
     driver.join(60)
     assert len(found) == 1
     assert [store.figures(task.key) for task in tasks] == [{"twice": 2.0 * seed} for seed in range(16)]
-    known = run(tasks, tmp_path / "c", Dask(str(running.file)))
+    known = run(tasks, tmp_path / "c", DaskExecutor(str(running.file)))
     assert all(outcome.known for outcome in known)
 
 
@@ -72,9 +72,9 @@ def test_a_cluster_that_goes_away_is_told_of_in_a_line(
     ending = threading.Thread(target=end)
     ending.start()
     with pytest.raises(EnvironmentFailure, match="the connection was lost; what was finished is kept"):
-        run(tasks, tmp_path / "c", Dask(running.address), retries=0)
+        run(tasks, tmp_path / "c", DaskExecutor(running.address), retries=0)
     ending.join()
-    assert all(outcome.figures is not None for outcome in run(tasks, tmp_path / "c", Processes(2), retries=0))
+    assert all(outcome.figures is not None for outcome in run(tasks, tmp_path / "c", ProcessExecutor(2), retries=0))
 
 
 def test_stopping_ends_what_is_under_way_on_the_cluster(tmp_path: Path, running: _Cluster) -> None:
@@ -89,7 +89,7 @@ def test_stopping_ends_what_is_under_way_on_the_cluster(tmp_path: Path, running:
             holders.append(holder)
         return bool(holders)
 
-    run([task], tmp_path / "c", Dask(running.address), stop=stop)
+    run([task], tmp_path / "c", DaskExecutor(running.address), stop=stop)
     end = time.monotonic() + 10.0
     while is_running(holders[0].pid, holders[0].start):
         assert time.monotonic() < end
@@ -104,7 +104,7 @@ def test_an_address_that_does_not_answer_is_told_in_a_line(tmp_path: Path, monke
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
         for wrong in (address, "nonsense://x", "no-such-scheduler.json"):
             with pytest.raises(InputError, match="no Dask scheduler answers there"):
-                run(cheap.adding(1), tmp_path / "c", Dask(wrong))
+                run(cheap.adding(1), tmp_path / "c", DaskExecutor(wrong))
 
 
 def test_settings_of_a_campaign_are_gone_after_it_and_no_others(tmp_path: Path) -> None:
@@ -133,7 +133,7 @@ def test_a_cluster_without_workers_is_told_of(
         worker.terminate()
         worker.wait()
     with pytest.raises(InputError, match=r"has had no worker for 0\.5 s"):
-        run(cheap.adding(1), tmp_path / "c", Dask(running.address))
+        run(cheap.adding(1), tmp_path / "c", DaskExecutor(running.address))
 
 
 class _Cluster:

@@ -4,8 +4,8 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns.contrasts import contest, measures, places
-from wakewise.experiments.campaigns.plan import Entry, Plan
-from wakewise.experiments.campaigns.table import Made, Results
+from wakewise.experiments.campaigns.plan import CampaignPlan, PlanEntry
+from wakewise.experiments.campaigns.table import Results, TrialRecord
 
 
 def campaign(trials):
@@ -14,11 +14,11 @@ def campaign(trials):
     for k, (method, target, world, seed, figures) in enumerate(trials):
         factors = {"method": method, "target": target, "world": world, "seed": seed}
         state = "waiting" if figures == "waiting" else "failed" if figures is None else "done"
-        entry = Entry(key=f"k{k}", name=f"{method}/{seed}", factors=factors)
+        entry = PlanEntry(key=f"k{k}", name=f"{method}/{seed}", factors=factors)
         known = figures if isinstance(figures, dict) else {}
         reason = "it fell over" if figures is None else None
-        made.append(Made(entry=entry, state=state, figures=known, reason=reason, attempts=1, took_s=2.0))
-    plan = Plan(
+        made.append(TrialRecord(entry=entry, state=state, figures=known, reason=reason, attempts=1, took_s=2.0))
+    plan = CampaignPlan(
         name="first", campaign={"methods": ["dp"]}, wakewise="0", sources="s", trials=tuple(m.entry for m in made)
     )
     return Results(plan=plan, made=tuple(made), drivers=0, others=0)

@@ -10,10 +10,10 @@ import pytest
 
 from wakewise.experiments.campaigns import attempt_log
 from wakewise.experiments.campaigns.index import INDEX, listing
-from wakewise.experiments.campaigns.store import FIGURES, Store, open_store, write_figures
+from wakewise.experiments.campaigns.store import FIGURES, CampaignStore, open_store, write_figures
 
 
-def _folder(tmp_path: Path, count: int) -> Store:
+def _folder(tmp_path: Path, count: int) -> CampaignStore:
     """A store with so many trials; a third of them failed, one in seven is not ended."""
     store = open_store(tmp_path / "c")
     for number in range(count):

@@ -10,7 +10,7 @@ import trimesh
 from wakewise.experiments.campaigns.pictures import MODEL, keep_pictures, photographs_of
 from wakewise.scene.targets import Mesh
 from wakewise.scene.targets.target import place_on_bed
-from wakewise.vision.reconstruction.clouds import Cloud, write_cloud
+from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud
 
 BALL = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
 TARGET = place_on_bed("ball", Mesh(BALL.vertices + np.array([0.0, 0.0, 0.1]), BALL.faces), 2.0)
@@ -51,7 +51,9 @@ def test_a_model_stays_with_its_errors(places):
     """Points 1 mm off the truth are kept as such."""
     trial, folder = places
     points, normals = BALL.vertices * 1.01 + np.array([0.0, 0.0, 1.9]), BALL.vertex_normals
-    write_cloud(trial / "dense.ply", Cloud(points_m=points, normals=normals, colours=np.full_like(points, 0.5)))
+    write_cloud(
+        trial / "dense.ply", OrientedPointCloud(points_m=points, normals=normals, colours=np.full_like(points, 0.5))
+    )
     keep_pictures(TARGET, trial, folder)
     with np.load(folder / MODEL) as kept:
         assert kept["points_m"].shape[0] == kept["error_mm"].shape[0] > 100

@@ -18,10 +18,10 @@ import pytest
 
 from wakewise.core.errors import EnvironmentFailure
 from wakewise.core.run_lock import is_running
-from wakewise.experiments.campaigns import Processes, Task, run
+from wakewise.experiments.campaigns import ProcessExecutor, Task, run
 from wakewise.experiments.campaigns.attempt_log import read_attempts
 from wakewise.experiments.campaigns.index import listing
-from wakewise.experiments.campaigns.store import FIGURES, Store, open_store
+from wakewise.experiments.campaigns.store import FIGURES, CampaignStore, open_store
 from wakewise.experiments.campaigns.trial_lock import holder_of
 
 KILLS = 20
@@ -68,19 +68,19 @@ def test_no_worker_outlives_its_driver(tmp_path: Path) -> None:
     while any(is_running(holder.pid, holder.start) for holder in holders):
         assert time.monotonic() < end
         time.sleep(0.02)
-    outcomes = run(tasks, folder, Processes(2), stop=lambda: _all_begun(store, tasks, 2))
+    outcomes = run(tasks, folder, ProcessExecutor(2), stop=lambda: _all_begun(store, tasks, 2))
     assert [outcome.attempts for outcome in outcomes] == [2, 2]
 
 
 def test_a_kill_between_writing_and_naming_leaves_no_figures(tmp_path: Path) -> None:
     """Figures that were on the disk under a temporary name are no figures; the trial is made again and tidied up."""
     task = cheap.one("die_before_the_name")
-    (outcome,) = run([task], tmp_path / "c", Processes(1), retries=0)
+    (outcome,) = run([task], tmp_path / "c", ProcessExecutor(1), retries=0)
     place = open_store(tmp_path / "c").place(task.key)
     assert outcome.figures is None
     assert not (place / FIGURES).exists()
     assert [left.name.startswith(".figures") for left in place.glob(".*")] == [True]
-    (outcome,) = run([task], tmp_path / "c", Processes(1), retries=1)
+    (outcome,) = run([task], tmp_path / "c", ProcessExecutor(1), retries=1)
     assert (outcome.figures, outcome.attempts) == ({"tries": 2.0}, 2)
     assert not list(place.glob(".*"))
 
@@ -98,7 +98,7 @@ def test_two_drivers_on_one_folder_share_the_work(tmp_path: Path) -> None:
 def test_clocks_need_not_be_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Files of the future and of long ago change nothing, nor does a clock that is set back an hour at every look."""
     folder, tasks = tmp_path / "c", cheap.adding(3)
-    run(tasks, folder, Processes(1))
+    run(tasks, folder, ProcessExecutor(1))
     store = open_store(folder)
     listing(store)
     for times, task in zip(((0, 0), (2**33, 2**33), (1e9, 1e9)), tasks, strict=True):
@@ -107,7 +107,7 @@ def test_clocks_need_not_be_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     hour_s = iter(range(10**9, 0, -3600))
     monkeypatch.setattr(time, "time", lambda: float(next(hour_s)))
     monkeypatch.setattr(time, "time_ns", lambda: 10**9 * next(hour_s))
-    outcomes = run([*tasks, *cheap.adding(5)[3:]], folder, Processes(1), timeout_s=60.0, retries=0)
+    outcomes = run([*tasks, *cheap.adding(5)[3:]], folder, ProcessExecutor(1), timeout_s=60.0, retries=0)
     assert [outcome.known for outcome in outcomes] == [True, True, True, False, False]
     monkeypatch.undo()
     tasks += cheap.adding(5)[3:]
@@ -121,12 +121,12 @@ def test_a_disk_that_fills_up_loses_nothing(small_disk: Path) -> None:
     folder, tasks = small_disk / "c", cheap.adding(16)
     for _ in range(2):
         with pytest.raises(EnvironmentFailure, match="the disk is full; what was finished is kept"):
-            run(tasks, folder, Processes(2))
+            run(tasks, folder, ProcessExecutor(2))
     store, finished = open_store(folder), {}
     _check_nothing_changed(store, tasks, finished)
     assert 0 < len(finished) < len(tasks)
     subprocess.run(["mount", "-o", "remount,size=4m", str(small_disk)], check=True)
-    assert all(outcome.figures is not None for outcome in run(tasks, folder, Processes(2)))
+    assert all(outcome.figures is not None for outcome in run(tasks, folder, ProcessExecutor(2)))
     _check_nothing_changed(store, tasks, finished)
     _check_all_once(store, tasks)
 
@@ -152,18 +152,18 @@ def _begin(folder: Path, tasks: list[Task], takes_s: float) -> subprocess.Popen[
     )
 
 
-def _kill_workers(store: Store) -> None:
+def _kill_workers(store: CampaignStore) -> None:
     for place in store.trials.glob("*"):
         holder = holder_of(place)
         if holder is not None and is_running(holder.pid, holder.start):
             os.kill(holder.pid, signal.SIGKILL)
 
 
-def _all_begun(store: Store, tasks: list[Task], times: int) -> bool:
+def _all_begun(store: CampaignStore, tasks: list[Task], times: int) -> bool:
     return all(read_attempts(store.place(task.key)).begun == times for task in tasks)
 
 
-def _check_nothing_changed(store: Store, tasks: list[Task], finished: dict[str, tuple[int, int]]) -> None:
+def _check_nothing_changed(store: CampaignStore, tasks: list[Task], finished: dict[str, tuple[int, int]]) -> None:
     """What was finished before is there still, the same file; what is finished now is remembered."""
     for task in tasks:
         path = store.place(task.key) / FIGURES
@@ -173,7 +173,7 @@ def _check_nothing_changed(store: Store, tasks: list[Task], finished: dict[str, 
         assert finished.setdefault(task.key, (facts.st_ino, facts.st_mtime_ns)) == (facts.st_ino, facts.st_mtime_ns)
 
 
-def _check_all_once(store: Store, tasks: list[Task]) -> None:
+def _check_all_once(store: CampaignStore, tasks: list[Task]) -> None:
     """Figures of every trial are right, nothing was begun after a trial was done, and no file is half there."""
     for seed, task in enumerate(tasks):
         place = store.place(task.key)

@@ -14,7 +14,7 @@ import cheap
 import pytest
 
 from wakewise.core.errors import EnvironmentFailure, InputError
-from wakewise.experiments.campaigns import Processes, Task, run
+from wakewise.experiments.campaigns import ProcessExecutor, Task, run
 from wakewise.experiments.campaigns.attempt_log import read_attempts
 from wakewise.experiments.campaigns.store import open_store
 
@@ -23,7 +23,7 @@ def test_every_trial_has_its_figures_and_what_fails_its_reason(tmp_path: Path) -
     """Outcomes come in the order asked for; an exception of the work is final, a process that died is tried again."""
     tasks = [*cheap.adding(5), cheap.one("refuse"), cheap.one("die", times=2), cheap.one("die", times=9)]
     told: list[tuple[float, float, str]] = []
-    outcomes = run(tasks, tmp_path / "c", Processes(2), retries=2, progress=lambda *words: told.append(words))
+    outcomes = run(tasks, tmp_path / "c", ProcessExecutor(2), retries=2, progress=lambda *words: told.append(words))
     assert [outcome.task for outcome in outcomes] == tasks
     assert [outcome.figures for outcome in outcomes[:5]] == [{"twice": 2.0 * seed} for seed in range(5)]
     refused, late, lost = outcomes[5:]
@@ -39,12 +39,12 @@ def test_every_trial_has_its_figures_and_what_fails_its_reason(tmp_path: Path) -
 def test_a_second_run_makes_nothing_and_again_tries_what_failed(tmp_path: Path) -> None:
     """Finished trials and failures are known; `again` begins failures anew and leaves the finished alone."""
     tasks = [*cheap.adding(3), cheap.one("die", times=2)]
-    run(tasks, tmp_path / "c", Processes(1), retries=0)
-    second = run(tasks, tmp_path / "c", Processes(1), retries=0)
+    run(tasks, tmp_path / "c", ProcessExecutor(1), retries=0)
+    second = run(tasks, tmp_path / "c", ProcessExecutor(1), retries=0)
     assert all(outcome.known for outcome in second)
     assert second[-1].figures is None
-    run(tasks, tmp_path / "c", Processes(1), retries=0, again=True)
-    third = run(tasks, tmp_path / "c", Processes(1), retries=0, again=True)
+    run(tasks, tmp_path / "c", ProcessExecutor(1), retries=0, again=True)
+    third = run(tasks, tmp_path / "c", ProcessExecutor(1), retries=0, again=True)
     assert third[-1].figures == {"tries": 3.0}
     assert [outcome.attempts for outcome in third] == [1, 1, 1, 3]
 
@@ -52,8 +52,8 @@ def test_a_second_run_makes_nothing_and_again_tries_what_failed(tmp_path: Path) 
 def test_more_retries_go_on_where_fewer_gave_up(tmp_path: Path) -> None:
     """Attempts are counted in the folder, over runs."""
     task = cheap.one("die", times=2)
-    assert run([task], tmp_path / "c", Processes(1), retries=1)[0].figures is None
-    assert run([task], tmp_path / "c", Processes(1), retries=2)[0].attempts == 3
+    assert run([task], tmp_path / "c", ProcessExecutor(1), retries=1)[0].figures is None
+    assert run([task], tmp_path / "c", ProcessExecutor(1), retries=2)[0].attempts == 3
 
 
 def test_a_trial_that_never_ends_is_ended(tmp_path: Path) -> None:
@@ -64,15 +64,17 @@ def test_a_trial_that_never_ends_is_ended(tmp_path: Path) -> None:
     def other_is_made() -> bool:
         return store.figures(tasks[1].key) is not None
 
-    hung, made = run(tasks, tmp_path / "c", Processes(2), stop=other_is_made)
+    hung, made = run(tasks, tmp_path / "c", ProcessExecutor(2), stop=other_is_made)
     assert (hung.figures, made.figures) == (None, {"twice": 0.0})
-    (hung,) = run(tasks[:1], tmp_path / "c", Processes(1), timeout_s=0.5, retries=0)
+    (hung,) = run(tasks[:1], tmp_path / "c", ProcessExecutor(1), timeout_s=0.5, retries=0)
     assert hung.reason == "took longer than 0.5 s"
 
 
 def test_a_trial_that_takes_too_much_memory_is_ended(tmp_path: Path) -> None:
     """Memory is that of the trial's processes, and the reason says how much."""
-    (swollen,) = run([cheap.one("swell")], tmp_path / "c", Processes(1), memory_MB=300.0, retries=0, timeout_s=30.0)
+    (swollen,) = run(
+        [cheap.one("swell")], tmp_path / "c", ProcessExecutor(1), memory_MB=300.0, retries=0, timeout_s=30.0
+    )
     assert swollen.reason is not None
     assert swollen.reason.startswith("took ")
     assert swollen.reason.endswith("MB of memory, allowed 300")
@@ -83,11 +85,11 @@ def test_a_full_disk_is_told_in_a_line_and_nothing_is_lost(tmp_path: Path) -> No
     folder, room = tmp_path / "c", tmp_path / "room"
     tasks = [*cheap.adding(2), cheap.one("no_room", room=str(room))]
     with pytest.raises(EnvironmentFailure, match="the disk is full; what was finished is kept"):
-        run(tasks, folder, Processes(1))
+        run(tasks, folder, ProcessExecutor(1))
     store = open_store(folder)
     assert [store.figures(task.key) for task in tasks] == [{"twice": 0.0}, {"twice": 2.0}, None]
     room.touch()
-    outcomes = run(tasks, folder, Processes(1))
+    outcomes = run(tasks, folder, ProcessExecutor(1))
     assert [outcome.known for outcome in outcomes] == [True, True, False]
     assert len(outcomes[-1].figures or {}) == 200
     assert not list(store.place(tasks[-1].key).glob(".*"))
@@ -99,10 +101,10 @@ def test_a_table_that_does_not_fit_is_a_full_disk_too(tmp_path: Path) -> None:
     task = cheap.one("too_large", room=str(room))
     for _ in range(4):  # more than there are retries
         with pytest.raises(EnvironmentFailure, match="the disk is full; what was finished is kept"):
-            run([task], folder, Processes(1))
+            run([task], folder, ProcessExecutor(1))
     assert not list((open_store(folder).place(task.key) / "work").iterdir())
     room.touch()
-    (outcome,) = run([task], folder, Processes(1))
+    (outcome,) = run([task], folder, ProcessExecutor(1))
     assert outcome.figures == {"made": 1.0}
 
 
@@ -111,7 +113,7 @@ def test_failures_of_the_computer_are_never_the_trials_own(tmp_path: Path) -> No
     room = tmp_path / "room"
     tasks = [*cheap.adding(1), *(cheap.one("fail", fault=name, room=str(room)) for name in cheap.FAULTS)]
     for runs in (1, 2):
-        first, *others = run(tasks, tmp_path / "c", Processes(2), retries=1)
+        first, *others = run(tasks, tmp_path / "c", ProcessExecutor(2), retries=1)
         assert first.figures == {"twice": 0.0}
         assert [(one.figures, one.how, one.attempts) for one in others] == [(None, "computer", 2 * runs)] * len(others)
     assert others[0].reason == "out of memory (Unable to allocate 9 GiB)"
@@ -119,14 +121,14 @@ def test_failures_of_the_computer_are_never_the_trials_own(tmp_path: Path) -> No
         "Input/output error", "Read-only file system", "Too many open files", "Stale file handle",
     ]  # fmt: skip
     room.touch()
-    assert all(one.figures is not None for one in run(tasks, tmp_path / "c", Processes(2), retries=1))
+    assert all(one.figures is not None for one in run(tasks, tmp_path / "c", ProcessExecutor(2), retries=1))
 
 
 def test_stopping_ends_what_is_under_way_and_it_counts_as_no_failure(tmp_path: Path) -> None:
     """What was stopped is made by the next run, as if it had not been begun."""
     task = cheap.adding(1, takes_s=300.0)[0]
     place = open_store(tmp_path / "c").place(task.key)
-    (outcome,) = run([task], tmp_path / "c", Processes(1), stop=lambda: read_attempts(place).begun > 0)
+    (outcome,) = run([task], tmp_path / "c", ProcessExecutor(1), stop=lambda: read_attempts(place).begun > 0)
     assert outcome.figures is None
     told = read_attempts(place)
     assert (told.begun, told.failed, told.how) == (1, 0, "stopped")
@@ -138,7 +140,9 @@ def test_time_that_is_over_ends_what_is_under_way_and_no_more_than_it_is_told(tm
     told: list[str] = []
     tasks = cheap.adding(40, takes_s=0.5)
     until = time.monotonic() + 5.0
-    outcomes = run(tasks, tmp_path / "c", Processes(1), until=until, progress=lambda *words: told.append(words[2]))
+    outcomes = run(
+        tasks, tmp_path / "c", ProcessExecutor(1), until=until, progress=lambda *words: told.append(words[2])
+    )
     made = [outcome.figures is not None for outcome in outcomes]
     assert made == sorted(made, reverse=True) and not made[-1]
     left_s = [float(words.removesuffix(" s left")) for words in told if words.endswith("s left")]
@@ -148,7 +152,7 @@ def test_time_that_is_over_ends_what_is_under_way_and_no_more_than_it_is_told(tm
 def test_workers_share_the_cores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Libraries in a worker are told how many threads they may have: cores over workers, at least one."""
     monkeypatch.setattr("wakewise.experiments.campaigns.engines.cores", lambda: 8)
-    (outcome,) = run([cheap.one("threads")], tmp_path / "c", Processes(2))
+    (outcome,) = run([cheap.one("threads")], tmp_path / "c", ProcessExecutor(2))
     assert outcome.figures == {"threads": 4.0, "omp": 4.0}
 
 
@@ -158,7 +162,7 @@ def test_two_drivers_in_one_process_do_not_disturb_each_other(tmp_path: Path) ->
     both: list[list[float | None]] = []
 
     def drive() -> None:
-        found = run(tasks, tmp_path / "c", Processes(1))
+        found = run(tasks, tmp_path / "c", ProcessExecutor(1))
         both.append([outcome.took_s for outcome in found if outcome.figures is not None])
 
     drivers = [threading.Thread(target=drive) for _ in range(2)]
@@ -175,7 +179,7 @@ def test_two_drivers_in_one_process_do_not_disturb_each_other(tmp_path: Path) ->
 def test_what_is_made_says_of_what(tmp_path: Path) -> None:
     """A trial's folder tells its work, settings and versions, so that anyone can make it again."""
     (task,) = cheap.adding(1)
-    run([task], tmp_path / "c", Processes(1))
+    run([task], tmp_path / "c", ProcessExecutor(1))
     told = json.loads((open_store(tmp_path / "c").place(task.key) / "trial.json").read_text())
     assert told["settings"] == {"seed": 0, "takes_s": 0.0}
     assert told["key"] == task.key
@@ -193,7 +197,7 @@ def test_what_is_made_says_of_what(tmp_path: Path) -> None:
 def test_bounds_that_nothing_can_keep_are_refused(tmp_path: Path, bounds: dict[str, float], words: str) -> None:
     """In one line, before anything is begun."""
     with pytest.raises(InputError, match=words):
-        run(cheap.adding(1), tmp_path / "c", Processes(1), **bounds)  # type: ignore[arg-type]
+        run(cheap.adding(1), tmp_path / "c", ProcessExecutor(1), **bounds)  # type: ignore[arg-type]
     assert not (tmp_path / "c").exists()
 
 
@@ -201,12 +205,12 @@ def test_bounds_that_nothing_can_keep_are_refused(tmp_path: Path, bounds: dict[s
 def test_a_number_of_workers_that_cannot_be_is_refused(workers: int) -> None:
     """At least one, and no more than a machine could have."""
     with pytest.raises(InputError, match="workers"):
-        Processes(workers)
+        ProcessExecutor(workers)
 
 
 def test_no_tasks_are_no_work(tmp_path: Path) -> None:
     """An empty campaign has no outcomes."""
-    assert run([], tmp_path / "c", Processes(1)) == []
+    assert run([], tmp_path / "c", ProcessExecutor(1)) == []
 
 
 def test_tasks_of_one_key_are_made_once(tmp_path: Path) -> None:
@@ -215,6 +219,6 @@ def test_tasks_of_one_key_are_made_once(tmp_path: Path) -> None:
         cheap.adding(1)[0],
         Task(name="b", work="cheap:add", settings={"takes_s": 0.0, "seed": 0}, sources=("files.py",)),
     )
-    outcomes = run([task, other], tmp_path / "c", Processes(2))
+    outcomes = run([task, other], tmp_path / "c", ProcessExecutor(2))
     assert [outcome.figures for outcome in outcomes] == [{"twice": 0.0}] * 2
     assert outcomes[0].attempts == 1

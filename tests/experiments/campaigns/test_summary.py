@@ -2,9 +2,9 @@
 
 import pytest
 
-from wakewise.experiments.campaigns.summary import Measure, glance, worst_trials
+from wakewise.experiments.campaigns.summary import ComparisonMetric, glance, worst_trials
 
-RMSE = Measure("rmse_mm", "mm RMSE", 1.0, True)
+RMSE = ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True)
 
 
 def place(method, seed, rmse, energy=1.0, target="brain", world="pump-tank"):

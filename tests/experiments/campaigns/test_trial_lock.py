@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from wakewise.experiments.campaigns import trial_lock
-from wakewise.experiments.campaigns.trial_lock import CLAIM, Holder, this_process
+from wakewise.experiments.campaigns.trial_lock import CLAIM, LockHolder, this_process
 
 
-def _write(folder: Path, holder: Holder) -> None:
+def _write(folder: Path, holder: LockHolder) -> None:
     (folder / CLAIM).write_text(json.dumps(asdict(holder)))
 
 
@@ -64,7 +64,7 @@ def test_a_number_given_anew_is_not_taken_for_its_holder(tmp_path: Path, change:
 
 def test_a_holder_on_another_computer_is_gone_when_its_heart_stops(tmp_path: Path) -> None:
     """Of it nothing but the heartbeat is known: only a beat that was seen not to change makes its claim free."""
-    _write(tmp_path, Holder("elsewhere", "b", 1, 1))
+    _write(tmp_path, LockHolder("elsewhere", "b", 1, 1))
     assert not trial_lock.take(tmp_path)
     beat = trial_lock.beat_of(tmp_path)
     assert beat is not None

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 from wakewise.core.geometry import quat_from_rotvec
-from wakewise.experiments.exports import Cloud, Photographs, Track
+from wakewise.experiments.exports import Photographs, SparsePoints, Trajectory
 
 RNG = np.random.default_rng(18)
 
 
 @pytest.fixture
-def track() -> Track:
+def track() -> Trajectory:
     """Four poses, turned in all ways."""
     q = np.array([quat_from_rotvec(v) for v in RNG.uniform(-2.0, 2.0, (4, 3))])
-    return Track(times_s=np.array([0.0, 0.1, 1.25, 2.0000001]), p_W_m=RNG.normal(size=(4, 3)), q=q)
+    return Trajectory(times_s=np.array([0.0, 0.1, 1.25, 2.0000001]), p_W_m=RNG.normal(size=(4, 3)), q=q)
 
 
 @pytest.fixture
-def photographs(track: Track, tmp_path: Path) -> Photographs:
+def photographs(track: Trajectory, tmp_path: Path) -> Photographs:
     """Photographs of 64 x 48 px; what is in the files is of no concern here."""
     (tmp_path / "photos").mkdir()
     files = tuple(tmp_path / "photos" / f"{k:03}.jpg" for k in range(4))
@@ -30,9 +30,9 @@ def photographs(track: Track, tmp_path: Path) -> Photographs:
 
 
 @pytest.fixture
-def cloud() -> Cloud:
+def cloud() -> SparsePoints:
     """Five points."""
-    return Cloud(
+    return SparsePoints(
         points_W_m=RNG.normal(size=(5, 3)),
         colours=RNG.integers(0, 256, (5, 3), np.uint8),
         errors_px=RNG.uniform(0.1, 1.0, 5),

@@ -7,14 +7,14 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.experiments.exports import Cloud, Photographs, read_points, write_colmap
+from wakewise.experiments.exports import Photographs, SparsePoints, read_points, write_colmap
 
 pycolmap = pytest.importorskip("pycolmap")
 RNG = np.random.default_rng(7)
 
 
 @pytest.mark.parametrize("where", ["sparse/0", "sparse_text"])
-def test_colmap_reads_the_poses_back(where: str, photographs: Photographs, cloud: Cloud, tmp_path: Path) -> None:
+def test_colmap_reads_the_poses_back(where: str, photographs: Photographs, cloud: SparsePoints, tmp_path: Path) -> None:
     """Poses, camera and points to 1e-9 from the binary model and from the text; world points project as ours do."""
     (tmp_path / "out").mkdir()
     write_colmap(tmp_path / "out", photographs, cloud)
@@ -44,7 +44,9 @@ def test_no_cloud_is_a_model_without_points(photographs: Photographs, tmp_path: 
     assert (model.num_images(), model.num_points3D()) == (4, 0)
 
 
-def test_points_of_a_model_are_read_without_colmap(photographs: Photographs, cloud: Cloud, tmp_path: Path) -> None:
+def test_points_of_a_model_are_read_without_colmap(
+    photographs: Photographs, cloud: SparsePoints, tmp_path: Path
+) -> None:
     """What COLMAP wrote, tracks and all, is read; a file that was cut short is refused in one line."""
     (tmp_path / "out").mkdir()
     write_colmap(tmp_path / "out", photographs)
@@ -67,7 +69,7 @@ def test_points_of_a_model_are_read_without_colmap(photographs: Photographs, clo
         read_points(path)
 
 
-def _theirs(folder: Path, photographs: Photographs, cloud: Cloud) -> Path:
+def _theirs(folder: Path, photographs: Photographs, cloud: SparsePoints) -> Path:
     """A sparse model as COLMAP writes it of points that some photographs saw, beside features that belong to none."""
     (folder / "out").mkdir()
     write_colmap(folder / "out", photographs)
@@ -84,7 +86,7 @@ def _theirs(folder: Path, photographs: Photographs, cloud: Cloud) -> Path:
 
 
 @pytest.mark.parametrize("where", ["sparse/0", "sparse_text"])
-def test_points_keep_what_saw_them(where: str, photographs: Photographs, cloud: Cloud, tmp_path: Path) -> None:
+def test_points_keep_what_saw_them(where: str, photographs: Photographs, cloud: SparsePoints, tmp_path: Path) -> None:
     """COLMAP reads the observations of its own model back, and reckons the same errors with the poses written here."""
     theirs = _theirs(tmp_path, photographs, cloud)
     before = pycolmap.Reconstruction(theirs)
@@ -112,7 +114,7 @@ def test_points_keep_what_saw_them(where: str, photographs: Photographs, cloud: 
             assert written[key] == pytest.approx(point.error, rel=1e-9)
 
 
-def test_points_that_nothing_saw_claim_no_error(photographs: Photographs, cloud: Cloud, tmp_path: Path) -> None:
+def test_points_that_nothing_saw_claim_no_error(photographs: Photographs, cloud: SparsePoints, tmp_path: Path) -> None:
     """Without observations an error is not known, and COLMAP prints none."""
     (tmp_path / "out").mkdir()
     assert write_colmap(tmp_path / "out", photographs, cloud) == 0
@@ -121,7 +123,7 @@ def test_points_that_nothing_saw_claim_no_error(photographs: Photographs, cloud:
     assert model.compute_mean_reprojection_error() == 0.0
 
 
-def test_images_that_were_cut_short_are_refused(photographs: Photographs, cloud: Cloud, tmp_path: Path) -> None:
+def test_images_that_were_cut_short_are_refused(photographs: Photographs, cloud: SparsePoints, tmp_path: Path) -> None:
     """In one line, as points that were."""
     theirs = _theirs(tmp_path, photographs, cloud)
     data = (theirs / "images.bin").read_bytes()

@@ -7,9 +7,9 @@ import numpy as np
 import trimesh
 
 from wakewise.core.geometry import Pose
-from wakewise.experiments.exports import Cloud, Photographs, write_nerfstudio
+from wakewise.experiments.exports import Photographs, SparsePoints, write_nerfstudio
 from wakewise.experiments.exports.frames import flu_of
-from wakewise.vision.imaging.camera_model import Calibration
+from wakewise.vision.imaging.camera_model import OpenCVCamera
 
 
 def _undistorted(x: float, y: float, k1: float, k2: float, p1: float, p2: float) -> tuple[float, float]:
@@ -39,7 +39,7 @@ def test_rays_hit_the_points_that_our_camera_sees(photographs: Photographs, tmp_
     (tmp_path / "out").mkdir()
     write_nerfstudio(tmp_path / "out", photographs)
     told = json.loads((tmp_path / "out" / "transforms.json").read_text())
-    ours = Calibration(
+    ours = OpenCVCamera(
         width=64, height=48, params=photographs.params, ahead_m=0.0, rms_px=0.0, max_px=0.0, depths_m=np.ones(1)
     )
     rng = np.random.default_rng(3)
@@ -59,7 +59,9 @@ def test_rays_hit_the_points_that_our_camera_sees(photographs: Photographs, tmp_
             assert np.linalg.norm(away - (away @ ray) * ray) < 1e-9
 
 
-def test_photographs_and_points_lie_beside_the_poses(photographs: Photographs, cloud: Cloud, tmp_path: Path) -> None:
+def test_photographs_and_points_lie_beside_the_poses(
+    photographs: Photographs, cloud: SparsePoints, tmp_path: Path
+) -> None:
     """Every file that is named is there with the same bytes; the cloud stands in the world of the poses."""
     (tmp_path / "out").mkdir()
     write_nerfstudio(tmp_path / "out", photographs, cloud)

@@ -8,7 +8,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import quat_from_euler
-from wakewise.experiments.exports import Origin, Track, write_plan
+from wakewise.experiments.exports import GeodeticOrigin, Trajectory, write_plan
 
 
 def _ecef(lat_deg: float, lon_deg: float, height_m: float) -> np.ndarray:
@@ -21,8 +21,10 @@ def _ecef(lat_deg: float, lon_deg: float, height_m: float) -> np.ndarray:
     return np.array([across * np.cos(lon), across * np.sin(lon), (normal * (1.0 - e2) + height_m) * np.sin(lat)])
 
 
-@pytest.mark.parametrize("origin", [Origin(36.52, -6.28), Origin(-60.0, 179.9995), Origin(0.0, 0.0)])
-def test_places_are_where_the_ellipsoid_has_them(origin: Origin) -> None:
+@pytest.mark.parametrize(
+    "origin", [GeodeticOrigin(36.52, -6.28), GeodeticOrigin(-60.0, 179.9995), GeodeticOrigin(0.0, 0.0)]
+)
+def test_places_are_where_the_ellipsoid_has_them(origin: GeodeticOrigin) -> None:
     """Reckoned back through Earth-centred coordinates, points within 100 m are right to 2 mm, also across 180 deg."""
     rng = np.random.default_rng(1)
     north, east = rng.uniform(-70.0, 70.0, (2, 30))
@@ -42,12 +44,12 @@ def test_places_are_where_the_ellipsoid_has_them(origin: Origin) -> None:
 
 def test_a_waypoint_is_below_home_and_faces_as_the_vehicle(tmp_path: Path) -> None:
     """Depth is a negative height, a heading of west is 270, and the items are numbered in their order."""
-    track = Track(
+    track = Trajectory(
         times_s=np.array([0.0, 1.0]),
         p_W_m=np.array([[1.0, 0.0, 1.5], [0.0, -2.0, 0.5]]),
         q=np.array([quat_from_euler(0.0, 0.1, 0.0), quat_from_euler(0.0, 0.0, -np.pi / 2)]),
     )
-    write_plan(tmp_path / "a.plan", track, Origin(40.0, 3.0), 0.1)
+    write_plan(tmp_path / "a.plan", track, GeodeticOrigin(40.0, 3.0), 0.1)
     plan = json.loads((tmp_path / "a.plan").read_text())
     assert (plan["fileType"], plan["version"], plan["mission"]["version"]) == ("Plan", 1, 2)
     assert plan["mission"]["plannedHomePosition"] == [40.0, 3.0, 0.0]
@@ -65,4 +67,4 @@ def test_a_waypoint_is_below_home_and_faces_as_the_vehicle(tmp_path: Path) -> No
 def test_an_origin_off_the_globe_is_refused(lat: float, lon: float) -> None:
     """So is one at a pole, where there is no east."""
     with pytest.raises(InputError, match="-89 to 89"):
-        Origin(lat, lon)
+        GeodeticOrigin(lat, lon)

@@ -8,7 +8,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import matrix_from_quat
-from wakewise.experiments.exports import Photographs, Telemetry, Track
+from wakewise.experiments.exports import Photographs, ThrustRecord, Trajectory
 from wakewise.experiments.exports.frames import enu_of, ros_body
 
 pytest.importorskip("rosbags")
@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 from wakewise.experiments.exports import write_bag
 
 RNG = np.random.default_rng(4)
-TELEMETRY = Telemetry(
+TELEMETRY = ThrustRecord(
     times_s=np.arange(3) * 0.1, thrusts_N=RNG.normal(size=(3, 8)), wrenches_B=np.tile(np.arange(1.0, 7.0), (3, 1))
 )
 
@@ -38,7 +38,7 @@ def _pose(position: Any, turn: Any) -> tuple[np.ndarray, np.ndarray]:
     return np.array([position.x, position.y, position.z]), np.array([turn.w, turn.x, turn.y, turn.z])
 
 
-def test_poses_come_back_to_ned_and_frd(track: Track, tmp_path: Path) -> None:
+def test_poses_come_back_to_ned_and_frd(track: Trajectory, tmp_path: Path) -> None:
     """What rosbags reads, turned back, is what was flown to 1e-9: poses and transforms, times to the nanosecond."""
     assert write_bag(tmp_path / "bag", {"true": track, "estimated": track}) == 16
     found = _read(tmp_path / "bag")
@@ -59,7 +59,7 @@ def test_poses_come_back_to_ned_and_frd(track: Track, tmp_path: Path) -> None:
         np.testing.assert_allclose(p, enu_of(track.p_W_m[k]), atol=1e-9)
 
 
-def test_a_wrench_is_flu_and_thrusts_stay(track: Track, tmp_path: Path) -> None:
+def test_a_wrench_is_flu_and_thrusts_stay(track: Trajectory, tmp_path: Path) -> None:
     """X, Y, Z, K, M, N of FRD become X, -Y, -Z, K, -M, -N; thrusts are the thrusters' own, exactly."""
     write_bag(tmp_path / "bag", {"estimated": track}, TELEMETRY)
     found = _read(tmp_path / "bag")
@@ -95,7 +95,7 @@ def test_a_point_projects_to_the_pixel_that_ours_gives(photographs: Photographs,
         np.testing.assert_allclose(p + matrix_from_quat(q) @ point_C, there, atol=1e-9)
 
 
-def test_times_run_forward_through_all_topics(track: Track, tmp_path: Path) -> None:
+def test_times_run_forward_through_all_topics(track: Trajectory, tmp_path: Path) -> None:
     """Messages lie in the file in the order of time, as they were recorded by a vehicle."""
     write_bag(tmp_path / "bag", {"true": track}, TELEMETRY)
     with Reader(tmp_path / "bag") as reader:
@@ -103,7 +103,7 @@ def test_times_run_forward_through_all_topics(track: Track, tmp_path: Path) -> N
     assert times == sorted(times)
 
 
-def test_foxgloves_reader_opens_it(track: Track, tmp_path: Path) -> None:
+def test_foxgloves_reader_opens_it(track: Trajectory, tmp_path: Path) -> None:
     """The `mcap` library, which knows nothing of rosbags, finds all messages, their types and definitions."""
     reader = pytest.importorskip("mcap.reader")
     written = write_bag(tmp_path / "bag", {"true": track}, TELEMETRY)
@@ -117,6 +117,6 @@ def test_foxgloves_reader_opens_it(track: Track, tmp_path: Path) -> None:
 
 def test_a_time_below_zero_is_refused(tmp_path: Path) -> None:
     """ROS's time holds none."""
-    early = Track(times_s=np.array([-1.0]), p_W_m=np.zeros((1, 3)), q=np.array([[1.0, 0, 0, 0]]))
+    early = Trajectory(times_s=np.array([-1.0]), p_W_m=np.zeros((1, 3)), q=np.array([[1.0, 0, 0, 0]]))
     with pytest.raises(InputError, match="below 0"):
         write_bag(tmp_path / "bag", {"true": early})

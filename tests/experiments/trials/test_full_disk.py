@@ -11,7 +11,7 @@ import pytest
 
 from wakewise.core.errors import EnvironmentFailure
 from wakewise.experiments.trials import trial as trials
-from wakewise.experiments.trials.stages import Ledger
+from wakewise.experiments.trials.stages import StageCosts
 from wakewise.operation import Parts, load_scenario
 from wakewise.vision.reconstruction import ReconstructionSettings, features
 from wakewise_paper import photo_model, photo_robustness
@@ -131,7 +131,7 @@ def test_a_level_that_met_a_full_disk_is_done_again(tmp_path: Path, monkeypatch:
 def test_a_ledger_that_cannot_be_written_does_not_hide_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first failure is the one that is told; a full disk that only the ledger met is told too."""
     monkeypatch.setattr("wakewise.experiments.trials.stages.write_json", _fill)
-    ledger = Ledger(tmp_path / "stages.json")
+    ledger = StageCosts(tmp_path / "stages.json")
     with pytest.raises(EnvironmentFailure, match="first"), ledger.account("fly"):
         raise EnvironmentFailure("first")
     with pytest.raises(OSError, match="No space"), ledger.account("fly"):

@@ -11,14 +11,14 @@ from wakewise.experiments.trials import run_trial
 from wakewise.operation import LiveFlight, load_scenario, read_scenario
 from wakewise.operation.teleop.assisted import assisted
 from wakewise.operation.teleop.input.script import script_of
-from wakewise.operation.teleop.operator_state import Desk
+from wakewise.operation.teleop.operator_state import OperatorState
 
 SCENARIO = load_scenario("quick", None, {"method": "dp", "imaging.width": 320, "imaging.height": 240})
 
 
 def flown(folder: Path, script: list[dict[str, object]]) -> Path:
     """The folder of a short flight by a script's hands."""
-    flight = LiveFlight(assisted(SCENARIO.parts(), script_of(script), Desk()), folder=folder, paced=False)
+    flight = LiveFlight(assisted(SCENARIO.parts(), script_of(script), OperatorState()), folder=folder, paced=False)
     flight.start()
     flight.join(120.0)
     assert flight.fault is None

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from wakewise.experiments.trials.metrics import BETTER, DEFINITIONS, UNITS, Gathering, comparison
+from wakewise.experiments.trials.metrics import BETTER, DEFINITIONS, UNITS, MetricsCollector, comparison
 
 # The keys that every scan promises to machines that read its JSON.
 PROMISED = [
@@ -47,7 +47,7 @@ PROMISED = [
 
 def test_every_promised_figure_is_there_with_unit_and_definition() -> None:
     """Even with nothing computed all keys are present, null, and say why."""
-    result = Gathering().finish()
+    result = MetricsCollector().finish()
     for key in PROMISED:
         assert result[key] is None
         assert result["why"][key]
@@ -58,7 +58,7 @@ def test_every_promised_figure_is_there_with_unit_and_definition() -> None:
 
 def test_a_figure_that_is_there_needs_no_excuse_and_one_that_failed_keeps_its_reason() -> None:
     """Reasons stand beside null figures only."""
-    gathering = Gathering()
+    gathering = MetricsCollector()
     gathering.add({"rmse_mm": 1.25, "success": False, "fallbacks": 0})
     gathering.missing(("rmse_mm", "f_score"), "no model: 3 of 48 photographs registered")
     result = gathering.finish()

@@ -6,7 +6,7 @@ import pytest
 
 from wakewise.control import vehicle_layout
 from wakewise.core.geometry import Pose, look_at
-from wakewise.experiments.trials.metrics import BETTER, DEFINITIONS, UNITS, Gathering
+from wakewise.experiments.trials.metrics import BETTER, DEFINITIONS, UNITS, MetricsCollector
 from wakewise.experiments.trials.reference_values import (
     add_yardsticks,
     ambient_speed_m_s,
@@ -64,7 +64,7 @@ def test_grains_move_at_the_stress_that_the_tank_takes(parts: Parts) -> None:
 def test_what_cannot_be_computed_says_why(parts: Parts) -> None:
     """Without commands no sharing, without grains no threshold; the water's own speed is there all the same."""
     clear = load_scenario("quick", None, {"tank.silt.kind": "clear"})
-    gathering = Gathering()
+    gathering = MetricsCollector()
     add_yardsticks(gathering, clear.parts(), pl.DataFrame({"time_s": [0.0, 1.0]}))
     result = gathering.finish()
     assert result["ambient_speed_m_s"] > 0.0

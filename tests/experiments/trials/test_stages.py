@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from wakewise.experiments.trials.stages import Ledger
+from wakewise.experiments.trials.stages import StageCosts
 
 
 def test_costs_add_up_also_when_a_stage_is_cut_short(tmp_path: Path) -> None:
     """A stage that was interrupted and run again has cost the sum of both."""
-    ledger = Ledger(tmp_path / "stages.json")
+    ledger = StageCosts(tmp_path / "stages.json")
     with pytest.raises(KeyboardInterrupt), ledger.account("fly"):
         raise KeyboardInterrupt
     first = ledger.read()["fly"]["wall_s"]

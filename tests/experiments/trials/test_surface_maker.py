@@ -15,7 +15,7 @@ from wakewise.core.files import write_json
 from wakewise.experiments.trials import surface
 from wakewise.experiments.trials.surface import SurfaceMaker
 from wakewise.vision.reconstruction import ReconstructionSettings
-from wakewise.vision.reconstruction.clouds import Cloud, write_cloud
+from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud
 from wakewise.vision.reconstruction.colmap import pycolmap
 
 COARSE = ReconstructionSettings(mesh_depth=6)
@@ -42,7 +42,7 @@ def folder(tmp_path):
     normals = rng.normal(size=(6000, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     colours = np.full((6000, 3), 0.5)
-    write_cloud(tmp_path / "dense.ply", Cloud(points_m=0.05 * normals, normals=normals, colours=colours))
+    write_cloud(tmp_path / "dense.ply", OrientedPointCloud(points_m=0.05 * normals, normals=normals, colours=colours))
     stamp = {"key": "k", "wall_s": 0.0, "figures": {"point_spacing_mm": 2.0}}
     write_json(tmp_path / "stages" / "dense.json", stamp)
     (tmp_path / "sparse").mkdir()

@@ -11,7 +11,7 @@ import yaml
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import quat_from_euler
-from wakewise.experiments.exports import Origin
+from wakewise.experiments.exports import GeodeticOrigin
 from wakewise.experiments.trials.export import EXPORTS, export_trial
 from wakewise.ui.cli.main import run
 
@@ -51,7 +51,7 @@ def test_each_format_is_written_once_and_again(trial: Path) -> None:
     pytest.importorskip("rosbags")
     for _ in range(2):
         for to in EXPORTS:
-            origin = Origin(36.5, -6.3) if to == "qgc-plan" else None
+            origin = GeodeticOrigin(36.5, -6.3) if to == "qgc-plan" else None
             assert export_trial(trial, to, origin=origin).path.exists()
     assert sorted(path.name for path in (trial / "export").iterdir()) == [
         "colmap", "nerfstudio", "rosbag2", "route.plan", "tum",

@@ -19,7 +19,7 @@ from wakewise.core.run_lock import alone
 from wakewise.experiments.trials import run_trial
 from wakewise.operation import Parts, Scenario, fly, load_scenario
 from wakewise.operation.worlds.makers import tank_world, true_start, true_vehicle
-from wakewise.operation.worlds.quasi_steady_world import InstantWater, jets_of
+from wakewise.operation.worlds.quasi_steady_world import QuasiSteadyWater, jets_of
 from wakewise.ui.reports import write_report
 from wakewise.wake import point_disturbance
 
@@ -248,7 +248,7 @@ def test_water_that_is_the_controllers_own_belief_is_found_out(gain: float, turb
 
     settings = parts.scenario.tank
     rng = np.random.default_rng(1)
-    water = InstantWater(jets, true_vehicle(parts), parts.target, settings, true_start(parts), rng)
+    water = QuasiSteadyWater(jets, true_vehicle(parts), parts.target, settings, true_start(parts), rng)
     found = likeness(parts, water, water.speeds_m_s)
     assert not found.own
     assert found.shape < 0.1 and found.memory < 1e-3, found

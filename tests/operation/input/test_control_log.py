@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.operation.teleop.input.control_log import Trace, TraceWriter, read_trace
+from wakewise.operation.teleop.input.control_log import ControlLog, ControlLogWriter, read_trace
 from wakewise.operation.teleop.input.controls import CONTROL_AXES, Controls
 
 
@@ -20,7 +20,7 @@ def hands(k):
 @pytest.mark.parametrize("ending", ["parquet", "csv"])
 def test_what_was_written_is_played_back(tmp_path, ending):
     """Step by step the same axes, buttons, absences and desk, and nobody after the end; begun again the same again."""
-    writer = TraceWriter()
+    writer = ControlLogWriter()
     desks = [{"mode": "hold", "gain": 0.5}, {"mode": "scan", "gain": 0.5}]
     for k in range(60):
         writer.take(0.02 * k, hands(k), desks[k >= 33])
@@ -39,7 +39,7 @@ def test_what_was_written_is_played_back(tmp_path, ending):
 
 def test_hands_at_rest_take_no_room():
     """An hour of centred sticks is two rows."""
-    writer, still = TraceWriter(), Controls(axes=np.zeros(5))
+    writer, still = ControlLogWriter(), Controls(axes=np.zeros(5))
     for k in range(180_000):
         writer.take(0.02 * k, still, {})
     assert writer.frame().height == 2
@@ -48,7 +48,7 @@ def test_hands_at_rest_take_no_room():
 def test_a_record_by_hand_needs_no_desk():
     """Time and axes suffice."""
     frame = pl.DataFrame({"time_s": [0.0, 1.0], **{name: [0.0, 0.5] for name in CONTROL_AXES}})
-    trace = Trace(frame)
+    trace = ControlLog(frame)
     assert trace.read(0.5).centred and trace.desk_at(0.5) is None and trace.end_s == 1.0
 
 
@@ -68,7 +68,7 @@ def test_a_bad_row_is_named(change, words):
     """Which row, and what is wrong with it."""
     columns = {"time_s": [0.0, 1.0], **{name: [0.0, 0.0] for name in CONTROL_AXES}, **change}
     with pytest.raises(InputError, match=words):
-        Trace(pl.DataFrame(columns, strict=False))
+        ControlLog(pl.DataFrame(columns, strict=False))
 
 
 def test_a_file_that_is_no_table_is_named(tmp_path):

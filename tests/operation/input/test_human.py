@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from wakewise.control.operator_model import Person, Sticks, View, begin, draw_person, steer
-from wakewise.control.operator_population import People
+from wakewise.control.operator_model import CameraMotion, OperatorModel, StickDeflection, begin, draw_person, steer
+from wakewise.control.operator_population import OperatorPopulation
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 
 DT_S = 0.02
-STICKS = Sticks(
+STICKS = StickDeflection(
     inertia=np.array([10.0, 12.0, 0.0, 0.0]),
     drag=np.array([5.0, 6.0, 0.0, 0.0]),
     full=np.array([100.0, 100.0, 5.0, 2.6]),
@@ -33,16 +33,16 @@ PLAIN = {
 """A person without limits but for the delays."""
 
 
-def person(seed: int = 3, **changes) -> Person:
-    return draw_person(seed, STICKS, People(**changes))
+def person(seed: int = 3, **changes) -> OperatorModel:
+    return draw_person(seed, STICKS, OperatorPopulation(**changes))
 
 
-def view(place=(0.0, 0.0, 0.0), heading=0.0, velocity=(0.0, 0.0, 0.0), turn=0.0) -> View:
+def view(place=(0.0, 0.0, 0.0), heading=0.0, velocity=(0.0, 0.0, 0.0), turn=0.0) -> CameraMotion:
     v = np.array(velocity)
-    return View(p_W_m=np.array(place), heading_rad=heading, v_W_m_s=v, turn_rad_s=turn, hull_W_m_s=v)
+    return CameraMotion(p_W_m=np.array(place), heading_rad=heading, v_W_m_s=v, turn_rad_s=turn, hull_W_m_s=v)
 
 
-def pushes(who: Person, views, wishes) -> np.ndarray:
+def pushes(who: OperatorModel, views, wishes) -> np.ndarray:
     """What the sticks ask for, step by step, shape (n, 4)."""
     state, out = begin(who), []
     for seen, wished in zip(views, wishes, strict=True):
@@ -101,9 +101,9 @@ def test_the_crossover_leaves_the_phase_that_is_kept_in_hand():
 
 def test_a_vehicle_that_coasts_for_ever_is_steered_with_less_gain():
     """Inertia beyond the lead that can be made costs phase, so the crossover is lower, at the same margin."""
-    sticks = Sticks(inertia=STICKS.inertia, drag=np.zeros(4), full=STICKS.full, lag_s=STICKS.lag_s)
+    sticks = StickDeflection(inertia=STICKS.inertia, drag=np.zeros(4), full=STICKS.full, lag_s=STICKS.lag_s)
     plain = {"phase_margin_deg": (30.0, 30.0), "lead_most_s": (4.0, 4.0)}
-    who, coasting = person(1, **plain), draw_person(1, sticks, People(**plain))
+    who, coasting = person(1, **plain), draw_person(1, sticks, OperatorPopulation(**plain))
     late_s, omega = coasting.delay_s + coasting.video_s + 0.1, coasting.crossover_rad_s[:2]
     assert np.all(omega < who.crossover_rad_s[:2]) and np.all(omega * 4.0 > 1.0)
     np.testing.assert_allclose(np.degrees(np.arctan(omega * 4.0) - omega * late_s), 30.0, atol=1e-6)
@@ -172,7 +172,7 @@ def test_a_view_is_where_the_camera_is():
     """Place, heading and motion are those of the camera, not of the hull that carries it."""
     X_WB = Pose(np.array([1.0, 2.0, 3.0]), quat_from_euler(0.0, 0.0, 0.5 * np.pi))
     X_BC = Pose.from_matrix(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([0.2, 0.0, 0.0]))
-    seen = View.of(X_WB, np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.5]), X_BC)
+    seen = CameraMotion.of(X_WB, np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.5]), X_BC)
     np.testing.assert_allclose(seen.p_W_m, [1.0, 2.2, 3.0], atol=1e-12)
     np.testing.assert_allclose(seen.v_W_m_s, [-0.1, 0.1, 0.0], atol=1e-12)
     np.testing.assert_allclose(seen.hull_W_m_s, [0.0, 0.1, 0.0], atol=1e-12)
@@ -185,4 +185,4 @@ def test_a_view_is_where_the_camera_is():
 def test_people_who_cannot_be_are_refused(wrong):
     """Ranges out of order, at zero, or without any phase left to steer with."""
     with pytest.raises(InputError, match=next(iter(wrong))):
-        People(**wrong)
+        OperatorPopulation(**wrong)

@@ -12,7 +12,7 @@ from wakewise.operation import Scenario
 from wakewise.operation.teleop.arbitration import BRAKING_M_S2
 from wakewise.operation.teleop.assisted import assisted_pilot
 from wakewise.operation.teleop.input import CENTRED, Controls
-from wakewise.operation.teleop.operator_state import Desk, DeskState
+from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
 from wakewise.operation.teleop.resumable_mission import PACE_S
 from wakewise.planning.barrier import least_gap
 from wakewise.planning.problem import CLEARANCE_M
@@ -46,7 +46,7 @@ class Flown:
     """A pilot whose vehicle is always at its goal; steps on demand."""
 
     def __init__(self, parts, hands=None, **desk):
-        self.desk = Desk(DeskState(**desk))
+        self.desk = OperatorState(OperatorSettings(**desk))
         self.hands = hands or Hands()
         self.pilot = assisted_pilot(parts, self.hands, self.desk)
         self.body, self.step, self.goals = parts.start, 0, []
@@ -234,7 +234,7 @@ def test_buttons_change_the_desk_or_wait_to_be_taken(parts):
     """Modes and gains act at once; photographs and the end are handed on, once, in order."""
     pressed = {1: ("operator", "capture"), 2: ("precise", "gain_up"), 3: ("capture", "stop")}
     flown = Flown(parts, Hands(lambda t: sticks(pressed=pressed.get(round(t / DT_S), ())))).until(0.2)
-    assert flown.desk.state == DeskState(mode="operator", precise=True, gain=0.6)
+    assert flown.desk.state == OperatorSettings(mode="operator", precise=True, gain=0.6)
     assert flown.pilot.taken() == ("capture", "capture", "stop") and flown.pilot.taken() == ()
 
 

@@ -6,7 +6,7 @@ import pytest
 from wakewise.operation import Scenario, fly
 from wakewise.operation.teleop.assisted import assisted
 from wakewise.operation.teleop.input.script import script_of
-from wakewise.operation.teleop.operator_state import Desk, DeskState
+from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
 
 OVERSHOOT_M = 0.1
 GO_S, LET_GO_S, END_S = 1.0, 3.1, 5.6
@@ -16,9 +16,9 @@ GO_S, LET_GO_S, END_S = 1.0, 3.1, 5.6
 @pytest.mark.parametrize("method", ["wake-aware", "direct"])
 def test_a_vehicle_stops_where_it_is_held(method, trim_N):
     """Released at 0.3 m/s sideways it goes less than 0.1 m beyond the place that is held, and comes back to it."""
-    begin = DeskState(mode="operator", method=method, gain=0.6, watch_target=False)
+    begin = OperatorSettings(mode="operator", method=method, gain=0.6, watch_target=False)
     sticks = script_of([{"at_s": GO_S, "right": 1.0}, {"at_s": LET_GO_S}])
-    parts = assisted(Scenario.preset("quick", **{"tank.mismatch.trim_N": trim_N}).parts(), sticks, Desk(begin))
+    parts = assisted(Scenario.preset("quick", **{"tank.mismatch.trim_N": trim_N}).parts(), sticks, OperatorState(begin))
     rows = []
     fly(
         parts,

@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.core.interfaces import Witness
+from wakewise.core.interfaces import TruthProvider
 from wakewise.operation import LiveFlight, load_scenario, read_exposures, read_scenario
 from wakewise.operation.loop import Step
 
@@ -16,7 +16,7 @@ SCENARIO = load_scenario("quick", None, {"method": "dp"})
 def flown(folder: Path | None, steps: int, captures: tuple[int, ...] = (), **more: object) -> LiveFlight:
     """A flight of so many steps, with photographs asked for at some."""
 
-    def watch(step: Step, witness: Witness | None) -> None:
+    def watch(step: Step, witness: TruthProvider | None) -> None:
         number = round(step.time_s * 50)
         if number in captures:
             flight.capture()

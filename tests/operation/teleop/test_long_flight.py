@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from wakewise.core.interfaces import BodyState, Command, Goal, Measurement, ScalarGrid, Truth, WaterTruth, Witness
+from wakewise.core.interfaces import BodyState, Command, Goal, Measurement, ScalarGrid, Truth, TruthProvider, WaterTruth
 from wakewise.operation import LiveFlight, load_scenario, read_exposures
 from wakewise.operation.flight_log import PARTS, FlightLog
 from wakewise.operation.loop import Step
@@ -61,7 +61,7 @@ def test_memory_does_not_grow_with_the_flight(tmp_path: Path) -> None:
     light = Light(parts.start)
     held: list[int] = []
 
-    def watch(step: Step, witness: Witness | None) -> None:
+    def watch(step: Step, witness: TruthProvider | None) -> None:
         k = round(step.time_s * 50)
         if k % 50 == 25:
             flight.capture()

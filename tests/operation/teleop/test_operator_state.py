@@ -5,7 +5,14 @@ import threading
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.operation.teleop.operator_state import FIELDS, Desk, DeskState, Meaning, meaning, regime
+from wakewise.operation.teleop.operator_state import (
+    FIELDS,
+    OperatorSettings,
+    OperatorState,
+    TrackingWeightMeaning,
+    meaning,
+    regime,
+)
 
 
 @pytest.mark.parametrize(
@@ -25,22 +32,22 @@ from wakewise.operation.teleop.operator_state import FIELDS, Desk, DeskState, Me
 )
 def test_nonsense_is_refused_by_name_and_changes_nothing(change, words):
     """The message names field, value and what is allowed."""
-    desk = Desk()
+    desk = OperatorState()
     with pytest.raises(InputError, match=words):
         desk.set(orbit=True, **change)
-    assert desk.state == DeskState()
+    assert desk.state == OperatorSettings()
 
 
 def test_what_is_set_stays_set():
     """`set` gives what is set then; the rest stays."""
-    desk = Desk(DeskState(gain=0.3))
-    assert desk.set(w_track=20, orbit=True) == desk.state == DeskState(gain=0.3, w_track=20, orbit=True)
+    desk = OperatorState(OperatorSettings(gain=0.3))
+    assert desk.set(w_track=20, orbit=True) == desk.state == OperatorSettings(gain=0.3, w_track=20, orbit=True)
     assert set(FIELDS) == set(vars(desk.state))
 
 
 def test_buttons_step_the_gain_within_its_range():
     """Up to 1 and down to 0.1, never beyond; precise mode toggles; capture and stop are not the desk's."""
-    desk = Desk()
+    desk = OperatorState()
     for _ in range(8):
         desk.press("gain_up")
     assert desk.state.gain == 1.0
@@ -67,14 +74,14 @@ def test_regimes_are_the_papers():
 def test_the_dials_meaning_is_what_was_measured():
     """Between two measurements by the logarithm, beyond them the last one; regime alone where there is none."""
     measured = {5.0: (7.0, 90.0), 20.0: (6.0, 80.0)}
-    assert meaning(10.0, measured) == Meaning(regime="work", deviation_pct=6.5, saved_pct=85.0)
+    assert meaning(10.0, measured) == TrackingWeightMeaning(regime="work", deviation_pct=6.5, saved_pct=85.0)
     assert meaning(50.0, measured).saved_pct == 80.0 and meaning(0.5, measured).deviation_pct == 7.0
-    assert meaning(1.0) == Meaning(regime="delicate")
+    assert meaning(1.0) == TrackingWeightMeaning(regime="delicate")
 
 
 def test_threads_lose_no_change():
     """Two writers of different fields: both changes stand."""
-    desk = Desk()
+    desk = OperatorState()
 
     def turn(field, values):
         for value in values:

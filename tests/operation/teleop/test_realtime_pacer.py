@@ -2,7 +2,7 @@
 
 import pytest
 
-from wakewise.operation.teleop.realtime_pacer import MOST_CATCHING_UP_S, Pace
+from wakewise.operation.teleop.realtime_pacer import MOST_CATCHING_UP_S, RealTimePacer
 
 
 class Clock:
@@ -21,7 +21,7 @@ class Clock:
 def test_steps_wait_for_their_time_and_a_little_lost_is_caught_up() -> None:
     """On time where work is short; after a step that took long the next ones follow at once until it is made good."""
     clock = Clock()
-    pace = Pace(clock.wait, clock=clock)
+    pace = RealTimePacer(clock.wait, clock=clock)
     begun = []
     for k in range(10):
         pace.pace(0.02 * k)
@@ -37,7 +37,7 @@ def test_steps_wait_for_their_time_and_a_little_lost_is_caught_up() -> None:
 def test_a_long_stop_is_let_go() -> None:
     """A world that stood still for a second does not run fast afterwards; what was lost is known."""
     clock = Clock()
-    pace = Pace(clock.wait, clock=clock)
+    pace = RealTimePacer(clock.wait, clock=clock)
     pace.pace(0.0)
     clock.now_s += 1.0
     pace.pace(0.02)
@@ -50,7 +50,7 @@ def test_a_long_stop_is_let_go() -> None:
 def test_without_pace_nothing_waits() -> None:
     """As fast as it goes; how long an answer takes is measured all the same."""
     clock = Clock()
-    pace = Pace(clock.wait, paced=False, clock=clock)
+    pace = RealTimePacer(clock.wait, paced=False, clock=clock)
     pace.pace(50.0)
     clock.now_s += 0.25
     pace.sent(50.0)

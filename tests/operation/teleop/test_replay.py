@@ -6,12 +6,12 @@ import polars as pl
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.core.interfaces import Witness
+from wakewise.core.interfaces import TruthProvider
 from wakewise.operation import LiveFlight, load_scenario, read_scenario
 from wakewise.operation.loop import Step
 from wakewise.operation.teleop.assisted import assisted
 from wakewise.operation.teleop.input.script import script_of
-from wakewise.operation.teleop.operator_state import Desk, DeskState
+from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
 from wakewise.operation.teleop.replay import replay_of
 
 SCENARIO = load_scenario("quick", None, {"world": "tank", "method": "dp"})
@@ -35,9 +35,9 @@ def test_the_same_hands_give_the_same_flight_to_the_byte(tmp_path: Path) -> None
             {"at_s": 1.4, "pressed": ["stop"]},
         ]
     )
-    desk = Desk(DeskState(w_track=3.0))
+    desk = OperatorState(OperatorSettings(w_track=3.0))
 
-    def watch(step: Step, witness: Witness | None) -> None:
+    def watch(step: Step, witness: TruthProvider | None) -> None:
         if step.time_s == pytest.approx(0.8):
             first.capture()
             desk.set(w_track=20.0, method="direct")

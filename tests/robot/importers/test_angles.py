@@ -7,12 +7,12 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.robot.importers.angles import read_angles, require_radians, unit_of
-from wakewise.robot.importers.xml import Place
+from wakewise.robot.importers.xml import SourceLocation
 
-HERE = Place(Path("a.yaml"), 3)
+HERE = SourceLocation(Path("a.yaml"), 3)
 
 
-def rows(*angles: list[float]) -> list[tuple[np.ndarray, Place]]:
+def rows(*angles: list[float]) -> list[tuple[np.ndarray, SourceLocation]]:
     return [(np.array(row, dtype=float), HERE) for row in angles]
 
 

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from wakewise.core.errors import InputError
 from wakewise.robot.importers import import_vehicle
 from wakewise.robot.importers.expressions import evaluate
-from wakewise.robot.importers.packages import Folders
+from wakewise.robot.importers.packages import PackagePaths
 from wakewise.robot.importers.scopes import literal, parse_parameters
-from wakewise.robot.importers.xacro import Xacro
-from wakewise.robot.importers.xml import Element, Place, parse_xml
+from wakewise.robot.importers.xacro import XacroExpander
+from wakewise.robot.importers.xml import Element, SourceLocation, parse_xml
 
 HEAD = '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">'
 
@@ -21,7 +21,9 @@ HEAD = '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">'
 def expand(folder: Path, body: str, *, skip_missing: bool = False, **arguments: str) -> Element:
     path = folder / "main.xacro"
     path.write_text(f"{HEAD}\n{body}\n</robot>")
-    return Xacro(Folders(path), arguments, skip_missing=skip_missing).expand(parse_xml(path.read_text(), path))
+    return XacroExpander(PackagePaths(path), arguments, skip_missing=skip_missing).expand(
+        parse_xml(path.read_text(), path)
+    )
 
 
 def nothing(name: str) -> float:
@@ -147,7 +149,7 @@ def test_a_missing_include_can_be_left_out_and_is_told(tmp_path: Path) -> None:
     """Calls of the macros that it held are left out too, and both are noted."""
     path = tmp_path / "main.xacro"
     path.write_text(f'{HEAD}<xacro:include filename="gone.xacro"/><xacro:sonar x="1"/><link name="a"/></robot>')
-    xacro = Xacro(Folders(path), {}, skip_missing=True)
+    xacro = XacroExpander(PackagePaths(path), {}, skip_missing=True)
     assert [e.tag for e in xacro.expand(parse_xml(path.read_text(), path)).children] == ["link"]
     assert any("gone.xacro" in note for note in xacro.notes)
     assert any("sonar" in note for note in xacro.notes)
@@ -169,7 +171,7 @@ def test_includes_may_not_climb_out(tmp_path: Path, way: str) -> None:
 
 def test_system_folders_are_no_packages(tmp_path: Path) -> None:
     """`$(find etc)` does not find /etc."""
-    folders = Folders(tmp_path / "x.xacro")
+    folders = PackagePaths(tmp_path / "x.xacro")
     assert [folders.package(name) for name in ("etc", "tmp", "..", ".", "", "a/b")] == [None] * 6
 
 
@@ -218,7 +220,7 @@ def test_text_and_elements_cannot_multiply_without_end(tmp_path: Path) -> None:
 
 def test_parameters_and_literals() -> None:
     """Defaults in quotes, with expressions, forwarded with and without a fallback."""
-    place = Place(Path("x"), 1)
+    place = SourceLocation(Path("x"), 1)
     names = parse_parameters("a *b **c d:=1 e:='x y' f:=^ g:=^|2 h:=^false i:=${1 + 2} j=5", place)
     assert [(p.name, p.block, p.forward, p.default) for p in names] == [
         ("a", "", False, None),

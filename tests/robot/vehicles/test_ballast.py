@@ -7,14 +7,14 @@ from pydantic import ValidationError
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.robot.vehicles import compile_body, load_vehicle, restoring_wrench
-from wakewise.robot.vehicles.ballast import FOAM_KG_M3, LEAD_KG_M3, Block, ballasted, net_buoyancy_N, with_blocks
+from wakewise.robot.vehicles.ballast import FOAM_KG_M3, LEAD_KG_M3, BallastBlock, ballasted, net_buoyancy_N, with_blocks
 from wakewise.robot.vehicles.fossen import rigid_body_mass
 
 VEHICLE = load_vehicle("paper")
 BLOCKS = (
-    Block(float_N=3.0, at_B_m=(-0.1, 0.05, -0.02)),
-    Block(float_N=-1.5, at_B_m=(0.2, -0.1, 0.05)),
-    Block(float_N=0.5),
+    BallastBlock(float_N=3.0, at_B_m=(-0.1, 0.05, -0.02)),
+    BallastBlock(float_N=-1.5, at_B_m=(0.2, -0.1, 0.05)),
+    BallastBlock(float_N=0.5),
 )
 
 
@@ -63,7 +63,7 @@ def test_the_order_of_blocks_is_of_no_account() -> None:
 
 def test_no_block_changes_nothing() -> None:
     """None, or one that lifts nothing: the vehicle itself."""
-    assert with_blocks(VEHICLE, ()) is VEHICLE and with_blocks(VEHICLE, [Block(float_N=0.0)]) is VEHICLE
+    assert with_blocks(VEHICLE, ()) is VEHICLE and with_blocks(VEHICLE, [BallastBlock(float_N=0.0)]) is VEHICLE
 
 
 def test_what_is_no_block_is_refused() -> None:
@@ -71,4 +71,4 @@ def test_what_is_no_block_is_refused() -> None:
     with pytest.raises(InputError, match="5000"):
         ballasted(VEHICLE, 5001.0)
     with pytest.raises(ValidationError):
-        Block(float_N=1.0, at_B_m=(9.0, 0.0, 0.0))
+        BallastBlock(float_N=1.0, at_B_m=(9.0, 0.0, 0.0))

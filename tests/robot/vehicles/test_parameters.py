@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from wakewise.robot.vehicles import Parameter, load_draft, parameters
+from wakewise.robot.vehicles import ParameterRow, load_draft, parameters
 
 
-def row(rows: list[Parameter], quantity: str) -> Parameter:
+def row(rows: list[ParameterRow], quantity: str) -> ParameterRow:
     return next(r for r in rows if r.quantity.startswith(quantity))
 
 

@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.scene.missions import CameraAim, Coverage, Patches, TankBounds, Views, patches_of, reachable_views
+from wakewise.scene.missions import (
+    CameraAim,
+    CandidateViews,
+    Coverage,
+    SurfacePatches,
+    TankBounds,
+    patches_of,
+    reachable_views,
+)
 from wakewise.scene.missions.coverage import WELL
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise.scene.targets import Mesh
@@ -32,7 +40,7 @@ PATCHES = patches_of(ball(), count=200, per_patch=5)
 
 
 @pytest.fixture(scope="module")
-def views() -> Views:
+def views() -> CandidateViews:
     return reachable_views(
         PATCHES,
         CAMERA,
@@ -50,7 +58,7 @@ def at(azimuth_deg: float, elevation_deg: float = 20.0, range_m: float = 0.5) ->
     return camera_pose(CENTRE, math.radians(azimuth_deg), math.radians(elevation_deg), range_m)
 
 
-def taken(*poses: Pose, patches: Patches = PATCHES) -> Coverage:
+def taken(*poses: Pose, patches: SurfacePatches = PATCHES) -> Coverage:
     coverage = Coverage.begin(patches)
     for X_WC in poses:
         coverage = coverage.seen(X_WC, CAMERA)
@@ -103,7 +111,7 @@ def test_coverage_knows_no_place_and_no_direction() -> None:
     """Target and cameras moved and turned about the vertical together leave every level as it was."""
     shift, turn = np.array([1.0, -2.0, 0.5]), math.radians(70.0)
     R = np.array([[math.cos(turn), -math.sin(turn), 0.0], [math.sin(turn), math.cos(turn), 0.0], [0.0, 0.0, 1.0]])
-    moved = Patches(
+    moved = SurfacePatches(
         points_W_m=PATCHES.points_W_m @ R.T + shift,
         normals=PATCHES.normals @ R.T,
         patch=PATCHES.patch,
@@ -147,7 +155,7 @@ def test_without_views_there_is_nowhere_to_go() -> None:
     assert taken(at(0)).next_view(at(0)) is None
 
 
-def test_going_where_it_says_covers_the_ball(views: Views) -> None:
+def test_going_where_it_says_covers_the_ball(views: CandidateViews) -> None:
     """Each view that is named adds to the score, and following them until none is left covers what can be reached."""
     coverage, X_WC = Coverage.begin(PATCHES, views), at(0)
     for _ in range(120):
@@ -166,7 +174,7 @@ def test_going_where_it_says_covers_the_ball(views: Views) -> None:
     assert coverage.photos < 0.75 * everywhere.photos
 
 
-def test_gains_are_what_a_photograph_brings(views: Views) -> None:
+def test_gains_are_what_a_photograph_brings(views: CandidateViews) -> None:
     """What a view is said to add to the levels is what a photograph from it adds, to a few percent of samples."""
     coverage = Coverage.begin(PATCHES, views)
     for number in (5, 6, 30, 50, 51, 52):

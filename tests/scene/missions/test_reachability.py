@@ -8,7 +8,7 @@ import trimesh
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.scene.missions import CameraAim, TankBounds, Views, patches_of, reachable_views
+from wakewise.scene.missions import CameraAim, CandidateViews, TankBounds, patches_of, reachable_views
 from wakewise.scene.missions.clearance import gaps_of
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise.scene.missions.reachability import place_of, way_words
@@ -27,7 +27,7 @@ def ball() -> Mesh:
     return Mesh(sphere.vertices + CENTRE, sphere.faces)
 
 
-def reached(*ranges_m: float, clearance_m: float = 0.05) -> Views:
+def reached(*ranges_m: float, clearance_m: float = 0.05) -> CandidateViews:
     return reachable_views(
         patches_of(ball(), count=50, per_patch=2),
         CAMERA,

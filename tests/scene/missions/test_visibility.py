@@ -9,17 +9,17 @@ import trimesh
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.scene.missions import Need, Patches, patches_of
+from wakewise.scene.missions import SurfacePatches, VisibilityCriteria, patches_of
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise.scene.missions.visibility import _nearest, well_shown
 from wakewise.scene.targets import Mesh, coral, place_on_bed
-from wakewise.vision.evaluation import Surface, count_views
+from wakewise.vision.evaluation import SurfaceSamples, count_views
 from wakewise.vision.imaging import PinholeCamera
 
 CAMERA = PinholeCamera(1280, 960, math.radians(80.0))
 CORAL = place_on_bed("branching", coral("branching"), 1.5)
 PATCHES = patches_of(CORAL.mesh, CORAL.bed_z_m)
-NEED = Need()
+NEED = VisibilityCriteria()
 
 
 def at(azimuth_deg: float, elevation_deg: float, range_m: float = 0.5) -> Pose:
@@ -43,7 +43,7 @@ def plate(z_m: float, half_m: float, facing: float = 1.0) -> trimesh.Trimesh:
 def test_rays_see_the_same(azimuth_deg: float, elevation_deg: float) -> None:
     """On a branching coral the raster and embreex's rays differ on fewer than one sample in a hundred."""
     X_WC = at(azimuth_deg, elevation_deg)
-    surface = Surface(points_m=PATCHES.points_W_m, normals=PATCHES.normals)
+    surface = SurfaceSamples(points_m=PATCHES.points_W_m, normals=PATCHES.normals)
     rays = count_views(surface, CORAL.mesh, X_WC.p_m[None], min_cosine=math.cos(NEED.incidence_rad)) > 0
     shown = well_shown(PATCHES, X_WC, CAMERA, NEED)
     assert (shown != rays).mean() < 0.01
@@ -86,7 +86,7 @@ def test_only_what_is_in_the_picture_is_shown() -> None:
 
 def test_size_does_not_matter_when_the_pixel_grows_with_it() -> None:
     """Target, way and footprint all twice as large: the same samples are shown."""
-    larger = Patches(
+    larger = SurfacePatches(
         points_W_m=2 * PATCHES.points_W_m,
         normals=PATCHES.normals,
         patch=PATCHES.patch,
@@ -139,4 +139,4 @@ def test_the_depth_picture_is_that_of_rays_through_triangles() -> None:
 def test_needs_that_cannot_be_are_refused(wrong: dict[str, object]) -> None:
     """An incidence beyond a right angle, a pixel of no size, angles that do not rise."""
     with pytest.raises(InputError, match="allowed"):
-        Need(**wrong)  # type: ignore[arg-type]
+        VisibilityCriteria(**wrong)  # type: ignore[arg-type]

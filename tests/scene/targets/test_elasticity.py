@@ -5,17 +5,17 @@ import pytest
 from rods import BED_Z, rod, rod_mesh, together
 
 from wakewise.core.errors import InputError
-from wakewise.scene.targets import Mesh, Sway, Tissue, place_on_bed, turned_normals
+from wakewise.scene.targets import BendingModes, Mesh, TissueProperties, place_on_bed, turned_normals
 
 WATER = 1000.0
 E = 1e6
-FLESH = Tissue(stiffness_Pa=E, density_kg_m3=WATER, drag=1.2, damping=0.1)
+FLESH = TissueProperties(stiffness_Pa=E, density_kg_m3=WATER, drag=1.2, damping=0.1)
 
 
 def test_an_even_rod_bends_as_beam_theory_says():
     """The stiffness against an even load is that of w L^4 / 8 EI; the frequency 3.516 sqrt(EI / m L^4), within 1 %."""
     r, length = 0.0025, 0.1
-    sway = Sway.of(rod(r, r, length), FLESH, WATER)
+    sway = BendingModes.of(rod(r, r, length), FLESH, WATER)
     second = np.pi / 4 * r**4
     per_tip = np.trapezoid(sway.shape[0], dx=length / (sway.shape.shape[2] - 1), axis=1)
     np.testing.assert_allclose(per_tip / sway.stiffness_N_m[0], length**4 / (8 * E * second), rtol=0.01)
@@ -28,7 +28,7 @@ def test_an_even_rod_bends_as_beam_theory_says():
 
 def test_a_strip_is_softest_across():
     """The first mode of a flat blade goes across it; stiffnesses are as the squares of the widths."""
-    sway = Sway.of(rod(0.006, 0.002), FLESH, WATER)
+    sway = BendingModes.of(rod(0.006, 0.002), FLESH, WATER)
     np.testing.assert_allclose(np.abs(sway.axes_W[0, 0]), [0.0, 1.0], atol=1e-6)
     assert sway.stiffness_N_m[0, 1] / sway.stiffness_N_m[0, 0] == pytest.approx(9.0, rel=0.01)
     # Water moves along as in a circle over the width: pi a^2 across, pi b^2 along.
@@ -45,7 +45,7 @@ def test_pieces_that_stand_alone_are_stems_of_their_own():
         rod_mesh(0.01, 0.01, 0.01, at=(-0.05, 0)),
     )
     target = place_on_bed("rods", mesh, BED_Z)
-    sway = Sway.of(target, FLESH, WATER)
+    sway = BendingModes.of(target, FLESH, WATER)
     np.testing.assert_allclose(sway.height_m, [0.1, 0.08], atol=1e-9)
     tips = np.array([[0.01, 0.0], [0.0, 0.02]])
     moved = sway.moved(sway.stem, target.mesh.vertices_m, tips)
@@ -59,7 +59,7 @@ def test_pieces_that_stand_alone_are_stems_of_their_own():
 
 def test_bending_keeps_the_length_of_the_axis():
     """To second order in the tip's way the axis is as long as at rest, and the foot stays where it is."""
-    sway = Sway.of(rod(), FLESH, WATER)
+    sway = BendingModes.of(rod(), FLESH, WATER)
     z = BED_Z - np.linspace(0.0, 0.1, 400)
     points = np.column_stack([np.zeros(400), np.zeros(400), z])
     stem = np.zeros(400, dtype=np.int64)
@@ -73,7 +73,7 @@ def test_bending_keeps_the_length_of_the_axis():
 def test_the_turned_normals_are_those_of_the_moved_surface():
     """Normals by the slope agree with those of the moved mesh's faces."""
     target = rod(0.004, 0.004)
-    sway = Sway.of(target, FLESH, WATER)
+    sway = BendingModes.of(target, FLESH, WATER)
     tips = np.array([[0.012, -0.006]])
     moved, tilt = sway.bent(tips)
     corners = (target.mesh.vertices_m + moved)[target.mesh.faces]
@@ -90,15 +90,16 @@ def test_the_turned_normals_are_those_of_the_moved_surface():
 def test_what_floats_stands_stiffer_and_what_is_heavy_falls():
     """Buoyancy adds to the stiffness; a limp and heavy one is refused in a line that says so."""
     light, even = (
-        Sway.of(rod(), Tissue(stiffness_Pa=1e5, density_kg_m3=d, drag=1.2, damping=0.1), WATER) for d in (700.0, 1000.0)
+        BendingModes.of(rod(), TissueProperties(stiffness_Pa=1e5, density_kg_m3=d, drag=1.2, damping=0.1), WATER)
+        for d in (700.0, 1000.0)
     )
     assert light.stiffness_N_m[0, 0] > 1.01 * even.stiffness_N_m[0, 0]
     with pytest.raises(InputError, match="cannot stand upright"):
-        Sway.of(rod(), Tissue(stiffness_Pa=1e3, density_kg_m3=2000.0, drag=1.2, damping=0.1), WATER)
+        BendingModes.of(rod(), TissueProperties(stiffness_Pa=1e3, density_kg_m3=2000.0, drag=1.2, damping=0.1), WATER)
 
 
 def test_an_open_mesh_is_refused():
     """It has no sections."""
     mesh = rod_mesh(0.003, 0.003, 0.1)
     with pytest.raises(InputError, match="closed"):
-        Sway.of(place_on_bed("open", Mesh(mesh.vertices_m, mesh.faces[:-3]), BED_Z), FLESH, WATER)
+        BendingModes.of(place_on_bed("open", Mesh(mesh.vertices_m, mesh.faces[:-3]), BED_Z), FLESH, WATER)

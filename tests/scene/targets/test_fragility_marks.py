@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
 from wakewise.scene.targets import Mesh, load_mesh, read_marks, read_vertex_scores
-from wakewise.scene.targets.fragility_marks import Marks
+from wakewise.scene.targets.fragility_marks import FragilityMarks
 
 HEADER = "x_m,y_m,z_m,radius_m,weight\n"
 place = st.floats(-1.0, 1.0)
@@ -91,7 +91,7 @@ def test_a_file_without_marks_is_refused(tmp_path, text, said):
 
 def test_scores_are_those_of_the_ball_a_vertex_lies_in():
     """Of balls that overlap the highest; 0 outside."""
-    marks = Marks(
+    marks = FragilityMarks(
         centres_m=np.array([[0.0, 0, 0], [0.0, 0, 0]]), radii_m=np.array([2.0, 1.0]), weights=np.array([0.3, 0.8])
     )
     mesh = Mesh(np.array([[0.5, 0, 0], [1.5, 0, 0], [2.5, 0, 0]]), np.array([[0, 1, 2]]))

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from wakewise.core.errors import InputError
-from wakewise.scene.targets import Delicacy, Mesh, MeshDistance, coral, place_on_bed, region_measure, sample_region
-from wakewise.scene.targets.region import DECAY_M, SHELL_M, Solid
+from wakewise.scene.targets import Fragility, Mesh, MeshDistance, coral, place_on_bed, region_measure, sample_region
+from wakewise.scene.targets.region import DECAY_M, SHELL_M, InsideTest
 
 BED_Z_M = 1.5
 
@@ -35,7 +35,7 @@ def test_a_third_of_the_points_lies_on_the_surface_and_the_others_in_the_water(s
     exact = MeshDistance(target.mesh.vertices_m, target.mesh.faces)(region.points_W_m)
     np.testing.assert_allclose(exact[:50], 0.0, atol=1e-9)
     np.testing.assert_allclose(exact[50:], region.distance_m[50:], atol=1e-12)
-    assert not np.any(Solid(target.mesh).holds(region.points_W_m[50:]))
+    assert not np.any(InsideTest(target.mesh).holds(region.points_W_m[50:]))
 
 
 def test_total_weight_is_that_of_the_papers_points(sampled):
@@ -101,7 +101,7 @@ def test_delicate_places_count_more():
     """With gain 3 the weight of a ball's marked upper half grows fourfold and that of the lower half stays."""
     target = ball(0.07, 0.2)
     up = BED_Z_M - 0.2 - target.mesh.vertices_m[:, 2]
-    marked = Delicacy(thickness_m=np.ones(len(up)), curvature_per_m=np.ones(len(up)), score=(up > 0).astype(float))
+    marked = Fragility(thickness_m=np.ones(len(up)), curvature_per_m=np.ones(len(up)), score=(up > 0).astype(float))
     plain, more = (sample_region(target, 150, np.random.default_rng(4), marked, gain) for gain in (0.0, 3.0))
 
     def halves(region):
@@ -117,7 +117,7 @@ def test_no_gain_is_the_papers_weights():
     """Delicate features that are given without a gain change nothing."""
     target = ball(subdivisions=3)
     n = len(target.mesh.vertices_m)
-    marked = Delicacy(thickness_m=np.ones(n), curvature_per_m=np.ones(n), score=np.ones(n))
+    marked = Fragility(thickness_m=np.ones(n), curvature_per_m=np.ones(n), score=np.ones(n))
     with_marks = sample_region(target, 40, np.random.default_rng(5), marked)
     np.testing.assert_array_equal(with_marks.weights, sample_region(target, 40, np.random.default_rng(5)).weights)
 
@@ -125,7 +125,7 @@ def test_no_gain_is_the_papers_weights():
 def test_a_gain_without_features_or_of_another_mesh_is_refused():
     """So is a gain out of range, NaN included."""
     target, rng = ball(subdivisions=2), np.random.default_rng(0)
-    other = Delicacy(thickness_m=np.ones(3), curvature_per_m=np.ones(3), score=np.ones(3))
+    other = Fragility(thickness_m=np.ones(3), curvature_per_m=np.ones(3), score=np.ones(3))
     with pytest.raises(InputError, match="no delicate features"):
         sample_region(target, 30, rng, gain=1.0)
     with pytest.raises(InputError, match="one per vertex"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError, StageError
-from wakewise.simulation.lattice.forced_lattice import LiveBox, disk_points
+from wakewise.simulation.lattice.forced_lattice import ForcedLattice, disk_points
 from wakewise.simulation.lattice.forced_lattice_kernel import interpolated, share_out
 
 RHO = 1000.0
@@ -16,7 +16,7 @@ NOTHING = np.zeros((0, 3))
 def box(cells, cell_m=0.02, current=(0.0, 0.0, 0.0), solid=None, fastest_m_s=1.0):
     low = np.array([-0.2, -0.5 * cells[1] * cell_m, 0.0])
     body = np.zeros(cells, bool) if solid is None else solid
-    return LiveBox(
+    return ForcedLattice(
         low,
         cells,
         cell_m,

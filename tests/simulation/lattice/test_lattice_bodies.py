@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.simulation.lattice import Case, DiskJet, LatticeRun, case_hash, find_case
-from wakewise.simulation.lattice.bounce_back import Bodies, solid_cells
+from wakewise.simulation.lattice import DiskJet, LatticeCase, LatticeRun, case_hash, find_case
+from wakewise.simulation.lattice.bounce_back import BounceBackLinks, solid_cells
 from wakewise.simulation.lattice.engines import make_engine
 from wakewise.simulation.lattice.run import Disk
 from wakewise.simulation.lattice.stencil import OPPOSITE, VELOCITIES, WALL, WEIGHTS, box, still_water
 
-BESIDE = Case(
+BESIDE = LatticeCase(
     name="beside",
     jets=(DiskJet(),),
     low_D=(-2, -2, -2),
@@ -42,7 +42,7 @@ def test_what_meets_a_body_comes_back_turned_round():
             there = np.array([x, y, z]) + VELOCITIES[i]
             if np.all(there >= 0) and np.all(there < cells) and solid[tuple(there)]:
                 expected[OPPOSITE[i], *(there + 1)] = water[i, x + 1, y + 1, z + 1]
-    Bodies(solid).turn_back(now)
+    BounceBackLinks(solid).turn_back(now)
     assert np.array_equal(box(now, *cells[1:]), expected)
     assert np.abs(expected[:, 1:-1, 1:-1, 1:-1][:, solid]).max() > 0.0
 

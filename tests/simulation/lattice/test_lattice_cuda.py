@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.simulation.lattice import Case, DiskJet, LatticeRun, engines
-from wakewise.simulation.lattice.engines import DEVICES, ProcessorEngine, make_engine
+from wakewise.simulation.lattice import DiskJet, LatticeCase, LatticeRun, engines
+from wakewise.simulation.lattice.engines import DEVICES, CpuEngine, make_engine
 from wakewise.simulation.lattice.stencil import OPEN
 
 SIDE_BY_SIDE = """
@@ -65,7 +65,7 @@ def test_without_a_card_cuda_is_refused_in_one_line_and_auto_takes_the_processor
     water = (np.full(6, 0.52), np.zeros((7, 8)), 0.0, np.full(6, OPEN))
     with pytest.raises(InputError, match=r"'cuda': CUDA finds no graphics card or no driver; allowed here: cpu, auto"):
         make_engine("cuda", *water)
-    assert isinstance(make_engine("auto", *water), ProcessorEngine)
+    assert isinstance(make_engine("auto", *water), CpuEngine)
     with pytest.raises(InputError, match=r"'tpu': no such device, allowed cpu, cuda, auto"):
         make_engine("tpu", *water)
     assert DEVICES == ("cpu", "cuda", "auto")
@@ -74,6 +74,6 @@ def test_without_a_card_cuda_is_refused_in_one_line_and_auto_takes_the_processor
 def test_a_run_takes_the_device_by_name(monkeypatch):
     """What cannot be had is refused before anything is computed."""
     monkeypatch.setattr(engines, "why_no_gpu", lambda: "no card")
-    case = Case(name="t", jets=(DiskJet(),), low_D=(-2, -2, -2), high_D=(2, 2, 2), cells_per_D=4)
+    case = LatticeCase(name="t", jets=(DiskJet(),), low_D=(-2, -2, -2), high_D=(2, 2, 2), cells_per_D=4)
     with pytest.raises(InputError, match="no card"):
         LatticeRun(case, device="cuda")

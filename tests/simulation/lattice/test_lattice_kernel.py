@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from wakewise.simulation.lattice.cases import Case, DiskJet
+from wakewise.simulation.lattice.cases import DiskJet, LatticeCase
 from wakewise.simulation.lattice.kernel import push, step, velocity, wrap
 from wakewise.simulation.lattice.reference_step import equilibrium, twin_step
 from wakewise.simulation.lattice.run import LatticeRun
@@ -202,7 +202,7 @@ def test_bytes_do_not_depend_on_threads():
     """One thread and two give the same flow, bit for bit."""
     if numba.config.NUMBA_NUM_THREADS < 2:
         pytest.skip("this machine has one core")
-    case = Case(name="t", jets=(DiskJet(torque=0.1),), low_D=(-2, -2, -2), high_D=(3, 2, 2), cells_per_D=4)
+    case = LatticeCase(name="t", jets=(DiskJet(torque=0.1),), low_D=(-2, -2, -2), high_D=(3, 2, 2), cells_per_D=4)
     before, digests = numba.get_num_threads(), []
     try:
         for threads in (1, 2):

@@ -13,12 +13,20 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.simulation.lattice import Case, DiskJet, LatticeRun, case_hash, compute_mean_field, compute_run, find_case
+from wakewise.simulation.lattice import (
+    DiskJet,
+    LatticeCase,
+    LatticeRun,
+    case_hash,
+    compute_mean_field,
+    compute_run,
+    find_case,
+)
 from wakewise.simulation.lattice.crossing import crossing_figures
 from wakewise.simulation.lattice.laws import momentum_flux
 from wakewise.simulation.lattice.run import Disk
 
-SMALL = Case(
+SMALL = LatticeCase(
     name="small",
     jets=(DiskJet(torque=0.1),),
     low_D=(-2, -2, -2),

@@ -10,7 +10,7 @@ from wakewise.scene.targets import Mesh, Target, coral, place_on_bed
 from wakewise.simulation.lattice import find_case
 from wakewise.simulation.lattice.deflected_jet import load_past_box, momentum, past_figures
 from wakewise.simulation.water.blockage import Blockage, _surface
-from wakewise.simulation.water.round_jet_closure import Spreading
+from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.simulation.water.water import Water
 
 D_M = 0.06
@@ -55,7 +55,7 @@ def past_box(name, solid):
     """Fastest water 4 to 10 D down a jet past a box, and momentum 8 to 10 D down it, over the lattice's."""
     field, case = load_past_box(name), find_case(name)
     body = Blockage.of(cube(case)) if solid else None
-    water = new_water(bed_z_m=50.0, turbulence=0.25, spreading=Spreading.of_width(0.13), body=body)
+    water = new_water(bed_z_m=50.0, turbulence=0.25, spreading=JetSpreading.of_width(0.13), body=body)
     at, behind, steps = DEEP, (field.x_D >= 8.0) & (field.x_D <= 10.0), round(80 * UNIT_S / 0.05)
     upright, planes = field.points_D()[0], field.planes_D()[behind]
     places = [points.reshape(-1, 3) * D_M + at for points in (upright, planes)]
@@ -92,7 +92,7 @@ def fastest_of_cuttings():
     places = upright[field.wet(upright)] * D_M + [0.0, 0.0, 25.0]
     for k in range(10):
         body = Blockage.of(cut(cube(case), 3, 77 * k))
-        water = new_water(bed_z_m=50.0, spreading=Spreading.of_width(0.13), body=body)
+        water = new_water(bed_z_m=50.0, spreading=JetSpreading.of_width(0.13), body=body)
         push(water, 4.0, [1.0], DEEP)
         speeds = [np.linalg.norm(push(water, 0.5, [1.0], DEEP).velocity(places), axis=1).max() for _ in range(16)]
         found.append(max(speeds) / EXIT_M_S)
@@ -115,7 +115,7 @@ def beside_box(name, times):
     found = []
     for k in range(times):
         body = Blockage.of(cut(cube(case), 3, 77 * k))
-        water = new_water(bed_z_m=50.0, turbulence=0.25, spreading=Spreading.of_width(0.13), body=body)
+        water = new_water(bed_z_m=50.0, turbulence=0.25, spreading=JetSpreading.of_width(0.13), body=body)
         push(water, 4.0, [1.0], DEEP)
         means = [np.zeros_like(plane) for plane in planes]
         for _ in range(60):

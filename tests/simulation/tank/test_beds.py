@@ -6,7 +6,7 @@ from pydantic import ValidationError
 
 from wakewise.simulation.tank.beds import SILT_RANGES, SILTS
 from wakewise.simulation.tank.grains import STRESS_INTENSITY
-from wakewise.simulation.tank.sediment import SiltLaws
+from wakewise.simulation.tank.sediment import SiltProperties
 from wakewise.simulation.tank.settings import SiltSettings
 
 
@@ -34,7 +34,7 @@ def test_fluff_moves_before_mud_and_mud_before_its_firm_layer():
     """The order of strengths is fluff, fresh mud, firm mud; loose grains of sand need more than fluff."""
     fluff, mud, sand = (SiltSettings(kind=kind) for kind in ("fluff", "fresh-mud", "sand"))
     assert fluff.threshold_Pa < mud.threshold_Pa < 10 * fluff.threshold_Pa
-    laws = SiltLaws.of(sand.grain_m, sand.grain_density_kg_m3, 1000.0, sand.erosion_kg_m2_s)
+    laws = SiltProperties.of(sand.grain_m, sand.grain_density_kg_m3, 1000.0, sand.erosion_kg_m2_s)
     assert laws.sand
     assert fluff.threshold_Pa < laws.threshold_Pa
 
@@ -42,7 +42,7 @@ def test_fluff_moves_before_mud_and_mud_before_its_firm_layer():
 def test_fluff_is_gone_where_its_firm_layer_is_not():
     """Under 0.1 Pa the fluff erodes and the layer below it does not, even with its turbulence."""
     bed = SiltSettings(kind="fluff")
-    laws = SiltLaws.of(
+    laws = SiltProperties.of(
         bed.grain_m, bed.grain_density_kg_m3, 1000.0, bed.erosion_kg_m2_s, bed.threshold_Pa,
         stress_intensity=STRESS_INTENSITY, firm_kg_m2=bed.firm_load_kg_m2,
     )  # fmt: skip

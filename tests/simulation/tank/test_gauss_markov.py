@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from wakewise.simulation.tank.gauss_markov import Lasting
+from wakewise.simulation.tank.gauss_markov import GaussMarkovProcess
 
 
 def walks(every_s, *, sigma=0.004, lasts_s=20.0, seconds=100.0, many=300):
     """Values at each look, shape (many, looks, 3)."""
     times = np.arange(0.0, seconds + 1e-9, every_s)
     rng = np.random.default_rng(3)
-    return np.array([[one.at(t) for t in times] for one in (Lasting(sigma, lasts_s, r) for r in rng.spawn(many))])
+    return np.array(
+        [[one.at(t) for t in times] for one in (GaussMarkovProcess(sigma, lasts_s, r) for r in rng.spawn(many))]
+    )
 
 
 @pytest.mark.parametrize("every_s", [0.5, 10.0])

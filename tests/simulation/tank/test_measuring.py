@@ -6,7 +6,7 @@ import pytest
 from wakewise.core.interfaces import ScalarGrid
 from wakewise.scene.targets import Mesh, place_on_bed
 from wakewise.simulation.tank.grains import beam_attenuation_per_m, friction_velocity_m_s
-from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M, SiltLaws
+from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M, SiltProperties
 from wakewise.simulation.tank.water_truth import FRAME_S, TargetProbes, concentration_at, tracer_speeds_m_s
 
 PYRAMID = place_on_bed(
@@ -17,7 +17,7 @@ PYRAMID = place_on_bed(
     ),
     1.5,
 )
-LAWS = SiltLaws.of(20e-6, 2710.0, 1000.0, 5e-5)
+LAWS = SiltProperties.of(20e-6, 2710.0, 1000.0, 5e-5)
 EYE = np.array([0.5, 0.0, 1.2])
 
 

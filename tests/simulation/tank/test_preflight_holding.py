@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.robot.vehicles import achievable_wrench, compile_body, damping_wrench, load_vehicle
-from wakewise.robot.vehicles.ballast import Block, with_blocks
+from wakewise.robot.vehicles.ballast import BallastBlock, with_blocks
 from wakewise.simulation.tank import holding
 
 VEHICLE = load_vehicle("paper")
@@ -49,7 +49,7 @@ def test_the_worst_drag_counts():
 @pytest.mark.parametrize("float_N", [5000.0, -5000.0, 300.0, -300.0])
 def test_weight_and_lift_are_held_too(float_N):
     """In still water: what the vertical thrusters give over what the vehicle weighs in water, either way."""
-    vehicle = with_blocks(VEHICLE, [Block(float_N=float_N)])
+    vehicle = with_blocks(VEHICLE, [BallastBlock(float_N=float_N)])
     found = holding(vehicle, np.zeros((1, 3)), 1000.0)
     able = achievable_wrench(vehicle)[2, 1 if float_N > 0.0 else 0]
     assert found.share <= abs(able / float_N) * 1.001
@@ -65,7 +65,7 @@ def test_trim_counts_as_weight():
 
 def test_a_vehicle_off_balance_is_held_level_by_its_thrusters():
     """Blocks that cancel in weight still turn it; a vehicle that can make no such moment leaves it to its weight."""
-    blocks = [Block(float_N=30.0, at_B_m=(2.0, 0.0, 0.0)), Block(float_N=-30.0, at_B_m=(-2.0, 0.0, 0.0))]
+    blocks = [BallastBlock(float_N=30.0, at_B_m=(2.0, 0.0, 0.0)), BallastBlock(float_N=-30.0, at_B_m=(-2.0, 0.0, 0.0))]
     found = holding(with_blocks(VEHICLE, blocks), np.zeros((1, 3)), 1000.0)
     assert found.righting_N_m == pytest.approx(120.0, rel=0.02)
     assert found.margin_pct < 0.0

@@ -5,7 +5,7 @@ import pytest
 
 from wakewise.core.geometry import quat_from_rotvec
 from wakewise.operation import Scenario, fly
-from wakewise.simulation.tank.prescribed_motion import LedTank, Way
+from wakewise.simulation.tank.prescribed_motion import PrescribedMotionTank, PrescribedPath
 from wakewise.simulation.tank.tank import tank_ambient, tank_points
 
 _STATE = (
@@ -23,9 +23,9 @@ def flown():
     ).parts()
     steps = fly(parts, checked=False, duration_s=14.0, water_every_s=0.25).steps
     state = [steps.select(f"true_{name}" for name in names).to_numpy() for names in _STATE]
-    way = Way(times_s=steps["time_s"].to_numpy(), p_WB_m=state[0], q_WB=state[1], nu_B=state[2])
+    way = PrescribedPath(times_s=steps["time_s"].to_numpy(), p_WB_m=state[0], q_WB=state[1], nu_B=state[2])
     world = parts.world
-    led = LedTank(
+    led = PrescribedMotionTank(
         vehicle=world.vehicle,
         target=world.target,
         settings=world.settings,
@@ -60,7 +60,8 @@ def test_thrusts_that_are_nothing_leave_no_more_than_the_hull_does(flown):
 def test_between_its_steps_a_way_goes_straight_and_minds_no_sign_of_a_quaternion():
     """Both q and -q are one attitude: half way between them lies no other."""
     q = quat_from_rotvec(np.array([0.0, 0.0, 0.4]))
-    way = Way(times_s=np.array([0.0, 1.0]), p_WB_m=np.array([[0.0, 0, 0], [2.0, 0, 0]]), q_WB=np.array([q, -q]),
+    way = PrescribedPath(
+        times_s=np.array([0.0, 1.0]), p_WB_m=np.array([[0.0, 0, 0], [2.0, 0, 0]]), q_WB=np.array([q, -q]),
               nu_B=np.zeros((2, 6)))  # fmt: skip
     middle = way.at(np.array([0.5]))
     assert middle.p_WB_m[0, 0] == 1.0

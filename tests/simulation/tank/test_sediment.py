@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.simulation.tank.grains import mean_excess
-from wakewise.simulation.tank.sediment import Silt, SiltLaws
+from wakewise.simulation.tank.sediment import Silt, SiltProperties
 
 SIZE_M = (1.0, 1.0, 0.5)
 EVERYWHERE = np.array([[0.0, 0.0, 2.0]])
@@ -31,7 +31,7 @@ class Whirl:
 
 
 def _silt(load=0.1, particles=500, seed=0, grain=20e-6):
-    laws = SiltLaws.of(grain, 2710.0, 1000.0, 5e-4)
+    laws = SiltProperties.of(grain, 2710.0, 1000.0, 5e-4)
     return Silt(laws, load, SIZE_M, particles, np.random.default_rng(seed))
 
 
@@ -72,7 +72,7 @@ def test_a_clean_bed_or_gentle_water_lifts_nothing():
 def test_well_mixed_silt_stays_mixed():
     """With no settling, an even cloud stays even although diffusivity varies tenfold with height."""
     silt = _silt(load=0.0)
-    silt.laws = SiltLaws.of(1e-6, 2710.0, 1000.0, 0.0)
+    silt.laws = SiltProperties.of(1e-6, 2710.0, 1000.0, 0.0)
     n = 20000
     rng = np.random.default_rng(1)
     silt.position_m = rng.uniform([-0.5, -0.5, 0.0], [0.5, 0.5, 0.5], (n, 3))
@@ -128,7 +128,7 @@ def test_the_same_seed_gives_the_same_bytes():
 
 
 def _sand(load=0.0, particles=4000, seed=0):
-    laws = SiltLaws.of(3e-4, 2710.0, 1000.0, 5e-4)
+    laws = SiltProperties.of(3e-4, 2710.0, 1000.0, 5e-4)
     return Silt(laws, load, SIZE_M, particles, np.random.default_rng(seed))
 
 
@@ -152,7 +152,7 @@ def test_suspended_sand_sinks_out_of_the_water():
 
 def test_suspended_grains_are_even_wherever_the_particles_are_finer():
     """Near the target and far from it a large tank holds the same concentration."""
-    silt = Silt(SiltLaws.of(2e-5, 2710.0, 1000.0, 0.0), 0.0, (6.0, 5.0, 1.5), 40000, np.random.default_rng(0))
+    silt = Silt(SiltProperties.of(2e-5, 2710.0, 1000.0, 0.0), 0.0, (6.0, 5.0, 1.5), 40000, np.random.default_rng(0))
     silt.suspend(0.05, np.zeros(3))
     x, y = silt.position_m[:, 0], silt.position_m[:, 1]
     near = (np.abs(x) < 0.8) & (np.abs(y) < 0.8)
@@ -165,8 +165,8 @@ def test_sand_is_lifted_by_van_rijns_law():
     """Sand takes van Rijn's pickup unless told otherwise, and a bed loses what it says."""
     silt = _sand(load=50.0, particles=20000)
     assert silt.laws.sand
-    assert not SiltLaws.of(3e-4, 2710.0, 1000.0, 5e-4, pickup="partheniades").sand
-    assert not SiltLaws.of(2e-5, 2710.0, 1000.0, 5e-4).sand
+    assert not SiltProperties.of(3e-4, 2710.0, 1000.0, 5e-4, pickup="partheniades").sand
+    assert not SiltProperties.of(2e-5, 2710.0, 1000.0, 5e-4).sand
     before = silt.bed_kg_m2.sum()
     silt._shear(Uniform([0.6, 0, 0]), EVERYWHERE)
     silt._erode(0.05)
@@ -187,7 +187,7 @@ def test_mass_is_kept_to_a_millionth_through_lifting_and_settling_of_sand():
 def test_a_fluctuating_stress_lifts_what_its_mean_does_not():
     """Just below the threshold a steady stress moves nothing, a turbulent one what the mean excess says."""
     stress = 0.9 * 0.0625
-    laws = [SiltLaws.of(20e-6, 2710.0, 1000.0, 5e-5, 0.0625, stress_intensity=i) for i in (0.0, 0.4)]
+    laws = [SiltProperties.of(20e-6, 2710.0, 1000.0, 5e-5, 0.0625, stress_intensity=i) for i in (0.0, 0.4)]
     load = np.array([1.0])
     assert laws[0].lifted_kg_m2_s(np.array([stress]), load)[0] == 0.0
     assert laws[1].lifted_kg_m2_s(np.array([stress]), load)[0] == pytest.approx(5e-5 * mean_excess(0.9, 0.4))
@@ -196,7 +196,7 @@ def test_a_fluctuating_stress_lifts_what_its_mean_does_not():
 
 def test_fluff_goes_first_and_the_firm_layer_stays():
     """Between the two thresholds all the fluff leaves, no firm grain; above both, the firm layer erodes too."""
-    laws = SiltLaws.of(8e-6, 2650.0, 1000.0, 1e-3, 0.035, firm_kg_m2=0.5)
+    laws = SiltProperties.of(8e-6, 2650.0, 1000.0, 1e-3, 0.035, firm_kg_m2=0.5)
     silt = Silt(laws, 0.6, SIZE_M, 4000, np.random.default_rng(0))
     start = silt.total_kg
     star = np.sqrt(0.2 / 1000.0)
@@ -213,7 +213,7 @@ def test_fluff_goes_first_and_the_firm_layer_stays():
 
 def test_what_settles_on_a_firm_bed_is_fluff():
     """A grain that has settled on a bare firm layer goes again at the fluff's threshold."""
-    laws = SiltLaws.of(8e-6, 2650.0, 1000.0, 1e-3, 0.035, firm_kg_m2=0.5)
+    laws = SiltProperties.of(8e-6, 2650.0, 1000.0, 1e-3, 0.035, firm_kg_m2=0.5)
     stress = np.array([0.1, 0.1])
     rates = laws.lifted_kg_m2_s(stress, np.array([0.5, 0.501]))
     assert rates[0] == 0.0
@@ -236,7 +236,7 @@ def test_what_was_lifted_is_what_left_the_bed():
 
 def test_aggregates_sink_at_the_speed_given():
     """A settling speed that is given replaces the grain's own and nothing else."""
-    own, given = (SiltLaws.of(8e-6, 2650.0, 1000.0, 1e-4, settling_m_s=w) for w in (None, 3e-4))
+    own, given = (SiltProperties.of(8e-6, 2650.0, 1000.0, 1e-4, settling_m_s=w) for w in (None, 3e-4))
     assert given.settling_m_s == 3e-4
     assert own.settling_m_s == pytest.approx(5.2e-5, rel=0.05)
     assert given.threshold_Pa == own.threshold_Pa
@@ -248,7 +248,7 @@ def test_a_plume_is_that_of_advection_and_diffusion():
     Far from the bed K is even, K0 + 0.40 u* 0.065 m; along the stream diffusion is negligible there.
     """
     speed, rate, h = 0.05, 1e-6, 0.02
-    laws = SiltLaws.of(1e-6, 2710.0, 1000.0, 0.0)
+    laws = SiltProperties.of(1e-6, 2710.0, 1000.0, 0.0)
     silt = Silt(laws, 0.0, (1.2, 1.0, 0.6), 10**6, np.random.default_rng(0))
     source, rng, dt, each = np.array([-0.5, 0.0, 0.3]), np.random.default_rng(1), 0.1, 500
     water = Uniform([speed, 0, 0])
@@ -276,7 +276,7 @@ def test_a_plume_is_that_of_advection_and_diffusion():
 
 def test_a_settling_plume_sinks_as_it_goes():
     """Grains released into a stream lie lower by w x / U, and what reaches the bed is counted there."""
-    laws = SiltLaws.of(20e-6, 2710.0, 1000.0, 0.0, settling_m_s=0.01)
+    laws = SiltProperties.of(20e-6, 2710.0, 1000.0, 0.0, settling_m_s=0.01)
     silt = Silt(laws, 0.0, (1.2, 1.0, 0.6), 10**6, np.random.default_rng(0))
     silt.position_m = np.tile([-0.5, 0.0, 0.2], (4000, 1))
     silt.mass_kg = np.full(4000, 1e-6)

@@ -7,12 +7,12 @@ import pytest
 from rods import BED_Z, rod, rod_mesh, together
 
 from wakewise.core.errors import InputError
-from wakewise.scene.targets import Sway, Tissue, place_on_bed
+from wakewise.scene.targets import BendingModes, TissueProperties, place_on_bed
 from wakewise.simulation.tank.soft_body import (
-    Loose,
-    Pieces,
-    Swaying,
-    Yielding,
+    SurfaceElements,
+    TargetCompliance,
+    TargetMotion,
+    UnanchoredTarget,
     check_sway,
     drag_N,
     slide_m_s,
@@ -41,12 +41,12 @@ class Stream:
 
 
 def tissue(stiffness_Pa=1e6, damping=0.0, drag=1.2):
-    return Tissue(stiffness_Pa=stiffness_Pa, density_kg_m3=WATER, drag=drag, damping=damping)
+    return TissueProperties(stiffness_Pa=stiffness_Pa, density_kg_m3=WATER, drag=drag, damping=damping)
 
 
 def swaying(target, flesh, stream, loose=None):
-    yielding = Yielding(drag=flesh.drag, sway=Sway.of(target, flesh, WATER), loose=loose)
-    return Swaying(target, yielding, WATER, stream)
+    yielding = TargetCompliance(drag=flesh.drag, sway=BendingModes.of(target, flesh, WATER), loose=loose)
+    return TargetMotion(target, yielding, WATER, stream)
 
 
 def go_on(body, stream, duration_s):
@@ -61,7 +61,7 @@ def go_on(body, stream, duration_s):
 
 def test_the_drag_of_a_rod_is_that_of_its_width():
     """1/2 rho Cd times the width turned to the stream times its height, whatever the stream's direction."""
-    pieces = Pieces.of(rod(), None)
+    pieces = SurfaceElements.of(rod(), None)
     for angle in np.deg2rad([0.0, 20.0, 65.0, 140.0]):
         passing = 0.2 * np.array([np.cos(angle), np.sin(angle), 0.0])
         force = drag_N(np.tile(passing, (len(pieces.stem), 1)), pieces.areas_m2, 1.2 * WATER)
@@ -75,8 +75,8 @@ def test_a_stream_bends_an_even_rod_by_w_l4_over_8_ei(speed):
     """The tip's way in a steady stream is the cantilever's of beam theory, within 4 %."""
     flesh = tissue()
     target = rod(R, R, LENGTH)
-    sway = Sway.of(target, flesh, WATER)
-    tips = standing_m(Pieces.of(target, sway), sway, flesh.drag * WATER, np.array([speed, 0.0, 0.0]))
+    sway = BendingModes.of(target, flesh, WATER)
+    tips = standing_m(SurfaceElements.of(target, sway), sway, flesh.drag * WATER, np.array([speed, 0.0, 0.0]))
     load = 0.5 * WATER * flesh.drag * 2 * R * speed**2
     way = load * LENGTH**4 / (8 * 1e6 * np.pi / 4 * R**4)
     assert way < 0.1 * LENGTH
@@ -137,8 +137,8 @@ def test_energy_never_grows_without_flow(damping, tip):
 def test_the_step_agrees_with_a_fine_runge_kutta():
     """In a gusty stream the tip is where RK4 with steps of half a millisecond has it, within 2 % of its way."""
     flesh, target = tissue(damping=0.1), rod(0.004, 0.002, 0.1)
-    sway = Sway.of(target, flesh, WATER)
-    pieces = Pieces.of(target, sway)
+    sway = BendingModes.of(target, flesh, WATER)
+    pieces = SurfaceElements.of(target, sway)
     rng = np.random.default_rng(2)
     water = 0.06 * rng.standard_normal((41, 3)) * [1, 1, 0.2] + [0.08, 0.02, 0.0]
 
@@ -211,10 +211,10 @@ def test_water_that_speeds_up_pushes_with_its_pressure_and_added_mass():
 def test_a_loose_object_slides_only_if_drag_exceeds_friction(speed, slides):
     """It stays while drag is below mu W and is shifted along the stream above it."""
     target, stream = rod(), Stream([0.0, speed, 0.0])
-    pieces = Pieces.of(target, None)
+    pieces = SurfaceElements.of(target, None)
     at_limit = drag_N(np.tile([0.0, 0.21, 0.0], (300, 1)), pieces.areas_m2, 1.2 * WATER)
-    loose = Loose(weight_N=float(np.hypot(*at_limit[:2])) / 0.5, friction=0.5)
-    body = Swaying(target, Yielding(drag=1.2, loose=loose), WATER, stream)
+    loose = UnanchoredTarget(weight_N=float(np.hypot(*at_limit[:2])) / 0.5, friction=0.5)
+    body = TargetMotion(target, TargetCompliance(drag=1.2, loose=loose), WATER, stream)
     for _ in range(20):
         body.step(stream, DT)
     shifted = body.posture().shift_m
@@ -235,7 +235,7 @@ def test_sliding_stops_where_friction_holds():
 
 def test_too_stiff_and_too_soft_are_refused_with_the_figures():
     """Above the frequency at which the water is known, and where the current bends it beyond half."""
-    stiff, soft, good = (Sway.of(rod(), tissue(stiffness_Pa=e), WATER) for e in (1e9, 3e3, 1e6))
+    stiff, soft, good = (BendingModes.of(rod(), tissue(stiffness_Pa=e), WATER) for e in (1e9, 3e3, 1e6))
     with pytest.raises(InputError, match=r"rod swings at .* Hz or more.*too stiff"):
         check_sway(rod(), stiff, 1.2, np.zeros(3), WATER, DT)
     with pytest.raises(InputError, match=r"current of 0.1 m/s bends rod.*too soft"):
@@ -273,6 +273,8 @@ def test_the_posture_tells_of_the_surface():
     assert posture.sway_mean_W_m[0] < posture.sway_m < posture.sway_peak_m
     assert posture.sway_mean_W_m[0] > 0.3 * posture.sway_peak_m
     assert posture.target_stress_Pa > 1e3
-    lying = Swaying(rod(), Yielding(drag=1.2, loose=Loose(weight_N=1.0, friction=0.6)), WATER, stream).posture()
+    lying = TargetMotion(
+        rod(), TargetCompliance(drag=1.2, loose=UnanchoredTarget(weight_N=1.0, friction=0.6)), WATER, stream
+    ).posture()
     assert lying.sway_m == lying.sway_peak_m == lying.target_stress_Pa == 0.0
     assert lying.tips_m.shape == (0, 2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.simulation.tank.grains import friction_velocity_m_s
-from wakewise.simulation.tank.sediment import Silt, SiltLaws
+from wakewise.simulation.tank.sediment import Silt, SiltProperties
 from wakewise.simulation.tank.swell import Swell, wave_friction_factor
 from wakewise.simulation.water import AiryWave
 
@@ -48,7 +48,9 @@ def test_coarse_beds_are_rough():
 
 def test_a_swell_drags_on_the_bed_more_than_a_stream_of_its_speed():
     """A silt bed under the wave alone feels the swell's stress everywhere, far above that of the log law."""
-    silt = Silt(SiltLaws.of(20e-6, 2710.0, 1000.0, 5e-5), 0.1, (4.0, 3.0, 1.5), 100, np.random.default_rng(0), SWELL)
+    silt = Silt(
+        SiltProperties.of(20e-6, 2710.0, 1000.0, 5e-5), 0.1, (4.0, 3.0, 1.5), 100, np.random.default_rng(0), SWELL
+    )
     silt._shear(Moving(0.7), np.zeros((0, 3)))
     stress = 1000.0 * silt._star_m_s**2
     places = silt._middles
@@ -59,7 +61,9 @@ def test_a_swell_drags_on_the_bed_more_than_a_stream_of_its_speed():
 
 def test_stream_and_swell_add_as_squares():
     """The squares of the two stresses add up in every cell, whatever the phase of the wave there."""
-    silt = Silt(SiltLaws.of(20e-6, 2710.0, 1000.0, 5e-5), 0.1, (4.0, 3.0, 1.5), 100, np.random.default_rng(0), SWELL)
+    silt = Silt(
+        SiltProperties.of(20e-6, 2710.0, 1000.0, 5e-5), 0.1, (4.0, 3.0, 1.5), 100, np.random.default_rng(0), SWELL
+    )
     silt._shear(Moving(0.7, [0.2, 0.1, 0.0]), np.zeros((0, 3)))
     stream = 1000.0 * float(friction_velocity_m_s(math.hypot(0.2, 0.1), 0.01, 20e-6)) ** 2
     expected = np.hypot(stream, SWELL.stress_Pa(silt._middles, 0.7))
@@ -68,7 +72,7 @@ def test_stream_and_swell_add_as_squares():
 
 def test_a_strong_swell_lifts_silt_where_its_speed_alone_would_not():
     """Orbits of 0.11 m/s over 20 um silt: the log law stays below the threshold, the swell's own stress does not."""
-    laws = SiltLaws.of(20e-6, 2710.0, 1000.0, 5e-5)
+    laws = SiltProperties.of(20e-6, 2710.0, 1000.0, 5e-5)
     wave = AiryWave(amplitude_m=0.05, period_s=4.0, heading_rad=0.0, depth_m=1.5)
     swell = Swell(wave=wave, grain_m=20e-6, density_kg_m3=1000.0)
     assert 1000.0 * float(friction_velocity_m_s(swell.amplitude_m_s, 0.01, 20e-6)) ** 2 < laws.threshold_Pa

@@ -29,7 +29,7 @@ from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M
 from wakewise.simulation.tank.validation_limits import ABSENT, LIMITS, limits_table
 from wakewise.simulation.water.blockage import Blockage, _surface
 from wakewise.simulation.water.hullwake import HullPush, first_wake
-from wakewise.simulation.water.round_jet_closure import Spreading
+from wakewise.simulation.water.round_jet_closure import JetSpreading
 
 Span = tuple[float, float]
 MEASURES: dict[str, Callable[[], Span]] = {}
@@ -62,7 +62,7 @@ def _axis():
 
 
 def _momentum(width, places):
-    water, found = push(new_water(spreading=Spreading.of_width(width)), 12.0, [1.0]), []
+    water, found = push(new_water(spreading=JetSpreading.of_width(width)), 12.0, [1.0]), []
     for x in places:
         r, flux = np.linspace(0, 0.7 * x, 300), []
         for _ in range(20):
@@ -141,7 +141,7 @@ def _crossing(name="crossing"):
     field, case = load_crossing(DATA / f"{name}.npz"), find_case(name)
     behind = (field.away_D >= 1.0) & (field.away_D <= 6.0)
     points = crossing_place(case) + field.points_D()[0][behind]
-    water = new_water(2, turbulence=0.25, spreading=Spreading.of_width(0.13))
+    water = new_water(2, turbulence=0.25, spreading=JetSpreading.of_width(0.13))
     at, jets = np.array([jet.position_D for jet in case.jets]) * D_M, [jet.direction for jet in case.jets]
     push(water, 40 * UNIT_S, [1.0, 1.0], at, jets)
     steps = round(80 * UNIT_S / 0.05)

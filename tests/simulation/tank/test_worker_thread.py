@@ -11,7 +11,7 @@ from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Mesh, place_on_bed
 from wakewise.simulation.tank import Tank, TankSettings, worker_thread
-from wakewise.simulation.tank.worker_thread import Lane
+from wakewise.simulation.tank.worker_thread import WorkerThread
 
 CORNERS = np.array([[0.07, 0.07, 0], [-0.07, 0.07, 0], [-0.07, -0.07, 0], [0.07, -0.07, 0], [0, 0, 0.15]])
 PYRAMID = place_on_bed(
@@ -24,7 +24,7 @@ def test_work_is_done_in_order(monkeypatch, cores):
     """Of many pieces each comes after the one before, on one core at once and on two on another thread."""
     monkeypatch.setattr(worker_thread, "cores", lambda: cores)
     done, where = [], set()
-    beside = Lane("order")
+    beside = WorkerThread("order")
 
     def piece(k):
         time.sleep(0.001 * (k % 3))
@@ -42,7 +42,7 @@ def test_work_is_done_in_order(monkeypatch, cores):
 def test_an_error_comes_out(monkeypatch, cores):
     """What a piece raises is raised to the one who asked, once, and no later piece hides it."""
     monkeypatch.setattr(worker_thread, "cores", lambda: cores)
-    beside = Lane("errors")
+    beside = WorkerThread("errors")
 
     def ask():
         beside.do(lambda: 1 / 0)

@@ -11,7 +11,7 @@ from wakewise.simulation.water.bedjets import (
     LOG_WIDTH,
     WALL_JET_SPEED,
     WALL_JET_SPREAD,
-    Rings,
+    WallJetRings,
     coarsened,
     grown,
     layer_speed,
@@ -36,7 +36,7 @@ def _rings(leaning=True):
 
 def _steady(M=1e-3, seconds=40.0, dt_s=0.05):
     """Rings of an upright jet of steady momentum flux M, struck at every step."""
-    rings = Rings.none()
+    rings = WallJetRings.none()
     for _ in range(round(seconds / dt_s)):
         rings, _ = grown(rings, np.zeros(3), dt_s)
         new = rings_from_strikes(np.array([[0.0, 0.0, 1.4]]), np.array([[0.0, 0.0, M * dt_s]]), np.array([0.03]))
@@ -132,7 +132,7 @@ def test_merging_keeps_impulse_its_direction_and_the_flow():
     """Sums of impulse, of impulse along the plane, of its place, and of impulse over radius, the flow, are kept."""
     rng = np.random.default_rng(0)
     n = 80
-    rings = Rings(
+    rings = WallJetRings(
         rng.uniform(-0.2, 0.2, (n, 2)),
         rng.uniform(0.3, 0.6, n),
         rng.uniform(1, 9, n) * 1e-4,
@@ -150,7 +150,7 @@ def test_merging_hardly_changes_the_flow():
     """A crowd of weak rings made fewer moves water by a tenth of its rms differently, and nowhere by 5 mm/s."""
     rng = np.random.default_rng(1)
     n = 60
-    rings = Rings(
+    rings = WallJetRings(
         rng.uniform(-0.3, 0.3, (n, 2)),
         rng.uniform(0.3, 0.6, n),
         rng.uniform(1, 9, n) * 3e-5,
@@ -178,7 +178,7 @@ def test_overlap_is_the_integral_it_stands_for():
 def test_rings_of_two_jets_on_the_same_ground_run_as_those_of_one():
     """Momentum adds: twice the impulse on one spot, as one jet or two, has the same layer speed."""
     one = _rings(leaning=False).take(np.array([0]))
-    twice = Rings(one.centre_m, one.radius_m, 2 * one.impulse_m4_s, one.lean)
+    twice = WallJetRings(one.centre_m, one.radius_m, 2 * one.impulse_m4_s, one.lean)
     assert layer_speed(one.joined(one)) == pytest.approx(np.repeat(layer_speed(twice), 2), rel=1e-12)
 
 
@@ -196,7 +196,7 @@ def test_pieces_of_a_list_give_the_same_bytes():
     """Many rings, of all sizes and leans: which points are summed together does not change what each gets."""
     rng = np.random.default_rng(7)
     n = 200
-    rings = Rings(
+    rings = WallJetRings(
         rng.uniform(-1.0, 1.0, (n, 2)),
         np.exp(rng.uniform(np.log(0.05), np.log(1.5), n)),
         1e-3 * rng.uniform(0.01, 1.0, n),
@@ -229,7 +229,7 @@ def test_a_thicker_jet_carries_the_same_momentum(stretch, least_m):
     """A layer made thicker runs slower by the root of that: speed squared times thickness stays within 12 %."""
     M, dt_s, at = 1e-3, 0.05, []
     for widening, least in ((1.0, 0.0), (stretch, least_m)):
-        rings = Rings.none()
+        rings = WallJetRings.none()
         for _ in range(1600):
             rings, _ = grown(rings, np.zeros(3), dt_s, least, widening)
             new = rings_from_strikes(np.array([[0.0, 0.0, 1.4]]), np.array([[0.0, 0.0, M * dt_s]]), np.array([0.03]))

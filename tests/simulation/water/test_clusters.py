@@ -4,7 +4,7 @@ import numpy as np
 
 from wakewise.simulation.water import blocked_sums
 from wakewise.simulation.water.clusters import ImpulseField
-from wakewise.simulation.water.faces import Room
+from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.induction import impulse_velocity
 from wakewise.simulation.water.space_order import in_space
 
@@ -23,7 +23,7 @@ def _jets():
         places.append(row)
         impulses.append(np.full((40, 1), 2e-5) * axis)
         sigmas.append(0.02 + 0.08 * reach)
-    return Room.of(1.5, (3.0, 2.5), surface=True).with_images(
+    return TankFaces.of(1.5, (3.0, 2.5), surface=True).with_images(
         np.clip(np.concatenate(places), [-2.9, -2.4, 0.0], [2.9, 2.4, 1.5]),
         np.concatenate(impulses),
         np.concatenate(sigmas),

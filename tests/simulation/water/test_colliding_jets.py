@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.simulation.water.bedjets import Rings
+from wakewise.simulation.water.bedjets import WallJetRings
 from wakewise.simulation.water.colliding_jets import turn_aside
-from wakewise.simulation.water.faces import Room
+from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.parcels import Parcels
-from wakewise.simulation.water.walljets import Planes
+from wakewise.simulation.water.walljets import JetPlanes
 
-ROOM = Room.of(1.5, (math.inf, math.inf), surface=False)
+ROOM = TankFaces.of(1.5, (math.inf, math.inf), surface=False)
 
 
 def _met(impulses, gap=0.1, sigma=0.05, planes=None, layers=None, rings=0):
@@ -25,8 +25,8 @@ def _met(impulses, gap=0.1, sigma=0.05, planes=None, layers=None, rings=0):
         np.zeros((2, 3)),
         np.zeros((2, 3)),
     ).with_room(4)
-    planes = planes or Planes.of(ROOM)
-    layers = layers or Rings(np.zeros((8, 2)), np.ones(8), np.zeros(8), np.zeros((8, 2))).layers()
+    planes = planes or JetPlanes.of(ROOM)
+    layers = layers or WallJetRings(np.zeros((8, 2)), np.ones(8), np.zeros(8), np.zeros((8, 2))).layers()
     count, rings, taken = turn_aside(jets, 2, 4, planes, len(ROOM.faces), layers, rings)
     return Parcels.of(jets, count), layers, rings, taken, planes
 
@@ -74,9 +74,9 @@ def test_the_same_jets_run_out_in_the_same_plane():
 
 def test_without_a_plane_left_a_meeting_waits():
     """Where rings run in all planes there are, the jets are left as they are."""
-    planes = Planes.of(ROOM)
+    planes = JetPlanes.of(ROOM)
     many = len(planes.used)
-    layers = Rings(np.zeros((many, 2)), np.ones(many), np.ones(many), np.zeros((many, 2))).layers()
+    layers = WallJetRings(np.zeros((many, 2)), np.ones(many), np.ones(many), np.zeros((many, 2))).layers()
     layers.plane[:] = np.arange(many)
     left, _, rings, taken, _ = _met([[1e-3, 0, 0], [-1e-3, 0, 0]], planes=planes, layers=layers, rings=many)
     assert left.count == 2 and rings == many and taken == 0.0

@@ -10,7 +10,7 @@ from wakewise.simulation.lattice.crossing import crossing_place, load_crossing
 from wakewise.simulation.lattice.meanfield import DATA
 from wakewise.simulation.water.crossing_jets import RAYS, fan_out, ray_azimuths
 from wakewise.simulation.water.parcels import Parcels
-from wakewise.simulation.water.round_jet_closure import Spreading
+from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.simulation.water.water import Water
 
 D_M = 0.06
@@ -104,7 +104,7 @@ def _crossing(width, points_D, name="crossing"):
         bed_z_m=math.inf,
         rng=np.random.default_rng(0),
         turbulence=0.25,
-        spreading=Spreading.of_width(width),
+        spreading=JetSpreading.of_width(width),
         rest_speed_m_s=0.0,
     )
     case = find_case(name)

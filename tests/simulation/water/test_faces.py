@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.simulation.water.faces import LEAST_IMAGE_M_S, Room
+from wakewise.simulation.water.faces import LEAST_IMAGE_M_S, TankFaces
 from wakewise.simulation.water.parcels import confined_velocity
 
-ROOM = Room.of(1.5, (0.6, 0.5), surface=True)
+ROOM = TankFaces.of(1.5, (0.6, 0.5), surface=True)
 
 
 @pytest.mark.parametrize("face", ROOM.faces, ids=lambda face: face.name)
@@ -29,10 +29,10 @@ def test_images_cancel_the_flow_across_every_face():
         points = rng.uniform([-0.6, -0.5, 0.0], [0.6, 0.5, 1.5], (100, 3))
         points[:, face.axis] = face.at_m
         u = confined_velocity(points, X, m, sigma, ROOM)
-        free = confined_velocity(points, X, m, sigma, Room(()))
+        free = confined_velocity(points, X, m, sigma, TankFaces(()))
         assert np.abs(u[:, face.axis]).max() < max(0.1 * np.abs(free[:, face.axis]).max(), 30 * LEAST_IMAGE_M_S)
 
 
 def test_open_water_has_no_faces():
     """Infinite sizes leave faces out."""
-    assert Room.of(math.inf, (math.inf, math.inf), surface=False).faces == ()
+    assert TankFaces.of(math.inf, (math.inf, math.inf), surface=False).faces == ()

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.simulation.water.faces import Room
+from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.parcel_advection import (
     EMISSION_SPACING,
     HELD_S,
@@ -65,7 +65,7 @@ def test_the_compiled_step_is_the_closure_as_written(spreading):
     rng = np.random.default_rng(0)
     parcels, dt_s = _parcels(rng), 0.05
     u, ambient = rng.normal(0, 0.3, (200, 3)), rng.normal(0, 0.05, (200, 3))
-    position, sigma, kept, speed = _drifted(parcels, u, ambient, dt_s, spreading, Room(()))
+    position, sigma, kept, speed = _drifted(parcels, u, ambient, dt_s, spreading, TankFaces(()))
     own = carried_share(parcels.sigma_m, parcels.diameter_m)[:, None] * u
     spread = bent_spread(spreading.spread, own, ambient - parcels.disk_m_s)
     length = np.linalg.norm(u, axis=1)
@@ -83,7 +83,7 @@ def test_the_compiled_step_is_the_closure_as_written(spreading):
 def test_nothing_ends_up_behind_a_face():
     """Parcels pushed through walls, bed or surface come back mirrored."""
     rng = np.random.default_rng(1)
-    parcels, room = _parcels(rng), Room.of(1.5, (1.0, 1.0), surface=True)
+    parcels, room = _parcels(rng), TankFaces.of(1.5, (1.0, 1.0), surface=True)
     position, *_ = _drifted(parcels, rng.normal(0, 4.0, (200, 3)), np.zeros((200, 3)), 0.1, PLAIN, room)
     assert np.all(np.abs(position[:, :2]) <= 1.0) and np.all((position[:, 2] >= 0.0) & (position[:, 2] <= 1.5))
 
@@ -125,7 +125,7 @@ def test_what_is_sent_lies_where_the_closure_puts_it():
     slug = (np.array([0, 1]), np.array([0, 1]), np.array([0.03, 0.01]), np.array([0.4, 0.3]), np.array([1e-5, 2e-5]))
     jets = Parcels.none().with_room(3)
     noise = np.arange(6.0).reshape(2, 3)
-    assert send(jets, 1, slug, areas, disks, ambient, _laws(PLAIN, dt_s), Room(()).walls, noise) == 3
+    assert send(jets, 1, slug, areas, disks, ambient, _laws(PLAIN, dt_s), TankFaces(()).walls, noise) == 3
     D = np.sqrt(4 * areas / math.pi)
     path, sigma = travel(D / math.sqrt(8), D, slug[3], slug[2], PLAIN)
     jet = np.array([[1.0, 0, 0], [0, 0, -1.0]])

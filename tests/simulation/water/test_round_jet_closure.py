@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.simulation.water.faces import Room
+from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.parcel_advection import drift
 from wakewise.simulation.water.round_jet_closure import (
     CORE_END_D,
     PLAIN,
     SWIRLING,
-    Spreading,
+    JetSpreading,
     lasting_spread,
     travel,
     wake_sigma_m,
@@ -31,7 +31,7 @@ def _steady(width, thrust_N, life=1.0):
         density_kg_m3=DENSITY,
         bed_z_m=math.inf,
         rng=np.random.default_rng(0),
-        spreading=Spreading.of_width(width),
+        spreading=JetSpreading.of_width(width),
         wake_life=life,
         rest_speed_m_s=1e-4,
     )
@@ -62,7 +62,7 @@ def test_a_jet_of_any_width_keeps_its_momentum_and_entrains(width, thrust_N):
     momentum and flux at .8 m (bounds 18 and 20 %): neighbours in its row differ so much in size that they no longer add
     up to a slender jet's.
     """
-    water, spread = _steady(width, thrust_N), Spreading.of_width(width)
+    water, spread = _steady(width, thrust_N), JetSpreading.of_width(width)
     tip = (spread.core_D - CORE_END_D / spread.spread) * D_M
     for x in (0.6, 0.8):
         r, speeds = _across(water, x, thrust_N)
@@ -104,11 +104,11 @@ def test_remains_last_longer_when_told_to():
 
 def test_the_two_published_jets_lie_on_one_line():
     """A width of 0.094 gives the jet without swirl, of 0.177 the propeller's; in between cores shorten evenly."""
-    assert Spreading.of_width(0.094) == PLAIN
-    wide = Spreading.of_width(SWIRLING.half_width_growth)
+    assert JetSpreading.of_width(0.094) == PLAIN
+    wide = JetSpreading.of_width(SWIRLING.half_width_growth)
     assert wide.core_D == pytest.approx(SWIRLING.core_D, rel=1e-9)
     assert wide.spread == pytest.approx(SWIRLING.spread, rel=1e-9)
-    cores = [Spreading.of_width(w).core_D for w in WIDTHS]
+    cores = [JetSpreading.of_width(w).core_D for w in WIDTHS]
     assert np.all(np.diff(cores) < 0.0) and np.all(np.array(cores) > 2.0)
 
 
@@ -119,7 +119,7 @@ def _drifted(parcels, life, wake):
     still, u = np.zeros((n, 3)), np.column_stack([speed, np.zeros((n, 2))])
     laws = np.array([PLAIN.core_spread, PLAIN.spread, 0.17, 0.05, life])
     out = np.empty(n), np.full(n, wake)
-    drift(still.copy(), sigma, np.zeros(n), out[0], D, still, u, still.copy(), start, out[1], laws, Room(()).walls)
+    drift(still.copy(), sigma, np.zeros(n), out[0], D, still, u, still.copy(), start, out[1], laws, TankFaces(()).walls)
     return sigma
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from wakewise.simulation.water.bedjets import Layers, planes_velocity
-from wakewise.simulation.water.faces import Room
+from wakewise.simulation.water.bedjets import RingBuffers, planes_velocity
+from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.induction import impulse_velocity
 from wakewise.simulation.water.water import Water, _with_room
 
@@ -33,7 +33,7 @@ def test_the_flow_is_that_of_its_parts():
     """All jets together are the parcels and their images one by one and the rings, both in double precision, to 1 %."""
     water = _water(160)
     now, points = water.now, np.random.default_rng(1).uniform([-1, -1, 0.6], [1, 1, 1.5], (700, 3))
-    room = Room.of(1.5, (1.5, 1.5), surface=True)
+    room = TankFaces.of(1.5, (1.5, 1.5), surface=True)
     free = impulse_velocity(
         points,
         *room.with_images(now.parcels.position_m, now._field.impulses_m4_s[: now.parcels.count], now.parcels.sigma_m),
@@ -63,7 +63,7 @@ def test_room_runs_out_and_nothing_changes():
     """A water whose room for parcels and rings had to grow is byte for byte one that had enough."""
     tight, wide = _water(0), _water(0)
     tight._jets = tight.now.parcels.with_room(1)
-    tight._layers = Layers(*(_with_room(column[:0], 1) for column in tight._layers))
+    tight._layers = RingBuffers(*(_with_room(column[:0], 1) for column in tight._layers))
     for water in (tight, wide):
         for _ in range(60):
             water.step(0.05, DISKS_M, DISKS_M, AXES, GIVEN_N_S)

@@ -125,10 +125,10 @@ def test_what_is_printed_at_home_is_what_a_flight_would_do() -> None:
     from wakewise.allocation import gentle_allocation
     from wakewise.control import vehicle_layout
     from wakewise.control.thrift import weights_of
-    from wakewise.wake import WakeView
+    from wakewise.wake import InfluenceModel
 
     parts = ww.Scenario.preset("quick").parts()
-    view = WakeView.of(parts.vehicle, parts.region, parts.wake)
+    view = InfluenceModel.of(parts.vehicle, parts.region, parts.wake)
     weights = weights_of(parts.control, view.total_weight)
     gram, before = view.gram(parts.start.X_WB), np.zeros(8)
     flown = gentle_allocation(vehicle_layout(parts.vehicle), np.array(WRENCH), gram, weights, before)

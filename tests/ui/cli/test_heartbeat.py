@@ -6,14 +6,14 @@ import time
 import pytest
 
 from wakewise.ui.cli import console
-from wakewise.ui.cli.console import Bars
+from wakewise.ui.cli.console import ProgressBars
 
 
 def test_a_silent_stage_says_where_it_is_now_and_then(capfd, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lines with share, note and minutes while nothing is told, none after the end, and the last says it is done."""
     console._stderr.cache_clear()
     monkeypatch.setattr(console, "HEARTBEAT_S", 0.05)
-    with Bars().stage("reconstruct") as progress:
+    with ProgressBars().stage("reconstruct") as progress:
         progress(30, 120, "matches")
         time.sleep(0.4)
     lines = capfd.readouterr().err.splitlines()
@@ -29,7 +29,7 @@ def test_a_stage_that_fails_stops_its_heartbeat(capfd, monkeypatch: pytest.Monke
     """No line after the error."""
     console._stderr.cache_clear()
     monkeypatch.setattr(console, "HEARTBEAT_S", 0.05)
-    with pytest.raises(ValueError, match="broken"), Bars().stage("work"):
+    with pytest.raises(ValueError, match="broken"), ProgressBars().stage("work"):
         raise ValueError("broken")
     time.sleep(0.15)
     assert capfd.readouterr().err == ""

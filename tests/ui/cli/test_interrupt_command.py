@@ -6,16 +6,16 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli import main
-from wakewise.ui.cli.console import INTERRUPTED, Bars
+from wakewise.ui.cli.console import INTERRUPTED, ProgressBars
 
 
 def test_work_that_goes_on_after_ctrl_c_is_stopped_at_its_next_word() -> None:
     """Progress after an interrupt raises it again; without one it does not."""
-    with Bars().stage("work") as progress:
+    with ProgressBars().stage("work") as progress:
         progress(0, 2, "note")
     INTERRUPTED.set()
     try:
-        with pytest.raises(KeyboardInterrupt), Bars().stage("work") as progress:
+        with pytest.raises(KeyboardInterrupt), ProgressBars().stage("work") as progress:
             progress(1, 2, "note")
     finally:
         INTERRUPTED.clear()

@@ -18,11 +18,11 @@ import cv2
 import numpy as np
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cockpit.control_mailbox import Seat
+from wakewise.ui.cockpit.control_mailbox import ControlMailbox
 from wakewise.ui.cockpit.ground_station_listing import PAGE
-from wakewise.ui.cockpit.server import Server
-from wakewise.ui.cockpit.view_model import Note, Picture
-from wakewise.ui.web.files import Files
+from wakewise.ui.cockpit.server import CockpitServer
+from wakewise.ui.cockpit.view_model import CameraPicture, StatusMessage
+from wakewise.ui.web.files import StaticFiles
 
 _THRUSTERS = 8
 _RANGES = {"w_track": [0.5, 50.0], "gain": [0.1, 1.0], "mode": ["operator", "hold", "scan"]}
@@ -32,7 +32,7 @@ _RANGES = {"w_track": [0.5, 50.0], "gain": [0.1, 1.0], "mode": ["operator", "hol
 class Rehearsal:
     """A `Show` whose vehicle is a point: it moves as the sticks say."""
 
-    seat: Seat = field(default_factory=Seat)
+    seat: ControlMailbox = field(default_factory=ControlMailbox)
     edition: int = 0
     desk: dict[str, Any] = field(
         default_factory=lambda: {
@@ -51,7 +51,7 @@ class Rehearsal:
         self.p, self.heading, self.energy = np.array([-0.8, 0.0, -0.1]), 0.0, 0.0
         self.axes, self.photos, self.frames = np.zeros(5), 0, 0
         self.flown: list[tuple[float, np.ndarray]] = []
-        self._notes: list[Note] = []
+        self._notes: list[StatusMessage] = []
         self._began_s, self._last_s = time.monotonic(), time.monotonic()
         angle, height = np.linspace(0.0, 2.0 * math.pi, 200, endpoint=False) * 7.0, np.linspace(-0.95, 0.95, 200)
         ring = np.sqrt(1.0 - height**2)
@@ -78,7 +78,7 @@ class Rehearsal:
                 self.photos += what == "capture"
                 if what in ("hold", "scan", "operator"):
                     self.desk["mode"] = what
-                self._notes.append(Note(text=what, time_s=self.time_s))
+                self._notes.append(StatusMessage(text=what, time_s=self.time_s))
             self.seat.flown()
             self.heading += 0.5 * self.axes[3] * 0.02
             c, s = math.cos(self.heading), math.sin(self.heading)
@@ -154,7 +154,7 @@ class Rehearsal:
             "fallback": None,
         }
 
-    def notes(self) -> Sequence[Note]:
+    def notes(self) -> Sequence[StatusMessage]:
         told, self._notes = self._notes, []
         return told
 
@@ -165,7 +165,7 @@ class Rehearsal:
                 raise InputError(f"desk: {name} {value}, allowed {allowed}")
         self.desk.update(changes)
 
-    def picture(self) -> Picture:
+    def picture(self) -> CameraPicture:
         image = np.full((270, 480, 3), (120, 90, 30), np.uint8)
         away = max(float(np.linalg.norm(self.p)), 0.2)
         bearing = math.atan2(-self.p[1], -self.p[0]) - self.heading
@@ -173,13 +173,13 @@ class Rehearsal:
         cv2.circle(image, at, int(60 / away), (80, 120, 220), -1)
         self.frames += 1
         jpeg = cv2.imencode(".jpg", image)[1].tobytes()
-        return Picture(number=self.frames, time_s=self.time_s, jpeg=jpeg)
+        return CameraPicture(number=self.frames, time_s=self.time_s, jpeg=jpeg)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--port", type=int, default=0)
-    server = Server(Rehearsal(), port=parser.parse_args().port, files=Files(folder=PAGE))
+    server = CockpitServer(Rehearsal(), port=parser.parse_args().port, files=StaticFiles(folder=PAGE))
     server.start()
     print(server.address, flush=True)
     try:

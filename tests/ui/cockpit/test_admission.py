@@ -16,7 +16,7 @@ from test_server import Page, _opening, page
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from wakewise.ui.cockpit.server import MOST_CLIENTS, Server
+from wakewise.ui.cockpit.server import MOST_CLIENTS, CockpitServer
 from wakewise.ui.web.pending import PER_ADDRESS
 
 ORIGIN = "http://rov.example"
@@ -30,23 +30,23 @@ def show() -> Iterator[Rehearsal]:
 
 
 @pytest.fixture
-def server(show: Rehearsal) -> Iterator[Server]:
-    serving = Server(show)
+def server(show: Rehearsal) -> Iterator[CockpitServer]:
+    serving = CockpitServer(show)
     serving.start()
     yield serving
     serving.stop()
 
 
 @pytest.fixture
-def guarded(show: Rehearsal) -> Iterator[Server]:
+def guarded(show: Rehearsal) -> Iterator[CockpitServer]:
     """A server that asks everybody for the token, as behind a proxy."""
-    serving = Server(show, origins=(ORIGIN,))
+    serving = CockpitServer(show, origins=(ORIGIN,))
     serving.start()
     yield serving
     serving.stop()
 
 
-def dialled(server: Server, says: bytes) -> socket.socket:
+def dialled(server: CockpitServer, says: bytes) -> socket.socket:
     caller = socket.create_connection(("127.0.0.1", server.port), timeout=20.0)
     with suppress(ConnectionError):  # closed already, for one that came after it
         caller.sendall(says)
@@ -54,7 +54,7 @@ def dialled(server: Server, says: bytes) -> socket.socket:
 
 
 @pytest.mark.parametrize("kind", ["silent", "half a request", "a drip", "no hello"])
-def test_connections_that_say_nothing_keep_nobody_out(server: Server, show: Rehearsal, kind: str) -> None:
+def test_connections_that_say_nothing_keep_nobody_out(server: CockpitServer, show: Rehearsal, kind: str) -> None:
     """However many there are and wherever they stop: the pilot gets page and helm, and they stay bounded."""
     says = {"silent": b"", "half a request": b"GET / HTTP/1.1\r\nHost: x", "a drip": b"G", "no hello": _opening(server)}
 
@@ -76,7 +76,7 @@ def test_connections_that_say_nothing_keep_nobody_out(server: Server, show: Rehe
         assert len(server.clients) <= PER_ADDRESS
 
 
-def test_it_ends_at_once_though_many_wait(server: Server) -> None:
+def test_it_ends_at_once_though_many_wait(server: CockpitServer) -> None:
     """Nobody is waited for who has not said anything."""
     with ExitStack() as stack:
         for says in (b"", b"GET", _opening(server)):
@@ -88,7 +88,7 @@ def test_it_ends_at_once_though_many_wait(server: Server) -> None:
         assert time.monotonic() - began_s < 4.0
 
 
-def test_of_too_many_pages_the_last_pilot_still_gets_in(server: Server) -> None:
+def test_of_too_many_pages_the_last_pilot_still_gets_in(server: CockpitServer) -> None:
     """One place is kept for whoever had the helm last; a lease that was never given opens nothing."""
 
     async def refused(**hello: str) -> tuple[int | None, str | None]:
@@ -117,7 +117,7 @@ def test_of_too_many_pages_the_last_pilot_still_gets_in(server: Server) -> None:
     asyncio.run(tries())
 
 
-def test_the_token_is_asked_at_the_handshake(guarded: Server) -> None:
+def test_the_token_is_asked_at_the_handshake(guarded: CockpitServer) -> None:
     """Without it no socket opens, so that none can wait; the same request without a socket is answered in words."""
     home = f"127.0.0.1:{guarded.port}"
     right: list[dict[str, object]] = [
@@ -153,7 +153,7 @@ def test_the_token_is_asked_at_the_handshake(guarded: Server) -> None:
 
 
 @pytest.mark.parametrize("token", ["guess", "\ud800", "x" * 64, "\x00", "токен"])
-def test_any_wrong_token_is_told_to_be_wrong(server: Server, token: str) -> None:
+def test_any_wrong_token_is_told_to_be_wrong(server: CockpitServer, token: str) -> None:
     """4401 in words, whatever characters it is made of."""
 
     async def tries() -> None:
@@ -166,7 +166,7 @@ def test_any_wrong_token_is_told_to_be_wrong(server: Server, token: str) -> None
     asyncio.run(tries())
 
 
-def test_pages_of_one_name_are_numbered(server: Server) -> None:
+def test_pages_of_one_name_are_numbered(server: CockpitServer) -> None:
     """So that "A pilot has the helm" tells the other pilot which; a number that is free is given again."""
 
     async def tries() -> None:
@@ -183,7 +183,7 @@ def test_pages_of_one_name_are_numbered(server: Server) -> None:
     asyncio.run(tries())
 
 
-def said(server: Server, request: bytes, *, then: bytes = b"") -> tuple[int, dict[str, str], bytes]:
+def said(server: CockpitServer, request: bytes, *, then: bytes = b"") -> tuple[int, dict[str, str], bytes]:
     """Status, headers and body of the answer to raw bytes."""
     with dialled(server, request) as caller:
         if then:
@@ -193,7 +193,7 @@ def said(server: Server, request: bytes, *, then: bytes = b"") -> tuple[int, dic
         return answer.status, {name.lower(): value for name, value in answer.getheaders()}, answer.read()
 
 
-def test_head_is_get_without_the_body(server: Server) -> None:
+def test_head_is_get_without_the_body(server: CockpitServer) -> None:
     """With the length that GET would have; refusals alike."""
     own = f"Host: 127.0.0.1:{server.port}\r\n\r\n".encode()
     for path in (b"/", b"/page/cockpit.js", b"/nothing", b"/register_service"):
@@ -222,7 +222,7 @@ def test_head_is_get_without_the_body(server: Server) -> None:
         (b"HEAD / HTTP/1.1", b"X: " + b"y" * 20_000 + b"\r\n\r\n", 431),
     ],
 )
-def test_whatever_is_asked_is_answered(server: Server, request_line: bytes, headers: bytes, status: int) -> None:
+def test_whatever_is_asked_is_answered(server: CockpitServer, request_line: bytes, headers: bytes, status: int) -> None:
     """No request ends without a status; a method that is not allowed is told which are."""
     own = b"" if b"Host:" in headers else f"Host: 127.0.0.1:{server.port}\r\n".encode()
     got, told, body = said(server, request_line + b"\r\n" + own + headers)

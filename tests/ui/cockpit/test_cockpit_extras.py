@@ -11,7 +11,7 @@ import pytest
 from rehearsal import Rehearsal
 
 from wakewise.ui.cockpit.ground_station_listing import OFFER, page_files
-from wakewise.ui.cockpit.server import Server
+from wakewise.ui.cockpit.server import CockpitServer
 
 # Required and optional keys of each object, as Cockpit's "External Integrations" lists them.
 EXTRAS = (
@@ -71,7 +71,7 @@ def test_every_address_that_is_named_is_served() -> None:
 def test_another_sites_page_reads_the_extras_and_nothing_else() -> None:
     """Cockpit asks from a page of its own; a foreign host name is refused all the same."""
     show = Rehearsal()
-    server = Server(show)
+    server = CockpitServer(show)
     server.start()
     try:
         answer = ask(server, "/cockpit_extras.json", Origin="http://blueos.local")
@@ -91,6 +91,6 @@ def test_another_sites_page_reads_the_extras_and_nothing_else() -> None:
         show.close()
 
 
-def ask(server: Server, path: str, **headers: str) -> Any:
+def ask(server: CockpitServer, path: str, **headers: str) -> Any:
     request = urllib.request.Request(f"http://127.0.0.1:{server.port}{path}", headers=headers)
     return urllib.request.build_opener(urllib.request.ProxyHandler({})).open(request, timeout=10)

@@ -7,15 +7,15 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from wakewise.ui.cockpit.control_lease import FORGET_S, LAPSE_S, STALE_S, Helm
+from wakewise.ui.cockpit.control_lease import FORGET_S, LAPSE_S, STALE_S, ControlLease
 
 FULL = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
 CLIENTS = st.sampled_from(["a", "b", "c"])
 
 
-def held_by(client: str, now_s: float = 0.0) -> Helm:
+def held_by(client: str, now_s: float = 0.0) -> ControlLease:
     """A helm that a client has just been given under the lease L."""
-    helm, _ = Helm().ask(client, now_s, "L")
+    helm, _ = ControlLease().ask(client, now_s, "L")
     return helm
 
 
@@ -137,7 +137,7 @@ class AnyHelm(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.helm, self.now_s, self.count = Helm(), 100.0, 0
+        self.helm, self.now_s, self.count = ControlLease(), 100.0, 0
         self.leases: dict[str, str] = {}
         self.sent: dict[int, tuple[str, float]] = {}
         self.quickest = float("inf")

@@ -13,21 +13,21 @@ from standin import POINTS_W_M
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.ui.cockpit import scene as room
-from wakewise.ui.cockpit.scene import SPEED_RGB, Scene, open_scene, speed_colours
+from wakewise.ui.cockpit.scene import SPEED_RGB, ViserScene, open_scene, speed_colours
 
 viser = pytest.importorskip("viser")
 msgpack = pytest.importorskip("msgspec").msgpack
 
 
 @pytest.fixture(scope="module")
-def scene() -> Iterator[Scene]:
+def scene() -> Iterator[ViserScene]:
     opened = open_scene(load_vehicle("paper"), POINTS_W_M)
     assert opened is not None
     yield opened
     opened.close()
 
 
-def test_a_share_request_opens_no_connection(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_share_request_opens_no_connection(scene: ViserScene, monkeypatch: pytest.MonkeyPatch) -> None:
     """A client's request reaches the server, which answers nothing, starts no process and connects to nobody."""
     from websockets.sync.client import connect
 
@@ -53,14 +53,14 @@ def test_a_share_request_opens_no_connection(scene: Scene, monkeypatch: pytest.M
     assert scene._server._share_tunnel is None
 
 
-def test_it_listens_on_loopback_and_has_nothing_to_press(scene: Scene) -> None:
+def test_it_listens_on_loopback_and_has_nothing_to_press(scene: ViserScene) -> None:
     """No other interface, no control, no share button."""
     assert scene.url.startswith("http://127.0.0.1:")
     assert scene._server.get_host() == "127.0.0.1"
     assert not scene._server.gui._gui_input_handle_from_uuid
 
 
-def test_a_moment_moves_vehicle_thrusts_and_colours(scene: Scene) -> None:
+def test_a_moment_moves_vehicle_thrusts_and_colours(scene: ViserScene) -> None:
     """Pose, jets against the thrust, wash by colour; in world NED as it is."""
     vehicle = load_vehicle("paper")
     pose = Pose(np.array([-0.8, 0.1, -0.2]), quat_from_euler(0.0, 0.1, 0.5))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.operation.teleop.input.controls import CENTRED, Controls
-from wakewise.ui.cockpit.control_mailbox import DEVICE, Seat
+from wakewise.ui.cockpit.control_mailbox import DEVICE, ControlMailbox
 
 FULL = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
 
@@ -31,7 +31,7 @@ class Pad:
 def test_nobody_is_none_and_a_holder_is_what_the_sticks_say() -> None:
     """None before anybody has the helm and after a second of quiet; zero after 300 ms of it."""
     clock = Clock()
-    seat = Seat(clock)
+    seat = ControlMailbox(clock)
     assert seat.read(0.0) is None
     seat.ask("a")
     lease = seat.holding.lease or ""
@@ -49,7 +49,7 @@ def test_nobody_is_none_and_a_holder_is_what_the_sticks_say() -> None:
 
 def test_a_button_is_flown_once() -> None:
     """However late the flight reads it; another's button is none."""
-    seat = Seat(Clock())
+    seat = ControlMailbox(Clock())
     seat.ask("a")
     lease = seat.holding.lease or ""
     assert seat.press("a", lease, "capture")
@@ -64,7 +64,7 @@ def test_a_button_is_flown_once() -> None:
 def test_the_wait_of_a_stick_counts_from_its_arrival_to_its_thrusts() -> None:
     """Once for each message that was flown; those that a newer one overtook do not count."""
     clock = Clock()
-    seat = Seat(clock)
+    seat = ControlMailbox(clock)
     assert seat.stick_to_thrust_ms_p99 is None
     seat.ask("a")
     lease = seat.holding.lease or ""
@@ -86,7 +86,7 @@ def test_the_wait_of_a_stick_counts_from_its_arrival_to_its_thrusts() -> None:
 def test_a_gamepad_here_takes_a_free_helm_by_moving_and_leaves_it_when_pulled_out() -> None:
     """At rest it takes nothing; against a page that flies it must ask; gone, nobody is there."""
     clock, pad = Clock(), Pad()
-    seat = Seat(clock, pad)
+    seat = ControlMailbox(clock, pad)
     assert seat.read(0.0) is None
     assert seat.holding.holder is None
     pad.held = Controls(axes=FULL, pressed=("capture",))

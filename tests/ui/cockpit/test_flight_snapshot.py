@@ -12,7 +12,7 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Command, Goal, ScalarGrid, Truth, WaterTruth
 from wakewise.operation.loop import Step
 from wakewise.robot.vehicles import load_vehicle
-from wakewise.ui.cockpit.flight_snapshot import Lookout
+from wakewise.ui.cockpit.flight_snapshot import SnapshotRecorder
 
 DT_S = 0.02
 
@@ -51,10 +51,10 @@ def step(k: int, thrust_N: float = 1.0, speed_m_s: float = 0.1) -> Step:
     )
 
 
-def lookout(asked_m_s: float = 0.1) -> tuple[Lookout, list[int]]:
+def lookout(asked_m_s: float = 0.1) -> tuple[SnapshotRecorder, list[int]]:
     given: list[int] = []
     asked = np.array([asked_m_s, 0.0, 0.0])
-    made = Lookout(load_vehicle("paper"), np.zeros((4, 3)), DT_S, lambda: given.append(1), lambda: asked)
+    made = SnapshotRecorder(load_vehicle("paper"), np.zeros((4, 3)), DT_S, lambda: given.append(1), lambda: asked)
     return made, given
 
 

@@ -13,7 +13,7 @@ import pytest
 from wakewise.core.errors import StageError
 from wakewise.operation import Scenario
 from wakewise.ui.cockpit import live_camera
-from wakewise.ui.cockpit.live_camera import DRAWN_WITHIN_S, WIDTHS_PX, LiveCamera, View, Width
+from wakewise.ui.cockpit.live_camera import DRAWN_WITHIN_S, WIDTHS_PX, CameraState, LiveCamera, PictureWidth
 from wakewise.vision.imaging import photograph
 
 WIDTH_PX, HEIGHT_PX = 160, 120
@@ -28,7 +28,7 @@ def test_a_picture_is_the_photograph_but_for_what_is_left_out() -> None:
     scenario = Scenario.preset("quick")
     camera = LiveCamera(scenario, widths_px=(WIDTH_PX,))
     parts = scenario.parts()
-    view = View(X_WC=parts.start.X_WB @ parts.vehicle.X_BC)
+    view = CameraState(X_WC=parts.start.X_WB @ parts.vehicle.X_BC)
     assert camera.draw(view) is None
     camera.start()
     try:
@@ -76,7 +76,7 @@ def test_it_is_ready_once_a_picture_was_drawn(monkeypatch: pytest.MonkeyPatch) -
 
 def test_pictures_get_narrower_where_the_cores_are_busy_and_wide_again_where_they_are_not() -> None:
     """By a time that goes with the pixels: to a width that keeps it, without going to and fro, and back."""
-    width = Width()
+    width = PictureWidth()
     assert width.px == WIDTHS_PX[0]
 
     def flown(widest_takes_s: float) -> list[int]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wakewise.operation.teleop.input.controls import ACTIONS
-from wakewise.ui.cockpit.messages import Amiss, DeskChange, Hello, Press, Sticks, read_message
+from wakewise.ui.cockpit.messages import ButtonPress, Hello, InvalidMessage, SettingsChange, StickMessage, read_message
 
 GOOD: list[dict[str, Any]] = [
     {"type": "hello", "token": None, "name": "Ada", "wants": "helm"},
@@ -30,7 +30,7 @@ JUNK: list[Any] = [
 @pytest.mark.parametrize("told", GOOD, ids=lambda told: told["type"])
 def test_what_the_protocol_allows_is_read(told: dict[str, Any]) -> None:
     """Each kind of message becomes its own record."""
-    assert not isinstance(read_message(json.dumps(told)), Amiss)
+    assert not isinstance(read_message(json.dumps(told)), InvalidMessage)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_what_the_protocol_allows_is_read(told: dict[str, Any]) -> None:
 def test_what_it_does_not_allow_is_told_in_one_line(raw: str, words: str) -> None:
     """The line names the kind, what was found and what would be right."""
     read = read_message(raw)
-    assert isinstance(read, Amiss)
+    assert isinstance(read, InvalidMessage)
     assert words in read.why
     assert "\n" not in read.why
     assert len(read.why) < 200
@@ -66,16 +66,16 @@ def test_axes_of_any_size_are_made_harmless() -> None:
     """Huge axes are full stick, what is no number is centred, as for any device."""
     raw = '{"type": "sticks", "seq": 1, "t": 0, "axes": [1e300, -9, NaN, Infinity, 0.01], "lease": "L"}'
     read = read_message(raw)
-    assert isinstance(read, Sticks)
+    assert isinstance(read, StickMessage)
     np.testing.assert_array_equal(read.axes, [1.0, -1.0, 0.0, 0.0, 0.0])
     huge = read_message(raw.replace("1e300", "1" + "0" * 400))
-    assert isinstance(huge, Sticks)
+    assert isinstance(huge, StickMessage)
     assert float(np.abs(huge.axes).max()) <= 1.0
 
 
 def test_binary_is_refused() -> None:
     """Only the server sends bytes."""
-    assert isinstance(read_message(b"\x00\x01"), Amiss)
+    assert isinstance(read_message(b"\x00\x01"), InvalidMessage)
 
 
 def test_a_name_is_one_printable_line() -> None:
@@ -91,16 +91,16 @@ def test_a_hundred_thousand_mangled_messages_raise_nothing() -> None:
     read_well = 0
     for _ in range(100_000):
         read = read_message(_mangled(rng))
-        if isinstance(read, Amiss):
+        if isinstance(read, InvalidMessage):
             assert 0 < len(read.why) < 300
             continue
         read_well += 1
-        if isinstance(read, Sticks):
+        if isinstance(read, StickMessage):
             assert np.all(np.abs(read.axes) <= 1.0)
             assert abs(read.t_ms) <= 2**53
-        elif isinstance(read, Press):
+        elif isinstance(read, ButtonPress):
             assert read.what in ACTIONS
-        elif isinstance(read, DeskChange):
+        elif isinstance(read, SettingsChange):
             assert all(isinstance(value, str | float | bool) for value in read.changes.values())
     assert read_well > 1000
 

@@ -12,24 +12,24 @@ import pytest
 from browser import Browser, Page, until
 
 from wakewise.operation import Scenario
-from wakewise.ui.cockpit.server import Server
-from wakewise.ui.cockpit.session import Session
+from wakewise.ui.cockpit.server import CockpitServer
+from wakewise.ui.cockpit.session import CockpitSession
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def session(tmp_path: Path, browser: Browser) -> Iterator[Session]:
+def session(tmp_path: Path, browser: Browser) -> Iterator[CockpitSession]:
     scenario = Scenario.preset("quick", world="paper").replace(**{"target.points": 60})
-    flown = Session(scenario, tmp_path / "flight")
+    flown = CockpitSession(scenario, tmp_path / "flight")
     flown.start()
     yield flown
     flown.stop()
 
 
 @pytest.fixture
-def page(session: Session, browser: Browser) -> Iterator[Page]:
-    server = Server(session)
+def page(session: CockpitSession, browser: Browser) -> Iterator[Page]:
+    server = CockpitServer(session)
     server.start()
     opened = browser.open(server.address)
     yield opened
@@ -38,7 +38,7 @@ def page(session: Session, browser: Browser) -> Iterator[Page]:
     server.stop()
 
 
-def test_a_flight_by_hand_from_the_browser(session: Session, page: Page, browser: Browser) -> None:
+def test_a_flight_by_hand_from_the_browser(session: CockpitSession, page: Page, browser: Browser) -> None:
     """Fly, photograph, leave the window, come back, end: the vehicle went, held still, and its folder is whole."""
     page.until("document.body.dataset.link === 'up'")
     page.until("document.querySelector('#time').textContent !== '–'", 180.0)
@@ -72,9 +72,9 @@ def test_a_flight_by_hand_from_the_browser(session: Session, page: Page, browser
     page.until("document.getElementById('banner-more').innerText.includes('the flight is over')")
 
 
-def position(session: Session) -> np.ndarray:
+def position(session: CockpitSession) -> np.ndarray:
     return np.array((session.state() or {})["position_W_m"])
 
 
-def speed(session: Session) -> float:
+def speed(session: CockpitSession) -> float:
     return float(np.linalg.norm((session.state() or {})["velocity_m_s"]))

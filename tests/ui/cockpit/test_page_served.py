@@ -11,7 +11,7 @@ from browser import Browser, Page, until
 from rehearsal import Rehearsal
 
 from wakewise.ui.cockpit.ground_station_listing import page_files
-from wakewise.ui.cockpit.server import Server
+from wakewise.ui.cockpit.server import CockpitServer
 
 
 @pytest.fixture
@@ -22,15 +22,15 @@ def rehearsal() -> Iterator[Rehearsal]:
 
 
 @pytest.fixture
-def server(rehearsal: Rehearsal) -> Iterator[Server]:
-    served = Server(rehearsal, files=page_files())
+def server(rehearsal: Rehearsal) -> Iterator[CockpitServer]:
+    served = CockpitServer(rehearsal, files=page_files())
     served.start()
     yield served
     served.stop()
 
 
 @pytest.fixture
-def page(browser: Browser, server: Server) -> Iterator[Page]:
+def page(browser: Browser, server: CockpitServer) -> Iterator[Page]:
     opened = browser.open(server.address + "?name=Ada")
     opened.until("document.body.dataset.link === 'up' && document.querySelector('#time').textContent !== '–'")
     opened.press("KeyG")
@@ -88,7 +88,7 @@ def test_pictures_flow_and_captures_count(rehearsal: Rehearsal, page: Page) -> N
 
 
 def test_a_second_helm_needs_consent_and_a_reload_gives_up(
-    rehearsal: Rehearsal, page: Page, server: Server, browser: Browser
+    rehearsal: Rehearsal, page: Page, server: CockpitServer, browser: Browser
 ) -> None:
     """Handed over by who flies; who loads the page again only watches."""
     page.always_front()
@@ -108,12 +108,12 @@ def test_a_second_helm_needs_consent_and_a_reload_gives_up(
     ben.close()
 
 
-def test_a_server_that_restarts_is_found_again(rehearsal: Rehearsal, page: Page, server: Server) -> None:
+def test_a_server_that_restarts_is_found_again(rehearsal: Rehearsal, page: Page, server: CockpitServer) -> None:
     """On the same port, by the page's own tries; as a spectator."""
     server.stop()
     page.until("document.body.dataset.link === 'down'")
     assert "the vehicle holds" in page.text("#banner")
-    again = Server(rehearsal, port=server.port)
+    again = CockpitServer(rehearsal, port=server.port)
     again.start()
     try:
         page.until("document.body.dataset.link === 'up' && document.body.dataset.helm === 'free'")
@@ -142,7 +142,7 @@ def test_a_pause_of_the_link_must_be_answered_by_letting_go(rehearsal: Rehearsal
 @pytest.mark.parametrize(("fragment", "words"), [("", "a token is needed"), ("#token=guess", "the token is wrong")])
 def test_who_has_no_token_is_told_in_words(rehearsal: Rehearsal, browser: Browser, fragment: str, words: str) -> None:
     """The socket is refused at its handshake, of which a browser tells nothing: the page asks why."""
-    served = Server(rehearsal, files=page_files(), origins=("http://127.0.0.1:1",))
+    served = CockpitServer(rehearsal, files=page_files(), origins=("http://127.0.0.1:1",))
     served.start()
     try:
         opened = browser.open(f"http://127.0.0.1:{served.port}/{fragment}")

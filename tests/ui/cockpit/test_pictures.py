@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from wakewise.ui.cockpit.client import SEEN_WITHIN_S, Client
 from wakewise.ui.cockpit.pictures import OLD_S, show_pictures
-from wakewise.ui.cockpit.view_model import Picture, Show
+from wakewise.ui.cockpit.view_model import CameraPicture, ViewModel
 
 
 class Drawn:
@@ -17,9 +17,9 @@ class Drawn:
     def __init__(self) -> None:
         self.number = 0
 
-    def picture(self) -> Picture:
+    def picture(self) -> CameraPicture:
         self.number += 1
-        return Picture(number=self.number, time_s=0.0, jpeg=b"\xff\xd8")
+        return CameraPicture(number=self.number, time_s=0.0, jpeg=b"\xff\xd8")
 
 
 def looked_at(frames_seen: int, then_s: float) -> tuple[int, int | None, int]:
@@ -28,7 +28,7 @@ def looked_at(frames_seen: int, then_s: float) -> tuple[int, int | None, int]:
     async def fly() -> tuple[int, int | None, int]:
         show, seen = Drawn(), asyncio.Event()
         client = Client(connection=cast("Any", None), id="c", greeted=True)
-        task = asyncio.create_task(show_pictures(cast("Show", show), lambda: [client], seen))
+        task = asyncio.create_task(show_pictures(cast("ViewModel", show), lambda: [client], seen))
         for _ in range(frames_seen):
             while client.unseen is None:
                 await asyncio.sleep(0.001)

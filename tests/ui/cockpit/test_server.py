@@ -20,8 +20,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cockpit import server as server_module
-from wakewise.ui.cockpit.control_mailbox import Seat
-from wakewise.ui.cockpit.server import Server
+from wakewise.ui.cockpit.control_mailbox import ControlMailbox
+from wakewise.ui.cockpit.server import CockpitServer
 
 
 class Clock:
@@ -41,14 +41,14 @@ def clock() -> Clock:
 
 @pytest.fixture
 def show(clock: Clock) -> Iterator[Rehearsal]:
-    rehearsal = Rehearsal(seat=Seat(clock))
+    rehearsal = Rehearsal(seat=ControlMailbox(clock))
     yield rehearsal
     rehearsal.close()
 
 
 @pytest.fixture
-def server(show: Rehearsal) -> Iterator[Server]:
-    serving = Server(show)
+def server(show: Rehearsal) -> Iterator[CockpitServer]:
+    serving = CockpitServer(show)
     serving.start()
     yield serving
     serving.stop()
@@ -92,7 +92,7 @@ class Page:
 
 
 @asynccontextmanager
-async def page(server: Server, wants: str = "watch", **hello: Any) -> AsyncIterator[Page]:
+async def page(server: CockpitServer, wants: str = "watch", **hello: Any) -> AsyncIterator[Page]:
     home = f"127.0.0.1:{server.port}"
     async with connect(f"ws://{home}/ws", origin=f"http://{home}", max_queue=None, close_timeout=1) as socket:  # type: ignore[arg-type]
         one = Page(socket)
@@ -108,7 +108,7 @@ async def flown(show: Rehearsal, forward: float, within_s: float = 2.0) -> None:
             await asyncio.sleep(0.005)
 
 
-def get(server: Server, path: str, host: str | None = None) -> tuple[int, str]:
+def get(server: CockpitServer, path: str, host: str | None = None) -> tuple[int, str]:
     caller = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5)
     try:
         caller.request("GET", path, headers={} if host is None else {"Host": host})
@@ -118,7 +118,7 @@ def get(server: Server, path: str, host: str | None = None) -> tuple[int, str]:
         caller.close()
 
 
-def test_the_page_is_served_under_this_computers_names_alone(server: Server) -> None:
+def test_the_page_is_served_under_this_computers_names_alone(server: CockpitServer) -> None:
     """Another Host gets nothing, nor does an address that leads out of the page's folder."""
     status, body = get(server, "/")
     assert (status, "<html" in body.lower()) == (200, True)
@@ -128,7 +128,7 @@ def test_the_page_is_served_under_this_computers_names_alone(server: Server) -> 
         assert get(server, path)[0] == 404
 
 
-def test_another_sites_page_may_not_open_the_socket(server: Server) -> None:
+def test_another_sites_page_may_not_open_the_socket(server: CockpitServer) -> None:
     """Neither a foreign Origin nor a foreign Host."""
 
     async def tries() -> None:
@@ -140,7 +140,7 @@ def test_another_sites_page_may_not_open_the_socket(server: Server) -> None:
     asyncio.run(tries())
 
 
-def test_a_wrong_token_and_no_hello_end_the_connection(server: Server) -> None:
+def test_a_wrong_token_and_no_hello_end_the_connection(server: CockpitServer) -> None:
     """With 4401 and a reason; the right token is welcome though none is needed from here."""
 
     async def tries() -> None:
@@ -162,7 +162,7 @@ def test_a_wrong_token_and_no_hello_end_the_connection(server: Server) -> None:
     asyncio.run(tries())
 
 
-def test_one_flies_and_another_asks(server: Server, show: Rehearsal) -> None:
+def test_one_flies_and_another_asks(server: CockpitServer, show: Rehearsal) -> None:
     """The second waits for consent; sticks and dials of who has no lease, or another's, do nothing."""
 
     async def tries() -> None:
@@ -192,7 +192,7 @@ def test_one_flies_and_another_asks(server: Server, show: Rehearsal) -> None:
     asyncio.run(tries())
 
 
-def test_replays_are_dropped_and_quiet_hands_are_zero(server: Server, show: Rehearsal) -> None:
+def test_replays_are_dropped_and_quiet_hands_are_zero(server: CockpitServer, show: Rehearsal) -> None:
     """An old number changes nothing; 300 ms without sticks is zero, and a second without them frees the helm."""
 
     async def tries() -> None:
@@ -211,7 +211,7 @@ def test_replays_are_dropped_and_quiet_hands_are_zero(server: Server, show: Rehe
     asyncio.run(tries())
 
 
-def test_a_page_left_open_for_a_day_flies_nothing(server: Server, show: Rehearsal, clock: Clock) -> None:
+def test_a_page_left_open_for_a_day_flies_nothing(server: CockpitServer, show: Rehearsal, clock: Clock) -> None:
     """Its lease is void by then; it may ask anew."""
 
     async def tries() -> None:
@@ -228,7 +228,7 @@ def test_a_page_left_open_for_a_day_flies_nothing(server: Server, show: Rehearsa
     asyncio.run(tries())
 
 
-def test_a_page_that_closes_stops_the_vehicle_at_once(server: Server, show: Rehearsal) -> None:
+def test_a_page_that_closes_stops_the_vehicle_at_once(server: CockpitServer, show: Rehearsal) -> None:
     """With the connection its hands are gone, and the next page has the helm by asking."""
 
     async def tries() -> None:
@@ -245,7 +245,7 @@ def test_a_page_that_closes_stops_the_vehicle_at_once(server: Server, show: Rehe
     asyncio.run(tries())
 
 
-def test_what_cannot_be_read_is_told_back_and_too_much_of_it_ends(server: Server) -> None:
+def test_what_cannot_be_read_is_told_back_and_too_much_of_it_ends(server: CockpitServer) -> None:
     """A note for each, and after fifty the connection is closed."""
 
     async def tries() -> None:
@@ -267,7 +267,7 @@ def test_what_cannot_be_read_is_told_back_and_too_much_of_it_ends(server: Server
     asyncio.run(tries())
 
 
-def test_a_dial_out_of_range_is_told_to_who_set_it(server: Server, show: Rehearsal) -> None:
+def test_a_dial_out_of_range_is_told_to_who_set_it(server: CockpitServer, show: Rehearsal) -> None:
     """Nothing is changed then; what is in range is."""
 
     async def tries() -> None:
@@ -281,7 +281,7 @@ def test_a_dial_out_of_range_is_told_to_who_set_it(server: Server, show: Rehears
     asyncio.run(tries())
 
 
-def test_one_picture_is_under_way_until_it_was_seen(server: Server) -> None:
+def test_one_picture_is_under_way_until_it_was_seen(server: CockpitServer) -> None:
     """A page that does not acknowledge gets no second one; each has its number and the flight's time."""
 
     async def tries() -> None:
@@ -302,7 +302,7 @@ def test_one_picture_is_under_way_until_it_was_seen(server: Server) -> None:
 
 
 def test_a_spectator_who_never_reads_costs_nobody_anything(
-    server: Server, show: Rehearsal, monkeypatch: pytest.MonkeyPatch
+    server: CockpitServer, show: Rehearsal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """States go on to others at their pace, what waits for it stays small, and it is let go."""
     monkeypatch.setattr(server_module, "STUCK_S", 0.6)
@@ -316,7 +316,7 @@ def test_a_spectator_who_never_reads_costs_nobody_anything(
             deaf.sendall(_opening(server) + _masked('{"type":"hello","token":null,"name":"deaf","wants":"watch"}'))
             await beside(server)
 
-    async def beside(server: Server) -> None:
+    async def beside(server: CockpitServer) -> None:
         async with page(server, "helm") as one:
             began_s, states = time.monotonic(), 0
             while time.monotonic() - began_s < 2.5:
@@ -331,7 +331,7 @@ def test_a_spectator_who_never_reads_costs_nobody_anything(
     assert float(np.median(late)) < 0.03
 
 
-def test_a_flood_is_slowed_and_then_ended(server: Server) -> None:
+def test_a_flood_is_slowed_and_then_ended(server: CockpitServer) -> None:
     """A client that sends thousands of messages a second is not read that fast, and not for long."""
 
     async def tries() -> None:
@@ -346,15 +346,15 @@ def test_a_flood_is_slowed_and_then_ended(server: Server) -> None:
     asyncio.run(tries())
 
 
-def test_a_port_that_is_taken_is_said(server: Server, show: Rehearsal) -> None:
+def test_a_port_that_is_taken_is_said(server: CockpitServer, show: Rehearsal) -> None:
     """In one line that names the port and what to do."""
     with pytest.raises(InputError, match=f"--port {server.port} at 127.0.0.1: .*; give another --port, or 0 for any"):
-        Server(show, port=server.port).start()
+        CockpitServer(show, port=server.port).start()
 
 
 def test_it_ends_quickly_with_pages_open(show: Rehearsal) -> None:
     """Connections are closed, the thread ends, the port is free again."""
-    serving = Server(show)
+    serving = CockpitServer(show)
     serving.start()
 
     async def tries() -> float:
@@ -364,12 +364,12 @@ def test_it_ends_quickly_with_pages_open(show: Rehearsal) -> None:
             return time.monotonic() - began_s
 
     assert asyncio.run(tries()) < 4.0
-    again = Server(show, port=serving.port)
+    again = CockpitServer(show, port=serving.port)
     again.start()
     again.stop()
 
 
-def _opening(server: Server) -> bytes:
+def _opening(server: CockpitServer) -> bytes:
     lines = (
         "GET /ws HTTP/1.1",
         f"Host: 127.0.0.1:{server.port}",

@@ -13,7 +13,7 @@ import polars as pl
 import pytest
 
 from wakewise.operation import Scenario
-from wakewise.ui.cockpit.session import Session
+from wakewise.ui.cockpit.session import CockpitSession
 
 STATE = (
     "time_s", "mode", "desk", "controls", "thrusts_N", "commanded_m_s", "velocity_m_s", "deviation_pct", "disturbance",
@@ -26,7 +26,7 @@ STATE = (
 class Hands:
     """A page's holder of the helm, who sends sticks whenever something is waited for."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: CockpitSession) -> None:
         self.session, self.seq, self.axes, self.said = session, 0, np.zeros(5), [""]
         session.seat.ask("me")
 
@@ -54,11 +54,11 @@ class Hands:
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Session, Hands, Path]]:
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[CockpitSession, Hands, Path]]:
     """A session that flies, with hands at its helm."""
     folder = tmp_path_factory.mktemp("cockpit") / "flight"
     scenario = Scenario.preset("quick", world="paper").replace(**{"target.points": 60})
-    session = Session(scenario, folder, pictures=False)
+    session = CockpitSession(scenario, folder, pictures=False)
     assert session.welcome()["preparing"]
     session.start()
     hands = Hands(session)
@@ -68,7 +68,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Session, H
     assert not session.running
 
 
-def test_a_state_has_all_that_the_wire_promises(flown: tuple[Session, Hands, Path]) -> None:
+def test_a_state_has_all_that_the_wire_promises(flown: tuple[CockpitSession, Hands, Path]) -> None:
     """Every key is there, numbers are JSON's, and per-point arrays are as long as the target's points."""
     session, hands, _ = flown
     hands.until(lambda: hands.state.get("true_m_s"))
@@ -85,7 +85,7 @@ def test_a_state_has_all_that_the_wire_promises(flown: tuple[Session, Hands, Pat
     json.dumps(welcome, allow_nan=False)
 
 
-def test_sticks_move_the_vehicle_and_the_deviation_is_told(flown: tuple[Session, Hands, Path]) -> None:
+def test_sticks_move_the_vehicle_and_the_deviation_is_told(flown: tuple[CockpitSession, Hands, Path]) -> None:
     """As operator, a stick to the right becomes a velocity to the right, and its wait is measured."""
     _, hands, _ = flown
     hands.press("operator")
@@ -100,7 +100,7 @@ def test_sticks_move_the_vehicle_and_the_deviation_is_told(flown: tuple[Session,
     hands.axes = np.zeros(5)
 
 
-def test_a_photograph_is_counted_and_guided(flown: tuple[Session, Hands, Path]) -> None:
+def test_a_photograph_is_counted_and_guided(flown: tuple[CockpitSession, Hands, Path]) -> None:
     """It is said, counted, and the guide says where to go next."""
     _, hands, _ = flown
     hands.press("capture")
@@ -111,7 +111,7 @@ def test_a_photograph_is_counted_and_guided(flown: tuple[Session, Hands, Path]) 
     assert coverage["next"]["words"]
 
 
-def test_a_stop_leaves_a_trial_folder_and_another_flight_may_begin(flown: tuple[Session, Hands, Path]) -> None:
+def test_a_stop_leaves_a_trial_folder_and_another_flight_may_begin(flown: tuple[CockpitSession, Hands, Path]) -> None:
     """The folder is whole; between flights there is no state; the next flight gets a folder of its own."""
     session, hands, folder = flown
     hands.press("stop")

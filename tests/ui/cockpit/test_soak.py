@@ -16,8 +16,8 @@ import pytest
 from test_server import _masked, _opening, page
 
 from wakewise.operation import Scenario
-from wakewise.ui.cockpit.server import Server
-from wakewise.ui.cockpit.session import Session
+from wakewise.ui.cockpit.server import CockpitServer
+from wakewise.ui.cockpit.session import CockpitSession
 
 BEGINS_S, ENDS_S = 15.0, float(os.environ.get("WAKEWISE_SOAK_S", "50"))
 MOST_MB_PER_MINUTE = 3.0
@@ -35,8 +35,8 @@ def resident_mb() -> float:
 def test_a_flight_leaves_memory_as_it_is(tmp_path: Path) -> None:
     """Once all is loaded the process stays as large as it is, and the flight goes on whatever a client does."""
     scenario = Scenario.preset("quick", world="paper").replace(**{"target.points": 60})
-    session = Session(scenario, tmp_path / "flight", paced=False, pictures=False)
-    server = Server(session)
+    session = CockpitSession(scenario, tmp_path / "flight", paced=False, pictures=False)
+    server = CockpitServer(session)
     server.start()
     session.start()
     marks: list[tuple[float, float]] = []

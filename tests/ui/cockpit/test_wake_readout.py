@@ -8,8 +8,8 @@ import pytest
 from wakewise.allocation import least_thrusts
 from wakewise.operation import Parts, Scenario
 from wakewise.simulation.tank.water_truth import STILL_M_S
-from wakewise.ui.cockpit.state import Instruments
-from wakewise.ui.cockpit.wake_readout import Gauges
+from wakewise.ui.cockpit.state import StateEncoder
+from wakewise.ui.cockpit.wake_readout import WakeReadout
 
 
 @pytest.fixture(scope="module")
@@ -18,11 +18,11 @@ def parts() -> Parts:
 
 
 @pytest.fixture(scope="module")
-def gauges(parts: Parts) -> Gauges:
-    return Gauges.of(parts)
+def gauges(parts: Parts) -> WakeReadout:
+    return WakeReadout.of(parts)
 
 
-def test_direct_thrusts_save_nothing(parts: Parts, gauges: Gauges) -> None:
+def test_direct_thrusts_save_nothing(parts: Parts, gauges: WakeReadout) -> None:
     """Held against themselves the least thrusts of a wrench differ by nothing."""
     layout = gauges.watch.layout
     thrusts = least_thrusts(layout, np.array([5.0, 2.0, -3.0, 0.0, 0.1, 0.2])).thrusts_N
@@ -30,7 +30,7 @@ def test_direct_thrusts_save_nothing(parts: Parts, gauges: Gauges) -> None:
     assert flown == pytest.approx(direct, rel=1e-6)
 
 
-def test_thrusts_of_the_null_space_are_held_against_none(parts: Parts, gauges: Gauges) -> None:
+def test_thrusts_of_the_null_space_are_held_against_none(parts: Parts, gauges: WakeReadout) -> None:
     """They make no wrench, so direct allocation would push nowhere."""
     idle = 3.0 * parts.vehicle.null_space[:, 0]
     flown, direct = gauges.disturbances(parts.start, idle)
@@ -38,7 +38,7 @@ def test_thrusts_of_the_null_space_are_held_against_none(parts: Parts, gauges: G
     assert flown > 0.0
 
 
-def test_the_rms_speed_is_that_of_the_whole_region(parts: Parts, gauges: Gauges) -> None:
+def test_the_rms_speed_is_that_of_the_whole_region(parts: Parts, gauges: WakeReadout) -> None:
     """D over the sum of the region's weights, under the root."""
     weight = float(np.sum(parts.region.weights))
     assert gauges.rms_m_s(4e-6 * weight) == pytest.approx(2e-3, rel=1e-12)
@@ -47,15 +47,15 @@ def test_the_rms_speed_is_that_of_the_whole_region(parts: Parts, gauges: Gauges)
 
 
 @pytest.mark.parametrize(("direct_m_s", "saved"), [(2e-3, 75.0), (0.9 * STILL_M_S, None), (0.0, None)])
-def test_of_still_water_nothing_is_saved(gauges: Gauges, direct_m_s: float, saved: float | None) -> None:
+def test_of_still_water_nothing_is_saved(gauges: WakeReadout, direct_m_s: float, saved: float | None) -> None:
     """Where direct thrusts leave the water as good as still there is no share to tell, not one of 0 %."""
-    instruments = Instruments(gauges, None)  # type: ignore[arg-type]
+    instruments = StateEncoder(gauges, None)  # type: ignore[arg-type]
     direct = gauges.view.total_weight * direct_m_s**2
     instruments._both.append((0.25 * direct, direct))
     assert instruments.saved_pct == (None if saved is None else pytest.approx(saved))
 
 
-def test_predicted_speeds_grow_with_the_root_of_thrust(parts: Parts, gauges: Gauges) -> None:
+def test_predicted_speeds_grow_with_the_root_of_thrust(parts: Parts, gauges: WakeReadout) -> None:
     """Nothing pushes, nothing moves; four times the thrust, twice the speed."""
     n = len(parts.vehicle.thrusters)
     assert not gauges.predicted_m_s(parts.start, np.zeros(n)).any()
@@ -64,7 +64,7 @@ def test_predicted_speeds_grow_with_the_root_of_thrust(parts: Parts, gauges: Gau
     np.testing.assert_allclose(four, 2.0 * one, rtol=1e-9)
 
 
-def test_the_shown_places_lie_where_the_target_is_taken_to_be(parts: Parts, gauges: Gauges) -> None:
+def test_the_shown_places_lie_where_the_target_is_taken_to_be(parts: Parts, gauges: WakeReadout) -> None:
     """As far from the true ones as the survey is wrong."""
     off_m = gauges.points_W_m - gauges.true_points_W_m
     np.testing.assert_allclose(off_m, off_m[0] * np.ones((len(off_m), 1)), atol=1e-12)

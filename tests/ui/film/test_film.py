@@ -29,10 +29,10 @@ from wakewise.simulation.water import Water
 from wakewise.ui.film import compared_trials, make, write_film, write_rows
 from wakewise.ui.film.encode import film_writer
 from wakewise.ui.film.external_view import FASTEST_M_S, speed_colours
-from wakewise.ui.film.layout import Moment, Page, Story, cover
+from wakewise.ui.film.layout import FilmFrame, FilmOverview, FrameComposer, cover
 from wakewise.ui.film.make import silt_at
 from wakewise.ui.film.viewpoint import vantage
-from wakewise.ui.film.wash import STEP_S, TRAIL, Motion, replay, wash_of
+from wakewise.ui.film.wash import STEP_S, TRAIL, RecordedMotion, replay, wash_of
 from wakewise.ui.reports.vehicle.hull import corner_normals, hull_of
 from wakewise.vision.imaging import PinholeCamera
 
@@ -168,10 +168,10 @@ def test_all_that_was_flown_is_in_the_picture() -> None:
     assert X_WC.p_m[2] < 1.0
 
 
-def _held(thrust_N: float, seconds: float) -> Motion:
+def _held(thrust_N: float, seconds: float) -> RecordedMotion:
     time_s = np.arange(0.0, seconds, 0.02)
     n = len(time_s)
-    return Motion(
+    return RecordedMotion(
         time_s=time_s,
         p_W_m=np.tile([0.0, 0.0, 5.0], (n, 1)),
         q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
@@ -314,15 +314,15 @@ def test_speed_has_one_colour_and_ends(tmp_path: Path) -> None:
 
 def test_a_page_without_any_record_still_draws() -> None:
     """No speed, no photographs, no thrusters: a frame is made, and says so."""
-    story = Story(
+    story = FilmOverview(
         title="dp", subtitle="", duration_s=10.0, pace=1.0, legs=(), time_s=np.zeros(0), speed_m_s=np.zeros(0), shots=()
     )
-    moment = Moment(
+    moment = FilmFrame(
         time_s=1.0, leg="", speed_m_s=None, turbidity_per_m=None, thrusts_N=np.zeros(0), outside=None, photo=None,
         shot=None, since_shot_s=float("inf"),
     )  # fmt: skip
     for view in ("both", "outside", "camera"):
-        assert Page(story, view).frame(moment).shape == (720, 1280, 3)
+        assert FrameComposer(story, view).frame(moment).shape == (720, 1280, 3)
     assert cover(np.zeros((30, 40, 3), np.uint8), 64, 64).shape == (64, 64, 3)
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from wakewise.experiments.campaigns.pictures import MODEL
-from wakewise.experiments.campaigns.plan import Entry, Plan
-from wakewise.experiments.campaigns.table import Made, Results
+from wakewise.experiments.campaigns.plan import CampaignPlan, PlanEntry
+from wakewise.experiments.campaigns.table import Results, TrialRecord
 from wakewise.ui.reports import write_campaign
 from wakewise.ui.reports.campaign import campaign_page
 
@@ -22,15 +22,17 @@ def campaign(seeds=6, worlds=("mud",), waiting=0, factor="method", names=("dp", 
                 rmse = None if place and seed == seeds and lost else 3.0 - place + 0.02 * seed
                 figures = {"rmse_mm": rmse, "target_speed_mean_m_s": 0.02 / (1 + place), "energy_kJ": 1.0 + place}
                 key = f"{world}-{seed}-{place}"
-                entry = Entry(
+                entry = PlanEntry(
                     key=key, name=key, factors={factor: name, "target": "brain", "world": world, "seed": seed}
                 )
-                made.append(Made(entry=entry, state="done", figures=figures, reason=None, attempts=1, took_s=60.0))
+                made.append(
+                    TrialRecord(entry=entry, state="done", figures=figures, reason=None, attempts=1, took_s=60.0)
+                )
     made += [
-        Made(entry=one.entry, state="waiting", figures={}, reason=None, attempts=0, took_s=0.0)
+        TrialRecord(entry=one.entry, state="waiting", figures={}, reason=None, attempts=0, took_s=0.0)
         for one in made[:waiting]
     ]
-    plan = Plan(
+    plan = CampaignPlan(
         name="first <try>",
         campaign={"seeds": seeds},
         wakewise="0.1",

@@ -27,7 +27,7 @@ from wakewise.ui.reports.report import report_page
 from wakewise.ui.reports.text import NONE, fixed, number, shown
 from wakewise.ui.reports.trial import read_trial
 from wakewise.ui.reports.vehicle import page as vehicle
-from wakewise.vision.reconstruction.photo_preview import Look, PhotoLook
+from wakewise.vision.reconstruction.photo_preview import PhotoPreview, PhotoQuality
 from wakewise_ardusub.reports.log import log_page
 from wakewise_paper.reports.operator_bench_plot import draw_operator
 from wakewise_paper.reports.photo_robustness import plot_degradation
@@ -263,11 +263,11 @@ def test_the_page_of_a_log(monkeypatch):
 def test_the_page_of_a_look_at_photographs():
     """Of one photograph and of all."""
     photos = tuple(
-        PhotoLook(name=name, width=80, height=60, sharpness_pct=100.0, mean=90.0, dark_pct=1.0, bright_pct=2.0,
+        PhotoQuality(name=name, width=80, height=60, sharpness_pct=100.0, mean=90.0, dark_pct=1.0, bright_pct=2.0,
                   features=300, partners=(("b.jpg", 40),), covered_pct=50.0, group=0, faults=faults)
         for name, faults in (("a.jpg", ()), ("b.jpg", ("blurred: 20 % of the usual",)))
     )  # fmt: skip
-    look = Look(photos=photos, groups=(2,), pairs=1, advice=("shoot b again",), passed_over={"video": 1})
+    look = PhotoPreview(photos=photos, groups=(2,), pairs=1, advice=("shoot b again",), passed_over={"video": 1})
     every_hole(look, lambda found: look_page(found, {"a.jpg": b"", "b.jpg": b""}, "dive"))
 
 

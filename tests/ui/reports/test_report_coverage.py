@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from wakewise.ui.reports.coverage import coverage_html
-from wakewise.ui.reports.page_parts import Draft
+from wakewise.ui.reports.page_parts import PageParts
 from wakewise.ui.reports.trial import Trial, read_trial
 
 
@@ -18,7 +18,7 @@ def trial(made_up: Path) -> Trial:
 
 def test_the_share_and_the_reasons_are_the_whole(trial: Trial) -> None:
     """What is seen well and what is not, by reason, come to a hundred percent but for rounding; five pictures."""
-    html = coverage_html(trial, Draft())
+    html = coverage_html(trial, PageParts())
     shares = [float(found) for found in re.findall(r"(\d+) % (?:of the target|is in no|is only|is shown)", html)]
     assert 98.0 <= sum(shares) <= 102.0
     assert html.count("<img") == 5
@@ -27,7 +27,7 @@ def test_the_share_and_the_reasons_are_the_whole(trial: Trial) -> None:
 
 def test_a_trial_without_poses_or_truth_leaves_a_gap(trial: Trial) -> None:
     """What cannot be shown is named, with what is missing."""
-    gap = coverage_html(replace(trial, photographs=()), Draft())
+    gap = coverage_html(replace(trial, photographs=()), PageParts())
     assert "cannot be shown" in gap
-    gap = coverage_html(replace(trial, truth=None, missing={"truth.ply": "was not written"}), Draft())
+    gap = coverage_html(replace(trial, truth=None, missing={"truth.ply": "was not written"}), PageParts())
     assert "truth.ply was not written" in gap

@@ -15,7 +15,7 @@ import yaml
 from wakewise.core.geometry import matrix_from_quat
 from wakewise.ui.reports.errors import ModelErrors, model_errors
 from wakewise.ui.reports.scene3d import Q_UW, R_UW, lightened, scene_html, upright
-from wakewise.ui.reports.trial import Surface, Trial, read_trial
+from wakewise.ui.reports.trial import Trial, TrialMesh, read_trial
 from wakewise.vision.texturing.textured import standing
 
 
@@ -130,7 +130,7 @@ def test_a_trial_without_places_has_no_scene(made_up: Path) -> None:
 def test_a_heavy_mesh_becomes_light_and_keeps_its_shape() -> None:
     """Fewer triangles than allowed, every vertex one of the old ones, hardly less volume; a light mesh is kept."""
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.1)
-    heavy = Surface(vertices_m=np.asarray(ball.vertices), faces=np.asarray(ball.faces, np.int64))
+    heavy = TrialMesh(vertices_m=np.asarray(ball.vertices), faces=np.asarray(ball.faces, np.int64))
     light, chosen = lightened(heavy, max_faces=6000)
     assert 2000 < len(light.faces) <= 6000
     np.testing.assert_array_equal(light.vertices_m, heavy.vertices_m[chosen])

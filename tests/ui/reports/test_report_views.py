@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from wakewise.ui.reports.svg_style import NOT_COVERED, OVER_LIMIT, error_colours, rgb
-from wakewise.ui.reports.trial import Surface
-from wakewise.ui.reports.views import SIDES, Frame, View, coverage_colours, draw_cloud, draw_surface
+from wakewise.ui.reports.trial import TrialMesh
+from wakewise.ui.reports.views import SIDES, ViewBounds, Viewpoint, coverage_colours, draw_cloud, draw_surface
 
 PIXELS = 64
 
@@ -20,13 +20,13 @@ def _decoded(uri: str) -> np.ndarray:
     return cv2.imdecode(raw, cv2.IMREAD_UNCHANGED)[..., [2, 1, 0, 3]].astype(float) / 255
 
 
-def _plate(centre: np.ndarray, along: np.ndarray, up: np.ndarray) -> Surface:
+def _plate(centre: np.ndarray, along: np.ndarray, up: np.ndarray) -> TrialMesh:
     corners = centre + np.array([-along - up, along - up, along + up, up - along])
-    return Surface(vertices_m=corners, faces=np.array([[0, 1, 2], [0, 2, 3]]))
+    return TrialMesh(vertices_m=corners, faces=np.array([[0, 1, 2], [0, 2, 3]]))
 
 
 @pytest.mark.parametrize("view", SIDES, ids=lambda v: v.name)
-def test_axes_of_a_view_are_right_handed(view: View) -> None:
+def test_axes_of_a_view_are_right_handed(view: Viewpoint) -> None:
     """Right, up and toward the viewer are orthonormal and turn the right way round."""
     frame = np.stack(view.axes)
     np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
@@ -48,12 +48,12 @@ def test_east_is_on_the_left_when_seen_from_the_north() -> None:
 
 def test_a_square_facing_the_viewer_fills_its_share_of_the_picture() -> None:
     """A plate of half the frame's width covers a quarter of the pixels, in its own colour, whichever way it faces."""
-    view = View(name="level", azimuth_deg=180, elevation_deg=0)
+    view = Viewpoint(name="level", azimuth_deg=180, elevation_deg=0)
     plate = _plate(np.zeros(3), np.array([0, 0.5, 0]), np.array([0, 0, 0.5]))
-    frame = Frame(centre_m=np.zeros(3), radius_m=1.0)
+    frame = ViewBounds(centre_m=np.zeros(3), radius_m=1.0)
     red = np.tile([1.0, 0.0, 0.0], (4, 1))
     for faces in (plate.faces, plate.faces[:, ::-1]):
-        turned = Surface(vertices_m=plate.vertices_m, faces=faces)
+        turned = TrialMesh(vertices_m=plate.vertices_m, faces=faces)
         image = _decoded(draw_surface(turned, red, (view,), frame, PIXELS)[0])
         assert image[..., 3].mean() == pytest.approx(0.25, abs=0.01)
         seen = image[image[..., 3] > 0.99]
@@ -63,11 +63,11 @@ def test_a_square_facing_the_viewer_fills_its_share_of_the_picture() -> None:
 
 def test_the_nearer_point_hides_the_farther() -> None:
     """In a cloud, as on a surface."""
-    view = View(name="from the south", azimuth_deg=180, elevation_deg=0)
+    view = Viewpoint(name="from the south", azimuth_deg=180, elevation_deg=0)
     points = np.array([[-0.5, 0, 0], [0.5, 0, 0]])
     colours = np.array([[0, 1.0, 0], [1.0, 0, 0]])
     for order in ([0, 1], [1, 0]):
-        frame = Frame(centre_m=np.zeros(3), radius_m=1.0)
+        frame = ViewBounds(centre_m=np.zeros(3), radius_m=1.0)
         image = _decoded(draw_cloud(points[order], colours[order], (view,), frame, PIXELS)[0])
         middle = image[PIXELS // 2, PIXELS // 2]
         assert middle[1] > 0.5 > middle[0]

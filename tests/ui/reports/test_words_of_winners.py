@@ -7,7 +7,7 @@ from importlib import resources
 import pytest
 from test_campaign_page import campaign
 
-from wakewise.experiments.campaigns.summary import Glance, Measure, glance
+from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, glance
 from wakewise.ui.reports.campaign import campaign_page
 from wakewise.ui.reports.methods_compared import price, won
 from wakewise.ui.reports.page import chip, missing, prose, scene_box
@@ -17,7 +17,7 @@ from wakewise_paper.reports.reproduction import sentences
 
 def judged(low=5.0, high=15.0, trials=12, less=10.0, ours=0.9, theirs=1.0, rival="smooth"):
     """A comparison of two methods."""
-    return Glance(
+    return MethodSummary(
         world="mud", figure="rmse_mm", words="mm RMSE", means={"wake-aware": ours, "smooth": theirs},
         winner="wake-aware", rival=rival, less_pct=less, interval_pct=None if low is None else (low, high), p_t=0.2,
         improvement=0.7,
@@ -69,7 +69,7 @@ def test_the_price_of_less_wash_counts_silt():
         for seed in (1, 2)
         for method, rmse, silt in (("dp", 1.0, 0.1), ("wake-aware", 0.9, 0.3))
     ]
-    found = glance(Measure("rmse_mm", "mm RMSE", 1.0, True), "mud", places)
+    found = glance(ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True), "mud", places)
     assert found is not None and found.silt_ratio == pytest.approx(3.0) and found.energy_ratio == pytest.approx(1.0)
 
 

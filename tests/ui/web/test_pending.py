@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from wakewise.ui.web.pending import Pending
+from wakewise.ui.web.pending import PendingConnections
 
 
 class Line:
     """Connections by number of arrival, and which were closed."""
 
     def __init__(self, per_address: int, in_all: int) -> None:
-        self.pending = Pending(per_address, in_all)
+        self.pending = PendingConnections(per_address, in_all)
         self.closed: list[str] = []
 
     def comes(self, address: str, name: str) -> int:

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from wakewise.ui.web.blueos import EXTRAS_PATH, SERVICE_PATH, Offer
-from wakewise.ui.web.files import Files
+from wakewise.ui.web.blueos import EXTRAS_PATH, SERVICE_PATH, ServiceDescription
+from wakewise.ui.web.files import StaticFiles
 from wakewise.ui.web.origin_check import page_headers
 
-OFFER = Offer(name="A page", description="Shows something.", widget="A widget")
+OFFER = ServiceDescription(name="A page", description="Shows something.", widget="A widget")
 
 
 def test_what_is_offered_is_served_to_other_sites() -> None:
     """Both files, as JSON that a ground station's page may read; the names are the offer's."""
-    files = Files(folder=Path("nowhere"), more=OFFER.files())
+    files = StaticFiles(folder=Path("nowhere"), more=OFFER.files())
     for path, told in ((EXTRAS_PATH, OFFER.cockpit_extras()), (SERVICE_PATH, OFFER.register_service())):
         file = files.at(path)
         assert file is not None
@@ -33,7 +33,7 @@ def test_no_address_leads_out_of_the_pages_folders(address: str, tmp_path: Path)
     """What every page has is there beside its own; anything else is not."""
     (tmp_path / "own.js").write_text("own", encoding="utf-8")
     (tmp_path / "secret.txt").write_text("secret", encoding="utf-8")
-    files = Files(folder=tmp_path)
+    files = StaticFiles(folder=tmp_path)
     assert files.at("/page/own.js") is not None
     assert files.at("/page/theme.js?v=1") is not None
     assert files.at("/page/secret.txt") is None

@@ -7,14 +7,14 @@ from scipy.integrate import dblquad
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, look_at
-from wakewise.vision.imaging import Lights, Panels, PinholeCamera, render
+from wakewise.vision.imaging import LedPanels, Lights, PinholeCamera, render
 
 DOWN = np.array([[0.0, 0.0, -1.0]])
 
 
 def test_irradiance_is_the_integral_over_the_panels():
     """Level and tilted points get the integral of cos cos / (pi r^2) over the panels' faces, within 1 %."""
-    panels = Panels.over_tank(6.0, 5.0)
+    panels = LedPanels.over_tank(6.0, 5.0)
     tilted = np.array([[0.6, 0.0, -0.8]])
     for point, normal in (((0.0, 0.0, 1.5), DOWN), ((0.9, -0.4, 1.45), DOWN), ((0.1, 0.2, 1.4), tilted)):
         place = np.array([point])
@@ -57,5 +57,5 @@ def test_light_of_panels_adds_to_the_skys():
 def test_bad_panels_are_refused():
     """A panel without a face raises InputError; no panel at all gives no light."""
     with pytest.raises(InputError, match="panels"):
-        Panels(centres_W_m=np.zeros((1, 3)), size_m=(0.0, 0.3))
-    assert Panels(centres_W_m=np.zeros((0, 3))).irradiance(np.array([[0.0, 0.0, 1.0]]), DOWN)[0] == 0.0
+        LedPanels(centres_W_m=np.zeros((1, 3)), size_m=(0.0, 0.3))
+    assert LedPanels(centres_W_m=np.zeros((0, 3))).irradiance(np.array([[0.0, 0.0, 1.0]]), DOWN)[0] == 0.0

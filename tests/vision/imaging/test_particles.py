@@ -11,7 +11,7 @@ from wakewise.vision.imaging import Lights, PinholeCamera, Shutter, water_optics
 from wakewise.vision.imaging.particles import (
     FARTHEST_M,
     NEAREST_M,
-    Seen,
+    VisibleFlakes,
     concentration,
     draw_flakes,
     flake_positions,
@@ -25,7 +25,7 @@ STILL = [Pose(np.zeros(3))]
 
 def _seen(points, velocity=(0.0, 0.0, 0.0)):
     n = len(points)
-    return Seen(
+    return VisibleFlakes(
         p_C_m=np.array(points), v_W_m_s=np.tile(np.array(velocity), (n, 1)), size=np.zeros(n), shade=np.full(n, 0.5)
     )
 

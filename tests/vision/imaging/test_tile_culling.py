@@ -5,7 +5,7 @@ import pytest
 from imaging_helpers import coral_scene, view
 
 from wakewise.vision.imaging import FlatPort, LensCamera, PinholeCamera
-from wakewise.vision.imaging.tile_culling import TILE_PX, Pieces, may_meet
+from wakewise.vision.imaging.tile_culling import TILE_PX, BoundingSpheres, may_meet
 
 
 def test_spheres_hold_all_faces():
@@ -16,14 +16,14 @@ def test_spheres_hold_all_faces():
         away = np.linalg.norm(corners[:, None] - scene.spheres_F_m[None, :, :3], axis=2) - scene.spheres_F_m[None, :, 3]
         assert away.min(axis=1).max() < 1e-6
     assert np.median(scene.spheres_F_m[:, 3]) < 0.03
-    assert Pieces.of(np.zeros((0, 3)), np.zeros((0, 3), int)).spheres(np.zeros((0, 3))).shape == (0, 4)
+    assert BoundingSpheres.of(np.zeros((0, 3)), np.zeros((0, 3), int)).spheres(np.zeros((0, 3))).shape == (0, 4)
 
 
 def test_pieces_of_a_surface_at_rest_hold_it_when_it_has_moved():
     """Moved and bent, every corner of each piece is in that piece's sphere, which is as small as about it can be."""
     scene = coral_scene()[0]
     rest = scene.vertices_F_m[: scene.first_bed_vertex].astype(float)
-    pieces = Pieces.of(rest, scene.faces[: scene.first_face[1]])
+    pieces = BoundingSpheres.of(rest, scene.faces[: scene.first_face[1]])
     assert sorted(map(tuple, pieces.faces)) == sorted(map(tuple, scene.faces[: scene.first_face[1]]))
     moved = rest + np.column_stack([2.0 * rest[:, 2] ** 2, 0.1 - 0.3 * rest[:, 2], 0.2 * rest[:, 0]])
     spheres = pieces.spheres(moved)

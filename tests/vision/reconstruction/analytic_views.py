@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from wakewise.vision.reconstruction.registered_photos import View
+from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
 
 
 def straight(width, height, focal, centre=(0.0, 0.0, 0.0), R_CW=None):
     """A view that looks along z from a place."""
-    return View(
+    return RegisteredPhoto(
         name="00.png",
         width=width,
         height=height,

@@ -10,11 +10,11 @@ import pytest
 
 from wakewise.core.errors import InputError, StageError
 from wakewise.ui.cli.main import run
-from wakewise.vision.reconstruction import Board, calibrate, read_lens
+from wakewise.vision.reconstruction import CalibrationBoard, calibrate, read_lens
 from wakewise.vision.reconstruction.calibration import APRILTAG, board_detector
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[4] / "shared" / "data"))
-BOARD = Board(columns=7, rows=5, square_m=0.03, marker_m=0.022)
+BOARD = CalibrationBoard(columns=7, rows=5, square_m=0.03, marker_m=0.022)
 K = np.array([[700.0, 0, 319.5], [0, 700.0, 239.5], [0, 0, 1]])
 
 
@@ -69,9 +69,9 @@ def test_what_is_no_board_is_told(tmp_path, boards):
     with pytest.raises(InputError, match="allowed are pinhole"):
         calibrate(boards, BOARD, "magic")
     with pytest.raises(InputError, match="at least 2 x 2"):
-        Board(columns=1, rows=5, square_m=0.03, marker_m=0.02)
+        CalibrationBoard(columns=1, rows=5, square_m=0.03, marker_m=0.02)
     with pytest.raises(InputError, match="markers must"):
-        Board(columns=7, rows=5, square_m=0.03, marker_m=0.03)
+        CalibrationBoard(columns=7, rows=5, square_m=0.03, marker_m=0.03)
 
 
 @pytest.mark.slow
@@ -80,7 +80,7 @@ def test_real_boards_behind_an_aquarium_wall():
     folder = DATA / "charuco_aquarium" / "Example_data" / "worst_case_distortion"
     if not folder.is_dir():
         pytest.skip("charuco_aquarium is not among the shared data")
-    found = calibrate(folder, Board(columns=11, rows=8, square_m=0.008, marker_m=0.006))
+    found = calibrate(folder, CalibrationBoard(columns=11, rows=8, square_m=0.008, marker_m=0.006))
     assert found.photos == 12
     assert found.residual_px < 0.5
     assert found.residuals_px["pinhole"] > 2.0
@@ -114,7 +114,7 @@ def test_another_board_or_too_few_photos_say_what_is_seen(boards, tmp_path):
     ):
         calibrate(tmp_path, BOARD)
     with pytest.raises(StageError) as fault:
-        calibrate(tmp_path, Board(columns=4, rows=3, square_m=0.03, marker_m=0.022))
+        calibrate(tmp_path, CalibrationBoard(columns=4, rows=3, square_m=0.03, marker_m=0.022))
     assert "seen are markers of DICT_5X5_1000, 17 in a photo and numbered up to 16" in str(fault.value)
     assert "a board of 4 x 3 squares has 6, numbered up to 5: does --board give its squares?" in str(fault.value)
 

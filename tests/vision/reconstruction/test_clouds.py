@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import EnvironmentFailure, InputError, StageError
-from wakewise.vision.reconstruction import Cloud, read_cloud, write_cloud, write_mesh
+from wakewise.vision.reconstruction import OrientedPointCloud, read_cloud, write_cloud, write_mesh
 from wakewise.vision.reconstruction.colmap import call, no_stderr
 from wakewise.vision.reconstruction.stages import fingerprint, need_room, run_stage
 
@@ -16,7 +16,7 @@ def test_cloud_comes_back(tmp_path):
     rng = np.random.default_rng(0)
     normals = rng.normal(size=(50, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    cloud = Cloud(points_m=rng.normal(size=(50, 3)), normals=normals, colours=rng.random((50, 3)))
+    cloud = OrientedPointCloud(points_m=rng.normal(size=(50, 3)), normals=normals, colours=rng.random((50, 3)))
     write_cloud(tmp_path / "a.ply", cloud)
     back = read_cloud(tmp_path / "a.ply")
     assert np.allclose(back.points_m, cloud.points_m, atol=1e-6)

@@ -6,14 +6,14 @@ from relief import CENTRE, FOCAL, HEIGHT, WIDTH, height, photo, poses, texture
 
 from wakewise.core.geometry import Pose, look_at
 from wakewise.vision.reconstruction.fusion import facing_normals, fuse, lonely
-from wakewise.vision.reconstruction.registered_photos import Ball, View, rank_partners
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest, RegisteredPhoto, rank_partners
 from wakewise.vision.reconstruction.stereo import DepthMap, pair_depth, rectifiable, rectify_axes
 
-BALL = Ball(centre_W_m=CENTRE, radius_m=0.06)
+BALL = RegionOfInterest(centre_W_m=CENTRE, radius_m=0.06)
 
 
 def view(name, X_WC):
-    return View(
+    return RegisteredPhoto(
         name=name,
         width=WIDTH,
         height=HEIGHT,

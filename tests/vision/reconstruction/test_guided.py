@@ -13,8 +13,8 @@ from wakewise.vision.reconstruction.guided import (
     BAND_RAD,
     MAX_ANGLE_RAD,
     RATIO,
+    PhotoFeatures,
     RelativePose,
-    Spots,
     match_by_poses,
     match_pair,
     trusted,
@@ -71,7 +71,7 @@ def test_the_kernel_is_its_readable_twin(t):
     own = described(rng, len(one))
     seen = np.clip(own + rng.normal(0.0, 12.0, own.shape), 0, 255).astype(np.uint8)
     order = rng.permutation(len(two))
-    first, second = Spots(xy=one, descriptors=own), Spots(xy=two[order], descriptors=seen[order])
+    first, second = PhotoFeatures(xy=one, descriptors=own), PhotoFeatures(xy=two[order], descriptors=seen[order])
     found = match_pair(first, second, pose)
     assert [tuple(row) for row in found] == twin(first, second, pose)
     assert (order[found[:, 1]] == found[:, 0]).mean() > 0.99 and len(found) > 200
@@ -82,7 +82,7 @@ def test_a_pose_that_is_a_little_off_still_holds_the_partners_in_the_band():
     rng = np.random.default_rng(2)
     one, two, pose = scene(rng)
     own = described(rng, len(one))
-    first, second = Spots(xy=one, descriptors=own), Spots(xy=two, descriptors=own)
+    first, second = PhotoFeatures(xy=one, descriptors=own), PhotoFeatures(xy=two, descriptors=own)
     kept = [len(match_pair(first, second, off(pose, rng, 0.005, 0.06))) for _ in range(20)]
     assert np.mean(kept) > 0.97 * len(one)
 

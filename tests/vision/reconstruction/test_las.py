@@ -6,7 +6,7 @@ from datetime import date
 import numpy as np
 import pytest
 
-from wakewise.vision.reconstruction import Cloud
+from wakewise.vision.reconstruction import OrientedPointCloud
 from wakewise.vision.reconstruction.las import write_las
 
 
@@ -16,7 +16,7 @@ def test_points_and_colours_come_back(tmp_path):
     points = rng.uniform(-3.0, 5.0, (1000, 3)) * [1.0, 0.2, 0.1] + [1000.0, -20.0, 3.0]
     colours = rng.uniform(0.0, 1.0, (1000, 3))
     path = tmp_path / "a.las"
-    write_las(path, Cloud(points_m=points, normals=np.zeros((1000, 3)), colours=colours), date(2026, 2, 3))
+    write_las(path, OrientedPointCloud(points_m=points, normals=np.zeros((1000, 3)), colours=colours), date(2026, 2, 3))
     data = path.read_bytes()
     # LAS 1.2, table 3: offsets in bytes from the beginning of the file.
     assert data[:4] == b"LASF"
@@ -41,5 +41,8 @@ def test_points_and_colours_come_back(tmp_path):
 
 def test_one_point_is_a_file(tmp_path):
     """No spread, no division by it."""
-    write_las(tmp_path / "a.las", Cloud(points_m=np.ones((1, 3)), normals=np.zeros((1, 3)), colours=np.ones((1, 3))))
+    write_las(
+        tmp_path / "a.las",
+        OrientedPointCloud(points_m=np.ones((1, 3)), normals=np.zeros((1, 3)), colours=np.ones((1, 3))),
+    )
     assert (tmp_path / "a.las").stat().st_size == 253

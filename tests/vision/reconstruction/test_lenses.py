@@ -8,14 +8,14 @@ from wakewise.core.errors import InputError
 from wakewise.vision.imaging import ImagingSettings, calibrate
 from wakewise.vision.reconstruction import read_lens
 from wakewise.vision.reconstruction.lenses import LAYOUTS, lens_of
-from wakewise.vision.reconstruction.registered_photos import View
+from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
 
 OPENCV = np.array([700.0, 690.0, 480.0, 361.0, -0.21, 0.04, 0.002, -0.001])
 
 
 def view_of(params, fisheye=False):
     """A view at the origin, looking along z, with an OPENCV lens or a fisheye."""
-    return View(
+    return RegisteredPhoto(
         name="a.png",
         width=960,
         height=720,

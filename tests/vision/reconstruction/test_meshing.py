@@ -6,7 +6,7 @@ import trimesh
 
 from wakewise.core.errors import EnvironmentFailure
 from wakewise.vision.reconstruction import ReconstructionSettings, stages
-from wakewise.vision.reconstruction.clouds import Cloud, write_cloud
+from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud
 from wakewise.vision.reconstruction.meshing import mesh_points, near_subject, octree_depth, without_crumbs
 
 
@@ -25,7 +25,9 @@ def test_a_surface_that_a_full_disk_cut_short_is_not_taken(tmp_path, monkeypatch
     """What the mesher wrote on a disk without room is no surface, and no failure of the points either."""
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
     points, normals = np.asarray(ball.vertices), np.asarray(ball.vertex_normals)
-    write_cloud(tmp_path / "dense.ply", Cloud(points_m=points, normals=normals, colours=np.full_like(points, 0.5)))
+    write_cloud(
+        tmp_path / "dense.ply", OrientedPointCloud(points_m=points, normals=normals, colours=np.full_like(points, 0.5))
+    )
     monkeypatch.setattr(stages, "RESERVE_MB", 1e15)
     with pytest.raises(EnvironmentFailure, match="mesh: the disk of"):
         mesh_points(

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from wakewise.vision.reconstruction.model_quality import Evidence, doubts, few_doubts, known_doubts
+from wakewise.vision.reconstruction.model_quality import ModelEvidence, doubts, few_doubts, known_doubts
 
-SOUND = Evidence(
+SOUND = ModelEvidence(
     observations_per_photo=400.0, coverage_pct=60.0, angle_deg=20.0, agreeing_pairs_pct=100.0, held_out_px=0.6
 )
 

@@ -14,13 +14,13 @@ from wakewise.vision.reconstruction.colmap import pycolmap
 from wakewise.vision.reconstruction.features import match_photos
 from wakewise.vision.reconstruction.mapping import map_photos
 from wakewise.vision.reconstruction.pairs import choose_pairs
-from wakewise.vision.reconstruction.per_photo_intrinsics import OwnLens, heaps
+from wakewise.vision.reconstruction.per_photo_intrinsics import PhotoIntrinsics, heaps
 
 SETTINGS = ReconstructionSettings(detector="opencv", max_features=1500)
 
 
 def own(focals, points=500):
-    return {f"{k:03d}": OwnLens(focal_px=float(f), points=points) for k, f in enumerate(focals)}
+    return {f"{k:03d}": PhotoIntrinsics(focal_px=float(f), points=points) for k, f in enumerate(focals)}
 
 
 @pytest.mark.parametrize("n", [10, 14, 25, 40])
@@ -41,7 +41,7 @@ def test_two_lenses_a_tenth_apart_are_told(seed, n, ratio):
     rng = np.random.default_rng(seed)
     lens = rng.permutation(np.arange(2 * n) % 2)
     focals = 600.0 * ratio**lens * np.exp(rng.normal(0.0, 0.008, 2 * n).clip(-0.02, 0.02))
-    found = heaps(own(focals) | {"few": OwnLens(focal_px=610.0, points=3)})
+    found = heaps(own(focals) | {"few": PhotoIntrinsics(focal_px=610.0, points=3)})
     wanted = {tuple(f"{k:03d}" for k in range(2 * n) if lens[k] == side) for side in (0, 1)}
     assert {tuple(name for name in group if name != "few") for group in found} == wanted
     assert next(group for group in found if "few" in group)[0] == f"{int(np.argmin(lens)):03d}"

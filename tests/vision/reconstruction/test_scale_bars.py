@@ -3,12 +3,12 @@
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.vision.reconstruction.scale import Bar, Bars, parse_bar, read_bars
+from wakewise.vision.reconstruction.scale import ScaleBar, ScaleBars, parse_bar, read_bars
 
 
 def test_bars_are_read_from_words_and_files(tmp_path):
     """With and without an uncertainty; family, size and board from the file."""
-    assert parse_bar("3, 7, 0.5, 0.0002") == Bar(ends=(3, 7), length_m=0.5, sigma_m=0.0002)
+    assert parse_bar("3, 7, 0.5, 0.0002") == ScaleBar(ends=(3, 7), length_m=0.5, sigma_m=0.0002)
     assert parse_bar("3,7,0.5").sigma_m == pytest.approx(0.0005)
     path = tmp_path / "bars.yaml"
     path.write_text(
@@ -59,4 +59,4 @@ def test_bad_files_are_named(tmp_path, text, told):
     with pytest.raises(InputError, match=told) as fault:
         read_bars(path)
     assert str(path) in str(fault.value)
-    assert isinstance(Bars(bars=(parse_bar("1,2,3"),)).key(), list)
+    assert isinstance(ScaleBars(bars=(parse_bar("1,2,3"),)).key(), list)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.vision.reconstruction.registered_photos import camera_centres
-from wakewise.vision.reconstruction.scale.position_fixes import Fix, Fixes
+from wakewise.vision.reconstruction.scale.position_fixes import PositionFix, PositionFixes
 from wakewise.vision.reconstruction.scale.scale_from_positions import MOST_UNSURE_PCT, place_by_fixes, why_unused
 from wakewise.vision.reconstruction.scale.stage import place_model
 
@@ -34,8 +34,8 @@ def told(rng, places, sigma_m, depth_sigma_m, flat=True):
     fixes = {}
     for name, place in places.items():
         seen = place + rng.normal(size=3) * sigmas
-        fixes[name] = Fix(place_W_m=seen if flat else np.array([np.nan, np.nan, seen[2]]), sigma_m=sigmas)
-    return Fixes(fixes=fixes)
+        fixes[name] = PositionFix(place_W_m=seen if flat else np.array([np.nan, np.nan, seen[2]]), sigma_m=sigmas)
+    return PositionFixes(fixes=fixes)
 
 
 @pytest.mark.parametrize("flat", [True, False])
@@ -75,8 +75,10 @@ def test_wrong_fixes_are_told_and_hardly_pull(flat):
     places = cameras(rng)
     fixes = dict(told(rng, places, 0.3, 0.05, flat).fixes)
     for name in ("03.jpg", "17.jpg", "30.jpg"):
-        fixes[name] = Fix(place_W_m=fixes[name].place_W_m + np.array([0.0, 0.0, 20.0]), sigma_m=fixes[name].sigma_m)
-    placed = place_by_fixes(in_model(places), Fixes(fixes=fixes))
+        fixes[name] = PositionFix(
+            place_W_m=fixes[name].place_W_m + np.array([0.0, 0.0, 20.0]), sigma_m=fixes[name].sigma_m
+        )
+    placed = place_by_fixes(in_model(places), PositionFixes(fixes=fixes))
     assert {"03.jpg", "17.jpg", "30.jpg"} <= set(placed.far)
     assert placed.scale == pytest.approx(SCALE, rel=0.03)
 
@@ -102,7 +104,9 @@ def test_photos_without_names_of_fixes_are_said():
     rng = np.random.default_rng(3)
     places = cameras(rng)
     with pytest.raises(InputError, match="0 of 40 registered photos have one"):
-        place_by_fixes(in_model(places), Fixes(fixes={"x.jpg": Fix(place_W_m=np.zeros(3), sigma_m=np.ones(3))}))
+        place_by_fixes(
+            in_model(places), PositionFixes(fixes={"x.jpg": PositionFix(place_W_m=np.zeros(3), sigma_m=np.ones(3))})
+        )
 
 
 def test_a_model_on_disk_comes_to_lie_where_its_fixes_are(tmp_path):

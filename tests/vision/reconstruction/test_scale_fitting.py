@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.vision.reconstruction.scale.fitting import Measured, fit_scale
+from wakewise.vision.reconstruction.scale.fitting import BarMeasurement, fit_scale
 
 
 def measured(name, length, found, sigma=1e-4, found_sigma=0.0):
-    return Measured(name=name, length_m=length, sigma_m=sigma, found=found, found_sigma=found_sigma, photos=5)
+    return BarMeasurement(name=name, length_m=length, sigma_m=sigma, found=found, found_sigma=found_sigma, photos=5)
 
 
 def test_scale_is_the_weighted_mean_and_as_sure_as_bars_drawn_say():

@@ -11,7 +11,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.interfaces import no_progress
 from wakewise.vision.reconstruction.photos import PhotoStore
 from wakewise.vision.reconstruction.registered_photos import camera_centres
-from wakewise.vision.reconstruction.scale import Bar, Bars
+from wakewise.vision.reconstruction.scale import ScaleBar, ScaleBars
 from wakewise.vision.reconstruction.scale.marks import find_board
 from wakewise.vision.reconstruction.scale.stage import scale_model
 
@@ -19,7 +19,7 @@ UNIT_M = 0.137
 
 
 def bar(one, two, times=1.0):
-    return Bar(ends=(one, two), length_m=times * scene.bar_m(one, two), sigma_m=1e-4)
+    return ScaleBar(ends=(one, two), length_m=times * scene.bar_m(one, two), sigma_m=1e-4)
 
 
 GOOD = (bar(3, 20), bar(7, 12))
@@ -40,7 +40,9 @@ def sparse(photos, tmp_path):
 def test_two_bars_give_metres_within_a_thousandth(photos, sparse):
     """A model in units of 137 mm comes back with its cameras where they were; family found, bars agree, and again."""
     folder, truth = photos
-    said = scale_model(PhotoStore(folder), sparse, Bars(bars=GOOD, tag_m=scene.TAG_M), 2, no_progress)["scale_bars"]
+    said = scale_model(PhotoStore(folder), sparse, ScaleBars(bars=GOOD, tag_m=scene.TAG_M), 2, no_progress)[
+        "scale_bars"
+    ]
     centres = camera_centres(sparse)
     for one in centres:
         for two in centres:
@@ -54,7 +56,7 @@ def test_two_bars_give_metres_within_a_thousandth(photos, sparse):
     assert all(side == pytest.approx(1e3 * scene.TAG_M, rel=0.02) for t in said["targets"] for side in t["sides_mm"])
     assert json.dumps(said)
     again = scale_model(
-        PhotoStore(folder), sparse, Bars(bars=GOOD, family="apriltag_36h11"), 2, no_progress, keep=True
+        PhotoStore(folder), sparse, ScaleBars(bars=GOOD, family="apriltag_36h11"), 2, no_progress, keep=True
     )["scale_bars"]
     assert not again["used"]
     assert abs(again["model_off_pct"]) < 1e-6
@@ -67,10 +69,13 @@ def test_what_cannot_give_a_scale_is_said_in_a_line(photos, sparse, tmp_path):
     known = {"family": "apriltag_36h11"}
     store = PhotoStore(folder)
     for bars, words in (
-        (Bars(bars=(bar(3, 20), Bar(ends=(3, 99), length_m=0.1, sigma_m=1e-4)), **known), "target 99 .* in no regist"),
-        (Bars(bars=(bar(3, 20), bar(7, 12, 1.04)), **known), r"3-20 and 7-12 differ by 4\.. %"),
-        (Bars(bars=GOOD, tag_m=0.040, **known), r"3[56]\.\d mm by the bars, 40 mm were"),
-        (Bars(bars=(bar(3, 20),), family="aruco_7x7"), "seen are none"),
+        (
+            ScaleBars(bars=(bar(3, 20), ScaleBar(ends=(3, 99), length_m=0.1, sigma_m=1e-4)), **known),
+            "target 99 .* in no regist",
+        ),
+        (ScaleBars(bars=(bar(3, 20), bar(7, 12, 1.04)), **known), r"3-20 and 7-12 differ by 4\.. %"),
+        (ScaleBars(bars=GOOD, tag_m=0.040, **known), r"3[56]\.\d mm by the bars, 40 mm were"),
+        (ScaleBars(bars=(bar(3, 20),), family="aruco_7x7"), "seen are none"),
     ):
         with pytest.raises(InputError, match=words):
             scale_model(store, sparse, bars, 2, no_progress)
@@ -85,16 +90,16 @@ def test_what_cannot_give_a_scale_is_said_in_a_line(photos, sparse, tmp_path):
             cv2.circle(image, tuple(int(v) for v in place), 45, (90, 90, 90), -1)
         cv2.imwrite(str(once / path.name), image)
     with pytest.raises(InputError, match=r"target 7 is seen in one photo only \(00\.png\)"):
-        scale_model(PhotoStore(once), sparse, Bars(bars=GOOD, **known), 2, no_progress)
+        scale_model(PhotoStore(once), sparse, ScaleBars(bars=GOOD, **known), 2, no_progress)
     after = camera_centres(sparse)
     assert all(np.array_equal(before[name], after[name]) for name in before)
 
 
 def test_a_board_is_found_with_its_places(tmp_path):
     """Corners of a drawn ChArUco board come back at their pixels, numbered as its places in m."""
-    from wakewise.vision.reconstruction import Board
+    from wakewise.vision.reconstruction import CalibrationBoard
 
-    board = Board(columns=6, rows=5, square_m=0.03, marker_m=0.022)
+    board = CalibrationBoard(columns=6, rows=5, square_m=0.03, marker_m=0.022)
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_1000)
     drawn = cv2.aruco.CharucoBoard((6, 5), 0.03, 0.022, dictionary).generateImage((600, 500))
     page = np.full((640, 760), 255, np.uint8)

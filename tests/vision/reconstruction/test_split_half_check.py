@@ -5,11 +5,11 @@ import pytest
 from tagged_relief import poses, true_model
 
 from wakewise.core.errors import InputError, StageError
-from wakewise.vision.reconstruction.clouds import Cloud, write_cloud, write_mesh
-from wakewise.vision.reconstruction.ground_plane import Level
+from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud, write_mesh
+from wakewise.vision.reconstruction.ground_plane import GroundPlane
 from wakewise.vision.reconstruction.split_half_check import cells_of, extent_over, measure_halves
 
-FLAT = Level(origin=np.zeros(3), axes=np.eye(3))
+FLAT = GroundPlane(origin=np.zeros(3), axes=np.eye(3))
 
 
 def field(rise, size=0.4, count=81):
@@ -50,7 +50,9 @@ def test_halves_that_differ_are_told_by_how_much(tmp_path):
     wide, _ = field(0.08, count=121)
     write_cloud(
         tmp_path / "dense.ply",
-        Cloud(points_m=wide, normals=np.tile([0.0, 0.0, 1.0], (len(wide), 1)), colours=np.full((len(wide), 3), 0.5)),
+        OrientedPointCloud(
+            points_m=wide, normals=np.tile([0.0, 0.0, 1.0], (len(wide), 1)), colours=np.full((len(wide), 3), 0.5)
+        ),
     )
     asked = []
 

@@ -9,16 +9,16 @@ import trimesh
 
 from wakewise.core.errors import StageError
 from wakewise.core.geometry import look_at
-from wakewise.vision.reconstruction.registered_photos import View
+from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
 from wakewise.vision.texturing import atlas
 from wakewise.vision.texturing.atlas import lay_out, paint, write_atlas
 
 R_BC = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
-def view(name: str, eye: np.ndarray) -> View:
+def view(name: str, eye: np.ndarray) -> RegisteredPhoto:
     R_WC = look_at(eye, np.zeros(3)) @ R_BC
-    return View(
+    return RegisteredPhoto(
         name=name, width=400, height=320, focal_px=360.0, centre_px=np.array([200.0, 160.0]), radial=0.0,
         R_CW=R_WC.T, p_WC_m=eye, near_m=0.1, far_m=5.0, focus_W_m=np.zeros(3), seen=np.arange(8),
     )  # fmt: skip

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from wakewise.core.geometry import look_at
-from wakewise.vision.reconstruction import Cloud, write_cloud
-from wakewise.vision.reconstruction.registered_photos import View
+from wakewise.vision.reconstruction import OrientedPointCloud, write_cloud
+from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
 from wakewise.vision.texturing import orthophoto
 from wakewise.vision.texturing.orthophoto import closed, grid_faces, without_strays, write_orthophoto
 
@@ -21,7 +21,7 @@ def test_a_slanted_photograph_of_a_wall_is_straightened(tmp_path: Path, monkeypa
     views = []
     for k, eye in enumerate((np.array([0.5, 0.3, -1.0]), np.array([-0.5, 0.3, -1.0]))):
         R_WC = look_at(eye, np.zeros(3)) @ R_BC
-        own = View(
+        own = RegisteredPhoto(
             name=f"{k}.png", width=640, height=480, focal_px=700.0, centre_px=np.array([320.0, 240.0]), radial=0.0,
             R_CW=R_WC.T, p_WC_m=eye, near_m=0.1, far_m=5.0, focus_W_m=np.zeros(3), seen=np.arange(8),
         )  # fmt: skip
@@ -34,7 +34,7 @@ def test_a_slanted_photograph_of_a_wall_is_straightened(tmp_path: Path, monkeypa
         views.append(own)
     x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-0.3, 0.3, 121), np.linspace(-0.2, 0.2, 81)))
     z = np.where((x < -0.2) & (y > 0.1), -0.02, 0.0)
-    cloud = Cloud(
+    cloud = OrientedPointCloud(
         points_m=np.stack([x, y, z], axis=1),
         normals=np.tile([0.0, 0, -1], (len(x), 1)),
         colours=np.full((len(x), 3), 0.5),

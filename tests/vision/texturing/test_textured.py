@@ -12,25 +12,25 @@ import pytest
 import trimesh
 
 from wakewise.core.geometry import look_at
-from wakewise.vision.reconstruction.registered_photos import View
+from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
 from wakewise.vision.texturing import textured
 from wakewise.vision.texturing.colour import srgb_decode
-from wakewise.vision.texturing.photo_colours import Depths, correct_photos, project, rays
+from wakewise.vision.texturing.photo_colours import RangeMaps, correct_photos, project, rays
 from wakewise.vision.texturing.textured import filled, read_textured, standing, vertex_colours, write_textured
 
 R_BODY_CAMERA = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
-def _view(name: str, eye: np.ndarray, radial: float = 0.0) -> View:
+def _view(name: str, eye: np.ndarray, radial: float = 0.0) -> RegisteredPhoto:
     R_WC = look_at(eye, np.zeros(3)) @ R_BODY_CAMERA
-    return View(
+    return RegisteredPhoto(
         name=name, width=200, height=160, focal_px=180.0, centre_px=np.array([100.0, 80.0]), radial=radial,
         R_CW=R_WC.T, p_WC_m=eye, near_m=0.1, far_m=5.0, focus_W_m=np.zeros(3), seen=np.arange(8),
     )  # fmt: skip
 
 
 @pytest.fixture
-def ball(tmp_path: Path) -> tuple[trimesh.Trimesh, tuple[View, ...], Path]:
+def ball(tmp_path: Path) -> tuple[trimesh.Trimesh, tuple[RegisteredPhoto, ...], Path]:
     """A ball, a red photograph of its north side and a blue one of its south side."""
     for name, bgr in (("n.png", (0, 0, 200)), ("s.png", (200, 0, 0))):
         cv2.imwrite(str(tmp_path / name), np.full((160, 200, 3), bgr, np.uint8))
@@ -38,7 +38,7 @@ def ball(tmp_path: Path) -> tuple[trimesh.Trimesh, tuple[View, ...], Path]:
     return trimesh.creation.icosphere(subdivisions=3, radius=0.2), views, tmp_path
 
 
-def test_each_side_has_its_photographs_colour(ball: tuple[trimesh.Trimesh, tuple[View, ...], Path]) -> None:
+def test_each_side_has_its_photographs_colour(ball: tuple[trimesh.Trimesh, tuple[RegisteredPhoto, ...], Path]) -> None:
     """North is red, south is blue, the rim that both see too slanted is seen by neither; hidden sides get nothing."""
     mesh, views, photos = ball
     vertices = np.asarray(mesh.vertices)
@@ -73,7 +73,7 @@ def test_gaps_take_their_neighbours_colour() -> None:
 
 
 def test_the_file_is_standard_and_comes_back(
-    ball: tuple[trimesh.Trimesh, tuple[View, ...], Path], monkeypatch: pytest.MonkeyPatch
+    ball: tuple[trimesh.Trimesh, tuple[RegisteredPhoto, ...], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A GLB 2 with positions, normals, colours and metre lengths, y up; reading it gives the mesh that went in."""
     mesh, views, folder = ball
@@ -119,8 +119,8 @@ def test_ranges_on_a_plane_are_right() -> None:
     points = np.column_stack([rng.uniform(-0.4, 0.4, (300, 2)), np.zeros(300)])
     eye = np.array([0.6, 0.1, -0.6])
     view = _view("n.png", eye)
-    view = View(**{**{f: getattr(view, f) for f in view.__dataclass_fields__}, "seen": np.arange(300)})
-    depths = Depths(views={"n.png": view}, points_m=points, mesh=None, corners_m=np.zeros((0, 3)))
+    view = RegisteredPhoto(**{**{f: getattr(view, f) for f in view.__dataclass_fields__}, "seen": np.arange(300)})
+    depths = RangeMaps(views={"n.png": view}, points_m=points, mesh=None, corners_m=np.zeros((0, 3)))
     found = depths.ranges_m("n.png", (160, 200)).astype(float)
     rows, columns = np.mgrid[0:160, 0:200] + 0.5
     ways = rays(view, np.stack([columns.ravel(), rows.ravel()], axis=1)) @ view.R_CW

@@ -29,9 +29,9 @@ _FIRST_MOTORS, _LATER_MOTORS = 33, 82
 """SERVOn_FUNCTION of motor 1 (to 8), and of motor 9 (to 12)."""
 
 
-class Driven(Protocol):
-    """What is asked of a vehicle here: a `Vehicle`, or a `wakewise_ardusub.vehicle_summary.Craft`, which holds its
-    curve itself.
+class MotorDrivenVehicle(Protocol):
+    """What is asked of a vehicle here: a `Vehicle`, or a `wakewise_ardusub.vehicle_summary.VehicleSummary`, which holds
+    its curve itself.
     """
 
     @property
@@ -64,7 +64,7 @@ def channels_of_motors(parameters: Mapping[str, float]) -> dict[int, list[int]]:
     return {motor: sorted(named[motor]) for motor in sorted(named)}
 
 
-def motor_channels(vehicle: Driven, parameters: Mapping[str, float]) -> tuple[int, ...]:
+def motor_channels(vehicle: MotorDrivenVehicle, parameters: Mapping[str, float]) -> tuple[int, ...]:
     """Servo channel of each thruster, from 1: as SERVOn_FUNCTION says, or in their order where nothing does.
 
     Raises
@@ -87,7 +87,7 @@ def directions_of_motors(parameters: Mapping[str, float], count: int) -> Array:
     return np.array([np.sign(parameters.get(f"MOT_{i + 1}_DIRECTION", 1.0)) or 1.0 for i in range(count)])
 
 
-def thrusts_of_pulses(vehicle: Driven, pulses_us: Array, directions: Array, supply_V: float) -> Array:
+def thrusts_of_pulses(vehicle: MotorDrivenVehicle, pulses_us: Array, directions: Array, supply_V: float) -> Array:
     """Thrusts of a vehicle's motors at pulses, both shape (n,) or (k, n); without a table they go in proportion.
 
     Raises
@@ -127,7 +127,7 @@ def pulses_of_thrusts(vehicle: Vehicle, thrusts_N: Array, directions: Array, sup
     return np.asarray(np.take_along_axis(around, best[None], axis=0)[0])
 
 
-def limits_of_motors(vehicle: Driven, directions: Array, supply_V: float) -> tuple[Array, Array]:
+def limits_of_motors(vehicle: MotorDrivenVehicle, directions: Array, supply_V: float) -> tuple[Array, Array]:
     """Lowest and highest thrusts at a voltage, shape (n,) each; a motor that is turned about has them turned about."""
     curve = _curve(vehicle)
     if curve is None:
@@ -148,7 +148,7 @@ def supply_in_table(vehicle: Vehicle, supply_V: float) -> float:
     return float(np.clip(measured, curve.supply_V[0], curve.supply_V[-1]))
 
 
-def require_motors(vehicle: Driven, motors: list[int], who: str, advice: str) -> None:
+def require_motors(vehicle: MotorDrivenVehicle, motors: list[int], who: str, advice: str) -> None:
     """Refuse another number of motors than the vehicle has thrusters.
 
     Raises
@@ -162,7 +162,7 @@ def require_motors(vehicle: Driven, motors: list[int], who: str, advice: str) ->
         raise InputError(f"vehicle {vehicle.name}: {count} thrusters, {who} drives motors {found}; {advice}")
 
 
-def _curve(vehicle: Driven) -> ThrustCurve | None:
+def _curve(vehicle: MotorDrivenVehicle) -> ThrustCurve | None:
     """The curve of a vehicle's motors, None without one."""
     if vehicle.curve is None or isinstance(vehicle.curve, ThrustCurve):
         return vehicle.curve
@@ -171,7 +171,7 @@ def _curve(vehicle: Driven) -> ThrustCurve | None:
     return library_curve(vehicle.curve.table)
 
 
-def _own_thrusts(vehicle: Driven, pulses_us: Array, supply_V: float) -> Array:
+def _own_thrusts(vehicle: MotorDrivenVehicle, pulses_us: Array, supply_V: float) -> Array:
     """Thrusts as each motor itself turns."""
     curve = _curve(vehicle)
     if curve is not None:
@@ -181,6 +181,6 @@ def _own_thrusts(vehicle: Driven, pulses_us: Array, supply_V: float) -> Array:
     return np.asarray(output * np.where(output > 0.0, forward, reverse))
 
 
-def _own_limits(vehicle: Driven) -> tuple[Array, Array]:
+def _own_limits(vehicle: MotorDrivenVehicle) -> tuple[Array, Array]:
     """Largest thrusts of a vehicle without a table as each motor itself turns, shape (n,) each, as magnitudes."""
     return vehicle.thrust_upper_N, -vehicle.thrust_lower_N

@@ -1,8 +1,8 @@
 """A scenario's vehicle in its water behind an autopilot's firmware: any vehicle and any world that there is a truth of.
 
 The firmware is answered with what truly is, not with what sensors say: its own sensor models are in it. Position is the
-tank's own, with its surface at a depth of 0, which the vehicle cannot leave (`Surface`). Neither mission nor controller
-of the scenario has a part in it, but for where the vehicle starts.
+tank's own, with its surface at a depth of 0, which the vehicle cannot leave (`WaterSurface`). Neither mission nor
+controller of the scenario has a part in it, but for where the vehicle starts.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
-from wakewise.core.interfaces import BodyState, Plant, Witness
+from wakewise.core.interfaces import BodyState, Plant, TruthProvider
 from wakewise.core.jit.precompile import warm
-from wakewise_ardusub.physics.datagrams import Motion
-from wakewise_ardusub.physics.lowered_start import Lowered
-from wakewise_ardusub.physics.physics import Body
-from wakewise_ardusub.physics.surface import Surface
+from wakewise_ardusub.physics.datagrams import PhysicsState
+from wakewise_ardusub.physics.lowered_start import LoweringBody
+from wakewise_ardusub.physics.physics import SimulatedBody
+from wakewise_ardusub.physics.surface import WaterSurface
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,20 +30,20 @@ if TYPE_CHECKING:
 _GRAVITY_W_M_S2 = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
-class FlownBody:
-    """A plant with a witness, as `wakewise_ardusub.physics.Body`.
+class PlantBody:
+    """A plant with a witness, as `wakewise_ardusub.physics.SimulatedBody`.
 
     The specific force is the mean over the step: what the velocity in the world gained, less gravity, in B.
 
     Parameters
     ----------
     plant : Plant
-    witness : Witness
+    witness : TruthProvider
     surface : Surface, optional
         Where the water ends; the plant must have a method `push`.
     """
 
-    def __init__(self, plant: Plant, witness: Witness, surface: Surface | None = None) -> None:
+    def __init__(self, plant: Plant, witness: TruthProvider, surface: WaterSurface | None = None) -> None:
         self._plant, self._witness, self._surface = plant, witness, surface
         self._time_s = 0.0
         self.state = witness.observe().state
@@ -51,7 +51,7 @@ class FlownBody:
         self._v_W_m_s = _velocity_W(self.state)
         self._push: Callable[[Array], None] | None = None if surface is None else plant.push  # type: ignore[attr-defined]
 
-    def step(self, thrusts_N: Array, dt_s: float) -> Motion:
+    def step(self, thrusts_N: Array, dt_s: float) -> PhysicsState:
         """Hold commanded thrusts, shape (n,), for `dt_s`."""
         if self._surface is not None and self._push is not None:
             self._push(self._surface.wrench_B(self.state.X_WB))
@@ -61,7 +61,7 @@ class FlownBody:
         self.state = state = self._witness.observe().state
         R_WB, before = state.X_WB.R, self._v_W_m_s
         self._v_W_m_s = _velocity_W(state)
-        return Motion(
+        return PhysicsState(
             time_s=self._time_s,
             omega_B_rad_s=state.nu_B[3:],
             force_B_m_s2=((self._v_W_m_s - before) / dt_s - _GRAVITY_W_M_S2) @ R_WB,
@@ -72,20 +72,20 @@ class FlownBody:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class BehindFirmware:
+class SitlPlant:
     """The world of a scenario's parts, made ready to be driven by a firmware; `begin` is what `Physics` takes.
 
     Parameters
     ----------
     parts : Parts
     held_s : float
-        How long the vehicle is held at the surface first, see `Lowered`; 0 begins at its start.
+        How long the vehicle is held at the surface first, see `LoweringBody`; 0 begins at its start.
     """
 
     parts: Parts
     held_s: float = 0.0
 
-    def begin(self) -> Body:
+    def begin(self) -> SimulatedBody:
         """The vehicle at its start, a fresh one at each call.
 
         Raises
@@ -96,9 +96,9 @@ class BehindFirmware:
         plant, witness = self.parts.world.begin()
         if witness is None:
             raise InputError(f"--world {self.parts.scenario.world}: nobody knows the truth of it, a firmware needs it")
-        surface = Surface.of(self.parts.vehicle) if self.has_surface(plant) else None
-        body = FlownBody(plant, witness, surface)
-        return Lowered(body, body.state, self.held_s) if self.held_s > 0.0 else body
+        surface = WaterSurface.of(self.parts.vehicle) if self.has_surface(plant) else None
+        body = PlantBody(plant, witness, surface)
+        return LoweringBody(body, body.state, self.held_s) if self.held_s > 0.0 else body
 
     @staticmethod
     def has_surface(plant: Plant) -> bool:
@@ -110,7 +110,7 @@ class BehindFirmware:
         warm(("fly",), progress)
         plant, witness = self.parts.world.begin()
         if witness is not None:
-            FlownBody(plant, witness).step(np.zeros(len(self.parts.vehicle.thrusters)), 0.0025)
+            PlantBody(plant, witness).step(np.zeros(len(self.parts.vehicle.thrusters)), 0.0025)
         self.begin()
         return "" if self.has_surface(plant) else "the world has no method push: the vehicle can rise out of its water"
 

@@ -1,7 +1,7 @@
 """What the judging of pulses needs to know of a vehicle, as plain numbers: its thrusters, their curve, its wake model.
 
-A small computer on a vehicle reads it from one JSON file that a larger one wrote (`Craft.of`, `craft_json`): vehicle
-files, thrust tables and wake models have readers there that need more than NumPy.
+A small computer on a vehicle reads it from one JSON file that a larger one wrote (`VehicleSummary.of`, `craft_json`):
+vehicle files, thrust tables and wake models have readers there that need more than NumPy.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
 from wakewise.robot.thrusters.thrust_curve import CurveSide, ThrustCurve
-from wakewise.wake.jets import AxialJet, Law
+from wakewise.wake.jets import AxialJet, JetLaw
 from wakewise_ardusub.logs.channels import SERVOS
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ FORMAT = "wakewise craft 1"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class StatedJet(AxialJet):
+class KernelJet(AxialJet):
     """A wake model as the kernels know it: its name, which kernel (`wakewise.wake.kernels`), and its numbers."""
 
     label: str
@@ -45,13 +45,13 @@ class StatedJet(AxialJet):
         return self.label
 
     @property
-    def law(self) -> Law:
+    def law(self) -> JetLaw:
         """Kernel and numbers."""
-        return Law(self.kind, self.numbers)
+        return JetLaw(self.kind, self.numbers)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Craft:
+class VehicleSummary:
     """A vehicle with m thrusters; body frame FRD.
 
     Parameters
@@ -68,7 +68,7 @@ class Craft:
     bow_m, camera_z_m : float
         Front of the vehicle's box ahead of the body origin, and the camera's height below it.
     wake : WakeModel
-        A `StatedJet` where it came from a file.
+        A `KernelJet` where it came from a file.
     curve : ThrustCurve or None
         Pulse to thrust; without one it goes in proportion to the limits.
     supply_V : float
@@ -102,7 +102,7 @@ class Craft:
         freeze(self, areas_m2=(m,), thrust_lower_N=(m,), thrust_upper_N=(m,))
 
     @classmethod
-    def of(cls, vehicle: Vehicle, wake: WakeModel) -> Craft:
+    def of(cls, vehicle: Vehicle, wake: WakeModel) -> VehicleSummary:
         """The numbers of a vehicle and of the wake model that its jets are believed to follow."""
         from wakewise.robot.thrusters.curve_library import library_curve
 
@@ -129,7 +129,7 @@ class Craft:
         return len(self.thrusters)
 
 
-def craft_json(craft: Craft) -> str:
+def craft_json(craft: VehicleSummary) -> str:
     """The craft as JSON that `read_craft` reads.
 
     Raises
@@ -159,7 +159,7 @@ def _plain_curve(curve: ThrustCurve) -> dict[str, Any]:
 _SMALL = ("paper", "paper-calibrated", "fitted", "linear", "jet", "jet-fitted")
 
 
-def read_craft(path: Path) -> Craft:
+def read_craft(path: Path) -> VehicleSummary:
     """Read a craft that was written by `craft_json`.
 
     Raises
@@ -182,9 +182,9 @@ def read_craft(path: Path) -> Craft:
         raise InputError(f"{path}: {fault}") from None
 
 
-def _craft(told: dict[str, Any]) -> Craft:
+def _craft(told: dict[str, Any]) -> VehicleSummary:
     wake = told["wake"]
-    return Craft(
+    return VehicleSummary(
         name=str(told["name"]),
         thrusters=tuple(map(str, told["thrusters"])),
         allocation_matrix=_array(told["allocation_matrix"]),
@@ -195,7 +195,7 @@ def _craft(told: dict[str, Any]) -> Craft:
         thrust_upper_N=_array(told["thrust_upper_N"]),
         bow_m=float(told["bow_m"]),
         camera_z_m=float(told["camera_z_m"]),
-        wake=StatedJet(label=str(wake["label"]), kind=int(wake["kind"]), numbers=_array(wake["numbers"])),
+        wake=KernelJet(label=str(wake["label"]), kind=int(wake["kind"]), numbers=_array(wake["numbers"])),
         curve=None if told["curve"] is None else _curve(told["curve"]),
         supply_V=float(told["supply_V"]),
     )

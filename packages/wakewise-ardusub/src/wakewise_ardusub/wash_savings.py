@@ -18,9 +18,9 @@ from wakewise.allocation import Layout, Weights, compile_layout, disturbance_of,
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.jit.njit import COMPILED
-from wakewise.wake.influence import WakeView
+from wakewise.wake.influence import InfluenceModel
 from wakewise_ardusub.motors import limits_of_motors, thrusts_of_pulses
-from wakewise_ardusub.vehicle_summary import Craft
+from wakewise_ardusub.vehicle_summary import VehicleSummary
 
 EFFORT = 1e-6
 """Weight of squared thrust beside D in (m/s)^2 per N^2, as `wakewise allocate` has it."""
@@ -35,19 +35,19 @@ SHARES: tuple[Shares, ...] = ("flown", "least", "gentle")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Spared:
+class WashSavings:
     """One instant: thrusts, shape (m,) in N, and D in (m/s)^2 as flown, with least thrusts and with gentle ones."""
 
     thrusts_N: Mapping[Shares, Array]
     disturbance: Mapping[Shares, float]
 
 
-class Sparing:
+class WashSavingsCalculator:
     """Judges the pulses of one craft, each instant by itself; keeps what each voltage's limits leave.
 
     Parameters
     ----------
-    craft : Craft
+    craft : VehicleSummary
     directions : ndarray, shape (m,)
         MOT_n_DIRECTION, 1 or -1.
 
@@ -57,7 +57,7 @@ class Sparing:
         If the search for the craft's gentlest thrusts needs solvers that this computer lacks.
     """
 
-    def __init__(self, craft: Craft, directions: Array) -> None:
+    def __init__(self, craft: VehicleSummary, directions: Array) -> None:
         self.craft, self.directions = craft, directions
         self._layouts: dict[float, Layout] = {}
         if not COMPILED and not self.is_small(craft):
@@ -67,7 +67,7 @@ class Sparing:
             )
 
     @staticmethod
-    def is_small(craft: Craft) -> bool:
+    def is_small(craft: VehicleSummary) -> bool:
         """Whether each direction of the null space has thrusters of its own: then NumPy alone is fast enough."""
         layout = compile_layout(craft.allocation_matrix, craft.thrust_lower_N, craft.thrust_upper_N)
         return len(layout.lines) == layout.k
@@ -84,16 +84,16 @@ class Sparing:
         """Thrusts of pulses, both shape (m,); a thruster without a curve goes in proportion to its limits."""
         return thrusts_of_pulses(self.craft, pulses_us, self.directions, supply_V)
 
-    def judge(self, pulses_us: Array, supply_V: float, gram: Array) -> Spared:
+    def judge(self, pulses_us: Array, supply_V: float, gram: Array) -> WashSavings:
         """Thrusts and D of pulses, shape (m,), at a voltage of `supply_V`, by the Gram matrix, shape (2 m, 2 m)."""
         flown = self.flown_N(pulses_us, supply_V)
         if not np.any(flown):
-            return Spared(thrusts_N=dict.fromkeys(SHARES, flown), disturbance=dict.fromkeys(SHARES, 0.0))
+            return WashSavings(thrusts_N=dict.fromkeys(SHARES, flown), disturbance=dict.fromkeys(SHARES, 0.0))
         layout = self._layout(supply_V)
         wrench = self.craft.allocation_matrix @ flown
         least = least_thrusts(layout, wrench, gram)
         gentle = gentle_allocation(layout, wrench, gram, Weights(disturbance=1.0, effort=EFFORT), budget=BOXES)
-        return Spared(
+        return WashSavings(
             thrusts_N={"flown": flown, "least": least.thrusts_N, "gentle": gentle.thrusts_N},
             disturbance={
                 "flown": disturbance_of(gram, flown),
@@ -110,9 +110,9 @@ class Sparing:
         return self._layouts[supply_V]
 
 
-def look(craft: Craft, points_m: Array, weights: Array) -> WakeView:
+def look(craft: VehicleSummary, points_m: Array, weights: Array) -> InfluenceModel:
     """A craft's jets before points, shape (n, 3), with weights, shape (n,)."""
-    return WakeView(
+    return InfluenceModel(
         wake=craft.wake,
         points_W_m=points_m,
         weights=weights,

@@ -19,31 +19,31 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.ui.cli.main import run
-from wakewise_ardusub.link.motor_results import MotorResults, MotorSeen, write_results
+from wakewise_ardusub.link.motor_results import MotorObservation, MotorResults, write_results
 from wakewise_ardusub.link.parameters import read_parameter_file
 from wakewise_ardusub.link.protocol import SCRIPT_VERSION
 from wakewise_ardusub.link.script import parameters_text, script_text
-from wakewise_ardusub.physics.datagrams import Motion
+from wakewise_ardusub.physics.datagrams import PhysicsState
 from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
 from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.simulated_autopilot import StandIn
-from wakewise_ardusub.sitl.udp_endpoints import Embedded, Link
+from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics, UdpEndpoint
 from wakewise_ardusub.sitl.udp_endpoints import run as run_stand_in
 
 Capture = pytest.CaptureFixture[str]
 
 
 @pytest.fixture
-def stand_in() -> Iterator[tuple[StandIn, str]]:
+def stand_in() -> Iterator[tuple[SimulatedAutopilot, str]]:
     """A stand-in autopilot without any script, and where it is: it speaks to that port of this computer only."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    autopilot = StandIn({"SCR_ENABLE": 0.0}, loop_hz=50.0)
+    autopilot = SimulatedAutopilot({"SCR_ENABLE": 0.0}, loop_hz=50.0)
     vehicle = load_vehicle("bluerov2-heavy")
-    behind = Embedded(body=FreeWater(vehicle), table=PulseTable.of(vehicle))
-    link, ended = Link("127.0.0.1", port, out=True), threading.Event()
+    behind = InProcessPhysics(body=FreeWater(vehicle), table=PulseTable.of(vehicle))
+    link, ended = UdpEndpoint("127.0.0.1", port, out=True), threading.Event()
     runner = threading.Thread(target=run_stand_in, args=(autopilot, behind, [link], lambda: not ended.is_set()))
     runner.start()
     yield autopilot, f"udpin:127.0.0.1:{port}"
@@ -52,7 +52,9 @@ def stand_in() -> Iterator[tuple[StandIn, str]]:
     link.close()
 
 
-def test_the_script_goes_onto_an_autopilot_and_starts(stand_in: tuple[StandIn, str], capsys: Capture) -> None:
+def test_the_script_goes_onto_an_autopilot_and_starts(
+    stand_in: tuple[SimulatedAutopilot, str], capsys: Capture
+) -> None:
     """Uploaded over UDP, read back, SCR_ENABLE set and rebooted: then the script runs there."""
     autopilot, where = stand_in
     assert run(["link", "script", "--upload", where, "--start", "--json"]) == 0
@@ -77,7 +79,9 @@ def test_the_script_by_hand(capsys: Capture, tmp_path: Path) -> None:
     assert "SCR_ENABLE" in capsys.readouterr().out
 
 
-def test_a_live_check_says_go_or_no_go(stand_in: tuple[StandIn, str], capsys: Capture, tmp_path: Path) -> None:
+def test_a_live_check_says_go_or_no_go(
+    stand_in: tuple[SimulatedAutopilot, str], capsys: Capture, tmp_path: Path
+) -> None:
     """A fresh autopilot without pilot or script is no-go with 1, row by row."""
     _, where = stand_in
     results = str(tmp_path / "none.json")
@@ -95,7 +99,7 @@ def test_a_live_check_says_go_or_no_go(stand_in: tuple[StandIn, str], capsys: Ca
 
 
 def test_a_motor_turns_only_by_consent(
-    stand_in: tuple[StandIn, str], capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    stand_in: tuple[SimulatedAutopilot, str], capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Said no, a motor does not turn and the file says so; said yes, that one alone gets the pulse that was said.
 
@@ -105,7 +109,7 @@ def test_a_motor_turns_only_by_consent(
     results, seen = tmp_path / "motors.json", set()
     turned = autopilot.step
 
-    def watched(motion: Motion) -> tuple[int, ...]:
+    def watched(motion: PhysicsState) -> tuple[int, ...]:
         pulses = turned(motion)
         seen.add(pulses[:8])
         return pulses
@@ -134,7 +138,7 @@ def test_a_motor_turns_only_by_consent(
 
 
 def test_a_refusal_is_the_autopilots_own_words(
-    stand_in: tuple[StandIn, str], capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    stand_in: tuple[SimulatedAutopilot, str], capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Disarmed between question and turn: one line, and nothing turns."""
     autopilot, where = stand_in
@@ -176,7 +180,7 @@ def test_go_wants_motors_that_were_seen_to_turn(capsys: Capture, tmp_path: Path)
     assert run(asked) == 2
     assert "but nobody has seen the motors turn" in capsys.readouterr().out
     seen = {
-        motor: MotorSeen(motor=motor, pulse_us=1560, direction=1.0, expected="ahead", answer="as expected")
+        motor: MotorObservation(motor=motor, pulse_us=1560, direction=1.0, expected="ahead", answer="as expected")
         for motor in range(1, 8)
     }
     write_results(results, MotorResults(vehicle="bluerov2-heavy", time="2026-11-26T12:00:00Z", seen=seen))
@@ -275,8 +279,8 @@ def test_ctrl_c_ends_a_session_in_its_own_words(
         assert why == "Ctrl-C"
 
     monkeypatch.setattr("wakewise_ardusub.cli.link_ardusub._watch", interrupted)
-    monkeypatch.setattr("wakewise_ardusub.session.session.SeaSession.start", lambda session: None)
-    monkeypatch.setattr("wakewise_ardusub.session.session.SeaSession.stop", stopped)
+    monkeypatch.setattr("wakewise_ardusub.session.session.VehicleSession.start", lambda session: None)
+    monkeypatch.setattr("wakewise_ardusub.session.session.VehicleSession.stop", stopped)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         where = f"udpin:127.0.0.1:{probe.getsockname()[1]}"

@@ -17,24 +17,24 @@ from wakewise.core.geometry import (
     quat_from_matrix,
     quat_multiply,
 )
-from wakewise_ardusub.link.message_state import Said
-from wakewise_ardusub.link.telemetry_adapter import SETTLED, SenderClock, Telemetry, measured, odometry_pose
+from wakewise_ardusub.link.message_state import MavlinkMessage
+from wakewise_ardusub.link.telemetry_adapter import SETTLED, SenderClock, TelemetryAdapter, measured, odometry_pose
 
 STILL = {"rollspeed": 0.0, "pitchspeed": 0.0, "yawspeed": 0.0}
 UNIT = st.tuples(*(st.floats(-1.0, 1.0) for _ in range(4))).filter(lambda q: np.linalg.norm(q) > 0.1)
 PLACE = st.tuples(*(st.floats(-50.0, 50.0) for _ in range(3)))
 
 
-def attitude(boot_s: float, yaw: float = 0.0, **rates: float) -> Said:
+def attitude(boot_s: float, yaw: float = 0.0, **rates: float) -> MavlinkMessage:
     """ATTITUDE at a time since boot."""
     fields = {"time_boot_ms": round(1e3 * boot_s), "roll": 0.0, "pitch": 0.0, "yaw": yaw, **STILL, **rates}
-    return Said(1, 1, "ATTITUDE", fields)
+    return MavlinkMessage(1, 1, "ATTITUDE", fields)
 
 
-def place(boot_s: float) -> Said:
+def place(boot_s: float) -> MavlinkMessage:
     """LOCAL_POSITION_NED at a time since boot."""
     fields = {"time_boot_ms": round(1e3 * boot_s), "x": 1.0, "y": 2.0, "z": 3.0, "vx": 0.0, "vy": 0.0, "vz": 0.0}
-    return Said(1, 1, "LOCAL_POSITION_NED", fields)
+    return MavlinkMessage(1, 1, "LOCAL_POSITION_NED", fields)
 
 
 @given(lags=st.lists(st.floats(0.0, 0.2), min_size=1, max_size=60))
@@ -53,7 +53,7 @@ def test_times_are_right_but_for_the_quickest_way(lags):
 @pytest.mark.parametrize("by_s", [-3600.0, -2.0, 2.0, 86400.0])
 def test_a_clock_that_jumps_is_told_and_refused_for_a_while(by_s):
     """By how much it jumped is said once; then nothing is measured until it has gone on evenly."""
-    telemetry, found = Telemetry(), ()
+    telemetry, found = TelemetryAdapter(), ()
     for k in range(20):
         telemetry, found = measured(telemetry, attitude(5000.0 + 0.02 * k), 1000.0 + 0.02 * k, 1)
     assert len(found) == 1
@@ -67,7 +67,7 @@ def test_a_clock_that_jumps_is_told_and_refused_for_a_while(by_s):
 
 def test_a_position_gets_the_attitude_of_its_own_instant():
     """The attitude of 40 ms before, carried on by the rates that it came with."""
-    telemetry, gyro = measured(Telemetry(), attitude(10.0, yaw=0.5, yawspeed=1.0), 100.0, 1)
+    telemetry, gyro = measured(TelemetryAdapter(), attitude(10.0, yaw=0.5, yawspeed=1.0), 100.0, 1)
     assert gyro[0].omega_B_rad_s == pytest.approx([0.0, 0.0, 1.0])
     telemetry, found = measured(telemetry, place(10.04), 100.04, 1)
     X_WB = found[0].X_WB
@@ -77,8 +77,8 @@ def test_a_position_gets_the_attitude_of_its_own_instant():
 
 def test_a_position_without_a_fresh_attitude_is_no_pose():
     """None was heard, or the last is too old to be carried on."""
-    assert measured(Telemetry(), place(10.0), 100.0, 1)[1] == ()
-    telemetry, _ = measured(Telemetry(), attitude(10.0), 100.0, 1)
+    assert measured(TelemetryAdapter(), place(10.0), 100.0, 1)[1] == ()
+    telemetry, _ = measured(TelemetryAdapter(), attitude(10.0), 100.0, 1)
     assert measured(telemetry, place(10.5), 100.5, 1)[1] == ()
 
 
@@ -86,22 +86,22 @@ def test_other_vehicles_measure_nothing():
     """Attitude of system 2, or of another component of ours, is not this vehicle's."""
     message = attitude(10.0)
     for system, component in ((2, 1), (1, 154)):
-        said = Said(system, component, message.name, message.fields)
-        assert measured(Telemetry(), said, 100.0, 1)[1] == ()
+        said = MavlinkMessage(system, component, message.name, message.fields)
+        assert measured(TelemetryAdapter(), said, 100.0, 1)[1] == ()
 
 
 def test_specific_force_at_rest_points_up():
     """RAW_IMU says -1000 mG along z at rest."""
-    said = Said(1, 1, "RAW_IMU", {"time_usec": 10_000_000, "xacc": 0, "yacc": 0, "zacc": -1000})
-    found = measured(Telemetry(), said, 100.0, 1)[1]
+    said = MavlinkMessage(1, 1, "RAW_IMU", {"time_usec": 10_000_000, "xacc": 0, "yacc": 0, "zacc": -1000})
+    found = measured(TelemetryAdapter(), said, 100.0, 1)[1]
     assert found[0].force_B_m_s2 == pytest.approx([0.0, 0.0, -9.81], abs=0.01)
 
 
 def test_a_cameras_pose_puts_the_autopilots_estimate_aside():
     """VISION_POSITION_ESTIMATE is a pose; while it comes LOCAL_POSITION_NED is none."""
-    telemetry, _ = measured(Telemetry(), attitude(10.0), 100.0, 1)
+    telemetry, _ = measured(TelemetryAdapter(), attitude(10.0), 100.0, 1)
     seen = {"usec": 7_000_000, "x": 1.0, "y": 2.0, "z": 3.0, "roll": 0.1, "pitch": 0.2, "yaw": 0.3}
-    telemetry, found = measured(telemetry, Said(1, 197, "VISION_POSITION_ESTIMATE", seen), 100.0, 1)
+    telemetry, found = measured(telemetry, MavlinkMessage(1, 197, "VISION_POSITION_ESTIMATE", seen), 100.0, 1)
     assert found[0].X_WB.q == pytest.approx(quat_from_euler(0.1, 0.2, 0.3))
     assert measured(telemetry, place(10.02), 100.02, 1)[1] == ()
 
@@ -127,5 +127,5 @@ def test_odometry_is_the_same_pose_in_every_frame(p, q):
 def test_odometry_that_is_none_measures_nothing(fields):
     """A global frame, an unknown one, no quaternion, no number: nothing is measured and nothing raised."""
     whole = {"time_usec": 1, "frame_id": 1, "child_frame_id": 12, "x": 0.0, "y": 0.0, "z": 0.0, "q": [1.0, 0, 0, 0]}
-    said = Said(1, 197, "ODOMETRY", {**whole, **fields})
-    assert measured(Telemetry(), said, 100.0, 1)[1] == ()
+    said = MavlinkMessage(1, 197, "ODOMETRY", {**whole, **fields})
+    assert measured(TelemetryAdapter(), said, 100.0, 1)[1] == ()

@@ -14,8 +14,8 @@ from wakewise_ardusub.link import protocol
 from wakewise_ardusub.link.script import script_text
 from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
-from wakewise_ardusub.sitl.simulated_autopilot import StandIn
-from wakewise_ardusub.sitl.udp_endpoints import Embedded, Link, run
+from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics, UdpEndpoint, run
 
 PAGE = (Path(__file__).parents[4] / "docs" / "ardusub.md").read_text(encoding="utf-8")
 
@@ -34,15 +34,17 @@ def test_the_program_of_the_page_drives_the_motors() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    autopilot = StandIn({"FS_GCS_ENABLE": 0.0, "FS_PILOT_INPUT": 0.0}, loop_hz=50.0, scripts={"w.lua": script_text()})
+    autopilot = SimulatedAutopilot(
+        {"FS_GCS_ENABLE": 0.0, "FS_PILOT_INPUT": 0.0}, loop_hz=50.0, scripts={"w.lua": script_text()}
+    )
     vehicle = load_vehicle("bluerov2-heavy")
-    behind = Embedded(body=FreeWater(vehicle), table=PulseTable.of(vehicle))
+    behind = InProcessPhysics(body=FreeWater(vehicle), table=PulseTable.of(vehicle))
     # The script switches itself off as it starts, with the first loops: the pilot switches it on after that.
     for _ in range(5):
         autopilot.step(behind.exchange(autopilot.pulses_us, 50))
     autopilot.set_parameter(protocol.ENABLE_PARAMETER, 1.0)
     autopilot.armed = True
-    link, ended = Link("127.0.0.1", port, out=True), threading.Event()
+    link, ended = UdpEndpoint("127.0.0.1", port, out=True), threading.Event()
     runner = threading.Thread(target=run, args=(autopilot, behind, [link], lambda: not ended.is_set()))
     runner.start()
     try:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.interfaces import Measurement
-from wakewise_ardusub.link.ardusub_plant import EARLY, SeaPlant
+from wakewise_ardusub.link.ardusub_plant import EARLY, ArduSubPlant
 
 
 @dataclass
@@ -35,7 +35,7 @@ class Around:
 
 
 def plant(around, entry=3):
-    return SeaPlant(warden=around, clock=around, wait=around.wait, entry=lambda: entry)
+    return ArduSubPlant(warden=around, clock=around, wait=around.wait, entry=lambda: entry)
 
 
 def test_measurements_come_shortly_before_the_next_decision_is_due():

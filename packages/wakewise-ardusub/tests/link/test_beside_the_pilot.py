@@ -6,28 +6,28 @@ import numpy as np
 import pytest
 
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.engagement_fsm import Limits
+from wakewise_ardusub.link.engagement_fsm import EngagementLimits
 from wakewise_ardusub.link.protocol import NEUTRAL_WITHIN_S
-from wakewise_ardusub.link.session_log import Journal, read_journal
-from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD, Aboard
-from wakewise_ardusub.sitl.inprocess_session import Rehearsal, noise
+from wakewise_ardusub.link.session_log import SessionLog, read_journal
+from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD, CompanionHarness
+from wakewise_ardusub.sitl.inprocess_session import InProcessSession, noise
 
 HEAVY = load_vehicle("bluerov2-heavy")
 SLACK_S = 1e-6
-WIDE = Limits(depth_m=(-1.0, 100.0), distance_m=100.0, tilt_rad=4.0, speed_m_s=10.0)
+WIDE = EngagementLimits(depth_m=(-1.0, 100.0), distance_m=100.0, tilt_rad=4.0, speed_m_s=10.0)
 """What constant thrusts do is no matter here."""
 
 
-def aboard(journal: Journal | None = None, **flight) -> Aboard:
+def aboard(journal: SessionLog | None = None, **flight) -> CompanionHarness:
     """A warden beside the stand-in, at the pace of its own watch."""
-    made = Rehearsal(HEAVY, loop_hz=50.0, **flight)
-    return Aboard(made, limits=WIDE, journal=journal, thrusts_N=np.tile([6.0, -6.0], 4))
+    made = InProcessSession(HEAVY, loop_hz=50.0, **flight)
+    return CompanionHarness(made, limits=WIDE, journal=journal, thrusts_N=np.tile([6.0, -6.0], 4))
 
 
 @pytest.mark.parametrize("fault", FAULTS_ABOARD)
 def test_after_a_fault_the_outputs_are_the_pilots(fault, tmp_path):
     """From the fault on no output is driven for longer than the bound; what ended it is in the journal."""
-    journal = Journal(tmp_path / "journal.jsonl")
+    journal = SessionLog(tmp_path / "journal.jsonl")
     companion = aboard(journal).engaged()
     flight = companion.flight
     assert flight.moments[-1].overridden

@@ -15,8 +15,8 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.cli.link_ardusub import _buttons
 from wakewise_ardusub.link.buttons import BUTTONS, buttons_amiss, conflict, free_buttons
-from wakewise_ardusub.link.checks import Facts, check, verdict
-from wakewise_ardusub.sitl.inprocess_session import Rehearsal
+from wakewise_ardusub.link.checks import CheckInputs, check, verdict
+from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 
 ROOT = Path(__file__).parents[4]
@@ -43,7 +43,7 @@ def test_a_button_at_which_the_autopilot_acts_is_refused(button: int) -> None:
     changed = False
     for armed in (False, True):
         for shift in (0, 1 << 5):
-            flight = Rehearsal(HEAVY, loop_hz=50.0, values={"BTN5_FUNCTION": 1.0}).run(0.2)
+            flight = InProcessSession(HEAVY, loop_hz=50.0, values={"BTN5_FUNCTION": 1.0}).run(0.2)
             flight.arm(armed)
             flight.run(0.2)
             before = (flight.stand_in.armed, flight.stand_in.mode)
@@ -61,7 +61,7 @@ def test_a_button_at_which_the_autopilot_acts_is_refused(button: int) -> None:
 
 def test_without_a_button_that_disarms_arduSub_does_not_arm() -> None:
     """So nobody is told to take the function from that one."""
-    flight = Rehearsal(HEAVY, values={"BTN4_FUNCTION": 0.0}).run(0.2)
+    flight = InProcessSession(HEAVY, values={"BTN4_FUNCTION": 0.0}).run(0.2)
     flight.arm(True)
     flight.run(0.2)
     assert not flight.stand_in.armed
@@ -79,16 +79,16 @@ def test_a_photograph_may_trigger_the_autopilots_camera() -> None:
 
 def test_the_check_says_which_button_is_whose() -> None:
     """No-go with the function's name and what is free; without --buttons the free ones are listed."""
-    rows = check(Facts(vehicle=HEAVY, parameters=FRESH, system=1, buttons={"engage": 4, "scan": 15}))
+    rows = check(CheckInputs(vehicle=HEAVY, parameters=FRESH, system=1, buttons={"engage": 4, "scan": 15}))
     engage, scan = (row for row in rows if row.what.startswith("button "))
     assert (engage.what, engage.verdict) == ("button 4 (engage)", "no-go")
     assert (engage.found, engage.do) == ("BTN4_FUNCTION is 4 (disarm)", "free is 0")
     assert scan.verdict == "go"
     assert verdict(rows) == "no-go"
-    (free,) = (row for row in check(Facts(vehicle=HEAVY, parameters=FRESH, system=1)) if "buttons" in row.what)
+    (free,) = (row for row in check(CheckInputs(vehicle=HEAVY, parameters=FRESH, system=1)) if "buttons" in row.what)
     assert (free.found, free.verdict) == ("0, 15", "go")
     unknown = {name: value for name, value in FRESH.items() if name != "BTN0_SFUNCTION"}
-    (row,) = (row for row in check(Facts(vehicle=HEAVY, parameters=unknown, system=1, buttons={"engage": 0}))
+    (row,) = (row for row in check(CheckInputs(vehicle=HEAVY, parameters=unknown, system=1, buttons={"engage": 0}))
               if row.what == "button 0 (engage)")  # fmt: skip
     assert (row.verdict, row.needed, row.found) == ("unknown", True, "BTN0_SFUNCTION is not known")
 

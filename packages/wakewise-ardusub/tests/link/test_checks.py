@@ -12,8 +12,8 @@ from fake_autopilot import FakeAutopilot
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link import protocol
-from wakewise_ardusub.link.checks import Facts, Heard, Row, check, verdict
-from wakewise_ardusub.link.motor_results import MotorResults, MotorSeen, read_results, write_results
+from wakewise_ardusub.link.checks import CheckInputs, CheckResult, ReceivedTelemetry, check, verdict
+from wakewise_ardusub.link.motor_results import MotorObservation, MotorResults, read_results, write_results
 from wakewise_ardusub.link.parameters import read_parameter_file
 from wakewise_ardusub.link.vehicle_survey import await_autopilot, survey
 
@@ -26,20 +26,20 @@ PARAMETERS = {
     **{f"MOT_{i}_DIRECTION": float(d) for i, d in enumerate(DIRECTIONS, 1)},
     **{f"SERVO{i}_FUNCTION": 32.0 + i for i in range(1, 9)},
 }  # fmt: skip
-HEARD = Heard(
+HEARD = ReceivedTelemetry(
     seconds=2.0,
     firmware=(4, 5, 3),
     script=float(protocol.SCRIPT_VERSION),
     sticks={255: 40},
     poses={"LOCAL_POSITION_NED": 20},
 )
-RIGHT = Facts(vehicle=HEAVY, parameters=PARAMETERS, system=1, heard=HEARD)
+RIGHT = CheckInputs(vehicle=HEAVY, parameters=PARAMETERS, system=1, heard=HEARD)
 DATA = Path(os.environ.get("WAKEWISE_DATA", "")) / "ardusub"
 
 
 def _seen(**answers: str) -> MotorResults:
     seen = {
-        int(key[1:]): MotorSeen(
+        int(key[1:]): MotorObservation(
             motor=int(key[1:]),
             pulse_us=1560,
             direction=float(DIRECTIONS[int(key[1:]) - 1]),
@@ -51,16 +51,16 @@ def _seen(**answers: str) -> MotorResults:
     return MotorResults(vehicle=HEAVY.name, time="2026-11-23T03:00:00Z", seen=seen)
 
 
-def _with(**parameters: float | None) -> Facts:
+def _with(**parameters: float | None) -> CheckInputs:
     changed = {name: value for name, value in {**PARAMETERS, **parameters}.items() if value is not None}
     return dataclasses.replace(RIGHT, parameters=changed)
 
 
-def _heard(**fields: object) -> Facts:
+def _heard(**fields: object) -> CheckInputs:
     return dataclasses.replace(RIGHT, heard=dataclasses.replace(HEARD, **fields))
 
 
-def _bad(facts: Facts) -> list[Row]:
+def _bad(facts: CheckInputs) -> list[CheckResult]:
     return [row for row in check(facts) if row.verdict == "no-go" or (row.verdict == "unknown" and row.needed)]
 
 
@@ -103,7 +103,7 @@ def test_a_vehicle_on_which_all_is_right_goes() -> None:
         (_heard(mavlink_2=False), "MAVLink", "MAVLink 2"),
     ],
 )
-def test_each_thing_that_is_wrong_is_found_alone(facts: Facts, what: str, do: str) -> None:
+def test_each_thing_that_is_wrong_is_found_alone(facts: CheckInputs, what: str, do: str) -> None:
     """One row says it, with what to do, and the verdict is not go."""
     (row,) = _bad(facts)
     assert row.what == what
@@ -171,7 +171,7 @@ def test_results_survive_their_file(tmp_path: Path) -> None:
 def test_real_parameters_say_what_is_wrong_with_them(name: str, vehicle: str) -> None:
     """Those that ship for the BlueROV2: mixer and geometry agree on all motors; scripting is off, directions unsaid."""
     parameters = read_parameter_file(DATA / f"{name}-4_0_0.params")
-    rows = check(Facts(vehicle=load_vehicle(vehicle), parameters=parameters, system=1))
+    rows = check(CheckInputs(vehicle=load_vehicle(vehicle), parameters=parameters, system=1))
     assert {row.what for row in rows if row.verdict == "no-go"} == {"SCR_ENABLE"}
     assert {row.what for row in rows if row.verdict == "unknown" and row.needed} == {"directions (MOT_n_DIRECTION)"}
     assert sum(row.what.endswith("pushes") for row in rows) == len(load_vehicle(vehicle).thrusters)
@@ -195,7 +195,7 @@ def test_a_survey_finds_what_there_is() -> None:
 
     talk.on["COMMAND_LONG"] = answer_version
     facts = survey(talk, HEAVY, seconds=0.05)
-    assert facts.heard == Heard(
+    assert facts.heard == ReceivedTelemetry(
         seconds=0.05,
         firmware=(4, 5, 3),
         script=float(protocol.SCRIPT_VERSION),

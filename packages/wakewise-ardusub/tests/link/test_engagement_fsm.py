@@ -9,11 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wakewise_ardusub.link.engagement_fsm import FAULTS, REST_S, Engagement, Facts, Limits, faults
+from wakewise_ardusub.link.engagement_fsm import (
+    FAULTS,
+    REST_S,
+    EngagementInputs,
+    EngagementLimits,
+    EngagementState,
+    faults,
+)
 from wakewise_ardusub.link.protocol import SCRIPT_VERSION
 
-LIMITS = Limits(battery_V=13.0)
-WELL = Facts(
+LIMITS = EngagementLimits(battery_V=13.0)
+WELL = EngagementInputs(
     now_s=10.0,
     armed=True,
     mode=19,
@@ -55,9 +62,9 @@ AMISS = {
 }
 
 
-def engaged(facts: Facts = WELL) -> Engagement:
+def engaged(facts: EngagementInputs = WELL) -> EngagementState:
     """An engagement that drives."""
-    return Engagement().begun(9.0).judged(facts, LIMITS).consented(facts, LIMITS)
+    return EngagementState().begun(9.0).judged(facts, LIMITS).consented(facts, LIMITS)
 
 
 def test_every_kind_of_fault_is_tried_here():
@@ -67,7 +74,7 @@ def test_every_kind_of_fault_is_tried_here():
 
 def test_nothing_engages_by_itself():
     """All may be well for ever: without consent it is ready and no more."""
-    now = Engagement().begun(0.0)
+    now = EngagementState().begun(0.0)
     for k in range(100):
         now = now.judged(replace(WELL, now_s=float(k)), LIMITS)
     assert now.state == "ready"
@@ -95,7 +102,7 @@ def test_each_fault_ends_an_engagement(kind):
 def test_each_fault_keeps_consent_from_counting(kind):
     """Consent while something is amiss changes nothing, and is forgotten."""
     ill = replace(WELL, **AMISS[kind])
-    now = Engagement().begun(9.0).consented(ill, LIMITS)
+    now = EngagementState().begun(9.0).consented(ill, LIMITS)
     assert now.state == "listening"
     assert now.judged(WELL, LIMITS).state == "ready"
 
@@ -108,7 +115,7 @@ def test_the_gravest_fault_is_the_reason():
 
 def test_what_was_never_heard_is_amiss():
     """Facts of a vehicle of which nothing is known fit no limit."""
-    kinds = {fault.kind for fault in faults(Facts(now_s=0.0), LIMITS, engaged=False)}
+    kinds = {fault.kind for fault in faults(EngagementInputs(now_s=0.0), LIMITS, engaged=False)}
     expected = "disarmed mode heartbeat telemetry pose operator script late depth distance tilt speed battery"
     assert kinds == set(expected.split())
 
@@ -137,7 +144,7 @@ def test_release_gives_the_sticks_back():
 
 AGES = st.floats(0.0, 5.0)
 ANY = st.builds(
-    Facts,
+    EngagementInputs,
     now_s=st.just(0.0),
     armed=st.sampled_from([True, True, True, False, None]),
     mode=st.sampled_from([19, 19, 0, 0, 2, 2, 16, None]),
@@ -170,7 +177,7 @@ MOVES = st.lists(st.tuples(st.sampled_from(["judge", "judge", "consent", "releas
 @settings(max_examples=200, deadline=None)
 def test_engaged_only_while_nothing_is_amiss(moves):
     """Whatever happens in whatever order, after any move it is engaged only if armed, allowed, fresh and in limits."""
-    now = Engagement().begun(0.0)
+    now = EngagementState().begun(0.0)
     for k, (move, facts) in enumerate(moves):
         at = replace(facts, now_s=float(k))
         before = now
@@ -204,6 +211,6 @@ def test_limits_are_all_used():
     tightest = {
         "depth_m": (8.0, 9.0), "modes": frozenset(), "battery_V": 100.0, "thrusts_s": -1.0, "standstill_s": -1.0,
     }  # fmt: skip
-    for field in fields(Limits):
+    for field in fields(EngagementLimits):
         hard = replace(LIMITS, **{field.name: tightest.get(field.name, -1.0)})
         assert faults(WELL, hard, engaged=True), field.name

@@ -5,20 +5,22 @@ from __future__ import annotations
 import pytest
 
 from bottle import Bottle
-from wakewise_ardusub.link.engagement_fsm import Facts, Limits
-from wakewise_ardusub.link.freshness_margins import Margins
+from wakewise_ardusub.link.engagement_fsm import EngagementInputs, EngagementLimits
+from wakewise_ardusub.link.freshness_margins import FreshnessMargins
 
 
 def test_ages_are_those_of_the_last_minute() -> None:
     """Of a hundred looks the one that is far off is left out; what is over its limit is marked."""
-    margins = Margins()
-    assert margins.words(Limits()) == ""
-    margins.looked(Facts(now_s=0.0))
-    assert margins.words(Limits()) == ""
+    margins = FreshnessMargins()
+    assert margins.words(EngagementLimits()) == ""
+    margins.looked(EngagementInputs(now_s=0.0))
+    assert margins.words(EngagementLimits()) == ""
     for k in range(1000):
-        margins.looked(Facts(now_s=0.02 * k, pose_s=0.25 if k % 50 == 0 else 0.05, operator_s=0.04, telemetry_s=0.02))
+        margins.looked(
+            EngagementInputs(now_s=0.02 * k, pose_s=0.25 if k % 50 == 0 else 0.05, operator_s=0.04, telemetry_s=0.02)
+        )
     assert margins.p99_s() == pytest.approx({"pose": 0.25, "sticks": 0.04, "attitude": 0.02})
-    assert margins.words(Limits()) == "p99 ms pose 250!, sticks 40, attitude 20 of 200"
+    assert margins.words(EngagementLimits()) == "p99 ms pose 250!, sticks 40, attitude 20 of 200"
 
 
 def test_each_trip_is_counted_by_its_kind() -> None:

@@ -9,12 +9,12 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from bottle import Bottle
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.engagement_fsm import Limits
-from wakewise_ardusub.link.motor_interface import VehicleDrive
+from wakewise_ardusub.link.engagement_fsm import EngagementLimits
+from wakewise_ardusub.link.motor_interface import VehicleMotors
 from wakewise_ardusub.link.protocol import ALLOWED_MODES, ALT_HOLD, POSHOLD
 from wakewise_ardusub.link.script import script_text
 from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD
-from wakewise_ardusub.sitl.inprocess_session import Rehearsal
+from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 
 ROOT = Path(__file__).parents[4]
@@ -37,7 +37,7 @@ def test_every_row_names_a_test_that_exists():
 def test_a_vehicle_of_another_number_of_motors_is_refused():
     """A file of six thrusters on an autopilot that drives eight motors: said in one line, and it is never ready."""
     six = load_vehicle("bluerov2")
-    words = VehicleDrive(six).amiss(own_parameters(8))
+    words = VehicleMotors(six).amiss(own_parameters(8))
     assert words.startswith("vehicle bluerov2: 6 thrusters, the autopilot drives motors 1, 2, 3, 4, 5, 6, 7, 8;")
     assert "\n" not in words
     bottle = Bottle()
@@ -47,7 +47,7 @@ def test_a_vehicle_of_another_number_of_motors_is_refused():
 
 def risen_m(mode: int, script: str, seconds: float = 10.0) -> float:
     """How far the vehicle rises after thrusts have pushed it down for 15 s in a mode, and it was handed back."""
-    flight = Rehearsal(load_vehicle("bluerov2-heavy"), loop_hz=50.0, scripts={"wakewise.lua": script})
+    flight = InProcessSession(load_vehicle("bluerov2-heavy"), loop_hz=50.0, scripts={"wakewise.lua": script})
     flight.run(0.2)
     flight.set_mode(mode)
     flight.arm(True)
@@ -88,6 +88,6 @@ def test_hand_back_does_not_jump_in_any_mode_that_is_allowed():
 
 def test_modes_that_hold_a_place_are_not_allowed():
     """POSHOLD would go back to its place, so neither script nor warden drives in it."""
-    assert POSHOLD not in Limits().modes
+    assert POSHOLD not in EngagementLimits().modes
     bottle = Bottle(mode=POSHOLD)
     assert bottle.engage() == "not engaged: mode POSHOLD, allowed are MANUAL, ALT_HOLD, STABILIZE"

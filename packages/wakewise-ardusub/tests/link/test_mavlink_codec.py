@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
-from wakewise_ardusub.link.mavlink_codec import Post, Tap
+from wakewise_ardusub.link.mavlink_codec import MavlinkCodec, RelayTransport
 from wakewise_ardusub.link.requests import RATES_HZ, interval_requests, parameter_request
 
 
@@ -27,7 +27,7 @@ class Line:
 def test_it_speaks_as_the_vehicles_companion():
     """MAVLink 2 under the vehicle's system id and component 191, in sequence."""
     line = Line()
-    post = Post(line, 7)
+    post = MavlinkCodec(line, 7)
     for _ in range(3):
         post.send("heartbeat", {"type": 18, "autopilot": 8, "base_mode": 0, "custom_mode": 5, "system_status": 4})
     found = ardupilotmega.MAVLink(None).parse_buffer(b"".join(line.sent))
@@ -38,7 +38,7 @@ def test_it_speaks_as_the_vehicles_companion():
 def test_what_is_asked_for_are_messages_that_can_be_sent():
     """Requests for rates and parameters are packed and read back as they were."""
     line = Line()
-    post = Post(line, 1)
+    post = MavlinkCodec(line, 1)
     for name, fields in interval_requests(1):
         post.send(name, fields)
     post.send("param_request_read", parameter_request(1, "MOT_1_DIRECTION"))
@@ -54,7 +54,7 @@ def test_what_is_asked_for_are_messages_that_can_be_sent():
 def test_noise_is_counted_and_nothing_is_raised(noise):
     """Any bytes: messages or noise, and after them a message is understood again within a packet's length."""
     line = Line()
-    post = Post(line, 1)
+    post = MavlinkCodec(line, 1)
     line.waiting.append(noise)
     post.receive(0.0)
     mav = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
@@ -65,7 +65,7 @@ def test_noise_is_counted_and_nothing_is_raised(noise):
 
 def test_a_tap_gives_what_went_by():
     """All datagrams since the last look, in order; nothing after a wait, where nothing went by."""
-    tap = Tap()
+    tap = RelayTransport()
     tap.put(b"a")
     tap.put(b"b")
     assert tap.receive(0.0) == b"ab"

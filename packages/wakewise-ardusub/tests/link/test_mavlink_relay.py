@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
-from wakewise_ardusub.link.mavlink_relay import Mediator, stilled
+from wakewise_ardusub.link.mavlink_relay import MavlinkRelay, stilled
 
 PILOT = (255, 190)
 
@@ -90,7 +90,7 @@ def relayed():
     for one in (vehicle, ground):
         one.settimeout(2.0)
     drives, heard = [False], []
-    mediator = Mediator(inner_vehicle, inner_ground, driving=lambda: drives[0], heard=heard.append)
+    mediator = MavlinkRelay(inner_vehicle, inner_ground, driving=lambda: drives[0], heard=heard.append)
     mediator.start()
     vehicle.send(b"here")
     while not mediator._took_s:

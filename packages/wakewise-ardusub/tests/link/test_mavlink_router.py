@@ -12,7 +12,7 @@ import pytest
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.ui.cli.main import run
 from wakewise_ardusub.link.connection import parse_connection
-from wakewise_ardusub.link.mavlink_router import Share
+from wakewise_ardusub.link.mavlink_router import MavlinkRouter
 
 
 def opened(stack: ExitStack) -> socket.socket:
@@ -39,7 +39,7 @@ def test_what_one_says_goes_to_all_others_as_it_is() -> None:
     with ExitStack() as stack:
         autopilot, station, companion = (opened(stack) for _ in range(3))
         outs = [f"udpout:127.0.0.1:{one.getsockname()[1]}" for one in (station, companion)]
-        shared = Share([parse_connection(f"udpin:127.0.0.1:{port}"), *map(parse_connection, outs)])
+        shared = MavlinkRouter([parse_connection(f"udpin:127.0.0.1:{port}"), *map(parse_connection, outs)])
         stack.callback(shared.close)
         autopilot.sendto(b"\xfd first", ("127.0.0.1", port))
         shared.turn()
@@ -64,7 +64,7 @@ def test_a_firmware_that_comes_back_at_another_port_is_answered_there() -> None:
     with ExitStack() as stack:
         station = opened(stack)
         outs = [f"udpout:127.0.0.1:{station.getsockname()[1]}", f"udpout:127.0.0.1:{free_port()}"]
-        shared = Share([parse_connection(f"udpin:127.0.0.1:{port}"), *map(parse_connection, outs)])
+        shared = MavlinkRouter([parse_connection(f"udpin:127.0.0.1:{port}"), *map(parse_connection, outs)])
         stack.callback(shared.close)
         for _ in range(2):
             autopilot = opened(stack)
@@ -81,12 +81,12 @@ def test_a_firmware_that_comes_back_at_another_port_is_answered_there() -> None:
 def test_only_udp_can_be_shared_and_a_port_that_is_taken_is_said() -> None:
     """In one line each; what was opened is given back."""
     with pytest.raises(InputError, match="only udpin:HOST:PORT and udpout:HOST:PORT can be shared"):
-        Share([parse_connection("tcp:127.0.0.1:5760")])
+        MavlinkRouter([parse_connection("tcp:127.0.0.1:5760")])
     with ExitStack() as stack:
         taken, port = opened(stack).getsockname()[1], free_port()
         with pytest.raises(EnvironmentFailure, match="another program listens there already"):
-            Share([parse_connection(f"udpin:127.0.0.1:{each}") for each in (port, taken)])
-        Share([parse_connection(f"udpin:127.0.0.1:{port}")]).close()
+            MavlinkRouter([parse_connection(f"udpin:127.0.0.1:{each}") for each in (port, taken)])
+        MavlinkRouter([parse_connection(f"udpin:127.0.0.1:{port}")]).close()
 
 
 def test_the_command_counts_what_went_by(capsys: pytest.CaptureFixture[str]) -> None:

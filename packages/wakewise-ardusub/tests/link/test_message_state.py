@@ -10,22 +10,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
-from wakewise_ardusub.link.message_state import Known, Said, heard, stick_axes, tilt_of
+from wakewise_ardusub.link.message_state import LinkState, MavlinkMessage, heard, stick_axes, tilt_of
 
 STICKS = {"target": 1, "x": 0, "y": 0, "z": 500, "r": 0, "buttons": 0}
 
 
-def after(*said: Said, known: Known | None = None) -> Known:
+def after(*said: MavlinkMessage, known: LinkState | None = None) -> LinkState:
     """What is known after messages, a second apart."""
-    known = known or Known(session=7)
+    known = known or LinkState(session=7)
     for k, one in enumerate(said):
         known = heard(known, one, 100.0 + k)
     return known
 
 
-def beat(system: int = 1, component: int = 1, **fields: int) -> Said:
+def beat(system: int = 1, component: int = 1, **fields: int) -> MavlinkMessage:
     """A heartbeat, of an armed ArduSub in MANUAL unless told otherwise."""
-    return Said(
+    return MavlinkMessage(
         system, component, "HEARTBEAT", {"type": 12, "autopilot": 3, "base_mode": 129, "custom_mode": 19, **fields}
     )
 
@@ -42,7 +42,7 @@ def test_the_mode_has_ardusubs_name():
     """19 is MANUAL, and one without a name keeps its number."""
     assert after(beat()).mode_name == "MANUAL"
     assert after(beat(custom_mode=77)).mode_name == "mode 77"
-    assert Known().mode_name == ""
+    assert LinkState().mode_name == ""
 
 
 @pytest.mark.parametrize(
@@ -66,38 +66,48 @@ def test_sticks_as_ardusub_has_them(fields, axes):
 
 def test_sticks_beyond_full_are_nonsense():
     """A stick at 1500 of 1000 is counted and moves nothing."""
-    known = after(Said(255, 190, "MANUAL_CONTROL", {**STICKS, "x": 1500}))
+    known = after(MavlinkMessage(255, 190, "MANUAL_CONTROL", {**STICKS, "x": 1500}))
     assert known.sticks is None
     assert (known.garbage, known.odd) == (1, ("MANUAL_CONTROL",))
 
 
 def test_sticks_for_another_vehicle_are_not_ours():
     """They count by their target, whoever moves them."""
-    assert after(Said(255, 190, "MANUAL_CONTROL", {**STICKS, "target": 2})).sticks is None
+    assert after(MavlinkMessage(255, 190, "MANUAL_CONTROL", {**STICKS, "target": 2})).sticks is None
 
 
 def test_two_ground_stations_at_once_are_a_takeover():
     """Sticks of two systems within a second; a station that comes back after a while is none."""
-    one, two = (Said(system, 190, "MANUAL_CONTROL", STICKS) for system in (255, 254))
-    known = heard(heard(Known(), one, 0.0), two, 0.5)
+    one, two = (MavlinkMessage(system, 190, "MANUAL_CONTROL", STICKS) for system in (255, 254))
+    known = heard(heard(LinkState(), one, 0.0), two, 0.5)
     assert known.takeover == "sticks from two ground stations, 255 and 254"
-    assert heard(heard(Known(), one, 0.0), two, 1.5).takeover == ""
+    assert heard(heard(LinkState(), one, 0.0), two, 1.5).takeover == ""
 
 
 @pytest.mark.parametrize(
     ("said", "words"),
     [
-        (Said(255, 190, "SET_MODE", {"target_system": 1, "custom_mode": 2}), "system 255 set the mode"),
-        (Said(255, 190, "COMMAND_LONG", {"target_system": 1, "command": 400}), "system 255 armed or disarmed"),
-        (Said(255, 190, "COMMAND_LONG", {"target_system": 1, "command": 300}), "system 255 started a mission"),
-        (Said(255, 190, "COMMAND_LONG", {"target_system": 1, "command": 511}), ""),
-        (Said(255, 190, "COMMAND_LONG", {"target_system": 2, "command": 400}), ""),
+        (MavlinkMessage(255, 190, "SET_MODE", {"target_system": 1, "custom_mode": 2}), "system 255 set the mode"),
         (
-            Said(255, 0, "RC_CHANNELS_OVERRIDE", {"target_system": 1, **{f"chan{i}_raw": 65535 for i in range(1, 9)}}),
+            MavlinkMessage(255, 190, "COMMAND_LONG", {"target_system": 1, "command": 400}),
+            "system 255 armed or disarmed",
+        ),
+        (
+            MavlinkMessage(255, 190, "COMMAND_LONG", {"target_system": 1, "command": 300}),
+            "system 255 started a mission",
+        ),
+        (MavlinkMessage(255, 190, "COMMAND_LONG", {"target_system": 1, "command": 511}), ""),
+        (MavlinkMessage(255, 190, "COMMAND_LONG", {"target_system": 2, "command": 400}), ""),
+        (
+            MavlinkMessage(
+                255, 0, "RC_CHANNELS_OVERRIDE", {"target_system": 1, **{f"chan{i}_raw": 65535 for i in range(1, 9)}}
+            ),
             "",
         ),
         (
-            Said(255, 0, "RC_CHANNELS_OVERRIDE", {"target_system": 1, **{f"chan{i}_raw": 1600 for i in range(1, 9)}}),
+            MavlinkMessage(
+                255, 0, "RC_CHANNELS_OVERRIDE", {"target_system": 1, **{f"chan{i}_raw": 1600 for i in range(1, 9)}}
+            ),
             "system 255 overrides the pilot's channels",
         ),
     ],
@@ -109,9 +119,9 @@ def test_what_counts_as_taking_over(said, words):
 
 def test_a_rival_is_told_from_its_own_echo():
     """Thrusts of a time that was not sent, and a heartbeat with another session's number, are somebody else's."""
-    thrusts = Said(1, 191, "SET_ACTUATOR_CONTROL_TARGET", {"time_usec": 5})
+    thrusts = MavlinkMessage(1, 191, "SET_ACTUATOR_CONTROL_TARGET", {"time_usec": 5})
     assert after(thrusts).duplicate
-    assert not after(thrusts, known=Known(session=7).sent(5)).duplicate
+    assert not after(thrusts, known=LinkState(session=7).sent(5)).duplicate
     assert after(beat(component=191, custom_mode=8)).duplicate
     assert not after(beat(component=191, custom_mode=7)).duplicate
 
@@ -124,25 +134,25 @@ def test_ground_stations_are_known_by_their_heartbeats():
 
 def test_a_sensors_own_pose_is_preferred():
     """While a camera's pose comes, the autopilot's estimate, which is made of it, does not stand for it."""
-    camera = Said(1, 197, "VISION_POSITION_ESTIMATE", {"x": 1.0, "y": 2.0, "z": 3.0})
-    own = Said(1, 1, "LOCAL_POSITION_NED", {"x": 9.0, "y": 9.0, "z": 9.0, "vx": 0.0, "vy": 0.0, "vz": 0.0})
-    known = heard(heard(Known(), camera, 0.0), own, 0.5)
+    camera = MavlinkMessage(1, 197, "VISION_POSITION_ESTIMATE", {"x": 1.0, "y": 2.0, "z": 3.0})
+    own = MavlinkMessage(1, 1, "LOCAL_POSITION_NED", {"x": 9.0, "y": 9.0, "z": 9.0, "vx": 0.0, "vy": 0.0, "vz": 0.0})
+    known = heard(heard(LinkState(), camera, 0.0), own, 0.5)
     assert known.place_W_m == pytest.approx([1.0, 2.0, 3.0])
     assert heard(known, own, 1.5).place_W_m == pytest.approx([9.0, 9.0, 9.0])
 
 
 def test_depth_is_positive_down():
     """VFR_HUD says an altitude."""
-    assert after(Said(1, 1, "VFR_HUD", {"alt": -3.5})).depth_m == 3.5
+    assert after(MavlinkMessage(1, 1, "VFR_HUD", {"alt": -3.5})).depth_m == 3.5
 
 
 def test_tilt_is_the_angle_of_the_body_from_upright():
     """By roll and pitch together; of an attitude that nobody said it is not a number."""
-    said = Said(
+    said = MavlinkMessage(
         1, 1, "ATTITUDE", {"roll": 0.3, "pitch": 0.4, "yaw": 1.0, "rollspeed": 0, "pitchspeed": 0, "yawspeed": 0}
     )
     assert tilt_of(after(said)) == pytest.approx(math.acos(math.cos(0.3) * math.cos(0.4)))
-    assert math.isnan(tilt_of(Known()))
+    assert math.isnan(tilt_of(LinkState()))
 
 
 def test_fields_of_a_real_message():
@@ -151,9 +161,9 @@ def test_fields_of_a_real_message():
     reader = ardupilotmega.MAVLink(None)
     packed = mav.param_value_encode(b"MOT_1_DIRECTION", -1.0, 9, 900, 3).pack(mav)
     packed += mav.named_value_float_encode(1, b"WKW_ENG", 1.0).pack(mav) + mav.system_time_encode(1, 1).pack(mav)
-    known, unwanted = Known(), None
+    known, unwanted = LinkState(), None
     for message in reader.parse_buffer(packed):
-        unwanted = Said.of(message)
+        unwanted = MavlinkMessage.of(message)
         known = heard(known, unwanted, 3.0)
     assert dict(known.parameters) == {"MOT_1_DIRECTION": -1.0}
     assert known.named_value("WKW_ENG", 3.5) == (1.0, 0.5)
@@ -167,8 +177,8 @@ def test_any_bytes_leave_what_is_known_sound(data):
     """Whatever pymavlink makes of noise, nothing is raised and numbers that are kept are numbers."""
     reader = ardupilotmega.MAVLink(None)
     reader.robust_parsing = True
-    known = Known()
+    known = LinkState()
     for message in reader.parse_buffer(data) or []:
         if message.get_type() != "BAD_DATA":
-            known = heard(known, Said.of(message), 1.0)
+            known = heard(known, MavlinkMessage.of(message), 1.0)
     assert known.place_W_m is None or np.isfinite(known.place_W_m).all()

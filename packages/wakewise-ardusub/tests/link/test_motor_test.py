@@ -11,7 +11,7 @@ from fake_autopilot import FakeAutopilot
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.motor_results import Answer
-from wakewise_ardusub.link.motor_test import COOL_S, MotorTurn, planned_turns, run_motor_test
+from wakewise_ardusub.link.motor_test import COOL_S, MotorTestStep, planned_turns, run_motor_test
 from wakewise_ardusub.motors import thrusts_of_pulses
 
 HEAVY = load_vehicle("bluerov2-heavy")
@@ -80,12 +80,12 @@ class Looker:
     armed: int = 0
     broken_at: int = 0
 
-    def consents(self, turn: MotorTurn) -> bool:
+    def consents(self, turn: MotorTestStep) -> bool:
         assert all(pulse == 1500.0 for pulse in self.bench.pulses.values())
         self.asked.append(turn.motor)
         return turn.motor not in self.refuses
 
-    def saw(self, turn: MotorTurn) -> Answer:
+    def saw(self, turn: MotorTestStep) -> Answer:
         assert all(pulse == 1500.0 for pulse in self.bench.pulses.values())
         self.bench.sleep(3.0)
         if turn.motor == self.broken_at:

@@ -23,8 +23,8 @@ from wakewise_ardusub.link.vehicle_survey import survey
 from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
 from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.simulated_autopilot import StandIn
-from wakewise_ardusub.sitl.udp_endpoints import Embedded
+from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics
 
 HEAVY = load_vehicle("bluerov2-heavy")
 DIRECTIONS = (1, -1, -1, 1, 1, -1, 1, -1)
@@ -38,8 +38,8 @@ class Wire:
     def __init__(self, **values: float) -> None:
         turned = {f"MOT_{i}_DIRECTION": float(d) for i, d in enumerate(DIRECTIONS, 1)}
         parameters = {**own_parameters(), "SCR_ENABLE": 0.0, **turned, **values}
-        self.autopilot = StandIn(parameters, loop_hz=100.0)
-        self.behind = Embedded(body=FreeWater(HEAVY), table=PulseTable.of(HEAVY, parameters))
+        self.autopilot = SimulatedAutopilot(parameters, loop_hz=100.0)
+        self.behind = InProcessPhysics(body=FreeWater(HEAVY), table=PulseTable.of(HEAVY, parameters))
         self.piloted, self._loops = True, 0
         self._waiting: deque[Any] = deque()
         self._ears = ardupilotmega.MAVLink(None)

@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 from bottle import SESSION, SOURCES, THRUST, THRUSTS, Bottle
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
-from wakewise_ardusub.link.engagement_fsm import Limits
-from wakewise_ardusub.link.message_state import Said
+from wakewise_ardusub.link.engagement_fsm import EngagementLimits
+from wakewise_ardusub.link.message_state import MavlinkMessage
 from wakewise_ardusub.link.output_gate import RELEASES, TICK_S
 from wakewise_ardusub.link.protocol import MOST_AHEAD_US, NEUTRAL_WITHIN_S, SESSION_STEP_US
-from wakewise_ardusub.link.session_log import Journal, read_journal
+from wakewise_ardusub.link.session_log import SessionLog, read_journal
 
 SLACK_S = 1e-6
-LIMITS = Limits()
+LIMITS = EngagementLimits()
 
 
 def engaged(**more) -> Bottle:
@@ -289,7 +289,7 @@ def test_what_is_missing_is_asked_for():
 
 def test_every_change_of_state_is_in_the_journal(tmp_path):
     """Each transition with its reason, in order; news that repeat are written down now and then."""
-    journal = Journal(tmp_path / "journal.jsonl")
+    journal = SessionLog(tmp_path / "journal.jsonl")
     bottle = engaged(journal=journal)
     for _ in range(50):
         bottle.say("COMMAND_LONG", system=255, component=190, target_system=1, command=176)
@@ -407,7 +407,9 @@ def test_messages_that_say_nonsense_do_no_harm(data):
     for _ in range(10):
         fields = data.draw(st.dictionaries(keys, value, max_size=12))
         bottle.warden.take(
-            Said(data.draw(st.integers(0, 255)), data.draw(st.sampled_from([1, 190, 191])), data.draw(names), fields)
+            MavlinkMessage(
+                data.draw(st.integers(0, 255)), data.draw(st.sampled_from([1, 190, 191])), data.draw(names), fields
+            )
         )
         bottle.now_s += 0.02
         bottle.warden.tick()

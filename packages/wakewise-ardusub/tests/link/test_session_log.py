@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
-from wakewise_ardusub.link.session_log import Journal, read_journal
+from wakewise_ardusub.link.session_log import SessionLog, read_journal
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
@@ -28,7 +28,7 @@ VALUES = st.recursive(
 def test_whatever_is_told_is_one_line_of_json(told, tmp_path_factory):
     """Any values give one line that JSON can read, with time and event first."""
     path = tmp_path_factory.mktemp("journal") / "journal.jsonl"
-    journal = Journal(path)
+    journal = SessionLog(path)
     journal.write("news", **told)
     journal.close()
     text = path.read_text(encoding="utf-8")
@@ -40,7 +40,7 @@ def test_whatever_is_told_is_one_line_of_json(told, tmp_path_factory):
 
 def test_arrays_and_numbers_that_are_none(tmp_path):
     """Arrays become lists, what is not finite null."""
-    journal = Journal(tmp_path / "j.jsonl", clock=lambda: 1.5, wall=lambda: 2.0)
+    journal = SessionLog(tmp_path / "j.jsonl", clock=lambda: 1.5, wall=lambda: 2.0)
     journal.write("pose", p=np.array([1.0, math.nan]), n=np.int64(3))
     journal.close()
     lines, spoiled = read_journal(tmp_path / "j.jsonl")
@@ -71,11 +71,11 @@ def test_a_killed_program_leaves_every_line_that_it_wrote(tmp_path):
 def test_a_line_cut_short_is_left_out_and_what_follows_is_not(tmp_path):
     """What a power cut leaves of a line is counted; a journal that goes on after it loses nothing more."""
     path = tmp_path / "journal.jsonl"
-    first = Journal(path)
+    first = SessionLog(path)
     first.write("one")
     first.close()
     path.write_bytes(path.read_bytes() + b'{"t_s": 3, "ev')
-    second = Journal(path)
+    second = SessionLog(path)
     second.write("two")
     second.close()
     lines, spoiled = read_journal(path)
@@ -85,7 +85,7 @@ def test_a_line_cut_short_is_left_out_and_what_follows_is_not(tmp_path):
 
 def test_a_full_disk_is_counted_and_does_not_end_the_session(tmp_path):
     """Lines that cannot be written are lost, and said to be."""
-    journal = Journal(tmp_path / "j.jsonl")
+    journal = SessionLog(tmp_path / "j.jsonl")
     os.close(journal._file)
     journal._file = os.open("/dev/full", os.O_WRONLY)
     journal.write("news")

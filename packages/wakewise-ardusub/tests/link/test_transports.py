@@ -14,8 +14,8 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise_ardusub.link.connection import Endpoint, parse_connection
-from wakewise_ardusub.link.mavlink_codec import Post
-from wakewise_ardusub.link.transports import Stream, Udp, carrier_of
+from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
+from wakewise_ardusub.link.transports import StreamTransport, UdpTransport, carrier_of
 
 
 def test_a_host_without_an_address_is_said():
@@ -37,7 +37,7 @@ def test_who_waits_answers_whoever_spoke():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
         vehicle.bind(("127.0.0.1", 0))
         vehicle.settimeout(2.0)
-        waiting = Udp(Endpoint(way="udpin", host="127.0.0.1"))
+        waiting = UdpTransport(Endpoint(way="udpin", host="127.0.0.1"))
         waiting.send(b"to nobody")
         vehicle.sendto(b"hello", waiting.socket.getsockname())
         assert waiting.receive(2.0) == b"hello"
@@ -45,7 +45,7 @@ def test_who_waits_answers_whoever_spoke():
         assert vehicle.recv(100) == b"answer"
         assert waiting.receive(0.0) == b""
         waiting.close()
-        speaking = Udp(Endpoint(way="udpout", host="127.0.0.1", port=vehicle.getsockname()[1]))
+        speaking = UdpTransport(Endpoint(way="udpout", host="127.0.0.1", port=vehicle.getsockname()[1]))
         speaking.send(b"first")
         assert vehicle.recv(100) == b"first"
         speaking.close()
@@ -122,9 +122,9 @@ def test_packets_of_a_stream_are_whole_however_it_was_cut(cuts, noise):
         at += cut
     ours, theirs = socket.socketpair()
     waiting = iter([piece for piece in pieces if piece])
-    stream = Stream(ours, lambda _: next(waiting), theirs.send, ours.close)
+    stream = StreamTransport(ours, lambda _: next(waiting), theirs.send, ours.close)
     theirs.send(b"ready")
-    post = Post(stream, 1)
+    post = MavlinkCodec(stream, 1)
     times = [said.fields["time_boot_ms"] for piece in pieces if piece for said in post.receive(0.0)[0]]
     ours.close()
     theirs.close()

@@ -8,13 +8,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
-from wakewise_ardusub.physics.datagrams import Motion, Request, read_reply, read_request, write_reply, write_request
+from wakewise_ardusub.physics.datagrams import (
+    PhysicsState,
+    ServoFrame,
+    read_reply,
+    read_request,
+    write_reply,
+    write_request,
+)
 
 PULSES = st.one_of(*(st.tuples(*(st.integers(0, 65535),) * n) for n in (16, 32)))
 NUMBERS = st.floats(-1e4, 1e4)
 
 
-def _motion(time_s: float = 1.25, **changed: object) -> Motion:
+def _motion(time_s: float = 1.25, **changed: object) -> PhysicsState:
     given_ = {
         "omega_B_rad_s": (0.1, -0.2, 0.3),
         "force_B_m_s2": (0.0, 0.0, -9.80665),
@@ -22,13 +29,13 @@ def _motion(time_s: float = 1.25, **changed: object) -> Motion:
         "q_WB": (1.0, 0.0, 0.0, 0.0),
         "v_W_m_s": (0.0, 0.5, 0.0),
     } | changed
-    return Motion(time_s=time_s, **{name: np.array(value) for name, value in given_.items()})
+    return PhysicsState(time_s=time_s, **{name: np.array(value) for name, value in given_.items()})
 
 
 @given(PULSES, st.integers(1, 65535), st.integers(0, 2**32 - 1))
 def test_a_request_is_read_as_it_was_written(pulses: tuple[int, ...], rate_hz: int, frame: int) -> None:
     """16 and 32 channels, all rates and counts."""
-    request = Request(rate_hz=rate_hz, frame=frame, pulses_us=pulses)
+    request = ServoFrame(rate_hz=rate_hz, frame=frame, pulses_us=pulses)
     assert read_request(write_request(request)) == request
 
 
@@ -45,7 +52,7 @@ def test_any_bytes_are_a_request_or_refused(data: bytes) -> None:
 def test_the_layout_is_ardupilots() -> None:
     """Magic 18458, rate, count, then pulses, little-endian."""
     data = bytes([0x1A, 0x48, 0x90, 0x01, 7, 0, 0, 0]) + b"\xdc\x05" * 16
-    assert read_request(data) == Request(rate_hz=400, frame=7, pulses_us=(1500,) * 16)
+    assert read_request(data) == ServoFrame(rate_hz=400, frame=7, pulses_us=(1500,) * 16)
 
 
 @pytest.mark.parametrize(
@@ -66,9 +73,9 @@ def test_what_is_wrong_with_a_request_is_said(data: bytes, words: str) -> None:
 def test_a_request_of_other_channels_or_numbers_is_not_written() -> None:
     """12 channels, or a pulse beyond 65535."""
     with pytest.raises(InputError, match="12 channels"):
-        write_request(Request(rate_hz=400, frame=1, pulses_us=(1500,) * 12))
+        write_request(ServoFrame(rate_hz=400, frame=1, pulses_us=(1500,) * 12))
     with pytest.raises(InputError, match="70000"):
-        write_request(Request(rate_hz=400, frame=1, pulses_us=(70000,) * 16))
+        write_request(ServoFrame(rate_hz=400, frame=1, pulses_us=(70000,) * 16))
 
 
 def test_a_reply_is_one_compact_line_of_json() -> None:

@@ -13,11 +13,11 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.mavlink_codec import Post
-from wakewise_ardusub.physics import Body, FreeWater
-from wakewise_ardusub.physics.depth_monitor import APART_M, DepthWatch
-from wakewise_ardusub.physics.lowered_start import Lowered
-from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
+from wakewise_ardusub.physics import FreeWater, SimulatedBody
+from wakewise_ardusub.physics.depth_monitor import APART_M, DepthMonitor
+from wakewise_ardusub.physics.lowered_start import LoweringBody
+from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 
 HEAVY = load_vehicle("bluerov2-heavy")
 START = BodyState(X_WB=Pose(np.array([0.0, 0.0, 1.4]), np.array([1.0, 0.0, 0.0, 0.0])))
@@ -27,7 +27,7 @@ UP, DOWN = (np.linalg.pinv(HEAVY.allocation_matrix) @ [0.0, 0.0, force_N, 0.0, 0
 class Wire:
     """A `Carrier` of what a stand-in says."""
 
-    def __init__(self, made: StandIn) -> None:
+    def __init__(self, made: SimulatedAutopilot) -> None:
         self._made = made
 
     def receive(self, timeout_s: float) -> bytes:
@@ -37,10 +37,10 @@ class Wire:
         raise AssertionError("a watch only listens")
 
 
-def flown(body: Body, hold_s: float) -> tuple[DepthWatch, list[float], list[float], list[str]]:
+def flown(body: SimulatedBody, hold_s: float) -> tuple[DepthMonitor, list[float], list[float], list[str]]:
     """Rest, 5 s down, up for 12 s, 2 s down again: the watch, true depths, those of the autopilot, the words."""
-    made = StandIn(loop_hz=50.0, zero_depth_m=None)
-    watch = DepthWatch(Post(Wire(made), 1))
+    made = SimulatedAutopilot(loop_hz=50.0, zero_depth_m=None)
+    watch = DepthMonitor(MavlinkCodec(Wire(made), 1))
     truths, told, words = [], [], []
     for push, seconds in ((np.zeros(8), hold_s), (DOWN, 5.0), (UP, 12.0), (DOWN, 2.0)):
         for k in range(round(50 * seconds)):
@@ -70,7 +70,7 @@ def test_started_under_water_it_knows_no_depth_and_that_is_said() -> None:
 
 def test_let_down_from_the_surface_it_knows_its_depth() -> None:
     """Down, up to the surface and down again it is right to a message's age; the surface gives no new zero."""
-    watch, truths, told, words = flown(Lowered(FreeWater(HEAVY, START), START, 2.0), 12.5)
+    watch, truths, told, words = flown(LoweringBody(FreeWater(HEAVY, START), START, 2.0), 12.5)
     assert max(truths) > 1.6
     assert min(truths) < 0.2
     assert told == pytest.approx(truths, abs=1e-6)
@@ -82,7 +82,7 @@ def test_let_down_from_the_surface_it_knows_its_depth() -> None:
 
 def test_an_autopilot_that_says_nothing_is_not_compared() -> None:
     """No figure is made of what was never heard, nor of a truth that there is not yet."""
-    watch = DepthWatch(Post(Wire(StandIn(loop_hz=50.0)), 1))
+    watch = DepthMonitor(MavlinkCodec(Wire(SimulatedAutopilot(loop_hz=50.0)), 1))
     watch.look(1.0)
     watch.look(None)
     assert (watch.looks, watch.words) == (0, "autopilot's depth not heard")

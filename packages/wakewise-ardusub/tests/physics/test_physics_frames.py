@@ -3,13 +3,13 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wakewise_ardusub.physics.frames import Frames
+from wakewise_ardusub.physics.frames import FrameCounter
 
 ONE, TWO = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
 
 
-def _after(*frames: int) -> tuple[Frames, list[str]]:
-    counted, verdicts = Frames(), []
+def _after(*frames: int) -> tuple[FrameCounter, list[str]]:
+    counted, verdicts = FrameCounter(), []
     for k, frame in enumerate(frames):
         counted, verdict = counted.take(frame, ONE, 0.0025 * k)
         verdicts.append(verdict)
@@ -40,7 +40,7 @@ def test_a_count_that_begins_anew_is_a_firmware_that_does() -> None:
 
 def test_a_second_firmware_waits_until_the_first_is_silent() -> None:
     """Two that fly one vehicle would each see the other's thrusts."""
-    counted, _ = Frames().take(10, ONE, 0.0)
+    counted, _ = FrameCounter().take(10, ONE, 0.0)
     counted, verdict = counted.take(1, TWO, 0.5)
     assert verdict == "other"
     assert counted.strangers == 1
@@ -51,7 +51,7 @@ def test_a_second_firmware_waits_until_the_first_is_silent() -> None:
 @given(st.lists(st.tuples(st.integers(0, 2**32 - 1), st.sampled_from([ONE, TWO]), st.floats(0.0, 2.0))))
 def test_every_frame_is_counted_once(frames: list[tuple[int, tuple[str, int], float]]) -> None:
     """Whatever comes: stepped, repeated, late or a stranger's."""
-    counted, now_s = Frames(), 0.0
+    counted, now_s = FrameCounter(), 0.0
     for frame, sender, wait_s in frames:
         now_s += wait_s
         counted, _ = counted.take(frame, sender, now_s)

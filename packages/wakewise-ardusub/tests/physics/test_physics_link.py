@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.physics import FreeWater, Physics, PulseTable, Request, read_reply, write_request
+from wakewise_ardusub.physics import FreeWater, PhysicsServer, PulseTable, ServoFrame, read_reply, write_request
 
 HEAVY = load_vehicle("bluerov2-heavy")
 TABLE = PulseTable.of(HEAVY)
@@ -17,12 +17,12 @@ AHEAD = (1300, 1300, 1700, 1700, *(1500,) * 12)
 SENDER = ("127.0.0.1", 40000)
 
 
-def _link(**more: object) -> Physics:
-    return Physics(lambda: FreeWater(HEAVY), TABLE.thrusts, **more)
+def _link(**more: object) -> PhysicsServer:
+    return PhysicsServer(lambda: FreeWater(HEAVY), TABLE.thrusts, **more)
 
 
 def _frame(count: int, pulses: tuple[int, ...] = REST, rate_hz: int = 400) -> bytes:
-    return write_request(Request(rate_hz=rate_hz, frame=count, pulses_us=pulses))
+    return write_request(ServoFrame(rate_hz=rate_hz, frame=count, pulses_us=pulses))
 
 
 def test_each_new_frame_is_one_step_of_the_rate_asked_for() -> None:

@@ -10,11 +10,11 @@ from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.physics import FreeWater
-from wakewise_ardusub.physics.lowered_start import LOWERED_M_S, Lowered
-from wakewise_ardusub.physics.surface import Surface
+from wakewise_ardusub.physics.lowered_start import LOWERED_M_S, LoweringBody
+from wakewise_ardusub.physics.surface import WaterSurface
 
 HEAVY = load_vehicle("bluerov2-heavy")
-SURFACE = Surface.of(HEAVY)
+SURFACE = WaterSurface.of(HEAVY)
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 TILTED = quat_from_euler(0.4, -0.3, 2.0)
 
@@ -46,7 +46,7 @@ def test_a_disk_in_the_air_gives_no_thrust() -> None:
 def test_it_is_held_let_down_and_then_free() -> None:
     """At rest at 0 while thrusts run, down to the start without a step in speed, then the body's own; time goes on."""
     start = BodyState(X_WB=Pose(np.array([0.5, -0.4, 1.5]), TILTED))
-    body = Lowered(FreeWater(HEAVY, start), start, 3.0)
+    body = LoweringBody(FreeWater(HEAVY, start), start, 3.0)
     push, dt_s = np.full(8, 20.0), 0.01
     assert body.stage == "held at the surface for 3 s more"
     motions = [body.step(push, dt_s) for _ in range(299)]

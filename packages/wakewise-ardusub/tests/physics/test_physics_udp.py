@@ -7,22 +7,22 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.physics import FreeWater, Physics, PulseTable
+from wakewise_ardusub.physics import FreeWater, PhysicsServer, PulseTable
 from wakewise_ardusub.physics.udp import LOOPBACK, open_socket, serve
-from wakewise_ardusub.sitl.udp_endpoints import OverUdp
+from wakewise_ardusub.sitl.udp_endpoints import UdpPhysics
 
 HEAVY = load_vehicle("bluerov2-heavy")
 
 
 def test_frames_over_a_socket_move_the_vehicle() -> None:
     """The stand-in's own client in lock step, with strangers' bytes in between."""
-    physics = Physics(lambda: FreeWater(HEAVY), PulseTable.of(HEAVY).thrusts)
+    physics = PhysicsServer(lambda: FreeWater(HEAVY), PulseTable.of(HEAVY).thrusts)
     over = threading.Event()
     with open_socket(LOOPBACK, 0) as listening:
         port = listening.getsockname()[1]
         serving = threading.Thread(target=serve, args=(physics, listening, lambda: not over.is_set()))
         serving.start()
-        client = OverUdp(LOOPBACK, port)
+        client = UdpPhysics(LOOPBACK, port)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
             times_s = []
             for _ in range(50):
@@ -42,7 +42,7 @@ def test_nobody_there_is_no_answer() -> None:
     """The client says so and sends the same frame again later."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as deaf:
         deaf.bind((LOOPBACK, 0))
-        client = OverUdp(LOOPBACK, deaf.getsockname()[1])
+        client = UdpPhysics(LOOPBACK, deaf.getsockname()[1])
         assert client.exchange((1500,) * 16, 400) is None
         assert client.exchange((1500,) * 16, 400) is None
         assert deaf.recv(100) == deaf.recv(100)

@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError, WakewiseError
-from wakewise_ardusub.ros import Field, cloud_points
+from wakewise_ardusub.ros import PointField, cloud_points
 
 XYZ = (
-    Field(name="x", offset=0, datatype=7),
-    Field(name="y", offset=4, datatype=7),
-    Field(name="z", offset=8, datatype=7),
+    PointField(name="x", offset=0, datatype=7),
+    PointField(name="y", offset=4, datatype=7),
+    PointField(name="z", offset=8, datatype=7),
 )
 
 
@@ -27,7 +27,7 @@ def test_places_and_weights_are_read_from_padded_rows(big: bool) -> None:
     table["weight"] = [[1, 2, 3], [4, 5, 6]]
     rows = [row.tobytes() + b"\xee" * 5 for row in table]
     names = {"x": 7, "y": 7, "z": 8, "weight": 4}
-    fields = [Field(name=name, offset=kind.fields[name][1], datatype=code) for name, code in names.items()]
+    fields = [PointField(name=name, offset=kind.fields[name][1], datatype=code) for name, code in names.items()]
     places, weights = cloud_points(fields, kind.itemsize, 3 * kind.itemsize + 5, 3, 2, big, b"".join(rows))
     np.testing.assert_array_equal(places, [[1, 0.5, -1], [2, 0.5, -2], [4, 0.5, -4], [5, 0.5, -5], [6, 0.5, -6]])
     np.testing.assert_array_equal(weights, [1, 2, 4, 5, 6])
@@ -43,7 +43,7 @@ def test_an_empty_cloud_is_no_target() -> None:
 @given(
     fields=st.lists(
         st.builds(
-            Field,
+            PointField,
             name=st.sampled_from(["x", "y", "z", "weight", "rgb"]),
             offset=st.integers(-4, 40),
             datatype=st.integers(-1, 9),
@@ -53,7 +53,9 @@ def test_an_empty_cloud_is_no_target() -> None:
     sizes=st.tuples(st.integers(-1, 40), st.integers(-1, 90), st.integers(-1, 4), st.integers(-1, 4)),
     data=st.binary(max_size=200),
 )
-def test_any_message_is_read_or_refused(fields: list[Field], sizes: tuple[int, int, int, int], data: bytes) -> None:
+def test_any_message_is_read_or_refused(
+    fields: list[PointField], sizes: tuple[int, int, int, int], data: bytes
+) -> None:
     """Sizes that lie never lead beyond the bytes; what is read is finite."""
     try:
         places, weights = cloud_points(fields, *sizes, False, data)
@@ -73,7 +75,7 @@ def test_any_message_is_read_or_refused(fields: list[Field], sizes: tuple[int, i
     ],
 )
 def test_a_cloud_that_does_not_fit_its_sizes_is_refused(
-    fields: tuple[Field, ...], sizes: tuple[int, int, int, int], data: bytes, said: str
+    fields: tuple[PointField, ...], sizes: tuple[int, int, int, int], data: bytes, said: str
 ) -> None:
     """One line says what does not."""
     with pytest.raises(InputError, match=said):

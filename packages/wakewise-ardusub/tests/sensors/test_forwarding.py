@@ -13,8 +13,8 @@ import pytest
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import Measurement
 from wakewise.ui.cli.main import run
-from wakewise_ardusub.link.message_state import Said
-from wakewise_ardusub.link.telemetry_adapter import Telemetry, measured
+from wakewise_ardusub.link.message_state import MavlinkMessage
+from wakewise_ardusub.link.telemetry_adapter import TelemetryAdapter, measured
 from wakewise_ardusub.sensors import PoseForwarder, PoseSample, UdpSocket, vision_position_estimate
 
 common = pytest.importorskip("pymavlink.dialects.v20.common")
@@ -42,11 +42,11 @@ def test_a_pose_goes_through_the_air_and_is_the_same_pose() -> None:
         time.sleep(0.05)
         messages = [_parsed(data) for data in port.read()]
     assert [message.get_seq() for message in messages] == [0, 1, 2]
-    known = Telemetry()
+    known = TelemetryAdapter()
     for k, message in enumerate(messages):
         assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 197)
         fields = MappingProxyType(message.to_dict())
-        said = Said(name=message.get_type(), system=1, component=197, fields=fields)
+        said = MavlinkMessage(name=message.get_type(), system=1, component=197, fields=fields)
         known, (taken,) = measured(known, said, 100.0 + k, 1)
         assert taken.time_s == pytest.approx(100.0 + k)
         np.testing.assert_allclose(taken.X_WB.p_m, P + k, rtol=1e-6)

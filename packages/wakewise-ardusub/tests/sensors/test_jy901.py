@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
 from wakewise_ardusub.sensors import FrameReader, InertialUnit, mounting
-from wakewise_ardusub.sensors.jy901 import Frame, composed
+from wakewise_ardusub.sensors.jy901 import SerialFrame, composed
 
 AT_REST = bytes.fromhex("5551 0000 0000 0008 c409 7b".replace(" ", ""))
 """0, 0, 1 g (2048 of 32768 in 16 g), 25.00 deg C: 55+51+08+c4+09 = 17b."""
@@ -67,7 +67,7 @@ def test_frames_come_through_however_they_are_cut(frames: list[tuple[int, tuple[
         step = cuts[k % len(cuts)]
         found += reader.feed(data[at : at + step])
         at, k = at + step, k + 1
-    assert found == [Frame(kind, values) for kind, values in frames]
+    assert found == [SerialFrame(kind, values) for kind, values in frames]
     assert reader.bad_bytes == 0
 
 
@@ -75,7 +75,7 @@ def test_frames_come_through_however_they_are_cut(frames: list[tuple[int, tuple[
 def test_noise_before_a_frame_is_skipped_and_counted(noise: bytes, values: tuple[int, ...]) -> None:
     """Bytes without a head are all bad; the frame after them is found."""
     reader = FrameReader()
-    assert reader.feed(noise + composed(0x59, values)) == [Frame(0x59, values)]
+    assert reader.feed(noise + composed(0x59, values)) == [SerialFrame(0x59, values)]
     assert reader.bad_bytes == len(noise)
 
 
@@ -92,6 +92,6 @@ def test_a_head_within_a_broken_frame_begins_the_next() -> None:
     """A frame cut off in the middle costs itself only."""
     reader = FrameReader()
     whole = composed(0x52, (1, 2, 3, 4))
-    assert reader.feed(AT_REST[:6] + whole + whole) == [Frame(0x52, (1, 2, 3, 4))] * 2
+    assert reader.feed(AT_REST[:6] + whole + whole) == [SerialFrame(0x52, (1, 2, 3, 4))] * 2
     assert reader.bad_bytes == 6
     assert struct.unpack("<h", AT_REST[6:8])[0] == 2048

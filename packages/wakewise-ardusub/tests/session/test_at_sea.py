@@ -13,17 +13,17 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.operation.flying import loop_of, recorder_of
 from wakewise.operation.scenario import Scenario
-from wakewise.operation.teleop.photo_trigger import Shutter
+from wakewise.operation.teleop.photo_trigger import PhotoTrigger
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.message_state import attitude_of
 from wakewise_ardusub.link.protocol import ALT_HOLD, STABILIZE
-from wakewise_ardusub.link.session_log import Journal, read_journal
+from wakewise_ardusub.link.session_log import SessionLog, read_journal
 from wakewise_ardusub.session.link_join import SEA, at_sea
-from wakewise_ardusub.session.protected_region import WhatToSpare, ball, ball_points
-from wakewise_ardusub.session.session import SeaSession
+from wakewise_ardusub.session.protected_region import ProtectedRegion, ball, ball_points
+from wakewise_ardusub.session.session import VehicleSession
 from wakewise_ardusub.session.warm_up import rehearse
-from wakewise_ardusub.sitl.companion_harness import Aboard
-from wakewise_ardusub.sitl.inprocess_session import Rehearsal
+from wakewise_ardusub.sitl.companion_harness import CompanionHarness
+from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 
 MISSION = {
     "mission.elevations_deg": [15.0],
@@ -36,9 +36,9 @@ MISSION = {
 }
 
 
-def aboard(journal: Journal | None = None) -> Aboard:
+def aboard(journal: SessionLog | None = None) -> CompanionHarness:
     """A warden beside the stand-in whose thrusts are the flight's alone."""
-    made = Aboard(Rehearsal(load_vehicle("bluerov2-heavy"), loop_hz=50.0), journal=journal)
+    made = CompanionHarness(InProcessSession(load_vehicle("bluerov2-heavy"), loop_hz=50.0), journal=journal)
     made.decides = False
     return made
 
@@ -54,7 +54,7 @@ class Clock:
         return self.began_s + time_s
 
 
-def afloat(companion: Aboard, method: str = "dp"):
+def afloat(companion: CompanionHarness, method: str = "dp"):
     """The parts of a flight of the vehicle of a companion, and how often it took a photograph."""
     known = companion.warden.known
     start = BodyState(X_WB=Pose(known.place_W_m, attitude_of(known)))
@@ -80,12 +80,12 @@ def test_arm_engage_fly_an_orbit_capture_release_disarm(tmp_path):
 
     The pilot has the vehicle before and after; no output is driven while it is disarmed or the pilot flies.
     """
-    journal = Journal(tmp_path / "journal.jsonl")
+    journal = SessionLog(tmp_path / "journal.jsonl")
     companion = aboard(journal)
     companion.flight.run(1.0)
     sea, photographs = afloat(companion)
     assert rehearse(sea) < 5.0
-    shutter = Shutter(sea.parts)
+    shutter = PhotoTrigger(sea.parts)
     steps, goals = [], []
 
     def watch(step):
@@ -197,15 +197,15 @@ class Deaf:
         return [], 0
 
 
-def session_of(folder, monkeypatch, **wardens) -> SeaSession:
+def session_of(folder, monkeypatch, **wardens) -> VehicleSession:
     """A session that compiles nothing and hears nothing by itself."""
     monkeypatch.setattr("wakewise_ardusub.session.session.warm", lambda jobs, progress: None)
-    return SeaSession(
+    return VehicleSession(
         scenario=Scenario(vehicle="bluerov2-heavy", method="dp").replace(**SEA),
         receiving=Deaf(),
         send=lambda name, fields: None,
         folder=folder,
-        spare=WhatToSpare(),
+        spare=ProtectedRegion(),
         session=1,
         wardens=wardens,
     )
@@ -213,7 +213,7 @@ def session_of(folder, monkeypatch, **wardens) -> SeaSession:
 
 def test_a_session_with_a_button_of_the_autopilots_ends_in_one_line(tmp_path, monkeypatch):
     """The stand-in's default table, whose button 4 disarms: no parts are made, and the fault names what is free."""
-    companion = Aboard(Rehearsal(load_vehicle("bluerov2-heavy"), loop_hz=50.0), buttons={"engage": 4})
+    companion = CompanionHarness(InProcessSession(load_vehicle("bluerov2-heavy"), loop_hz=50.0), buttons={"engage": 4})
     session = session_of(tmp_path / "sea", monkeypatch, buttons={"engage": 4, "scan": 0})
     companion.flight.run(3.0)
     session.warden.known = companion.warden.known

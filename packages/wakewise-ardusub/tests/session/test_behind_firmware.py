@@ -11,12 +11,12 @@ from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState, Truth
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.worlds.lattice_world import LatticeWater
-from wakewise.operation.worlds.quasi_steady_world import InstantWater
+from wakewise.operation.worlds.quasi_steady_world import QuasiSteadyWater
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.simulation.tank.tank import Tank
-from wakewise_ardusub.physics import Physics, PulseTable, Request, read_reply, write_request
-from wakewise_ardusub.physics.surface import Surface
-from wakewise_ardusub.sitl_plant import BehindFirmware, FlownBody
+from wakewise_ardusub.physics import PhysicsServer, PulseTable, ServoFrame, read_reply, write_request
+from wakewise_ardusub.physics.surface import WaterSurface
+from wakewise_ardusub.sitl_plant import PlantBody, SitlPlant
 
 HEAVY = load_vehicle("bluerov2-heavy")
 TURNED = quat_from_euler(0.3, -0.2, 1.1)
@@ -58,7 +58,7 @@ class World:
 def test_the_specific_force_is_acceleration_less_gravity_in_the_body() -> None:
     """Exactly, over any step; place, velocity and rate are the witness's."""
     sledge = Sledge()
-    body = FlownBody(sledge, sledge)
+    body = PlantBody(sledge, sledge)
     push = np.array([0.5, -0.25, 0.75])
     for dt_s in (0.0025, 0.01, 0.0025):
         motion = body.step(push, dt_s)
@@ -73,13 +73,13 @@ def test_the_specific_force_is_acceleration_less_gravity_in_the_body() -> None:
 def test_each_start_is_the_same_and_a_world_without_truth_is_refused() -> None:
     """A firmware can only be told what somebody knows."""
     parts = Scenario.preset("quick").parts()
-    behind = BehindFirmware(parts=parts.replace(world=World()))
+    behind = SitlPlant(parts=parts.replace(world=World()))
     moved = behind.begin()
     moved.step(np.ones(8), 0.1)
     again = behind.begin().step(np.zeros(8), 0.1)
     assert again.p_WB_m == pytest.approx([0.01, 0.0, 0.0])
     with pytest.raises(InputError, match="nobody knows the truth"):
-        BehindFirmware(parts=parts.replace(world=World(witnessed=False))).begin()
+        SitlPlant(parts=parts.replace(world=World(witnessed=False))).begin()
 
 
 class Buoy(Sledge):
@@ -105,21 +105,21 @@ def test_a_vehicle_cannot_leave_the_water() -> None:
         [Pose(np.zeros(3), TURNED).R.T @ [0.0, 0.0, -80.0], np.zeros(3)]
     )
     highest = {}
-    for surface in (Surface.of(HEAVY), None):
+    for surface in (WaterSurface.of(HEAVY), None):
         buoy = Buoy()
-        body = FlownBody(buoy, buoy, surface)
+        body = PlantBody(buoy, buoy, surface)
         highest[surface is not None] = min(float(body.step(up, 0.02).p_WB_m[2]) for _ in range(3000))
     assert highest[True] > -0.5 * float(np.linalg.norm(HEAVY.size_m))
     assert highest[False] < -5.0
 
 
-@pytest.mark.parametrize("water", [Tank, InstantWater, LatticeWater])
+@pytest.mark.parametrize("water", [Tank, QuasiSteadyWater, LatticeWater])
 def test_every_plant_of_this_package_can_be_given_a_surface(water: type) -> None:
     """Each world begins with one of these; a plant of others without `push` has none, which is said."""
-    assert BehindFirmware.has_surface(water)  # type: ignore[arg-type]
-    assert not BehindFirmware.has_surface(Sledge())
+    assert SitlPlant.has_surface(water)  # type: ignore[arg-type]
+    assert not SitlPlant.has_surface(Sledge())
     parts = Scenario.preset("quick").parts()
-    assert "can rise out of its water" in BehindFirmware(parts=parts.replace(world=World())).ready(lambda *_: None)
+    assert "can rise out of its water" in SitlPlant(parts=parts.replace(world=World())).ready(lambda *_: None)
 
 
 @pytest.mark.slow
@@ -131,7 +131,7 @@ def test_a_push_moves_the_true_vehicle_and_the_surface_holds_it() -> None:
     plant.push(np.array([0.0, 0.0, 10.0, 0.0, 0.0, 0.0]))
     plant.step(np.zeros(8), 1.0)
     assert witness.observe().state.X_WB.p_m[2] - begun > 0.05
-    body = BehindFirmware(parts=parts).begin()
+    body = SitlPlant(parts=parts).begin()
     up = np.linalg.pinv(HEAVY.allocation_matrix) @ np.array([0.0, 0.0, -100.0, 0.0, 0.0, 0.0])
     depths = [float(body.step(up, 0.02).p_WB_m[2]) for _ in range(1000)]
     assert min(depths) > -0.3
@@ -142,20 +142,22 @@ def test_a_push_moves_the_true_vehicle_and_the_surface_holds_it() -> None:
 def test_the_tank_behind_a_firmware_is_the_trials_own() -> None:
     """At rest the accelerometer feels g upwards; ahead is ahead; steps of 2.5 ms give what steps of 20 ms give."""
     parts = Scenario.preset("quick", world="still-tank", vehicle="bluerov2-heavy").parts()
-    behind = BehindFirmware(parts=parts)
+    behind = SitlPlant(parts=parts)
     behind.ready(lambda *_: None)
     table = PulseTable.of(parts.vehicle)
     ahead = (1420, 1420, 1580, 1580, *(1500,) * 4, *(0,) * 8)
     found = []
     for rate_hz in (400, 50):
-        physics = Physics(behind.begin, table.thrusts)
+        physics = PhysicsServer(behind.begin, table.thrusts)
         frame = 1
-        first = physics.answer(write_request(Request(rate_hz=rate_hz, frame=1, pulses_us=(1500,) * 16)), ("a", 1), 0.0)
+        first = physics.answer(
+            write_request(ServoFrame(rate_hz=rate_hz, frame=1, pulses_us=(1500,) * 16)), ("a", 1), 0.0
+        )
         assert first is not None
         assert np.linalg.norm(read_reply(first).force_B_m_s2) == pytest.approx(GRAVITY_M_S2, rel=0.02)
         start = physics.motion
         for frame in range(2, rate_hz + 2):
-            physics.answer(write_request(Request(rate_hz=rate_hz, frame=frame, pulses_us=ahead)), ("a", 1), 0.0)
+            physics.answer(write_request(ServoFrame(rate_hz=rate_hz, frame=frame, pulses_us=ahead)), ("a", 1), 0.0)
         assert start is not None
         assert physics.motion is not None
         nose = Pose(np.zeros(3), start.q_WB).R[:, 0]

@@ -12,7 +12,7 @@ from bottle import Bottle
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.vision.reconstruction import read_reference_cameras
-from wakewise_ardusub.link.session_log import Journal, read_journal
+from wakewise_ardusub.link.session_log import SessionLog, read_journal
 from wakewise_ardusub.session.cameras import CAMERAS_FILE, PHOTOGRAPHS, note_view, parse_camera, photo_name
 
 WRITES = f"run:{sys.executable} -c \"import sys; open(sys.argv[1], 'w').write(sys.argv[2])\" {{file}} {{number}}"
@@ -30,7 +30,7 @@ def asked(bottle: Bottle):
 def test_a_camera_is_asked_over_mavlink(way, command, numbers, tmp_path):
     """One image, of every component of the vehicle, without an interval, whether the companion drives or not."""
     bottle = Bottle()
-    camera = parse_camera(way)(bottle.warden, tmp_path, Journal(tmp_path / "j"))
+    camera = parse_camera(way)(bottle.warden, tmp_path, SessionLog(tmp_path / "j"))
     camera.take(7)
     camera.close()
     (fields,) = asked(bottle)
@@ -44,7 +44,7 @@ def test_a_camera_is_asked_over_mavlink(way, command, numbers, tmp_path):
 
 def test_what_the_camera_answers_is_known_and_kept(tmp_path):
     """A refusal in words, an image with where it lies; answers to others are not ours."""
-    journal = Journal(tmp_path / "j")
+    journal = SessionLog(tmp_path / "j")
     bottle = Bottle(journal=journal)
     bottle.say("COMMAND_ACK", command=2000, result=3, target_component=191)
     assert bottle.warden.known.camera == "component 1 takes none: unsupported"
@@ -65,7 +65,7 @@ def test_what_the_camera_answers_is_known_and_kept(tmp_path):
 
 def test_a_program_takes_the_photographs_beside_the_flight(tmp_path):
     """Nobody waits for it; each photograph is a file with its number, and the journal says how each went."""
-    journal = Journal(tmp_path / "j")
+    journal = SessionLog(tmp_path / "j")
     camera = parse_camera(WRITES)(Bottle().warden, tmp_path, journal)
     began_s = time.monotonic()
     for number in (1, 2):
@@ -80,7 +80,7 @@ def test_a_program_takes_the_photographs_beside_the_flight(tmp_path):
 
 def test_a_program_that_fails_is_told_of_and_ends_nothing(tmp_path):
     """Its last words are in the journal."""
-    journal = Journal(tmp_path / "j")
+    journal = SessionLog(tmp_path / "j")
     camera = parse_camera("run:ls /no-such-place")(Bottle().warden, tmp_path, journal)
     camera.take(1)
     camera.close()

@@ -13,7 +13,7 @@ pytest.importorskip("pymavlink", reason="the extra `links` is not installed")
 pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise_ardusub.sitl import files as ftp
-from wakewise_ardusub.sitl.files import PAYLOAD_B, Files
+from wakewise_ardusub.sitl.files import PAYLOAD_B, MavftpServer
 
 HEAD = struct.Struct("<HBBBBBxI")
 PATH = b"/APM/scripts/own.lua"
@@ -22,7 +22,7 @@ PATH = b"/APM/scripts/own.lua"
 class Client:
     """Requests with numbers of their own."""
 
-    def __init__(self, files: Files) -> None:
+    def __init__(self, files: MavftpServer) -> None:
         self.files, self.number = files, 0
 
     def ask(self, opcode: int, data: bytes = b"", *, size: int | None = None, offset: int = 0) -> tuple[int, bytes]:
@@ -44,7 +44,7 @@ class Client:
 
 def test_what_was_uploaded_is_read_listed_summed_and_removed() -> None:
     """And is a script for the next start."""
-    files, text = Files(), b"-- own\n" * 60
+    files, text = MavftpServer(), b"-- own\n" * 60
     client = Client(files)
     client.upload(PATH, text)
     assert files.scripts() == {"own.lua": text.decode()}
@@ -66,7 +66,7 @@ def test_what_was_uploaded_is_read_listed_summed_and_removed() -> None:
 
 def test_the_sum_is_crc_32_from_zero_and_not_inverted() -> None:
     """As the firmware reckons it: of one byte, the table's entry for it."""
-    client = Client(Files())
+    client = Client(MavftpServer())
     client.upload(PATH, b"\x01")
     assert client.ask(ftp.CRC32, PATH) == (ftp.ACK, struct.pack("<I", 0x77073096))
     assert binascii.crc32(b"\x01") != 0x77073096
@@ -74,7 +74,7 @@ def test_the_sum_is_crc_32_from_zero_and_not_inverted() -> None:
 
 def test_a_repeated_request_is_answered_alike_and_done_once() -> None:
     """A lost answer must not open a second session."""
-    files = Files()
+    files = MavftpServer()
     request = HEAD.pack(2, 0, ftp.CREATE, len(PATH), 0, 0, 0) + PATH
     assert files.answer(request) == files.answer(request)
     assert files.answer(request)[3] == ftp.ACK
@@ -97,13 +97,13 @@ def test_a_repeated_request_is_answered_alike_and_done_once() -> None:
 )
 def test_what_cannot_be_done_is_refused_with_its_reason(opcode: int, data: bytes, fault: int) -> None:
     """By the protocol's own numbers."""
-    assert Client(Files()).ask(opcode, data) == (ftp.NAK, bytes([fault]))
+    assert Client(MavftpServer()).ask(opcode, data) == (ftp.NAK, bytes([fault]))
 
 
 @given(st.lists(st.binary(max_size=260), max_size=20))
 def test_any_bytes_are_answered(requests: list[bytes]) -> None:
     """With a packet of the right length, and nothing grows beyond its bound."""
-    files = Files()
+    files = MavftpServer()
     for request in requests:
         assert len(files.answer(request)) == PAYLOAD_B
     assert sum(map(len, files.content.values())) <= ftp.MOST_B

@@ -10,13 +10,13 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 from wakewise.core.geometry import euler_from_quat
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.protocol import ALT_HOLD, MANUAL, STABILIZE
-from wakewise_ardusub.sitl.inprocess_session import Rehearsal
+from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 
 HEAVY = load_vehicle("bluerov2-heavy")
 
 
-def _flown(mode: int, seconds: float, **more: object) -> Rehearsal:
-    flight = Rehearsal(HEAVY, **more).run(0.1)
+def _flown(mode: int, seconds: float, **more: object) -> InProcessSession:
+    flight = InProcessSession(HEAVY, **more).run(0.1)
     flight.set_mode(mode)
     flight.arm(True)
     return flight.run(seconds)

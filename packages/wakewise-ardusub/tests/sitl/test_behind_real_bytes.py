@@ -29,7 +29,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.engagement_fsm import Limits
+from wakewise_ardusub.link.engagement_fsm import EngagementLimits
 from wakewise_ardusub.link.protocol import (
     ALT_HOLD,
     COMPANION_COMPONENT,
@@ -38,15 +38,15 @@ from wakewise_ardusub.link.protocol import (
     THRUST_GROUP,
 )
 from wakewise_ardusub.link.script import script_text
-from wakewise_ardusub.physics import Body, FreeWater, Physics, PulseTable
+from wakewise_ardusub.physics import FreeWater, PhysicsServer, PulseTable, SimulatedBody
 from wakewise_ardusub.physics.datagrams import PORT
-from wakewise_ardusub.physics.lowered_start import Lowered
+from wakewise_ardusub.physics.lowered_start import LoweringBody
 from wakewise_ardusub.physics.udp import LOOPBACK, open_socket, serve
-from wakewise_ardusub.sitl.companion_harness import Aboard
+from wakewise_ardusub.sitl.companion_harness import CompanionHarness
 from wakewise_ardusub.sitl.inprocess_session import STATION, STATION_COMPONENT, THRUSTS, shipped_script
 from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.simulated_autopilot import HOME_DEG, StandIn
-from wakewise_ardusub.sitl.udp_endpoints import Link, OverUdp, run
+from wakewise_ardusub.sitl.simulated_autopilot import HOME_DEG, SimulatedAutopilot
+from wakewise_ardusub.sitl.udp_endpoints import UdpEndpoint, UdpPhysics, run
 
 HEAVY = load_vehicle("bluerov2-heavy")
 BINARY = os.environ.get("WAKEWISE_ARDUSUB", "")
@@ -61,12 +61,13 @@ FIRST_S = 90.0
 class Ashore:
     """Pilot and companion at one socket: heartbeats and sticks go out by themselves, what comes is kept by kind.
 
-    It has what `Aboard` needs of a rehearsal, so the shipped warden can be the companion, by the clock on the wall.
+    It has what `CompanionHarness` needs of a rehearsal, so the shipped warden can be the companion, by the clock on the
+    wall.
     """
 
     vehicle, stand_in = HEAVY, SimpleNamespace(system=1)
 
-    def __init__(self, listening: socket.socket, physics: Physics) -> None:
+    def __init__(self, listening: socket.socket, physics: PhysicsServer) -> None:
         self._socket, self.physics = listening, physics
         self._station = mavlink.MAVLink(None, srcSystem=STATION, srcComponent=STATION_COMPONENT)
         self._companion = mavlink.MAVLink(None, srcSystem=1, srcComponent=COMPANION_COMPONENT)
@@ -216,8 +217,8 @@ class Ashore:
 
 def _start_stand_in(stack: ExitStack, physics_port: int, station_port: int) -> None:
     over = threading.Event()
-    made = StandIn(loop_hz=100.0, scripts=shipped_script())
-    link, behind = Link(LOOPBACK, station_port, out=True), OverUdp(LOOPBACK, physics_port)
+    made = SimulatedAutopilot(loop_hz=100.0, scripts=shipped_script())
+    link, behind = UdpEndpoint(LOOPBACK, station_port, out=True), UdpPhysics(LOOPBACK, physics_port)
     thread = threading.Thread(target=run, args=(made, behind, [link], lambda: not over.is_set()))
     thread.start()
     for last in (behind.close, link.close, thread.join, over.set):  # the last is called first
@@ -269,12 +270,12 @@ def ashore(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Ashore]:
     """A vehicle in still water behind an autopilot that has said its first heartbeat and loaded the script."""
     real = request.param == "ArduSub"
 
-    def begin() -> Body:
+    def begin() -> SimulatedBody:
         """The firmware calibrates its depth at the surface; the stand-in was calibrated there before."""
         body = FreeWater(HEAVY, START)
-        return Lowered(body, START, HELD_S) if real else body
+        return LoweringBody(body, START, HELD_S) if real else body
 
-    physics = Physics(begin, PulseTable.of(HEAVY).thrusts)
+    physics = PhysicsServer(begin, PulseTable.of(HEAVY).thrusts)
     over = threading.Event()
     with ExitStack() as stack:
         assert not real or os.access(BINARY, os.X_OK), f"WAKEWISE_ARDUSUB={BINARY}: no program is there"
@@ -343,8 +344,8 @@ def test_sticks_move_the_vehicle_as_the_frame_means(ashore: Ashore) -> None:
 
 def test_the_warden_drives_by_consent_and_lets_go_when_the_sticks_fall_silent(ashore: Ashore) -> None:
     """The whole companion but its controller: what it asks for, the position it needs, consent, loss, silence."""
-    wide = Limits(depth_m=(-10.0, 100.0), distance_m=1000.0, tilt_rad=4.0, speed_m_s=10.0)
-    aboard = Aboard(ashore, limits=wide)  # type: ignore[arg-type]
+    wide = EngagementLimits(depth_m=(-10.0, 100.0), distance_m=1000.0, tilt_rad=4.0, speed_m_s=10.0)
+    aboard = CompanionHarness(ashore, limits=wide)  # type: ignore[arg-type]
     ashore.enable()
     ashore.arm(True)
 

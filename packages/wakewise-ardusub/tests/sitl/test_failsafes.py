@@ -8,7 +8,7 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.protocol import ALT_HOLD
 from wakewise_ardusub.sitl.failsafes import ground_station, pilot_input
-from wakewise_ardusub.sitl.inprocess_session import Rehearsal
+from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 from wakewise_ardusub.sitl.parameters import ParameterTable
 
 HEAVY = load_vehicle("bluerov2-heavy")
@@ -16,7 +16,7 @@ HEAVY = load_vehicle("bluerov2-heavy")
 
 def test_a_silent_ground_station_disarms_after_its_time_out() -> None:
     """Three seconds after the last heartbeat, said in words; the outputs are in the middle then."""
-    flight = Rehearsal(HEAVY, sticks=(500, 0, 500, 0)).run(0.1)
+    flight = InProcessSession(HEAVY, sticks=(500, 0, 500, 0)).run(0.1)
     flight.arm(True)
     flight.run(1.0)
     flight.beats = False
@@ -30,7 +30,7 @@ def test_a_silent_ground_station_disarms_after_its_time_out() -> None:
 
 def test_it_may_hold_depth_instead() -> None:
     """FS_GCS_ENABLE of 3, as the parameter's documentation has it."""
-    flight = Rehearsal(HEAVY, values={"FS_GCS_ENABLE": 3}).run(0.1)
+    flight = InProcessSession(HEAVY, values={"FS_GCS_ENABLE": 3}).run(0.1)
     flight.arm(True)
     flight.run(1.0)
     flight.beats = False
@@ -41,7 +41,7 @@ def test_it_may_hold_depth_instead() -> None:
 
 def test_silent_sticks_go_to_the_middle_and_disarm() -> None:
     """They act on for FS_PILOT_TIMEOUT, as they do on the vehicle, and no longer."""
-    flight = Rehearsal(HEAVY, sticks=(500, 0, 500, 0)).run(0.1)
+    flight = InProcessSession(HEAVY, sticks=(500, 0, 500, 0)).run(0.1)
     flight.arm(True)
     flight.run(1.0)
     flight.sticks = None

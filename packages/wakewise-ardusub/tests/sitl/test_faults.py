@@ -12,7 +12,7 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.protocol import ENABLE_PARAMETER, LOOP_MS, NEUTRAL_WITHIN_S, STABILIZE
-from wakewise_ardusub.sitl.inprocess_session import FAULTS, THRUSTS, Rehearsal, Speaker, noise, suffer
+from wakewise_ardusub.sitl.inprocess_session import FAULTS, THRUSTS, InProcessSession, MavlinkSender, noise, suffer
 
 HEAVY = load_vehicle("bluerov2-heavy")
 ACTING = tuple(int(1500 + 400 * value + 0.5) for value in THRUSTS)
@@ -20,7 +20,7 @@ ACTING = tuple(int(1500 + 400 * value + 0.5) for value in THRUSTS)
 
 def test_engaged_the_companions_thrusts_are_on_the_motors() -> None:
     """As 1500 + 400 v us, and the script says that it acts."""
-    flight = Rehearsal(HEAVY).engaged()
+    flight = InProcessSession(HEAVY).engaged()
     assert flight.moments[-1].pulses_us[:8] == ACTING
     assert "Wakewise: acting" in flight.texts()
 
@@ -35,7 +35,7 @@ def test_after_a_fault_the_outputs_are_the_autopilots_within_300_ms(fault: str) 
 
 def test_the_pilot_has_the_sticks_after_the_stream_stops() -> None:
     """Not only is the override over: the motors do what the sticks say."""
-    flight = Rehearsal(HEAVY, sticks=(500, 0, 500, 0)).engaged()
+    flight = InProcessSession(HEAVY, sticks=(500, 0, 500, 0)).engaged()
     flight.streams = False
     flight.run(NEUTRAL_WITHIN_S)
     assert flight.moments[-1].pulses_us[:8] == (1400, 1400, 1600, 1600, 1500, 1500, 1500, 1500)
@@ -43,7 +43,7 @@ def test_the_pilot_has_the_sticks_after_the_stream_stops() -> None:
 
 def test_a_lost_ground_station_ends_thrusts_although_they_are_streamed() -> None:
     """The autopilot disarms after its time-out, and the script lets go at once."""
-    flight = Rehearsal(HEAVY).engaged()
+    flight = InProcessSession(HEAVY).engaged()
     flight.beats = False
     flight.run(4.0)
     assert not flight.stand_in.armed
@@ -53,7 +53,7 @@ def test_a_lost_ground_station_ends_thrusts_although_they_are_streamed() -> None
 
 def test_no_thrust_while_disarmed_whatever_is_streamed() -> None:
     """Streaming before arming with the switch on, never; after disarming, none beyond two turns of the script."""
-    flight = Rehearsal(HEAVY).run(0.2)
+    flight = InProcessSession(HEAVY).run(0.2)
     flight.set(ENABLE_PARAMETER, 1.0)
     flight.streams = True
     flight.run(1.0)
@@ -69,9 +69,9 @@ def test_no_thrust_while_disarmed_whatever_is_streamed() -> None:
 
 def test_others_than_the_companion_drive_nothing() -> None:
     """Another component, another system, the ground station: refused, and the companion's own go on."""
-    flight = Rehearsal(HEAVY).engaged()
+    flight = InProcessSession(HEAVY).engaged()
     strangers = [
-        Speaker(flight.stand_in.hear, system, component, f"{system} {component}")
+        MavlinkSender(flight.stand_in.hear, system, component, f"{system} {component}")
         for system, component in ((1, 190), (2, 191), (255, 190), (1, 1))
     ]
     flight.each = lambda now: [now.send_thrusts((0.9,) * 8, who=who) for who in strangers]
@@ -84,7 +84,7 @@ def test_others_than_the_companion_drive_nothing() -> None:
 
 def test_the_switch_is_off_after_a_start() -> None:
     """So a companion that streams into a vehicle that was started anew moves nothing, armed or not."""
-    flight = Rehearsal(HEAVY, streams=True).run(0.2)
+    flight = InProcessSession(HEAVY, streams=True).run(0.2)
     flight.arm(True)
     flight.run(1.0)
     assert not any(m.overridden for m in flight.moments)
@@ -92,7 +92,7 @@ def test_the_switch_is_off_after_a_start() -> None:
 
 def test_stabilize_is_allowed_and_its_loops_do_not_fight() -> None:
     """The override stands over what the loops ask for."""
-    flight = Rehearsal(HEAVY).run(0.1)
+    flight = InProcessSession(HEAVY).run(0.1)
     flight.set_mode(STABILIZE)
     flight.engaged()
     assert flight.moments[-1].pulses_us[:8] == ACTING
@@ -100,7 +100,7 @@ def test_stabilize_is_allowed_and_its_loops_do_not_fight() -> None:
 
 def test_a_million_bytes_of_noise_crash_nothing_and_turn_no_motor() -> None:
     """Disarmed; a third of them are packets of random content whose checksum is right."""
-    flight = Rehearsal(HEAVY).run(0.1)
+    flight = InProcessSession(HEAVY).run(0.1)
     heard = 0
     for k, piece in enumerate(noise(1_000_000, 7)):
         flight.stand_in.hear(piece, "noise")
@@ -117,7 +117,7 @@ def test_a_million_bytes_of_noise_crash_nothing_and_turn_no_motor() -> None:
 
 def test_noise_beside_an_engaged_companion_leaves_it_safe() -> None:
     """Whatever it does to the stream, the stream's end is the end within 300 ms."""
-    flight = Rehearsal(HEAVY).engaged()
+    flight = InProcessSession(HEAVY).engaged()
     pieces = iter(noise(100_000, 8))
     flight.each = lambda now: [now.stand_in.hear(piece, "noise") for piece in [next(pieces, b"")] * 1]
     flight.run(4.0)

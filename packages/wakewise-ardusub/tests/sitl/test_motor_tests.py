@@ -10,28 +10,28 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.sitl.inprocess_session import Rehearsal
+from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 from wakewise_ardusub.sitl.motor_tests import COOL_S, SILENT_S
 
 HEAVY = load_vehicle("bluerov2-heavy")
 
 
-def ask(flight: Rehearsal, motor: float, pulse: float, by: float = 1.0, order: float = 2.0) -> None:
+def ask(flight: InProcessSession, motor: float, pulse: float, by: float = 1.0, order: float = 2.0) -> None:
     command = mavlink.MAV_CMD_DO_MOTOR_TEST
     flight.station.say(
         mavlink.MAVLink_command_long_message(flight.stand_in.system, 1, command, 0, motor, by, pulse, 0, 0, order, 0)
     )
 
 
-def results(flight: Rehearsal) -> list[int]:
+def results(flight: InProcessSession) -> list[int]:
     """How commands of this kind were answered."""
     return [
         m.result for m in flight.said if m.get_type() == "COMMAND_ACK" and m.command == mavlink.MAV_CMD_DO_MOTOR_TEST
     ]
 
 
-def armed() -> Rehearsal:
-    flight = Rehearsal(HEAVY, sticks=(500, 0, 500, 0)).run(0.5)
+def armed() -> InProcessSession:
+    flight = InProcessSession(HEAVY, sticks=(500, 0, 500, 0)).run(0.5)
     flight.arm(True)
     return flight.run(0.2)
 
@@ -55,7 +55,7 @@ def test_one_motor_turns_past_mixer_and_direction_until_nobody_asks() -> None:
 
 def test_none_begins_disarmed_nor_soon_after_the_last() -> None:
     """Refused in words each time; after ten seconds it turns again."""
-    flight = Rehearsal(HEAVY).run(0.5)
+    flight = InProcessSession(HEAVY).run(0.5)
     ask(flight, 0, 1560)
     flight.run(0.1)
     assert "Arm motors before testing motors." in flight.texts()

@@ -9,14 +9,14 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.core.errors import MissingExtra
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.sitl.inprocess_session import Rehearsal
-from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+from wakewise_ardusub.sitl.inprocess_session import InProcessSession
+from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 
 HEAVY = load_vehicle("bluerov2-heavy")
 
 
-def _flown(text: str, seconds: float = 0.5, **values: float) -> Rehearsal:
-    return Rehearsal(HEAVY, scripts={"own.lua": text}, values=values).run(seconds)
+def _flown(text: str, seconds: float = 0.5, **values: float) -> InProcessSession:
+    return InProcessSession(HEAVY, scripts={"own.lua": text}, values=values).run(seconds)
 
 
 def test_a_script_has_its_turns() -> None:
@@ -104,6 +104,6 @@ def test_without_scripting_switched_on_nothing_runs() -> None:
 def test_without_lua_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only where there is a script to run."""
     monkeypatch.setattr("wakewise.core.optional_dependencies.find_spec", lambda name: None if name == "lupa" else sys)
-    assert StandIn(scripts={}).boot_ms == 0
+    assert SimulatedAutopilot(scripts={}).boot_ms == 0
     with pytest.raises(MissingExtra, match="lupa"):
-        StandIn(scripts={"own.lua": "return"})
+        SimulatedAutopilot(scripts={"own.lua": "return"})

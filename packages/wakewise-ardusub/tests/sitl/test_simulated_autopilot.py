@@ -12,19 +12,19 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.protocol import ALT_HOLD, MANUAL, STABILIZE
-from wakewise_ardusub.sitl.inprocess_session import Rehearsal
+from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 from wakewise_ardusub.sitl.mavlink_out import BUILDERS
-from wakewise_ardusub.sitl.scripted_ground_station import Ashore
-from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+from wakewise_ardusub.sitl.scripted_ground_station import ScriptedGroundStation
+from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 
 HEAVY = load_vehicle("bluerov2-heavy")
 
 
-def _of(flight: Rehearsal, kind: str) -> list[object]:
+def _of(flight: InProcessSession, kind: str) -> list[object]:
     return [message for message in flight.said if message.get_type() == kind]
 
 
-def _command(flight: Rehearsal, command: int, *numbers: float) -> int:
+def _command(flight: InProcessSession, command: int, *numbers: float) -> int:
     """Result of a command, as its acknowledgement says."""
     flight.said.clear()
     flight.station.say(mavlink.MAVLink_command_long_message(1, 1, command, 0, *(*numbers, 0, 0, 0, 0, 0, 0, 0)[:7]))
@@ -36,7 +36,7 @@ def _command(flight: Rehearsal, command: int, *numbers: float) -> int:
 
 def test_it_says_that_it_is_a_submarine_of_ardupilot() -> None:
     """Heartbeats once a second: type, autopilot, mode, not armed."""
-    flight = Rehearsal(HEAVY).run(3.05)
+    flight = InProcessSession(HEAVY).run(3.05)
     beats = _of(flight, "HEARTBEAT")
     assert len(beats) == 4
     beat = beats[-1]
@@ -47,7 +47,7 @@ def test_it_says_that_it_is_a_submarine_of_ardupilot() -> None:
 
 def test_arming_is_acknowledged_seen_and_undone() -> None:
     """The heartbeat's flag follows, and disarmed outputs stand in the middle."""
-    flight = Rehearsal(HEAVY, sticks=(500, 0, 500, 0)).run(0.1)
+    flight = InProcessSession(HEAVY, sticks=(500, 0, 500, 0)).run(0.1)
     assert set(flight.moments[-1].pulses_us[:8]) == {1500}
     assert _command(flight, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1) == mavlink.MAV_RESULT_ACCEPTED
     flight.run(1.2)
@@ -59,7 +59,7 @@ def test_arming_is_acknowledged_seen_and_undone() -> None:
 
 def test_sticks_reach_the_motors_by_the_frames_factors() -> None:
     """Half forward at half gain is a quarter, over the level four; the throttle's upper half pushes up."""
-    flight = Rehearsal(HEAVY, sticks=(500, 0, 500, 0)).run(0.1)
+    flight = InProcessSession(HEAVY, sticks=(500, 0, 500, 0)).run(0.1)
     flight.arm(True)
     flight.run(0.2)
     assert flight.moments[-1].pulses_us[:8] == (1400, 1400, 1600, 1600, 1500, 1500, 1500, 1500)
@@ -70,7 +70,7 @@ def test_sticks_reach_the_motors_by_the_frames_factors() -> None:
 
 def test_sticks_of_others_steer_nothing() -> None:
     """Only those of the ground station that SYSID_MYGCS names."""
-    flight = Rehearsal(HEAVY, sticks=(500, 0, 500, 0), values={"SYSID_MYGCS": 254}).run(0.1)
+    flight = InProcessSession(HEAVY, sticks=(500, 0, 500, 0), values={"SYSID_MYGCS": 254}).run(0.1)
     flight.arm(True)
     flight.run(0.3)
     assert flight.stand_in.armed
@@ -79,8 +79,8 @@ def test_sticks_of_others_steer_nothing() -> None:
 
 def test_a_turned_motor_gets_its_pulse_turned() -> None:
     """MOT_n_DIRECTION of -1 about the middle, and the motor that is turned pushes as ever."""
-    turned = Rehearsal(HEAVY, sticks=(500, 0, 500, 0), values={"MOT_1_DIRECTION": -1}).run(0.1)
-    plain = Rehearsal(HEAVY, sticks=(500, 0, 500, 0)).run(0.1)
+    turned = InProcessSession(HEAVY, sticks=(500, 0, 500, 0), values={"MOT_1_DIRECTION": -1}).run(0.1)
+    plain = InProcessSession(HEAVY, sticks=(500, 0, 500, 0)).run(0.1)
     for flight in (turned, plain):
         flight.arm(True)
         flight.run(2.0)
@@ -90,7 +90,7 @@ def test_a_turned_motor_gets_its_pulse_turned() -> None:
 
 def test_all_parameters_are_listed_once() -> None:
     """With their count and places, the script's own among them."""
-    flight = Rehearsal(HEAVY).run(0.1)
+    flight = InProcessSession(HEAVY).run(0.1)
     flight.said.clear()
     flight.station.say(mavlink.MAVLink_param_request_list_message(1, 1))
     flight.run(3.0)
@@ -103,7 +103,7 @@ def test_all_parameters_are_listed_once() -> None:
 
 def test_a_parameter_is_read_by_name_or_place_and_set() -> None:
     """Each is answered by its value; one that there is not, by nothing."""
-    flight = Rehearsal(HEAVY).run(0.1)
+    flight = InProcessSession(HEAVY).run(0.1)
     flight.said.clear()
     read = mavlink.MAVLink_param_request_read_message
     flight.station.say(read(1, 1, b"SERVO3_FUNCTION", -1))
@@ -118,7 +118,7 @@ def test_a_parameter_is_read_by_name_or_place_and_set() -> None:
 
 def test_it_names_its_release() -> None:
     """AUTOPILOT_VERSION on request, the release in its first three bytes."""
-    flight = Rehearsal(HEAVY).run(0.1)
+    flight = InProcessSession(HEAVY).run(0.1)
     assert _command(flight, mavlink.MAV_CMD_REQUEST_MESSAGE, 148) == mavlink.MAV_RESULT_ACCEPTED
     (version,) = _of(flight, "AUTOPILOT_VERSION")
     assert version.flight_sw_version >> 8 == 0x040503
@@ -127,7 +127,7 @@ def test_it_names_its_release() -> None:
 
 def test_it_tells_where_it_is_as_physics_says() -> None:
     """Position, attitude, depth and the water's pressure agree with the motion of that moment."""
-    flight = Rehearsal(HEAVY, sticks=(500, 0, 500, 10)).run(0.1)
+    flight = InProcessSession(HEAVY, sticks=(500, 0, 500, 10)).run(0.1)
     flight.arm(True)
     flight.run(3.0)
     motion = flight.stand_in.motion
@@ -147,7 +147,7 @@ def test_it_tells_where_it_is_as_physics_says() -> None:
 
 def test_rates_are_those_asked_for() -> None:
     """Faster, never, and as at first again; what is no message is refused."""
-    flight = Rehearsal(HEAVY).run(0.1)
+    flight = InProcessSession(HEAVY).run(0.1)
     interval = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
     counts = []
     for every_us in (20_000.0, -1.0, 0.0):
@@ -163,7 +163,7 @@ def test_rates_are_those_asked_for() -> None:
 
 def test_modes_that_it_does_not_fly_are_refused() -> None:
     """It says so, and stays in its own."""
-    flight = Rehearsal(HEAVY).run(0.1)
+    flight = InProcessSession(HEAVY).run(0.1)
     assert _command(flight, mavlink.MAV_CMD_DO_SET_MODE, 1, STABILIZE) == mavlink.MAV_RESULT_ACCEPTED
     assert _command(flight, mavlink.MAV_CMD_DO_SET_MODE, 1, 3) == mavlink.MAV_RESULT_FAILED
     assert flight.stand_in.mode == STABILIZE
@@ -174,7 +174,7 @@ def test_modes_that_it_does_not_fly_are_refused() -> None:
 
 def test_a_start_anew_forgets_who_was_there_and_switches_off() -> None:
     """Not while armed; afterwards disarmed, in MANUAL, the script's switch off."""
-    flight = Rehearsal(HEAVY).engaged()
+    flight = InProcessSession(HEAVY).engaged()
     reboot = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
     assert _command(flight, reboot, 1) == mavlink.MAV_RESULT_DENIED
     assert flight.stand_in.parameters.get("WKW_ENABLE") == 1.0
@@ -190,13 +190,13 @@ def test_a_start_anew_forgets_who_was_there_and_switches_off() -> None:
 def test_bad_arguments_are_refused() -> None:
     """Loops that no time-out of a script could be counted in."""
     with pytest.raises(InputError, match="10 loops"):
-        StandIn(loop_hz=10.0)
+        SimulatedAutopilot(loop_hz=10.0)
 
 
 def test_the_pilot_ashore_leaves_alone_what_somebody_else_switched_off() -> None:
     """It arms and switches on once; what another station undoes stays undone until the stand-in starts anew."""
-    flight = Rehearsal(HEAVY, sticks=None, beats=False)
-    pilot = Ashore(flight.stand_in, flight.carry)
+    flight = InProcessSession(HEAVY, sticks=None, beats=False)
+    pilot = ScriptedGroundStation(flight.stand_in, flight.carry)
     flight.turns.append(pilot.turn)
     flight.run(3.0)
     assert flight.stand_in.armed

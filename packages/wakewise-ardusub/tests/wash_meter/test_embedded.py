@@ -24,9 +24,9 @@ from bare import command, environment
 from loopback_vehicle import Vehicle, free_ends
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
-from wakewise_ardusub.vehicle_summary import Craft, craft_json
+from wakewise_ardusub.vehicle_summary import VehicleSummary, craft_json
 from wakewise_ardusub.wash_meter.embedded import main
-from wakewise_ardusub.wash_savings import Sparing
+from wakewise_ardusub.wash_savings import WashSavingsCalculator
 
 PULSES = made_logs.pulses(made_logs.ASTERN_S * made_logs.RATE_HZ)[:8]
 RUN = "from wakewise_ardusub.wash_meter.embedded import main; sys.exit(main(sys.argv[1:]))"
@@ -36,7 +36,7 @@ ASK = urllib.request.build_opener(urllib.request.ProxyHandler({})).open
 @pytest.fixture(scope="module")
 def craft_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("craft") / "heavy.json"
-    craft = Craft.of(load_vehicle("bluerov2-heavy"), wake_model("jet"))
+    craft = VehicleSummary.of(load_vehicle("bluerov2-heavy"), wake_model("jet"))
     path.write_text(craft_json(craft), encoding="utf-8")
     return path
 
@@ -129,8 +129,8 @@ def test_a_silent_meter_hears_and_says_nothing(craft_file: Path, tmp_path: Path)
         assert state["voltage_V"] == pytest.approx(made_logs.VOLTAGE_V)
         assert state["directions_known"]
         assert state["bad_messages"] > 0
-        craft = Craft.of(load_vehicle("bluerov2-heavy"), wake_model("jet"))
-        sparing = Sparing(craft, np.array(made_logs.DIRECTIONS, dtype=float))
+        craft = VehicleSummary.of(load_vehicle("bluerov2-heavy"), wake_model("jet"))
+        sparing = WashSavingsCalculator(craft, np.array(made_logs.DIRECTIONS, dtype=float))
         flown = sparing.flown_N(np.array(PULSES, dtype=float), sparing.supply_V(made_logs.VOLTAGE_V))
         assert state["thrusts_N"]["flown"] == pytest.approx(flown)
         assert state["saved_pct"] > 50.0

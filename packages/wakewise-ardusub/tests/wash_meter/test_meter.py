@@ -18,13 +18,13 @@ from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
 from wakewise_ardusub.logs import mavlink, tlog
-from wakewise_ardusub.logs.clock import Clock
+from wakewise_ardusub.logs.clock import LogClock
 from wakewise_ardusub.logs.read import read_log
-from wakewise_ardusub.logs.replay_allocation import Hindsight, bow_points, hindsight
+from wakewise_ardusub.logs.replay_allocation import ReplayedAllocation, bow_points, hindsight
 from wakewise_ardusub.logs.table import LogTable, tabulate
-from wakewise_ardusub.vehicle_summary import Craft
-from wakewise_ardusub.wash_meter.meter import MINUTE_S, Meter, Reading
-from wakewise_ardusub.wash_meter.vehicle_listener import Hearing
+from wakewise_ardusub.vehicle_summary import VehicleSummary
+from wakewise_ardusub.wash_meter.meter import MINUTE_S, MeterReading, WashMeter
+from wakewise_ardusub.wash_meter.vehicle_listener import VehicleListener
 from wakewise_ardusub.wash_savings import SHARES, bow_ball
 
 REAL = Path(os.environ.get("WAKEWISE_DATA", "../shared/data")) / "ardusub" / "2023-04-18.tlog"
@@ -32,19 +32,19 @@ Message = tuple[float, int, int, str, dict[str, Any]]
 
 
 @pytest.fixture(scope="module")
-def craft() -> Craft:
-    return Craft.of(load_vehicle("bluerov2-heavy"), wake_model("jet"))
+def craft() -> VehicleSummary:
+    return VehicleSummary.of(load_vehicle("bluerov2-heavy"), wake_model("jet"))
 
 
-def meter_of(craft: Craft, parameters: dict[str, float] | None = None) -> Meter:
+def meter_of(craft: VehicleSummary, parameters: dict[str, float] | None = None) -> WashMeter:
     points = bow_ball(craft.bow_m, craft.camera_z_m, 0.4)
-    return Meter(craft, Hearing(parameters=parameters), points, np.ones(len(points)))
+    return WashMeter(craft, VehicleListener(parameters=parameters), points, np.ones(len(points)))
 
 
 def tape(file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Message]:
     """Messages of a telemetry log in their order, on its mended clock."""
     found: list[Message] = []
-    clock = Clock()
+    clock = LogClock()
 
     def keep(gather: Any, stamp_s: float, system: int, component: int, name: str, fields: dict[str, Any]) -> None:
         boot = fields.get("time_boot_ms") if component == mavlink.AUTOPILOT and name in mavlink.WANTED else None
@@ -57,7 +57,7 @@ def tape(file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Message]:
     return found
 
 
-def replayed(meter: Meter, messages: list[Message], ticks_s: np.ndarray) -> Iterator[Reading]:
+def replayed(meter: WashMeter, messages: list[Message], ticks_s: np.ndarray) -> Iterator[MeterReading]:
     """Readings at ticks while messages come in."""
     at = 0
     for tick_s in ticks_s:
@@ -67,7 +67,7 @@ def replayed(meter: Meter, messages: list[Message], ticks_s: np.ndarray) -> Iter
         yield meter.read(float(tick_s))
 
 
-def judged(file: Path) -> tuple[LogTable, Hindsight]:
+def judged(file: Path) -> tuple[LogTable, ReplayedAllocation]:
     """The same log as the log's reader judges it."""
     vehicle = load_vehicle("bluerov2-heavy")
     log = read_log(file)
@@ -79,7 +79,7 @@ def judged(file: Path) -> tuple[LogTable, Hindsight]:
     "name", ["made", pytest.param("real", marks=pytest.mark.skipif(not REAL.is_file(), reason=f"{REAL} is not here"))]
 )
 def test_a_replayed_log_gives_hindsights_figures(
-    name: str, craft: Craft, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, craft: VehicleSummary, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Thrusts and D of every tick, as flown and otherwise, and the dive's saved per cent."""
     file = REAL
@@ -104,7 +104,7 @@ def test_a_replayed_log_gives_hindsights_figures(
     assert meter.dive.instants == int(found.running.sum())
 
 
-def test_shares_peak_and_root_mean_square_belong_together(craft: Craft) -> None:
+def test_shares_peak_and_root_mean_square_belong_together(craft: VehicleSummary) -> None:
     """Shares add up to all of D; the peak lies above the root mean square, which is D's."""
     meter = meter_of(craft)
     meter.hearing.hear(0.0, 1, 1, "SERVO_OUTPUT_RAW", pulses(1620, 1610, 1450, 1440, 1530, 1540, 1460, 1470))
@@ -117,7 +117,7 @@ def test_shares_peak_and_root_mean_square_belong_together(craft: Craft) -> None:
         assert reading.peak_m_s[share] >= reading.rms_m_s[share]
 
 
-def test_what_is_not_known_is_said_and_not_judged(craft: Craft) -> None:
+def test_what_is_not_known_is_said_and_not_judged(craft: VehicleSummary) -> None:
     """Silence, old pulses, an output that says nothing, a vehicle with other motors."""
     meter = meter_of(craft)
     assert meter.read(0.0).why_not == "no servo outputs are heard"
@@ -135,7 +135,7 @@ def test_what_is_not_known_is_said_and_not_judged(craft: Craft) -> None:
     assert "drives motors 1, 2, 3, 4, 5, 6" in (meter.read(1.8).why_not or "")
 
 
-def test_directions_that_come_late_count_from_then_on(craft: Craft) -> None:
+def test_directions_that_come_late_count_from_then_on(craft: VehicleSummary) -> None:
     """Thrusts change their sign when the autopilot says that a motor runs the other way."""
     meter = meter_of(craft)
     meter.hearing.hear(0.0, 1, 1, "SERVO_OUTPUT_RAW", pulses(*[1600] * 8))
@@ -151,7 +151,7 @@ def test_directions_that_come_late_count_from_then_on(craft: Craft) -> None:
     assert after.thrusts_N["flown"] == pytest.approx(np.array(made_logs.DIRECTIONS) * before.thrusts_N["flown"])
 
 
-def test_the_minute_forgets_and_the_dive_does_not(craft: Craft) -> None:
+def test_the_minute_forgets_and_the_dive_does_not(craft: VehicleSummary) -> None:
     """A minute of rest after thrusts leaves nothing to spare in the minute, all of it in the dive."""
     meter = meter_of(craft)
     astern = pulses(1650, 1650, 1350, 1350, 1500, 1500, 1500, 1500)
@@ -168,12 +168,12 @@ def test_the_minute_forgets_and_the_dive_does_not(craft: Craft) -> None:
     assert meter.dive.saved_pct(meter.weight) == pytest.approx(saved)
 
 
-def test_a_marked_target_stays_where_it_is(craft: Craft) -> None:
+def test_a_marked_target_stays_where_it_is(craft: VehicleSummary) -> None:
     """The jets astern lose it as the vehicle backs off, and find it again there; without a place there is no mark."""
     meter = meter_of(craft)
     astern = pulses(1650, 1650, 1350, 1350, 1500, 1500, 1500, 1500)
 
-    def at(time_s: float, north_m: float) -> Reading:
+    def at(time_s: float, north_m: float) -> MeterReading:
         hearing = meter.hearing
         hearing.hear(time_s, 1, 1, "SERVO_OUTPUT_RAW", astern)
         hearing.hear(time_s, 1, 1, "ATTITUDE", {"roll": 0.0, "pitch": 0.0, "yaw": 0.5 * np.pi, "time_boot_ms": 0})

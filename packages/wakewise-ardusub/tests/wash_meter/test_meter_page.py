@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from browser import CHROMIUM, NO_BROWSER, Browser, Page, until
 
-from wakewise_ardusub.wash_meter.server import Server
+from wakewise_ardusub.wash_meter.server import MeterServer
 
 NAMES = ["front right horizontal", "front left horizontal", "rear right horizontal", "rear left horizontal",
          "front right vertical", "front left vertical", "rear right vertical", "rear left vertical"]  # fmt: skip
@@ -34,7 +34,7 @@ class Stage:
         self.state: dict[str, Any] = dict(LIVE)
         self.past: dict[str, Any] = {"until_s": 99, "flown_mm_s": [None, 10.0, 14.0], "gentle_mm_s": [None, 5.0, 6.0]}
         self.wished: list[str] = []
-        self.server = Server(lambda: self.state, lambda: self.past, self._wish)
+        self.server = MeterServer(lambda: self.state, lambda: self.past, self._wish)
 
     def _wish(self, what: str) -> str | None:
         self.wished.append(what)
@@ -147,6 +147,6 @@ def test_a_server_that_is_gone_is_said(opened: Any, stage: Stage) -> None:
     stage.server.stop()
     page.until("document.body.dataset.link === 'lost'")
     assert page.text("#link") == "No answer"
-    stage.server = Server(lambda: stage.state, lambda: stage.past, stage._wish, port=stage.server.port)
+    stage.server = MeterServer(lambda: stage.state, lambda: stage.past, stage._wish, port=stage.server.port)
     stage.server.start()
     page.until("document.body.dataset.link === 'live'")

@@ -16,9 +16,9 @@ import pytest
 from test_cockpit_extras import EXTRAS, SERVICE, WIDGET, fits
 
 from wakewise.core.errors import InputError
-from wakewise.ui.web.origin_check import TOKEN_HEADER, Caller
+from wakewise.ui.web.origin_check import TOKEN_HEADER, RequestOrigin
 from wakewise.ui.web.pending import PER_ADDRESS
-from wakewise_ardusub.wash_meter.server import MOST_KEPT, OFFER, PAGE, Server
+from wakewise_ardusub.wash_meter.server import MOST_KEPT, OFFER, PAGE, MeterServer
 
 WISHED: list[str] = []
 ASK = urllib.request.build_opener(urllib.request.ProxyHandler({})).open
@@ -29,19 +29,19 @@ def wish(what: str) -> str | None:
     return "no place" if what == "mark" else None
 
 
-def make(host: str = "127.0.0.1", *, token: bool = True) -> Server:
-    return Server(lambda: {"why_not": None}, lambda: {"flown_mm_s": []}, wish, host, token=token)
+def make(host: str = "127.0.0.1", *, token: bool = True) -> MeterServer:
+    return MeterServer(lambda: {"why_not": None}, lambda: {"flown_mm_s": []}, wish, host, token=token)
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
+def server() -> Iterator[MeterServer]:
     server = make()
     server.start()
     yield server
     server.stop()
 
 
-def got(server: Server, path: str, method: str = "GET", **headers: str) -> tuple[int, Any, bytes]:
+def got(server: MeterServer, path: str, method: str = "GET", **headers: str) -> tuple[int, Any, bytes]:
     request = urllib.request.Request(f"http://127.0.0.1:{server.port}{path}", headers=headers, method=method)
     try:
         with ASK(request, timeout=10) as answer:
@@ -51,7 +51,7 @@ def got(server: Server, path: str, method: str = "GET", **headers: str) -> tuple
             return refusal.code, refusal.headers, refusal.read()
 
 
-def test_the_page_and_all_its_parts_are_served(server: Server) -> None:
+def test_the_page_and_all_its_parts_are_served(server: MeterServer) -> None:
     """Each file of the page's folder and those that every page has; nothing names another host."""
     for entry in PAGE.iterdir():
         path = "/" if entry.name == "index.html" else f"/page/{entry.name}"
@@ -66,7 +66,7 @@ def test_the_page_and_all_its_parts_are_served(server: Server) -> None:
     assert got(server, "/nothing")[0] == 404
 
 
-def test_the_state_is_told_and_wishes_are_done(server: Server) -> None:
+def test_the_state_is_told_and_wishes_are_done(server: MeterServer) -> None:
     """JSON both ways; a wish that cannot be done says why, one that is none is not there."""
     assert json.loads(got(server, "/state.json")[2]) == {"why_not": None}
     assert json.loads(got(server, "/history.json")[2]) == {"flown_mm_s": []}
@@ -79,7 +79,7 @@ def test_the_state_is_told_and_wishes_are_done(server: Server) -> None:
     assert WISHED == ["begin", "mark"]
 
 
-def test_another_sites_page_sees_and_wishes_nothing(server: Server) -> None:
+def test_another_sites_page_sees_and_wishes_nothing(server: MeterServer) -> None:
     """Foreign host names and origins are refused; only what ground stations read is shared."""
     for path, method in (("/state.json", "GET"), ("/begin", "POST"), ("/", "GET")):
         assert got(server, path, method, Host="evil.example")[0] == 403
@@ -93,7 +93,7 @@ def test_another_sites_page_sees_and_wishes_nothing(server: Server) -> None:
 
 def test_from_elsewhere_the_token_opens_it_unless_everybody_may() -> None:
     """Files lie open, state and wishes do not; with --no-token they do, and other sites are refused all the same."""
-    rov = Caller(address="10.0.0.7", host="rov.local:8765", origin=None)
+    rov = RequestOrigin(address="10.0.0.7", host="rov.local:8765", origin=None)
     closed, everybody = make("0.0.0.0"), make("0.0.0.0", token=False)
     try:
         assert closed.token is not None
@@ -105,7 +105,7 @@ def test_from_elsewhere_the_token_opens_it_unless_everybody_may() -> None:
             assert closed.answer(method, path, rov, "guess")[0] == 401
             assert closed.answer(method, path, rov, closed.token)[0] == 200
             assert everybody.answer(method, path, rov, None)[0] == 200
-            foreign = Caller(address="10.0.0.7", host="rov.local:8765", origin="http://evil.example")
+            foreign = RequestOrigin(address="10.0.0.7", host="rov.local:8765", origin="http://evil.example")
             assert everybody.answer(method, path, foreign, None)[0] == 403
     finally:
         for one in (closed, everybody):
@@ -114,7 +114,7 @@ def test_from_elsewhere_the_token_opens_it_unless_everybody_may() -> None:
     assert TOKEN_HEADER in (PAGE / "meter.js").read_text(encoding="utf-8")
 
 
-def test_ground_stations_are_told_by_their_schema(server: Server) -> None:
+def test_ground_stations_are_told_by_their_schema(server: MeterServer) -> None:
     """Cockpit's extras and BlueOS' service; every address they name is served."""
     extras, service = OFFER.cockpit_extras(), OFFER.register_service()
     fits(extras, EXTRAS)
@@ -128,13 +128,13 @@ def test_ground_stations_are_told_by_their_schema(server: Server) -> None:
     assert json.loads(got(server, "/register_service")[2]) == service
 
 
-def test_a_port_that_is_taken_is_said_in_one_line(server: Server) -> None:
+def test_a_port_that_is_taken_is_said_in_one_line(server: MeterServer) -> None:
     """With the way out."""
     with pytest.raises(InputError, match=r"--port \d+ at 127.0.0.1: .*give another --port"):
-        Server(dict, dict, wish, port=server.port)
+        MeterServer(dict, dict, wish, port=server.port)
 
 
-def dialled(server: Server, says: bytes) -> socket.socket:
+def dialled(server: MeterServer, says: bytes) -> socket.socket:
     caller = socket.create_connection(("127.0.0.1", server.port), timeout=20.0)
     with suppress(ConnectionError):  # closed already, for one that came after it
         caller.sendall(says)
@@ -156,7 +156,7 @@ def test_connections_that_say_nothing_keep_nobody_out(says: bytes) -> None:
         server.stop()
 
 
-def test_a_connection_that_was_let_in_is_kept_whatever_others_do(server: Server) -> None:
+def test_a_connection_that_was_let_in_is_kept_whatever_others_do(server: MeterServer) -> None:
     """A page that asks again and again loses nothing to a crowd of silent connections; of kept ones there are few."""
     page = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5)
     with ExitStack() as stack:
@@ -215,7 +215,7 @@ def test_without_the_token_no_connection_is_kept(monkeypatch: pytest.MonkeyPatch
         (b"GET / HTTP/1.1", b"Host: \xff\r\n\r\n", 403),
     ],
 )
-def test_whatever_is_asked_is_answered(server: Server, request_line: bytes, headers: bytes, status: int) -> None:
+def test_whatever_is_asked_is_answered(server: MeterServer, request_line: bytes, headers: bytes, status: int) -> None:
     """No request ends without a status, nor with a page of HTML."""
     own = b"" if b"Host:" in headers else f"Host: 127.0.0.1:{server.port}\r\n".encode()
     with dialled(server, request_line + b"\r\n" + own + headers) as caller:
@@ -226,7 +226,7 @@ def test_whatever_is_asked_is_answered(server: Server, request_line: bytes, head
         assert answer.read().strip()
 
 
-def test_head_is_get_without_the_body(server: Server) -> None:
+def test_head_is_get_without_the_body(server: MeterServer) -> None:
     """With the length that GET would have; refusals alike."""
     for path, host in (("/", ""), ("/page/meter.js", ""), ("/nothing", ""), ("/state.json", ""), ("/", "evil.example")):
         own = {"Host": host} if host else {}

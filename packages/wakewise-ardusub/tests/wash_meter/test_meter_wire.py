@@ -17,18 +17,18 @@ from hypothesis import strategies as st
 from loopback_vehicle import Vehicle, free_ends
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
-from wakewise_ardusub.vehicle_summary import Craft
-from wakewise_ardusub.wash_meter.history import KEPT_S, History
-from wakewise_ardusub.wash_meter.mavlink_socket import Heard, Wire
-from wakewise_ardusub.wash_meter.meter import Reading
-from wakewise_ardusub.wash_meter.record import Record
+from wakewise_ardusub.vehicle_summary import VehicleSummary
+from wakewise_ardusub.wash_meter.history import KEPT_S, WashHistory
+from wakewise_ardusub.wash_meter.mavlink_socket import MavlinkSocket, TimedMessage
+from wakewise_ardusub.wash_meter.meter import MeterReading
+from wakewise_ardusub.wash_meter.record import DiveRecord
 from wakewise_ardusub.wash_meter.settings import MeterSettings
-from wakewise_ardusub.wash_meter.vehicle_listener import Hearing
-from wakewise_ardusub.wash_savings import Spared
+from wakewise_ardusub.wash_meter.vehicle_listener import VehicleListener
+from wakewise_ardusub.wash_savings import WashSavings
 
 
-def heard_within(wire: Wire, seconds: float, enough: int) -> list[Heard]:
-    found: list[Heard] = []
+def heard_within(wire: MavlinkSocket, seconds: float, enough: int) -> list[TimedMessage]:
+    found: list[TimedMessage] = []
     end_s = time.monotonic() + seconds
     while len(found) < enough and time.monotonic() < end_s:
         wire.wait(0.05)
@@ -38,10 +38,10 @@ def heard_within(wire: Wire, seconds: float, enough: int) -> list[Heard]:
 
 def test_messages_come_through_a_hundred_thousand_bytes_of_rubbish() -> None:
     """Rubbish of one sender is counted and costs another's messages nothing; one's own comes back after it."""
-    wire = Wire(MeterSettings(connection=free_ends()).ends)
+    wire = MavlinkSocket(MeterSettings(connection=free_ends()).ends)
     rng = np.random.default_rng(5)
     with Vehicle(wire.port) as vehicle, Vehicle(wire.port, system=9) as other:
-        found: list[Heard] = []
+        found: list[TimedMessage] = []
         for turn in range(100):
             other.send_bytes(rng.bytes(1000))
             if turn % 10 == 0:
@@ -68,7 +68,7 @@ def test_messages_come_through_a_hundred_thousand_bytes_of_rubbish() -> None:
 )
 def test_no_fields_stop_the_hearing(name: str, fields: dict[str, object]) -> None:
     """Missing, of another kind, or no numbers: passed over, and what is told stays finite or unknown."""
-    hearing = Hearing(system=1)
+    hearing = VehicleListener(system=1)
     hearing.hear(0.0, 1, 1, name, fields)
     pose = hearing.pose(0.1)
     assert pose is None or np.isfinite(pose.p_m).all()
@@ -80,7 +80,7 @@ def test_no_fields_stop_the_hearing(name: str, fields: dict[str, object]) -> Non
 def test_the_first_vehicle_with_outputs_is_the_one() -> None:
     """Others are told apart; companions and ground stations are no vehicles; a system that was named is waited for."""
     outputs = {"port": 0} | {f"servo{i}_raw": 1500 for i in range(1, 17)}
-    hearing, named = Hearing(), Hearing(system=3)
+    hearing, named = VehicleListener(), VehicleListener(system=3)
     for one in (hearing, named):
         one.hear(0.0, 255, 190, "HEARTBEAT", {"base_mode": 0, "custom_mode": 0})
         one.hear(0.0, 2, 191, "SERVO_OUTPUT_RAW", outputs)
@@ -92,24 +92,24 @@ def test_the_first_vehicle_with_outputs_is_the_one() -> None:
     assert hearing.age_s("position", 1.0) == math.inf
 
 
-def reading(time_s: float, flown: float, gentle: float) -> Reading:
+def reading(time_s: float, flown: float, gentle: float) -> MeterReading:
     craft_thrusts = np.array([1.0, -2.0])
-    spared = Spared(
+    spared = WashSavings(
         thrusts_N=dict.fromkeys(("flown", "least", "gentle"), craft_thrusts),
         disturbance={"flown": flown, "least": flown, "gentle": gentle},
     )
     speeds = {"flown": 0.2, "least": 0.2, "gentle": 0.1}
-    return Reading(time_s=time_s, spared=spared, peak_m_s=speeds, rms_m_s=speeds)  # type: ignore[arg-type]
+    return MeterReading(time_s=time_s, spared=spared, peak_m_s=speeds, rms_m_s=speeds)  # type: ignore[arg-type]
 
 
 def test_the_past_is_a_mean_of_each_second_with_gaps() -> None:
     """D is averaged, its root is told; silence is a gap; no more is kept than is shown."""
-    history = History(weight=1.0)
+    history = WashHistory(weight=1.0)
     for k in range(10):
         history.add(reading(5.0 + 0.1 * k, 1e-6 * (1 + (k % 2)), 0.0))
-    history.add(Reading(time_s=6.5, why_not="silence"))
+    history.add(MeterReading(time_s=6.5, why_not="silence"))
     history.add(reading(7.5, 4e-6, 1e-6))
-    history.add(Reading(time_s=8.5, why_not="silence"))
+    history.add(MeterReading(time_s=8.5, why_not="silence"))
     told = history.told()
     assert told["flown_mm_s"] == [pytest.approx(math.sqrt(1.5), abs=1e-3), None, pytest.approx(2.0)]
     assert told["gentle_mm_s"] == [0.0, None, pytest.approx(1.0)]
@@ -120,15 +120,15 @@ def test_the_past_is_a_mean_of_each_second_with_gaps() -> None:
 
 def test_a_record_goes_on_and_keeps_another_crafts_rows(tmp_path: Path) -> None:
     """Rows are added to the same columns; a file of other columns is put aside, not mixed nor lost."""
-    heavy, six = (Craft.of(load_vehicle(name), wake_model("jet")) for name in ("bluerov2-heavy", "bluerov2"))
+    heavy, six = (VehicleSummary.of(load_vehicle(name), wake_model("jet")) for name in ("bluerov2-heavy", "bluerov2"))
     for _ in range(2):
-        record = Record(tmp_path / "dive", heavy)
-        record.add(1.5, Reading(time_s=0.0, why_not="silence"))
+        record = DiveRecord(tmp_path / "dive", heavy)
+        record.add(1.5, MeterReading(time_s=0.0, why_not="silence"))
         record.add(1.5, reading(0.0, 1e-6, 0.0))
         record.close({"a": 1})
     rows = (tmp_path / "dive" / "meter.csv").read_text().splitlines()
     assert len(rows) == 3
     assert rows[1].startswith("1.500,1e-06,1e-06,0,0.2,0.1,1,-2")
-    Record(tmp_path / "dive", six).close({})
+    DiveRecord(tmp_path / "dive", six).close({})
     assert len((tmp_path / "dive" / "meter-1.csv").read_text().splitlines()) == 3
     assert (tmp_path / "dive" / "meter.csv").read_text().startswith("time_s,")

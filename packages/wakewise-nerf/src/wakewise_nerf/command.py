@@ -9,7 +9,7 @@ import typer
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.commands import PHOTOGRAPHS, Command
-from wakewise.ui.cli.console import Bars, print_json, print_table, shown
+from wakewise.ui.cli.console import ProgressBars, print_json, print_table, shown
 from wakewise.ui.cli.options import Json, seed_option
 
 Model = Annotated[
@@ -84,7 +84,7 @@ def nerf(
     settings = profile_of(chosen).model_copy(update=changes)
     folder = out or model / "nerf"
     ball = None if region is None else _ball(region)
-    with Bars().stage("nerf") as progress:
+    with ProgressBars().stage("nerf") as progress:
         figures = (field_of_trial if is_trial(model) else field_of_model)(
             model,
             photos or model / "images",

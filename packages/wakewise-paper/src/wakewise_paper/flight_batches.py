@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wakewise.core.jit.precompile import warm
-from wakewise.experiments.campaigns import Engine, Processes, run
+from wakewise.experiments.campaigns import ProcessExecutor, TrialExecutor, run
 from wakewise.experiments.campaigns.store import open_store
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise_paper.flight_store import FlightStore, numbers
@@ -15,12 +15,12 @@ from wakewise_paper.flight_store import FlightStore, numbers
 Key = tuple[str, str, int]
 """World or flow, method or other name, seed."""
 Row = Mapping[str, float | None]
-Engines = Callable[[int], Engine]
+Engines = Callable[[int], TrialExecutor]
 """Makes an engine for a number of workers."""
 
 
 @dataclass(frozen=True)
-class Failure:
+class FlightFailure:
     """A flight that gave no figures, and why."""
 
     flow: str
@@ -34,8 +34,8 @@ def fly_all(
     fly: str,
     store: FlightStore,
     options: BenchOptions,
-    engine: Engines = Processes,
-) -> tuple[dict[Key, Row], list[Failure], int]:
+    engine: Engines = ProcessExecutor,
+) -> tuple[dict[Key, Row], list[FlightFailure], int]:
     """Figures of all flights, those that failed, and how many were known already.
 
     Flights that failed in an earlier run are tried again.
@@ -60,10 +60,10 @@ def fly_all(
         warm(progress=options.progress)  # else each of the processes would
     outcomes = run(list(tasks.values()), store.folder, engine(options.workers), progress=options.progress, again=True)
     rows: dict[Key, Row] = {}
-    failures: list[Failure] = []
+    failures: list[FlightFailure] = []
     for key, outcome in zip(tasks, outcomes, strict=True):
         if outcome.figures is None:
-            failures.append(Failure(*key, reason=outcome.reason or "not flown"))
+            failures.append(FlightFailure(*key, reason=outcome.reason or "not flown"))
         else:
             rows[key] = numbers(outcome.figures)
     return rows, failures, sum(outcome.known and outcome.figures is not None for outcome in outcomes)

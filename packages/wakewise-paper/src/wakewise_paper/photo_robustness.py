@@ -22,7 +22,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import write_json, write_text
 from wakewise.core.interfaces import ScalarGrid
 from wakewise.core.run_lock import alone
-from wakewise.experiments.trials.stages import Quiet, Watch, of_the_computer
+from wakewise.experiments.trials.stages import ProgressListener, SilentProgress, of_the_computer
 from wakewise.operation import Scenario
 from wakewise.scene.targets import Target
 from wakewise.vision.imaging import Render
@@ -87,7 +87,7 @@ def degrade(
     scenario: Scenario,
     folder: Path,
     levels: dict[str, tuple[float, ...]] | None = None,
-    watch: Watch | None = None,
+    watch: ProgressListener | None = None,
 ) -> list[dict[str, Any]]:
     """Go through the levels of each factor, up to and with the first that gives no model; write degradation.csv.
 
@@ -109,7 +109,7 @@ def degrade(
         If a factor is unknown, levels do not rise from 0 or more, the folder holds another study, or another run
         is at it.
     """
-    watch = watch or Quiet()
+    watch = watch or SilentProgress()
     wanted = _checked({name: factor.levels for name, factor in FACTORS.items()} if levels is None else levels)
     _claim(folder, scenario)
     with alone(folder):
@@ -117,7 +117,7 @@ def degrade(
 
 
 def _study(
-    scenario: Scenario, folder: Path, wanted: dict[str, tuple[float, ...]], watch: Watch
+    scenario: Scenario, folder: Path, wanted: dict[str, tuple[float, ...]], watch: ProgressListener
 ) -> list[dict[str, Any]]:
     target = scenario.parts().target
     clean: list[Render] = []

@@ -28,7 +28,7 @@ DOUBT_M, DOUBT_RAD = 0.0018 / np.sqrt(3), np.radians(0.04) / np.sqrt(3)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class View:
+class PhotoPoses:
     """One photograph: true poses X_WC over the exposure, and the middle one as the vehicle knows it."""
 
     name: str
@@ -63,7 +63,7 @@ class PhotoSet:
 
 def planned_views(
     target: Target, mission: MissionSettings, exposure_s: float, rng: np.random.Generator, smear_m: float = 0.0
-) -> list[View]:
+) -> list[PhotoPoses]:
     """Views along the mission's orbits, off the plan as a flight would be, moving along the orbit at its speed.
 
     A camera that follows its orbit keeps the target sharp; `smear_m` is a way on top of it that the camera slips
@@ -82,7 +82,7 @@ def planned_views(
         for side in (-1.0, 0.0, 1.0):
             turn = quat_from_rotvec(np.array([0.0, 0.0, -side * step_m / radius_m]))
             ends.append(Pose(middle.p_m + side * (step_m * middle.R[:, 0] + slip), quat_multiply(turn, middle.q)))
-        views.append(View(name=name, X_WC=tuple(ends), X_WC_est=disturbed(middle, rng, DOUBT_M, DOUBT_RAD)))
+        views.append(PhotoPoses(name=name, X_WC=tuple(ends), X_WC_est=disturbed(middle, rng, DOUBT_M, DOUBT_RAD)))
     return views
 
 
@@ -93,7 +93,7 @@ def disturbed(pose: Pose, rng: np.random.Generator, spread_m: float, spread_rad:
 
 
 def render_clean(
-    target: Target, views: list[View], imaging: ImagingSettings, seed: int = 0, progress: Progress = no_progress
+    target: Target, views: list[PhotoPoses], imaging: ImagingSettings, seed: int = 0, progress: Progress = no_progress
 ) -> list[Render]:
     """Each view in perfectly clear water; water, silt and flakes can be put in many times."""
     scene, camera = Scene.build(target, seed), imaging.camera()
@@ -106,7 +106,7 @@ def render_clean(
 
 def write_photos(
     folder: Path,
-    views: list[View],
+    views: list[PhotoPoses],
     renders: list[Render] | None,
     imaging: ImagingSettings,
     target: Target,

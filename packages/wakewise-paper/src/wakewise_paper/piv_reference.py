@@ -11,7 +11,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.constants import FRESH_WATER_KG_M3 as WATER_DENSITY_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.wake.calibration import Split
+from wakewise.wake.calibration import DataSplit
 from wakewise.wake.samples import CORE, JetSamples
 from wakewise.wake.scores import score_speeds
 
@@ -30,7 +30,7 @@ class MeasuredJet:
     """
 
     samples: JetSamples
-    split: Split
+    split: DataSplit
     half_width_m: float
     peak_m_s: float
     snapshots_r2_core: float
@@ -83,7 +83,7 @@ def read_air_jet(path: Path) -> MeasuredJet:
     explained = score_speeds(mean[known][inside], both.take(inside)).r2_core
     return MeasuredJet(
         samples=samples,
-        split=Split(
+        split=DataSplit(
             train=table[:, 4] < 2,
             test=table[:, 4] == 2,
             words="two snapshots to fit on, the third to test on; one speed",

@@ -18,12 +18,12 @@ from wakewise.core.arrays import Array
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.wake.calibration import Calibration, Split, calibrate, split_samples
+from wakewise.wake.calibration import DataSplit, WakeCalibration, calibrate, split_samples
 from wakewise.wake.fit_file import fit_figures
-from wakewise.wake.fit_parameters import FAMILIES, Family
+from wakewise.wake.fit_parameters import FAMILIES, WakeFamily
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.samples import CORE, WAKE, JetRegion, JetSamples, joined
-from wakewise.wake.scores import Scores, score
+from wakewise.wake.scores import WakeScores, score
 from wakewise_paper.flows import BLAAUW_VAN_DE_KAA, FUEHRER_ROEMISCH, JetFlow, ParcelJet
 from wakewise_paper.lattice_reference import grid_convergence_pct, oracle_jets
 from wakewise_paper.piv_reference import read_air_jet
@@ -61,7 +61,7 @@ class MeasuredFlow:
     title: str
     note: str
     samples: JetSamples
-    split: Split
+    split: DataSplit
 
     @property
     def test(self) -> JetSamples:
@@ -75,12 +75,12 @@ class MeasuredFlow:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Verdict:
+class ValidationScore:
     """One model against one flow."""
 
     model: AxialJet
-    scores: Scores
-    calibration: Calibration | None
+    scores: WakeScores
+    calibration: WakeCalibration | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +91,7 @@ class WakeValidation:
     """
 
     flows: tuple[MeasuredFlow, ...]
-    verdicts: dict[str, dict[str, Verdict]]
+    verdicts: dict[str, dict[str, ValidationScore]]
     absent: dict[str, str]
     grid_convergence_pct: float | None
     round_trips: tuple[RoundTrip, ...] = ()
@@ -164,7 +164,7 @@ def sampled(flow: JetFlow, thrusts_N: Iterable[float], spacing_m: float) -> JetS
     return joined(parts)
 
 
-def judge(family: Family, flow: MeasuredFlow, options: ValidationOptions) -> Verdict:
+def judge(family: WakeFamily, flow: MeasuredFlow, options: ValidationOptions) -> ValidationScore:
     """Calibrate a model, if it can be, on the training part within the region of the wake; test it on the rest."""
     calibration = None
     if family.parameters:
@@ -173,7 +173,7 @@ def judge(family: Family, flow: MeasuredFlow, options: ValidationOptions) -> Ver
         model = family.model(calibration.values)
     else:
         model = family.model(family.start)
-    return Verdict(model=model, scores=score(model, flow.test), calibration=calibration)
+    return ValidationScore(model=model, scores=score(model, flow.test), calibration=calibration)
 
 
 def figures(result: WakeValidation) -> dict[str, Any]:
@@ -208,7 +208,7 @@ def figures(result: WakeValidation) -> dict[str, Any]:
     }
 
 
-def _cell(flow: MeasuredFlow, verdict: Verdict) -> dict[str, Any]:
+def _cell(flow: MeasuredFlow, verdict: ValidationScore) -> dict[str, Any]:
     scores = asdict(verdict.scores)
     why = scores.pop("why")
     for key, region in (("r2_core", CORE), ("r2_wake", WAKE)):

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.campaigns.task import Outcome
+from wakewise.experiments.campaigns.task import TrialOutcome
 from wakewise.ui.cli.main import run
 from wakewise_paper.cli.reproduce import seconds
 
@@ -19,7 +19,7 @@ def made(monkeypatch, tmp_path):
         wash = {"manual": 0.03, "dp": 0.02, "unaware": 0.02, "smooth": 0.018, "wake-aware": 0.005}
         fields = [task.settings["fields"] for task in tasks]
         return [
-            Outcome(
+            TrialOutcome(
                 task=task,
                 figures={
                     "target_speed_mean_m_s": wash[own["method"]] + 1e-4 * own["seed"],

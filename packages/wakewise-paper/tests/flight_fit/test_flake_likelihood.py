@@ -19,8 +19,8 @@ from wakewise_paper.flight_fit.flake_tracks import (
     BLUR_NOISE,
     LEAST_COVER,
     PIXEL_NOISE,
-    Sightings,
-    Watcher,
+    FlakeObserver,
+    FlakeTracks,
     blur_radius_px,
     cover,
 )
@@ -58,7 +58,7 @@ def seen(slope, pairs, seed=0, gain=1.0, per_pair=20):
         parts.append((pixels[kept], moved[kept], radius[kept]))
         pushes.append(push)
     counts = [len(part[2]) for part in parts]
-    return Sightings(
+    return FlakeTracks(
         pair=np.repeat(np.arange(pairs), counts),
         first_px=np.concatenate([part[0] for part in parts]),
         moved_px=np.concatenate([part[1] for part in parts]),
@@ -105,7 +105,7 @@ def test_the_error_falls_with_minutes():
 def test_still_water_tells_nothing_of_the_width():
     """Without pushes only the prior speaks, and the fit says so."""
     still = seen(0.13, 30, 6)
-    quiet = Sightings(**{name: getattr(still, name) for name in (
+    quiet = FlakeTracks(**{name: getattr(still, name) for name in (
         "pair", "first_px", "blur_px", "times_s", "X_WC", "X_WC_next", "X_WB")},
         moved_px=0.0 * still.moved_px, pushes_N=0.0 * still.pushes_N)  # fmt: skip
     fit = fit_flight(quiet, CAMERA, VEHICLE)
@@ -156,7 +156,7 @@ def test_a_flake_is_found_again_where_the_water_took_it():
     p_C = np.column_stack([rng.uniform(-0.2, 0.2, (n, 2)), rng.uniform(0.2, 0.5, n)])
     looks = np.column_stack([rng.random(n), np.ones(n), rng.random(n)])
     velocity = np.tile([0.0, 0.1, 0.0], (n, 1))
-    watcher = Watcher(camera=CAMERA, vehicle=VEHICLE, rng=rng, per_m3=1500.0)
+    watcher = FlakeObserver(camera=CAMERA, vehicle=VEHICLE, rng=rng, per_m3=1500.0)
     clouds = [
         FlakeCloud(p_W_m=X_WC.apply(p_C) + t * velocity, v_W_m_s=velocity, looks=looks, low_W_m=np.full(3, -9.0),
                    high_W_m=np.full(3, 9.0), per_m3=1500.0, depth_m=0.62, slopes=(1.0, 0.8))

@@ -5,13 +5,13 @@ import pytest
 
 from wakewise.wake import wake_model
 from wakewise.wake.network import EDGES, Network
-from wakewise_paper.learned_wake.evaluation import Score, predictors, unit_f
+from wakewise_paper.learned_wake.evaluation import WakeModelScore, predictors, unit_f
 from wakewise_paper.learned_wake.truth import (
     FAR_D,
     LATTICE_HISTORIES,
     NEAR_D,
     THRUSTS_N,
-    Drawn,
+    SampledWater,
     _stepped,
     drawn_history,
     drawn_points,
@@ -20,7 +20,7 @@ from wakewise_paper.learned_wake.truth import (
     parcel_rows,
 )
 
-NARROW = Drawn(half_width_growth=0.094, wake_life=1.0)
+NARROW = SampledWater(half_width_growth=0.094, wake_life=1.0)
 
 
 def test_histories_hold_and_rest():
@@ -83,7 +83,7 @@ def test_unsteady_rows_carry_their_history():
 def test_a_model_that_says_the_truth_has_no_error():
     """And one that says twice of it is at the edge of the factor of two."""
     rows = even_lattice_rows("free", np.random.default_rng(1), 200)
-    right, double = Score.of(rows.f, rows), Score.of(2.01 * rows.f, rows)
+    right, double = WakeModelScore.of(rows.f, rows), WakeModelScore.of(2.01 * rows.f, rows)
     assert (right.rmse_mm_s, right.factor_of_2_pct) == (0.0, 100.0)
     assert double.error_share == pytest.approx(1.01)
     assert double.factor_of_2_pct == 0.0

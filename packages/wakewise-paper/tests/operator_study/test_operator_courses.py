@@ -11,7 +11,7 @@ from wakewise_paper.operator_study.courses import (
     COURSES,
     LOOK_ARC_M,
     SPEED_M_S,
-    CourseHands,
+    CourseInput,
     look_route,
     operator_route,
     start_pose,
@@ -40,7 +40,7 @@ def test_courses_rest_first_and_front_and_over_come_back():
 def test_sticks_ask_for_what_the_course_says_at_any_gain():
     """Axes are shares of what full stick means."""
     for share in (0.5, 1.0):
-        axes = CourseHands(COURSES["look"], share).read(SETTLE_S + 0.5).axes
+        axes = CourseInput(COURSES["look"], share).read(SETTLE_S + 0.5).axes
         assert 0.5 * share * axes[0] == pytest.approx(SPEED_M_S) and not axes[1:].any()
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.control.receding import PlanState
-from wakewise_paper.operator_study.controller_probe import Overheard, within
+from wakewise_paper.operator_study.controller_probe import ControllerProbe, within
 from wakewise_paper.operator_study.flight import (
     DEVIATIONS,
     FIGURES,
@@ -35,7 +35,7 @@ def test_the_same_seed_is_the_same_water_for_every_method_and_pilot():
     person = parts_of(OperatorTrial(world="close", pilot="human", method="dp", seed=2))
     assert one.scenario.tank == two.scenario.tank == person.scenario.tank
     assert one.start.X_WB.p_m == pytest.approx(two.start.X_WB.p_m)
-    assert isinstance(one.controller, Overheard) and one.controller.name == "dp"
+    assert isinstance(one.controller, ControllerProbe) and one.controller.name == "dp"
     assert course_of(OperatorTrial(world="close", pilot="human", method="dp", seed=1)) == "look"
 
 

@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 import yaml
 
-from wakewise_paper.reproduction.claim import TABLES, UNQUOTED, Claim
+from wakewise_paper.reproduction.claim import TABLES, UNQUOTED, PublishedFigure
 from wakewise_paper.reproduction.published_tables import CLAIMS, UNKNOWN
 
 EVERY = [(name, claim) for name, claims in CLAIMS.items() for claim in claims]
 
 
 def _claim(**told):
-    return Claim(**{"method": "m", "figure": "f", "title": "t", "unit": "", "said": "", "how": "h"} | told)
+    return PublishedFigure(**{"method": "m", "figure": "f", "title": "t", "unit": "", "said": "", "how": "h"} | told)
 
 
 @pytest.mark.parametrize(("side", "better", "worse"), [("less", 1.0, 3.0), ("more", 3.0, 1.0)])

@@ -7,7 +7,7 @@ import pytest
 
 from wakewise.scene.targets import coral, place_on_bed
 from wakewise.vision.piv.tracers import Sheet
-from wakewise_paper.reproduction.piv_flights import FIGURES, NEAR_M, PivWatch
+from wakewise_paper.reproduction.piv_flights import FIGURES, NEAR_M, PivRecorder
 
 
 @dataclass
@@ -42,7 +42,7 @@ def watch(times=(1.0,)):
         down_W=np.array([0.0, 0.0, 1.0]),
         half_thickness_m=4e-3,
     )
-    return PivWatch(target=target, sheet=sheet, times_s=list(times), rng=np.random.default_rng(0))
+    return PivRecorder(target=target, sheet=sheet, times_s=list(times), rng=np.random.default_rng(0))
 
 
 def test_wash_in_the_sheet_is_seen_in_a_stream_and_noise_is_told():

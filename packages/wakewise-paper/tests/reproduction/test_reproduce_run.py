@@ -4,10 +4,10 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns.store import open_store, write_figures
-from wakewise.experiments.campaigns.task import Outcome
+from wakewise.experiments.campaigns.task import TrialOutcome
 from wakewise_paper.reproduction import run as module
-from wakewise_paper.reproduction.run import Options, reproduce
-from wakewise_paper.reproduction.table_trials import Wish, blocks_of
+from wakewise_paper.reproduction.run import ReproduceOptions, reproduce
+from wakewise_paper.reproduction.table_trials import TableRequest, blocks_of
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def campaign(monkeypatch):
             if task.key not in known:
                 clock["now"] += 10.0 / engine.workers
                 known[task.key] = {"target_speed_mean_m_s": 0.01, "position_rmse_mm": 2.0, "energy_kJ": 1.0}
-            outcomes.append(Outcome(task=task, figures=known[task.key], attempts=1, took_s=10.0))
+            outcomes.append(TrialOutcome(task=task, figures=known[task.key], attempts=1, took_s=10.0))
         return outcomes
 
     monkeypatch.setattr(module, "run_campaign", run)
@@ -34,7 +34,7 @@ def campaign(monkeypatch):
 
 def test_without_a_budget_all_trials_are_made_at_once(tmp_path, campaign):
     """So that workers are busy to the end."""
-    told = reproduce(["station"], tmp_path, Options(trials=2, worlds=("pump-tank",)))["station"]
+    told = reproduce(["station"], tmp_path, ReproduceOptions(trials=2, worlds=("pump-tank",)))["station"]
     assert [len(call) for call in campaign] == [10]
     assert (told["trials"], told["seeds"], told["made"], told["failed"]) == (2, [1, 2], 10, 0)
     assert {row["method"] for row in told["rows"]} == {"manual", "dp", "unaware", "smooth", "wake-aware"}
@@ -43,7 +43,7 @@ def test_without_a_budget_all_trials_are_made_at_once(tmp_path, campaign):
 def test_a_budget_buys_whole_blocks_by_what_they_were_found_to_cost(tmp_path, campaign):
     """A hundred seconds with two workers hold 20 trials of ten, of which a tenth is kept back: three blocks of five."""
     said = []
-    options = Options(budget_s=100.0, worlds=("pump-tank",), progress=lambda *words: said.append(words[2]))
+    options = ReproduceOptions(budget_s=100.0, worlds=("pump-tank",), progress=lambda *words: said.append(words[2]))
     told = reproduce(["station"], tmp_path, options)["station"]
     assert [len(call) for call in campaign] == [5, 15]
     assert (told["made"], told["seeds"]) == (15, [1, 2, 3])
@@ -52,7 +52,7 @@ def test_a_budget_buys_whole_blocks_by_what_they_were_found_to_cost(tmp_path, ca
 
 def test_a_budget_is_shared_by_time_spent(tmp_path, campaign):
     """Two tables whose blocks cost alike get as many; one with no room says so."""
-    told = reproduce(["ablation", "flow", "dynamic"], tmp_path, Options(budget_s=160.0, worlds=("pump-tank",)))
+    told = reproduce(["ablation", "flow", "dynamic"], tmp_path, ReproduceOptions(budget_s=160.0, worlds=("pump-tank",)))
     assert told["dynamic"]["rows"] == [] and "no room" in told["dynamic"]["why"]["rows"]
     spent = [10.0 * told[name]["made"] for name in ("ablation", "flow")]
     assert abs(spent[0] - spent[1]) <= 40.0 and sum(spent) >= 200.0
@@ -61,7 +61,7 @@ def test_a_budget_is_shared_by_time_spent(tmp_path, campaign):
 def test_the_same_trials_have_the_same_configuration(tmp_path, campaign):
     """And others another."""
     hashes = [
-        reproduce(["station"], tmp_path, Options(trials=n, worlds=("pump-tank",)))["station"]["config_hash"]
+        reproduce(["station"], tmp_path, ReproduceOptions(trials=n, worlds=("pump-tank",)))["station"]["config_hash"]
         for n in (1, 1, 2)
     ]
     assert hashes[0] == hashes[1] != hashes[2]
@@ -69,33 +69,33 @@ def test_the_same_trials_have_the_same_configuration(tmp_path, campaign):
 
 def test_methods_of_one_table_do_not_hinder_another(tmp_path, campaign):
     """What a table does not have it ignores, unless it has none of them."""
-    options = Options(trials=1, worlds=("pump-tank",), methods=("dp", "unaware", "linear"))
+    options = ReproduceOptions(trials=1, worlds=("pump-tank",), methods=("dp", "unaware", "linear"))
     told = reproduce(["station", "ablation"], tmp_path, options)
     assert told["station"]["methods"] == ["dp", "unaware"] and told["ablation"]["methods"] == ["unaware", "linear"]
     with pytest.raises(InputError, match="--methods"):
-        reproduce(["station"], tmp_path, Options(methods=("magic",)))
+        reproduce(["station"], tmp_path, ReproduceOptions(methods=("magic",)))
 
 
 @pytest.mark.parametrize("options", [{"trials": 0}, {"budget_s": 0.0}])
 def test_what_cannot_be_is_refused(options):
     """No trials, no time."""
     with pytest.raises(InputError):
-        Options(**options)
+        ReproduceOptions(**options)
 
 
 def test_an_unknown_table_is_refused_with_what_there_is(tmp_path):
     """Before anything is made."""
     with pytest.raises(InputError, match="allowed: dynamic"):
-        reproduce(["quantum"], tmp_path, Options())
+        reproduce(["quantum"], tmp_path, ReproduceOptions())
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_part_of_a_block_that_an_earlier_run_made_is_shown(tmp_path, campaign):
     """Though there is no room for the rest of it; a table of which nothing was made says why."""
-    block = next(blocks_of("dynamic", Wish(trials=1, worlds=("pump-tank",))))
+    block = next(blocks_of("dynamic", TableRequest(trials=1, worlds=("pump-tank",))))
     place = open_store(tmp_path).place(block[-1].task.key)
     place.mkdir()
     write_figures(place, {"rmse_mm": 1.0}, 9.0)
-    told = reproduce(["dynamic", "success"], tmp_path, Options(budget_s=20.0, worlds=("pump-tank",)))
+    told = reproduce(["dynamic", "success"], tmp_path, ReproduceOptions(budget_s=20.0, worlds=("pump-tank",)))
     assert told["dynamic"]["why"] == {} and told["dynamic"]["rows"]
     assert "no room" in told["success"]["why"]["rows"] and not told["success"]["rows"]

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from wakewise.experiments.campaigns.task import Outcome, Task
-from wakewise_paper.reproduction.claim import ORDER, Claim
-from wakewise_paper.reproduction.rows import Made, Trials, once_rows, table_rows
-from wakewise_paper.reproduction.table_trials import Plan
+from wakewise.experiments.campaigns.task import Task, TrialOutcome
+from wakewise_paper.reproduction.claim import ORDER, PublishedFigure
+from wakewise_paper.reproduction.rows import CompletedCase, TableTrials, once_rows, table_rows
+from wakewise_paper.reproduction.table_trials import TableCase
 
 KEYS = ["method", "target", "figure", "paper", "ours", "low", "high", "n", "met"]
 
@@ -14,19 +14,19 @@ KEYS = ["method", "target", "figure", "paper", "ours", "low", "high", "n", "met"
 def made(method, seed, figures, *, target="brain", world="pump-tank", reason=None, attempts=1):
     """A trial that became these figures."""
     task = Task(name=f"{method}/{target}/{seed}", work="m:f", settings={"seed": seed}, sources=())
-    plan = Plan(table="dynamic", world=world, method=method, target=target, seed=seed, task=task)
-    return Made(plan, Outcome(task=task, figures=figures, reason=reason, attempts=attempts, took_s=1.0))
+    plan = TableCase(table="dynamic", world=world, method=method, target=target, seed=seed, task=task)
+    return CompletedCase(plan, TrialOutcome(task=task, figures=figures, reason=reason, attempts=attempts, took_s=1.0))
 
 
 def claim(reading="mean", **told):
     """A claim of ours."""
     base = {"method": "ours", "figure": "rmse_mm", "title": "RMSE", "unit": "mm", "paper": 2.0, "said": "2 mm"}
-    return Claim(**base | {"side": "less", "how": "h", "reading": reading} | told)
+    return PublishedFigure(**base | {"side": "less", "how": "h", "reading": reading} | told)
 
 
 def rows_of(claims, trials):
     """Rows in one world."""
-    return table_rows(claims, {"pump-tank": Trials(trials)})
+    return table_rows(claims, {"pump-tank": TableTrials(trials)})
 
 
 def test_a_row_begins_with_the_keys_that_are_promised():

@@ -8,13 +8,22 @@ from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns.task import function_named
 from wakewise.operation import Scenario
 from wakewise_paper.reproduction.claim import TABLES
-from wakewise_paper.reproduction.table_trials import APPROACHES, COMPARED, CORALS, NOWHERE, OWN, TABLE, Wish, blocks_of
+from wakewise_paper.reproduction.table_trials import (
+    APPROACHES,
+    COMPARED,
+    CORALS,
+    NOWHERE,
+    OWN,
+    TABLE,
+    TableRequest,
+    blocks_of,
+)
 
 
 @pytest.mark.parametrize("name", list(TABLES))
 def test_a_block_has_all_methods_on_one_seed_at_one_target_in_one_world(name):
     """So that what is compared met the same water."""
-    for block in blocks_of(name, Wish(trials=2)):
+    for block in blocks_of(name, TableRequest(trials=2)):
         assert len({(plan.world, plan.target, plan.seed) for plan in block}) == 1
         assert tuple(plan.method for plan in block) == TABLE[name].methods
         assert len({plan.task.key for plan in block}) == len(
@@ -25,7 +34,7 @@ def test_a_block_has_all_methods_on_one_seed_at_one_target_in_one_world(name):
 @pytest.mark.parametrize("name", list(TABLES))
 def test_the_work_of_a_trial_is_there_and_its_settings_are_a_scenario(name):
     """What would fail in a worker fails here: fields, methods, vehicles and targets by name."""
-    for block in blocks_of(name, Wish(trials=1)):
+    for block in blocks_of(name, TableRequest(trials=1)):
         for plan in block:
             assert callable(function_named(plan.task.work))
             if "fields" in plan.task.settings:
@@ -34,15 +43,15 @@ def test_the_work_of_a_trial_is_there_and_its_settings_are_a_scenario(name):
 
 def test_more_trials_add_to_what_was_there():
     """The first seed's trials are the same whether two or three seeds are asked for."""
-    few = [plan.task.key for block in blocks_of("station", Wish(trials=2)) for plan in block]
-    more = [plan.task.key for block in blocks_of("station", Wish(trials=3)) for plan in block]
+    few = [plan.task.key for block in blocks_of("station", TableRequest(trials=2)) for plan in block]
+    more = [plan.task.key for block in blocks_of("station", TableRequest(trials=3)) for plan in block]
     assert more[: len(few)] == few and len(more) > len(few)
     assert len(set(more)) == len(more)
 
 
 def test_worlds_and_targets_take_turns():
     """A budget that ends early has been to every world."""
-    blocks = list(blocks_of("dynamic", Wish(trials=1)))
+    blocks = list(blocks_of("dynamic", TableRequest(trials=1)))
     assert [(block[0].world, block[0].target) for block in blocks] == [
         ("pump-tank", CORALS[0]),
         ("payload", OWN),
@@ -53,19 +62,19 @@ def test_worlds_and_targets_take_turns():
 
 def test_wishes_narrow_a_table():
     """Worlds, methods and targets by name; what cannot be flown in the world of nothing stays."""
-    wish = Wish(trials=1, worlds=("reef",), methods=("smooth",), targets=("plate",))
+    wish = TableRequest(trials=1, worlds=("reef",), methods=("smooth",), targets=("plate",))
     (block,) = blocks_of("dynamic", wish)
     assert [(plan.world, plan.method, plan.target) for plan in block] == [("reef", "smooth", "plate")]
-    (solver,) = blocks_of("solver", Wish(trials=5, worlds=("reef",)))
+    (solver,) = blocks_of("solver", TableRequest(trials=5, worlds=("reef",)))
     assert solver[0].world == NOWHERE
 
 
 @pytest.mark.parametrize(
     ("wish", "words"),
     [
-        (Wish(trials=1, worlds=("atlantis",)), "--world: 'atlantis'"),
-        (Wish(trials=1, methods=("magic",)), "--methods: 'magic'"),
-        (Wish(trials=1, targets=("unicorn",)), "--targets: 'unicorn'.*brain"),
+        (TableRequest(trials=1, worlds=("atlantis",)), "--world: 'atlantis'"),
+        (TableRequest(trials=1, methods=("magic",)), "--methods: 'magic'"),
+        (TableRequest(trials=1, targets=("unicorn",)), "--targets: 'unicorn'.*brain"),
     ],
 )
 def test_an_unknown_name_is_refused_with_what_would_do(wish, words):
@@ -76,7 +85,7 @@ def test_an_unknown_name_is_refused_with_what_would_do(wish, words):
 
 def test_the_varied_missions_of_success_are_drawn_by_the_seed_alone():
     """Both methods fly the same mission, and another seed another one."""
-    first, _, second, _ = blocks_of("success", Wish(trials=2))
+    first, _, second, _ = blocks_of("success", TableRequest(trials=2))
     missions = [
         [{k: v for k, v in plan.task.settings["fields"].items() if k.startswith("mission.")} for plan in block]
         for block in (first, second)

@@ -21,8 +21,8 @@ from wakewise_paper.wash_reduction.energy_bound import chosen, sum_of
 from wakewise_paper.wash_reduction.energy_optimum import (
     ENERGIES,
     FRESH_GUSTS,
+    AllocationJudge,
     BoundTrial,
-    Judge,
     attained,
     candidates,
     fly_bound,
@@ -51,7 +51,7 @@ class MadeUp:
 def judged(speed, least_N):
     """A flight of given least thrusts, shape (k, n), without settling, in a made-up water."""
     flown = SimpleNamespace(led=MadeUp(speed, len(least_N) - 1), vehicle=VEHICLE, judged_s=0.0)
-    return Judge.of(flown, sharings(LAYOUT, least_N))
+    return AllocationJudge.of(flown, sharings(LAYOUT, least_N))
 
 
 def heavy_flight(seconds):

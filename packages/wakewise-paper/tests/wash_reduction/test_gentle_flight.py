@@ -6,15 +6,15 @@ import pytest
 
 from wakewise.control.trim import net_buoyancy_N
 from wakewise.operation.worlds.makers import true_vehicle
-from wakewise.robot.vehicles.ballast import Block
+from wakewise.robot.vehicles.ballast import BallastBlock
 from wakewise_paper.wash_reduction.ballasted_world import ballasted_world
-from wakewise_paper.wash_reduction.flight import FIGURES, Trial, fly_trial, parts_of
+from wakewise_paper.wash_reduction.flight import FIGURES, WashTrial, fly_trial, parts_of
 
 
 @pytest.fixture(scope="module")
 def row():
     """The first seconds of braking towards the target, after settling."""
-    return fly_trial(Trial(scenario="brake/bluerov2-heavy", method="dp", seed=1, duration_s=10.0))
+    return fly_trial(WashTrial(scenario="brake/bluerov2-heavy", method="dp", seed=1, duration_s=10.0))
 
 
 def test_a_flight_gives_every_figure(row):
@@ -40,8 +40,8 @@ def test_the_camera_is_off_by_about_what_the_body_is(row):
 
 def test_a_float_changes_the_true_vehicle_alone():
     """True net buoyancy rises by the float; what is believed, and all that is drawn, stays."""
-    parts = parts_of(Trial(scenario="orbit/paper", method="dp", seed=1))
-    light = ballasted_world(parts, (Block(float_N=2.5),))
+    parts = parts_of(WashTrial(scenario="orbit/paper", method="dp", seed=1))
+    light = ballasted_world(parts, (BallastBlock(float_N=2.5),))
     before, after = true_vehicle(parts), light.world.vehicle
     assert net_buoyancy_N(after) - net_buoyancy_N(before) == pytest.approx(2.5)
     assert after.mass_kg > before.mass_kg  # foam weighs, too

@@ -3,7 +3,7 @@
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise_paper.wash_reduction.flight import TRIM, Trial, parts_of, wrong_current
+from wakewise_paper.wash_reduction.flight import TRIM, WashTrial, parts_of, wrong_current
 from wakewise_paper.wash_reduction.plan import METHODS
 from wakewise_paper.wash_reduction.scenario_files import (
     SCENARIOS,
@@ -41,12 +41,12 @@ def test_what_a_seed_draws_lies_within_its_stratum(name):
 def test_methods_and_levers_of_one_seed_meet_the_same_world():
     """Trials of one seed differ in method and control alone, in scenarios and in worlds."""
     for scenario in ("close/bluerov2-heavy", "world/mud"):
-        plain = parts_of(Trial(scenario=scenario, method="dp", seed=2))
+        plain = parts_of(WashTrial(scenario=scenario, method="dp", seed=2))
         for trial in (
-            Trial(scenario=scenario, method="wake-aware", seed=2),
-            Trial(scenario=scenario, method="wake-aware" + TRIM, seed=2),
-            Trial(scenario=scenario, method="wake-aware", seed=2, control=(("levers.drift", False),)),
-            Trial(scenario=scenario, method="wake-aware", seed=2, wrong_current=True),
+            WashTrial(scenario=scenario, method="wake-aware", seed=2),
+            WashTrial(scenario=scenario, method="wake-aware" + TRIM, seed=2),
+            WashTrial(scenario=scenario, method="wake-aware", seed=2, control=(("levers.drift", False),)),
+            WashTrial(scenario=scenario, method="wake-aware", seed=2, wrong_current=True),
         ):
             other = parts_of(trial)
             same = other.scenario.model_copy(update={"control": plain.scenario.control, "method": "dp"})

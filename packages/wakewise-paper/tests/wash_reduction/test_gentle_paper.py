@@ -4,19 +4,19 @@ import numpy as np
 
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
-from wakewise.operation.worlds.quasi_steady_world import InstantWater, paper_jets
+from wakewise.operation.worlds.quasi_steady_world import QuasiSteadyWater, paper_jets
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import coral, place_on_bed
 from wakewise.simulation.tank import TankSettings
 from wakewise.wake import wake_model
-from wakewise_paper.wash_reduction.paper import OFF, PAPER_WAKE, PaperTrial, paper_scenario
+from wakewise_paper.wash_reduction.paper import OFF, PAPER_WAKE, PaperWashTrial, paper_scenario
 
 VEHICLE = load_vehicle("paper")
 
 
 def test_its_methods_believe_in_the_papers_model_without_levers():
     """The paper's cost and its model, smoothed at the edge."""
-    control = paper_scenario(PaperTrial(method="wake-aware", seed=1)).control
+    control = paper_scenario(PaperWashTrial(method="wake-aware", seed=1)).control
     assert control.wake.model == PAPER_WAKE["model"] and not any(getattr(control.levers, name) for name in OFF)
 
 
@@ -25,7 +25,7 @@ def test_the_papers_world_is_the_papers_model():
     target = place_on_bed("branching", coral("branching", 0), 1.5)
     settings = TankSettings(current={"velocity_m_s": (0.0, 0.0, 0.0)})
     start = BodyState(X_WB=Pose(np.array([0.0, 0.0, 0.9])))
-    world = InstantWater(paper_jets(), VEHICLE, target, settings, start, np.random.default_rng(0))
+    world = QuasiSteadyWater(paper_jets(), VEHICLE, target, settings, start, np.random.default_rng(0))
     points = np.array([[0.09, 0.14, 1.2], [0.0, 0.0, 1.4]])
     assert np.all(world.speeds_m_s(points) == 0.0)
     thrusts = np.zeros(8)

@@ -34,7 +34,7 @@ _DONE, _FAILED, _KILLED = "done", "failed", "its process ended"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Listed:
+class KernelEntry:
     """A kernel as it is called from Python.
 
     Parameters
@@ -56,7 +56,7 @@ class Listed:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Warmed:
+class PrecompileResult:
     """What was done: how many kernels were compiled (or found), and what went amiss, a line each."""
 
     kernels: int
@@ -64,13 +64,13 @@ class Warmed:
 
 
 @cache
-def listed() -> tuple[Listed, ...]:
+def listed() -> tuple[KernelEntry, ...]:
     """All kernels of the list."""
     rows = json.loads(LIST.read_text(encoding="utf-8"))
-    return tuple(Listed(name=r["name"], types=tuple(r["types"]), job=r["job"], cost_s=r["cost_s"]) for r in rows)
+    return tuple(KernelEntry(name=r["name"], types=tuple(r["types"]), job=r["job"], cost_s=r["cost_s"]) for r in rows)
 
 
-def of_jobs(jobs: Iterable[str]) -> tuple[Listed, ...]:
+def of_jobs(jobs: Iterable[str]) -> tuple[KernelEntry, ...]:
     """Kernels of some jobs, those of the earliest job first.
 
     Raises
@@ -93,7 +93,7 @@ def is_warm(jobs: Sequence[str] = JOBS) -> bool:
 _tried: set[str] = set()
 
 
-class Warming:
+class BackgroundCompilation:
     """Compiling in the background, from the moment that it is made; what is there already is only read.
 
     Jobs that this process has tried before are not tried again.
@@ -109,7 +109,7 @@ class Warming:
     def __init__(self, jobs: Sequence[str] = JOBS, processes: int | None = None) -> None:
         cold = [job for job in JOBS if job in jobs and job not in _tried and not is_warm([job])]
         _tried.update(cold)
-        self._waiting: queue.SimpleQueue[Listed] = queue.SimpleQueue()
+        self._waiting: queue.SimpleQueue[KernelEntry] = queue.SimpleQueue()
         self._left = {job: len(of_jobs([job])) for job in cold}
         self._cost = {job: sum(kernel.cost_s for kernel in of_jobs([job])) for job in cold}
         self._spent = dict.fromkeys(cold, 0.0)
@@ -126,7 +126,7 @@ class Warming:
         for _ in range(count):
             threading.Thread(target=self._serve, daemon=True).start()
 
-    def wait(self, jobs: Sequence[str] = JOBS, progress: Callable[..., None] | None = None) -> Warmed:
+    def wait(self, jobs: Sequence[str] = JOBS, progress: Callable[..., None] | None = None) -> PrecompileResult:
         """Wait until some of the jobs are done; `progress` is called as `(done, total, note)`, in seconds of work."""
         try:
             with self._change:
@@ -140,7 +140,7 @@ class Warming:
             raise
         amiss = [line for job in jobs if job in JOBS for line in (self._amiss.get(job) or _noted(job))]
         failed = sum(map(len, self._amiss.values()))
-        return Warmed(
+        return PrecompileResult(
             kernels=self._total - sum(self._left.values()) - failed,
             amiss=tuple([*amiss, self._fault] if self._fault else amiss),
         )
@@ -175,13 +175,13 @@ class Warming:
                 self._running -= 1
                 self._change.notify_all()
 
-    def _next(self) -> Listed | None:
+    def _next(self) -> KernelEntry | None:
         try:
             return self._waiting.get_nowait()
         except queue.Empty:
             return None
 
-    def _finish(self, kernel: Listed, answer: str) -> None:
+    def _finish(self, kernel: KernelEntry, answer: str) -> None:
         with self._change:
             if not answer.startswith(_DONE):
                 reason = answer.removeprefix(_FAILED).strip() or _KILLED
@@ -195,7 +195,7 @@ class Warming:
 
 def warm(
     jobs: Sequence[str] = JOBS, progress: Callable[..., None] | None = None, processes: int | None = None
-) -> Warmed:
+) -> PrecompileResult:
     """Compile all kernels of some jobs, unless they are there; returns when that is done.
 
     Raises
@@ -204,10 +204,10 @@ def warm(
         If there is no job of that name.
     """
     of_jobs(jobs)
-    return Warming(jobs, processes).wait(jobs, progress)
+    return BackgroundCompilation(jobs, processes).wait(jobs, progress)
 
 
-def _asked(kernel: Listed, to: IO[str], back: IO[str]) -> str:
+def _asked(kernel: KernelEntry, to: IO[str], back: IO[str]) -> str:
     """What the process answers that was asked to compile a kernel; nothing if it is gone."""
     try:
         to.write(json.dumps({"name": kernel.name, "types": kernel.types}) + "\n")

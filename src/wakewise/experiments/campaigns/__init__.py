@@ -16,19 +16,19 @@ from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
     from wakewise.experiments.campaigns.definition import Campaign, load_campaign, planned
-    from wakewise.experiments.campaigns.engines import Engine, Processes
+    from wakewise.experiments.campaigns.engines import ProcessExecutor, TrialExecutor
     from wakewise.experiments.campaigns.run import run
-    from wakewise.experiments.campaigns.task import Outcome, Task
+    from wakewise.experiments.campaigns.task import Task, TrialOutcome
     from wakewise.experiments.campaigns.versions import FLIES, PHOTOGRAPHS
 
 __all__ = [
     "FLIES",
     "PHOTOGRAPHS",
     "Campaign",
-    "Engine",
-    "Outcome",
-    "Processes",
+    "ProcessExecutor",
     "Task",
+    "TrialExecutor",
+    "TrialOutcome",
     "load_campaign",
     "planned",
     "run",

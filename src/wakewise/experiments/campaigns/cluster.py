@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.core.optional_dependencies import need
-from wakewise.experiments.campaigns.engines import Crew, check_workers, cores, threads_each
+from wakewise.experiments.campaigns.engines import WorkerPool, check_workers, cores, threads_each
 from wakewise.experiments.campaigns.versions import source_version
 from wakewise.experiments.campaigns.worker_process import close_slots
 
@@ -38,7 +38,7 @@ CONNECT_S, WORKERS_S = 10.0, 60.0
 
 
 @dataclass(frozen=True)
-class Dask:
+class DaskExecutor:
     """Workers of a Dask cluster.
 
     Parameters
@@ -63,7 +63,7 @@ class Dask:
         check_workers(self.workers)
 
     @contextmanager
-    def crew(self, driver: Path) -> Iterator[Crew]:
+    def crew(self, driver: Path) -> Iterator[WorkerPool]:
         """Threads of the cluster's workers.
 
         Raises
@@ -93,7 +93,7 @@ class Dask:
                     )
 
             try:
-                yield Crew(executor=executor, threads=each, size=size, check=check)
+                yield WorkerPool(executor=executor, threads=each, size=size, check=check)
             finally:
                 with suppress(Exception):  # whatever a cluster raises that is going away
                     client.run(close_slots, str(driver))

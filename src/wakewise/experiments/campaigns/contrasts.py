@@ -6,17 +6,17 @@ from typing import Any
 
 from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns.definition import FACTORS
-from wakewise.experiments.campaigns.summary import Glance, Measure, Place, glance
+from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place, glance
 from wakewise.experiments.campaigns.table import Results, varied
 
 MEASURES = (
-    Measure("success", "% of models good", 100.0, False),
-    Measure("rmse_mm", "mm RMSE of the model", 1.0, True),
-    Measure("completeness_pct", "% of the surface", 1.0, False),
-    Measure("target_speed_mean_m_s", "mm/s of water at the target", 1e3, True),
-    Measure("exposure_speed_mean_m_s", "mm/s while the shutter is open", 1e3, True),
-    Measure("position_rmse_mm", "mm off the wished place", 1.0, True),
-    Measure("energy_kJ", "kJ of the thrusters", 1.0, True),
+    ComparisonMetric("success", "% of models good", 100.0, False),
+    ComparisonMetric("rmse_mm", "mm RMSE of the model", 1.0, True),
+    ComparisonMetric("completeness_pct", "% of the surface", 1.0, False),
+    ComparisonMetric("target_speed_mean_m_s", "mm/s of water at the target", 1e3, True),
+    ComparisonMetric("exposure_speed_mean_m_s", "mm/s while the shutter is open", 1e3, True),
+    ComparisonMetric("position_rmse_mm", "mm off the wished place", 1.0, True),
+    ComparisonMetric("energy_kJ", "kJ of the thrusters", 1.0, True),
 )
 """What a page judges by, as far as trials have it; the first of RMSE and the water's speed that is there leads."""
 _LEADING = ("rmse_mm", "target_speed_mean_m_s")
@@ -62,7 +62,7 @@ def places(found: Results, compare: str = "") -> list[Place]:
     return list(told)
 
 
-def measures(found: list[Place]) -> list[Measure]:
+def measures(found: list[Place]) -> list[ComparisonMetric]:
     """Those that some trial has, the leading one first."""
     known = {key for place in found for key, value in place["figures"].items() if value is not None}
     there = [measure for measure in MEASURES if measure.figure in known]
@@ -70,7 +70,7 @@ def measures(found: list[Place]) -> list[Measure]:
     return sorted(there, key=lambda measure: measure.figure != leading)
 
 
-def contest(found: list[Place]) -> list[tuple[Measure, Glance]]:
+def contest(found: list[Place]) -> list[tuple[ComparisonMetric, MethodSummary]]:
     """Each measure in each world, over the trials that all of the compared have ended."""
     worlds = dict.fromkeys(place["world"] for place in found)
     pairs = ((measure, glance(measure, world, found)) for measure in measures(found) for world in worlds)

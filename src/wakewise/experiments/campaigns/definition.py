@@ -103,7 +103,7 @@ class Campaign(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Planned:
+class PlannedTrial:
     """A trial of a campaign: the task, and where in the campaign it stands (see `FACTORS`)."""
 
     task: Task
@@ -132,7 +132,7 @@ def check_campaign(tree: Mapping[str, Any], source: str = "campaign") -> Campaig
         raise InputError(f"{source}: {describe_fault(fault, Campaign)}") from None
 
 
-def planned(campaign: Campaign, source: str = "campaign") -> list[Planned]:
+def planned(campaign: Campaign, source: str = "campaign") -> list[PlannedTrial]:
     """All trials of a campaign, seed by seed, so that one that is stopped has whole seeds of everything.
 
     Raises
@@ -197,7 +197,7 @@ def _resolved(
         raise InputError(f"{source}: {where}: {fault}") from None
 
 
-def _trial(campaign: Campaign, cell: _Cell, scenario: Scenario, outside: dict[str, str], seed: int) -> Planned:
+def _trial(campaign: Campaign, cell: _Cell, scenario: Scenario, outside: dict[str, str], seed: int) -> PlannedTrial:
     factors: dict[str, str | int] = {**cell.names, "seed": seed}
     settings: dict[str, Any] = {
         "scenario": scenario.model_copy(update={"seed": seed, "name": campaign.name}).model_dump(mode="json"),
@@ -207,7 +207,7 @@ def _trial(campaign: Campaign, cell: _Cell, scenario: Scenario, outside: dict[st
         settings["outside"] = outside
     shown = [str(value) for key, value in factors.items() if _tells_apart(campaign, key)]
     task = Task(name="/".join(shown), work=_WORK[campaign.stages], settings=settings, sources=_SOURCES[campaign.stages])
-    return Planned(task=task, factors=factors)
+    return PlannedTrial(task=task, factors=factors)
 
 
 def _tells_apart(campaign: Campaign, factor: str) -> bool:

@@ -17,7 +17,7 @@ MOST_WORKERS = 1024
 
 
 @dataclass(frozen=True, kw_only=True)
-class Crew:
+class WorkerPool:
     """Those who work.
 
     Parameters
@@ -39,7 +39,7 @@ class Crew:
     check: Callable[[], None]
 
 
-class Engine(Protocol):
+class TrialExecutor(Protocol):
     """Gives a crew for the length of a block."""
 
     @property
@@ -47,13 +47,13 @@ class Engine(Protocol):
         """Of the engine, as the command line knows it."""
         ...
 
-    def crew(self, driver: Path) -> AbstractContextManager[Crew]:
+    def crew(self, driver: Path) -> AbstractContextManager[WorkerPool]:
         """Workers that see the driver's file, in the campaign's folder; leaving the block ends their processes."""
         ...
 
 
 @dataclass(frozen=True)
-class Processes:
+class ProcessExecutor:
     """Processes of this computer, started anew (no forks), each of which makes one trial after the other.
 
     Parameters
@@ -73,12 +73,12 @@ class Processes:
         check_workers(self.workers)
 
     @contextmanager
-    def crew(self, driver: Path) -> Iterator[Crew]:
+    def crew(self, driver: Path) -> Iterator[WorkerPool]:
         """Threads that each mind one process."""
         workers = self.workers or cores()
         executor = ThreadPoolExecutor(workers, thread_name_prefix="campaign")
         try:
-            yield Crew(
+            yield WorkerPool(
                 executor=executor,
                 threads=threads_each(cores(), workers),
                 size=lambda: workers,

@@ -17,7 +17,7 @@ import polars as pl
 
 from wakewise.core.files import whole_file
 from wakewise.experiments.campaigns.task import Figures, WorkProgress
-from wakewise.experiments.trials.metrics import UNITS, Gathering
+from wakewise.experiments.trials.metrics import UNITS, MetricsCollector
 from wakewise.experiments.trials.reference_values import add_yardsticks
 from wakewise.operation import Scenario, fly
 from wakewise.operation.flight_log import timings_of
@@ -36,7 +36,7 @@ def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress)
     began, worked = time.monotonic(), time.process_time()
     flight = fly(scenario_of(settings), progress=progress)
     judged = flight.steps.filter(pl.col("leg") != SETTLING)
-    gathering = Gathering()
+    gathering = MetricsCollector()
     gathering.add(flight_figures(judged))
     add_yardsticks(gathering, flight.parts, judged)
     solve_ms = timings_of(flight.recorder.log.frame().lazy())["solve_ms"].to_numpy()

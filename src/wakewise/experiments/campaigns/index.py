@@ -18,7 +18,7 @@ import polars as pl
 from wakewise.core.files import whole_file
 from wakewise.experiments.campaigns import attempt_log
 from wakewise.experiments.campaigns.attempt_log import ATTEMPTS, Attempts, read_attempts
-from wakewise.experiments.campaigns.store import FIGURES, Store, read_figures
+from wakewise.experiments.campaigns.store import FIGURES, CampaignStore, read_figures
 from wakewise.experiments.campaigns.task import Figure
 
 INDEX = "index.parquet"
@@ -38,7 +38,7 @@ _Stamp = tuple[int, int, int]
 
 
 @dataclass(frozen=True)
-class Listed:
+class IndexEntry:
     """A trial of a folder: its figures, if it is finished, and its attempts."""
 
     key: str
@@ -47,11 +47,11 @@ class Listed:
     attempts: Attempts
 
 
-def listing(store: Store) -> dict[str, Listed]:
+def listing(store: CampaignStore) -> dict[str, IndexEntry]:
     """All trials that were ever begun, by key; what the cache lacks is read from the trials' folders and added."""
     stamps = _stamps(store.trials)
     known = _read(store.folder / INDEX)
-    found: dict[str, Listed] = {}
+    found: dict[str, IndexEntry] = {}
     fresh = len(known) != len(stamps)
     for key, stamp in stamps.items():
         kept = known.get(key)
@@ -84,12 +84,14 @@ def _stamps(trials: Path) -> dict[str, _Stamp]:
     return found
 
 
-def _look(place: Path) -> Listed:
+def _look(place: Path) -> IndexEntry:
     kept = read_figures(place)
-    return Listed(place.name, None if kept is None else kept[0], 0.0 if kept is None else kept[1], read_attempts(place))
+    return IndexEntry(
+        place.name, None if kept is None else kept[0], 0.0 if kept is None else kept[1], read_attempts(place)
+    )
 
 
-def _read(path: Path) -> dict[str, tuple[_Stamp, Listed]]:
+def _read(path: Path) -> dict[str, tuple[_Stamp, IndexEntry]]:
     """What the cache holds; nothing if it cannot be read."""
     try:
         table = pl.read_parquet(path)
@@ -105,7 +107,7 @@ def _stamp_of(row: dict[str, object]) -> _Stamp:
     return int(str(row["figures_ns"])), int(str(row["figures_bytes"])), int(str(row["attempts_bytes"]))
 
 
-def _listed_of(row: dict[str, object]) -> Listed:
+def _listed_of(row: dict[str, object]) -> IndexEntry:
     figures, how = row["figures"], row["how"]
     told = Attempts(
         begun=int(str(row["begun"])),
@@ -113,12 +115,12 @@ def _listed_of(row: dict[str, object]) -> Listed:
         how=attempt_log.how_of(how),
         reason=None if row["reason"] is None else str(row["reason"]),
     )
-    return Listed(
+    return IndexEntry(
         str(row["key"]), None if figures is None else json.loads(str(figures)), float(str(row["took_s"])), told
     )
 
 
-def _write(path: Path, rows: Iterable[tuple[_Stamp, Listed]]) -> None:
+def _write(path: Path, rows: Iterable[tuple[_Stamp, IndexEntry]]) -> None:
     table = pl.DataFrame(
         [
             (

@@ -11,7 +11,7 @@ from typing import Any
 
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_json
-from wakewise.experiments.campaigns.definition import Campaign, Planned
+from wakewise.experiments.campaigns.definition import Campaign, PlannedTrial
 from wakewise.experiments.campaigns.store import read_store
 from wakewise.experiments.campaigns.versions import source_version
 
@@ -19,7 +19,7 @@ PLAN = "plan.json"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entry:
+class PlanEntry:
     """A trial of the plan."""
 
     key: str
@@ -28,7 +28,7 @@ class Entry:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class CampaignPlan:
     """What a campaign's folder was made for.
 
     Parameters
@@ -40,17 +40,17 @@ class Plan:
         Version of the package.
     sources : str
         Hash of the sources that matter.
-    trials : tuple of Entry
+    trials : tuple of PlanEntry
     """
 
     name: str
     campaign: Mapping[str, Any]
     wakewise: str
     sources: str
-    trials: tuple[Entry, ...]
+    trials: tuple[PlanEntry, ...]
 
 
-def keep_plan(folder: Path, campaign: Campaign, trials: Sequence[Planned]) -> None:
+def keep_plan(folder: Path, campaign: Campaign, trials: Sequence[PlannedTrial]) -> None:
     """Write the plan into a campaign's folder, in place of an earlier one of the same version.
 
     Raises
@@ -76,7 +76,7 @@ def keep_plan(folder: Path, campaign: Campaign, trials: Sequence[Planned]) -> No
     write_json(folder / PLAN, told, lasting=True)
 
 
-def read_plan(folder: Path) -> Plan:
+def read_plan(folder: Path) -> CampaignPlan:
     """The plan of a campaign's folder.
 
     Raises
@@ -88,8 +88,8 @@ def read_plan(folder: Path) -> Plan:
     path = folder / PLAN
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
-        trials = tuple(Entry(key=one["key"], name=one["name"], factors=one["factors"]) for one in told["trials"])
-        return Plan(
+        trials = tuple(PlanEntry(key=one["key"], name=one["name"], factors=one["factors"]) for one in told["trials"])
+        return CampaignPlan(
             name=told["name"],
             campaign=told["campaign"],
             wakewise=told["wakewise"],

@@ -21,13 +21,13 @@ from pathlib import Path
 from wakewise.core.errors import FULL, InputError
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.experiments.campaigns import attempt_log, trial_lock
-from wakewise.experiments.campaigns.engines import Crew, Engine
+from wakewise.experiments.campaigns.engines import TrialExecutor, WorkerPool
 from wakewise.experiments.campaigns.index import listing
-from wakewise.experiments.campaigns.store import Store, open_store, told_if_full
-from wakewise.experiments.campaigns.task import Outcome, Task
+from wakewise.experiments.campaigns.store import CampaignStore, open_store, told_if_full
+from wakewise.experiments.campaigns.task import Task, TrialOutcome
 from wakewise.experiments.campaigns.versions import source_version
-from wakewise.experiments.campaigns.worker import Ticket
-from wakewise.experiments.campaigns.worker_process import Report, attempt
+from wakewise.experiments.campaigns.worker import AttemptRequest
+from wakewise.experiments.campaigns.worker_process import AttemptReport, attempt
 
 DRIVERS = ".drivers"
 _LOOK_S = 0.2
@@ -52,7 +52,7 @@ def never() -> bool:
 def run(
     tasks: Sequence[Task],
     folder: Path,
-    engine: Engine,
+    engine: TrialExecutor,
     *,
     timeout_s: float | None = None,
     memory_MB: float | None = None,
@@ -61,7 +61,7 @@ def run(
     stop: Callable[[], bool] = never,
     until: float | None = None,
     again: bool = False,
-) -> list[Outcome]:
+) -> list[TrialOutcome]:
     """Make what is missing of some trials.
 
     Parameters
@@ -70,7 +70,7 @@ def run(
         One outcome each, in this order; those of one key are made once.
     folder : Path
         The campaign's, made if it is not there; with a Dask cluster, one that all of its computers see.
-    engine : Engine
+    engine : TrialExecutor
     timeout_s, memory_MB : float, optional
         An attempt that takes longer, or whose processes take more memory, is ended.
     retries : int
@@ -122,7 +122,7 @@ class _Driver:
 
     def __init__(
         self,
-        store: Store,
+        store: CampaignStore,
         tasks: Sequence[Task],
         timeout_s: float | None,
         memory_MB: float | None,
@@ -134,7 +134,7 @@ class _Driver:
         self._store, self._retries, self._progress = store, retries, progress
         self._timeout_s, self._memory_MB = timeout_s, memory_MB
         self._until = math.inf if until is None else until
-        self._done: dict[str, Outcome] = {}
+        self._done: dict[str, TrialOutcome] = {}
         self._held: dict[str, _Held] = {}
         self._abandoned: dict[str, int | None] = {}
         self._met: Counter[str] = Counter()  # failures of the computer, by trial
@@ -154,7 +154,7 @@ class _Driver:
                 self.pending.append(task)
                 continue
             told = kept.attempts
-            self._done[key] = Outcome(
+            self._done[key] = TrialOutcome(
                 task=task,
                 figures=kept.figures,
                 reason=None if kept.figures is not None else told.reason,
@@ -163,9 +163,9 @@ class _Driver:
                 known=True,
             )
 
-    def work(self, crew: Crew, driver: Path, stop: Callable[[], bool]) -> None:
+    def work(self, crew: WorkerPool, driver: Path, stop: Callable[[], bool]) -> None:
         """Hand out what is pending until nothing is left, `stop` says so or the time is over."""
-        futures: dict[Future[Report], Task] = {}
+        futures: dict[Future[AttemptReport], Task] = {}
         try:
             self._tell(crew, None)
             while (self.pending or self._held or futures) and not (stop() or time.monotonic() > self._until):
@@ -184,11 +184,11 @@ class _Driver:
             for future in futures:
                 future.cancel()
 
-    def outcomes(self, tasks: Sequence[Task]) -> list[Outcome]:
+    def outcomes(self, tasks: Sequence[Task]) -> list[TrialOutcome]:
         """What became of each."""
         return [self._done.get(task.key) or self._store.outcome(task) for task in tasks]
 
-    def _hand_out(self, task: Task, crew: Crew, driver: Path, futures: dict[Future[Report], Task]) -> None:
+    def _hand_out(self, task: Task, crew: WorkerPool, driver: Path, futures: dict[Future[AttemptReport], Task]) -> None:
         """Have a trial made, unless another process has made it or is at it."""
         key, place = task.key, self._store.place(task.key)
         if self._is_settled(task):
@@ -198,7 +198,7 @@ class _Driver:
         if holder is not None and not holder.is_gone and (left is None or left != beat):
             self._held[key] = _Held(task, beat, time.monotonic())
             return
-        ticket = Ticket(
+        ticket = AttemptRequest(
             place=str(place.resolve()),
             trial=task.plain(),
             timeout_s=self._timeout_s,
@@ -210,14 +210,14 @@ class _Driver:
         )
         futures[crew.executor.submit(attempt, ticket, crew.threads)] = task
 
-    def _take_back(self, task: Task, future: Future[Report], crew: Crew) -> None:
+    def _take_back(self, task: Task, future: Future[AttemptReport], crew: WorkerPool) -> None:
         """What came of an attempt."""
         key = task.key
         try:
             report = future.result()
         except (Exception, CancelledError) as fault:  # the engine lost its worker, with whatever exception it has
             crew.check()
-            report = Report(key=key, how="died", reason=" ".join(f"{type(fault).__name__}: {fault}".split()))
+            report = AttemptReport(key=key, how="died", reason=" ".join(f"{type(fault).__name__}: {fault}".split()))
             place = self._store.place(key)
             place.mkdir(parents=True, exist_ok=True)
             attempt_log.end(place, "died", report.reason, 0.0)
@@ -263,7 +263,7 @@ class _Driver:
             if not self._is_settled(held.task):
                 self.pending.append(held.task)
 
-    def _tell(self, crew: Crew, note: str | None) -> None:
+    def _tell(self, crew: WorkerPool, note: str | None) -> None:
         done = len(self._done)
         failed = sum(outcome.figures is None for outcome in self._done.values())
         words = f"{failed} failed; " if failed else ""
@@ -291,12 +291,12 @@ def _driver_file(folder: Path) -> Iterator[Path]:
             path.unlink(missing_ok=True)
 
 
-def living_drivers(folder: Path) -> list[trial_lock.Holder]:
+def living_drivers(folder: Path) -> list[trial_lock.LockHolder]:
     """Drivers that are at a campaign; files of those that are gone are removed."""
     found = []
     for path in sorted((folder / DRIVERS).glob("*.json")):
         try:
-            holder = trial_lock.Holder(**json.loads(path.read_text(encoding="utf-8")))
+            holder = trial_lock.LockHolder(**json.loads(path.read_text(encoding="utf-8")))
         except (OSError, ValueError, TypeError):
             continue
         if holder.is_gone:

@@ -21,7 +21,7 @@ from typing import Any
 from wakewise.core.errors import FULL, EnvironmentFailure, InputError, is_full
 from wakewise.core.files import write_json
 from wakewise.experiments.campaigns import attempt_log
-from wakewise.experiments.campaigns.task import Figure, Outcome, Task
+from wakewise.experiments.campaigns.task import Figure, Task, TrialOutcome
 
 FORMAT = 1
 """Of the folder; another one is refused."""
@@ -31,7 +31,7 @@ _STORE, _TRIALS = "store.json", "trials"
 
 
 @dataclass(frozen=True)
-class Store:
+class CampaignStore:
     """A campaign's folder; make one with `open_store`."""
 
     folder: Path
@@ -50,17 +50,17 @@ class Store:
         kept = read_figures(self.place(key))
         return None if kept is None else kept[0]
 
-    def outcome(self, task: Task, known: bool = False) -> Outcome:
+    def outcome(self, task: Task, known: bool = False) -> TrialOutcome:
         """What has become of a trial so far."""
         place = self.place(task.key)
         kept = read_figures(place)
         told = attempt_log.read_attempts(place)
         if kept is not None:
-            return Outcome(
+            return TrialOutcome(
                 task=task, figures=kept[0], attempts=max(1, told.begun), took_s=kept[1], known=known, how="done"
             )
         reason, begun = told.reason or "not finished", told.begun
-        return Outcome(
+        return TrialOutcome(
             task=task, figures=None, reason=reason, attempts=begun, took_s=told.took_s, known=known, how=told.how
         )
 
@@ -70,7 +70,7 @@ class Store:
         shutil.rmtree(self.place(key), ignore_errors=True)
 
 
-def open_store(folder: Path) -> Store:
+def open_store(folder: Path) -> CampaignStore:
     """The store in a folder, which is made if it is not there.
 
     Raises
@@ -91,7 +91,7 @@ def open_store(folder: Path) -> Store:
     return read_store(folder)
 
 
-def read_store(folder: Path) -> Store:
+def read_store(folder: Path) -> CampaignStore:
     """The store that is in a folder.
 
     Raises
@@ -108,7 +108,7 @@ def read_store(folder: Path) -> Store:
         raise InputError(f"{path}: cannot be read, must say the format of the campaign's folder") from None
     if told != FORMAT:
         raise InputError(f"{folder}: results of format {told}, this Wakewise reads {FORMAT}; give another --out")
-    return Store(folder)
+    return CampaignStore(folder)
 
 
 @contextmanager

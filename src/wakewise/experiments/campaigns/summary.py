@@ -24,7 +24,7 @@ FEWEST = 6
 """Pairs from which on a difference can be sure: five all agree by chance alone once in sixteen times."""
 
 
-class Measure(NamedTuple):
+class ComparisonMetric(NamedTuple):
     """A figure that methods are judged by, its unit in words, the factor to that, and whether less is better."""
 
     figure: str
@@ -34,7 +34,7 @@ class Measure(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Glance:
+class MethodSummary:
     """Methods in one world in a few words.
 
     `means` are in the unit of `words`, worst last; `less_pct` is how much better the winner is than `rival`, the best
@@ -76,7 +76,7 @@ class Glance:
         return "sure, the interval does not hold zero"
 
 
-def glance(measure: Measure, world: str, places: Sequence[Place]) -> Glance | None:
+def glance(measure: ComparisonMetric, world: str, places: Sequence[Place]) -> MethodSummary | None:
     """Methods in one world; None where no seed was flown by all."""
     figure, words, scale, less = measure
     here = [place for place in places if place["world"] == world]
@@ -112,7 +112,7 @@ def glance(measure: Measure, world: str, places: Sequence[Place]) -> Glance | No
         told["improvement"] = probability_of_improvement(*groups, less_is_better=less)[0]
         told["energy_ratio"] = _ratio(here, "energy_kJ", winner, rival, both)
         told["silt_ratio"] = _ratio(here, "ray_optical_depth", winner, rival, both)
-    return Glance(
+    return MethodSummary(
         world=world,
         figure=figure,
         words=words,
@@ -139,7 +139,7 @@ def _ratio(
     return sums[0] / sums[1] if sums[1] > 0.0 else None
 
 
-def worst_trials(measure: Measure, world: str, places: Sequence[Place]) -> dict[str, Place]:
+def worst_trials(measure: ComparisonMetric, world: str, places: Sequence[Place]) -> dict[str, Place]:
     """The worst trial of each method in a world: one that failed, else the one with the worst figure."""
     figure, _, _, less = measure
 

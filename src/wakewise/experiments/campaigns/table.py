@@ -17,10 +17,10 @@ from wakewise.experiments.campaigns import trial_lock
 from wakewise.experiments.campaigns.attempt_log import FINAL, TRIED, Attempts
 from wakewise.experiments.campaigns.definition import FACTORS
 from wakewise.experiments.campaigns.index import listing
-from wakewise.experiments.campaigns.plan import Entry, Plan, read_plan
+from wakewise.experiments.campaigns.plan import CampaignPlan, PlanEntry, read_plan
 from wakewise.experiments.campaigns.run import living_drivers
 from wakewise.experiments.campaigns.statistics import stratified_bootstrap, wilson
-from wakewise.experiments.campaigns.store import Store, read_store
+from wakewise.experiments.campaigns.store import CampaignStore, read_store
 from wakewise.experiments.campaigns.task import Figure
 
 State = Literal["done", "failed", "running", "waiting"]
@@ -39,10 +39,10 @@ HEADLINES = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Made:
+class TrialRecord:
     """A trial of a campaign and what has become of it."""
 
-    entry: Entry
+    entry: PlanEntry
     state: State
     figures: Mapping[str, Figure]
     reason: str | None
@@ -54,8 +54,8 @@ class Made:
 class Results:
     """A campaign's plan and all of its trials."""
 
-    plan: Plan
-    made: tuple[Made, ...]
+    plan: CampaignPlan
+    made: tuple[TrialRecord, ...]
     drivers: int
     others: int
     """Trials in the folder that are not the plan's any more."""
@@ -84,7 +84,9 @@ def results(folder: Path) -> Results:
         figures = kept.figures if kept is not None and kept.figures is not None else {}
         reason = told.reason if state in ("failed", "waiting") else None
         took_s = kept.took_s if kept is not None and done else told.took_s
-        made.append(Made(entry=entry, state=state, figures=figures, reason=reason, attempts=told.begun, took_s=took_s))
+        made.append(
+            TrialRecord(entry=entry, state=state, figures=figures, reason=reason, attempts=told.begun, took_s=took_s)
+        )
     keys = {entry.key for entry in plan.trials}
     return Results(
         plan=plan, made=tuple(made), drivers=len(living_drivers(folder)), others=sum(key not in keys for key in listed)
@@ -121,7 +123,7 @@ def failures(found: Results) -> list[dict[str, Any]]:
     ]
 
 
-def varied(plan: Plan) -> tuple[str, ...]:
+def varied(plan: CampaignPlan) -> tuple[str, ...]:
     """Factors that differ in a campaign, seeds aside: what its table is grouped by if not told otherwise."""
     return tuple(
         factor
@@ -150,7 +152,7 @@ def group_table(found: Results, by: Sequence[str] = (), figures: Sequence[str] =
         if known and name not in known:
             raise InputError(f"--figures: '{name}' is in no trial, allowed: {', '.join(known)}")
     wished = tuple(figures) or tuple(name for name in HEADLINES if name in known)
-    groups: dict[tuple[str | int, ...], list[Made]] = {}
+    groups: dict[tuple[str | int, ...], list[TrialRecord]] = {}
     for one in found.made:
         groups.setdefault(tuple(one.entry.factors.get(name, "") for name in by), []).append(one)
     rows = []
@@ -196,7 +198,7 @@ def _as_text(words: pl.Expr) -> pl.Expr:
     return pl.when(words.str.contains("^[=+@\t\r-]")).then("'" + words).otherwise(words).name.keep()
 
 
-def _state(store: Store, key: str, told: Attempts) -> State:
+def _state(store: CampaignStore, key: str, told: Attempts) -> State:
     """Where a trial is that has no figures."""
     holder = trial_lock.holder_of(store.place(key)) if told.begun else None
     if holder is not None and not holder.is_gone:
@@ -204,7 +206,7 @@ def _state(store: Store, key: str, told: Attempts) -> State:
     return "failed" if told.how in (*FINAL, *TRIED) else "waiting"
 
 
-def _mean(name: str, members: Sequence[Made], by: Sequence[str]) -> dict[str, Any]:
+def _mean(name: str, members: Sequence[TrialRecord], by: Sequence[str]) -> dict[str, Any]:
     """Mean of a figure over the trials that have it, with its interval."""
     known = [(one, value) for one in members if isinstance(value := one.figures.get(name), (int, float))]
     if not known:
@@ -217,7 +219,7 @@ def _mean(name: str, members: Sequence[Made], by: Sequence[str]) -> dict[str, An
     return {"mean": mean, "low": interval.low, "high": interval.high, "n": len(known)}
 
 
-def _share(name: str, members: Sequence[Made]) -> dict[str, Any]:
+def _share(name: str, members: Sequence[TrialRecord]) -> dict[str, Any]:
     """Share of trials that have it, of those that ended: one that failed has not."""
     ended = [one for one in members if one.state in ("done", "failed")]
     if not ended:

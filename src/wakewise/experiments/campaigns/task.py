@@ -81,7 +81,7 @@ class Task:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class TrialOutcome:
     """What became of a trial: its figures, or the reason that there are none.
 
     Parameters

@@ -23,7 +23,7 @@ _TAKING_OVER = ".taking-over"
 
 
 @dataclass(frozen=True)
-class Holder:
+class LockHolder:
     """A process: where, in which run of that computer, its number, and when it started (kernel ticks; 0 unknown)."""
 
     host: str
@@ -42,15 +42,15 @@ class Holder:
         return self.is_here and (self.boot != boot_id() or not is_running(self.pid, self.start))
 
 
-def this_process() -> Holder:
+def this_process() -> LockHolder:
     """The one that asks."""
-    return Holder(_host(), boot_id(), os.getpid(), start_of(os.getpid()))
+    return LockHolder(_host(), boot_id(), os.getpid(), start_of(os.getpid()))
 
 
-def holder_of(folder: Path) -> Holder | None:
+def holder_of(folder: Path) -> LockHolder | None:
     """Who has claimed a trial's folder; None if nobody has, or if the claim cannot be read."""
     try:
-        return Holder(**json.loads((folder / CLAIM).read_text(encoding="utf-8")))
+        return LockHolder(**json.loads((folder / CLAIM).read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
         return None
 

@@ -35,7 +35,7 @@ _PACKAGES = ("wakewise", "numpy", "scipy", "numba", "pycolmap", "embreex", "smal
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ticket:
+class AttemptRequest:
     """One attempt to be made at a trial.
 
     Parameters
@@ -67,7 +67,7 @@ class Ticket:
 
 
 def work_on(
-    ticket: Ticket, send: WorkProgress, quiet: bool = True, begun: Callable[[], None] = lambda: None
+    ticket: AttemptRequest, send: WorkProgress, quiet: bool = True, begun: Callable[[], None] = lambda: None
 ) -> dict[str, Any]:
     """Make one attempt in this process, and say how it ended: `how` (or "held", "known"), `reason`, `took_s`.
 
@@ -103,7 +103,7 @@ def work_on(
                 trial_lock.release(place)
 
 
-def _tried(ticket: Ticket, place: Path, send: WorkProgress, quiet: bool) -> dict[str, Any]:
+def _tried(ticket: AttemptRequest, place: Path, send: WorkProgress, quiet: bool) -> dict[str, Any]:
     """The work itself, and what came of it."""
     began = time.monotonic()
     try:
@@ -124,7 +124,7 @@ def _tried(ticket: Ticket, place: Path, send: WorkProgress, quiet: bool) -> dict
     return {"how": "done", "reason": None}
 
 
-def _check_version(ticket: Ticket) -> None:
+def _check_version(ticket: AttemptRequest) -> None:
     """Refuse to make a trial with other sources than its key says."""
     here = source_version(tuple(ticket.trial["sources"]))
     if ticket.version and here != ticket.version:
@@ -207,7 +207,7 @@ def _main() -> None:
 
     threading.Thread(target=listen, daemon=True).start()
     while True:
-        ticket = Ticket(**json.loads(tickets.get()))
+        ticket = AttemptRequest(**json.loads(tickets.get()))
         tell({"report": work_on(ticket, send, begun=lambda: tell({"begun": True}))})
 
 

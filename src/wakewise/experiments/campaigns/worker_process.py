@@ -23,7 +23,7 @@ from typing import Any
 from wakewise.experiments.campaigns import attempt_log, trial_lock
 from wakewise.experiments.campaigns.memory import memory_MB
 from wakewise.experiments.campaigns.store import LOG
-from wakewise.experiments.campaigns.worker import Ticket
+from wakewise.experiments.campaigns.worker import AttemptRequest
 
 _LOOK_S = 0.1
 _ASK_S, _BEAT_S = 0.5, 10.0
@@ -39,7 +39,7 @@ _THREADS = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report:
+class AttemptReport:
     """How an attempt ended: one of `attempts.How`, "held" (another process is at it) or "known" (it was finished)."""
 
     key: str
@@ -48,7 +48,7 @@ class Report:
     took_s: float = 0.0
 
 
-class Slot:
+class TrialProcess:
     """One process, started when there is something to do.
 
     Parameters
@@ -63,14 +63,14 @@ class Slot:
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._closed = False
 
-    def attempt(self, ticket: Ticket) -> Report:
+    def attempt(self, ticket: AttemptRequest) -> AttemptReport:
         """Make one attempt; returns when it has ended, whichever way."""
         key, place = ticket.trial["key"], Path(ticket.place)
         process = self._ready(ticket.cwd)
         began = asked = beaten = time.monotonic()
         limit_s = _START_S
 
-        def ended(how: attempt_log.How, reason: str | None = None) -> Report:
+        def ended(how: attempt_log.How, reason: str | None = None) -> AttemptReport:
             return self._ended(process, place, key, how, began, reason)
 
         try:
@@ -89,7 +89,7 @@ class Slot:
                     began = time.monotonic()
                     limit_s = ticket.timeout_s if ticket.timeout_s is not None else math.inf
                 if "report" in told:
-                    return Report(key=key, **told["report"])
+                    return AttemptReport(key=key, **told["report"])
             now = time.monotonic()
             if now - began > limit_s:
                 return ended("late", f"took longer than {limit_s:g} s")
@@ -139,7 +139,7 @@ class Slot:
         how: attempt_log.How,
         began: float,
         reason: str | None,
-    ) -> Report:
+    ) -> AttemptReport:
         """End the process and note how; what it had claimed is free for others then."""
         _kill(process)
         if how == "died":
@@ -149,17 +149,17 @@ class Slot:
         if holder is not None and holder.pid == process.pid and holder.is_here:  # else it had not begun, or was done
             with suppress(OSError):
                 attempt_log.end(place, how, reason, took_s)
-        return Report(key=key, how=how, reason=reason, took_s=took_s)
+        return AttemptReport(key=key, how=how, reason=reason, took_s=took_s)
 
 
-_slots: dict[tuple[str, int], Slot] = {}
+_slots: dict[tuple[str, int], TrialProcess] = {}
 
 
-def attempt(ticket: Ticket, threads: int) -> Report:
+def attempt(ticket: AttemptRequest, threads: int) -> AttemptReport:
     """Make one attempt in the slot that this thread has for the ticket's driver: what executors are handed."""
     mine = (ticket.driver, threading.get_ident())
     if mine not in _slots:
-        _slots[mine] = Slot(threads)
+        _slots[mine] = TrialProcess(threads)
     return _slots[mine].attempt(ticket)
 
 

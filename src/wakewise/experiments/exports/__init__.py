@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from wakewise.experiments.exports.colmap import write_colmap
     from wakewise.experiments.exports.colmap_points import read_points
     from wakewise.experiments.exports.nerfstudio import write_nerfstudio
-    from wakewise.experiments.exports.qgc_plan import Origin, write_plan
-    from wakewise.experiments.exports.records import Cloud, Photographs, Telemetry, Track
+    from wakewise.experiments.exports.qgc_plan import GeodeticOrigin, write_plan
+    from wakewise.experiments.exports.records import Photographs, SparsePoints, ThrustRecord, Trajectory
     from wakewise.experiments.exports.rosbag2 import write_bag
     from wakewise.experiments.exports.tum import write_tum
 
 __all__ = [
-    "Cloud",
-    "Origin",
+    "GeodeticOrigin",
     "Photographs",
-    "Telemetry",
-    "Track",
+    "SparsePoints",
+    "ThrustRecord",
+    "Trajectory",
     "read_points",
     "tam_yaml",
     "write_bag",

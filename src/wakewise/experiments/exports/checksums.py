@@ -16,7 +16,7 @@ _CHUNK = 1 << 20
 
 
 @dataclass(frozen=True)
-class Difference:
+class ChecksumMismatch:
     """A file that is not as it was, and in what."""
 
     path: str
@@ -69,15 +69,15 @@ def read_sums(path: Path) -> dict[str, str]:
 
 def differences(
     folder: Path, sums: Mapping[str, str], known: frozenset[str], progress: Callable[[int, int, str], None]
-) -> list[Difference]:
+) -> list[ChecksumMismatch]:
     """Files that are missing, changed, or there without a check sum; `known` ones need none."""
     found = []
     for number, (name, wanted) in enumerate(sorted(sums.items())):
         progress(number, len(sums), name)
         path = folder / name
         if not path.is_file():
-            found.append(Difference(name, "missing"))
+            found.append(ChecksumMismatch(name, "missing"))
         elif sha256_of(path) != wanted:
-            found.append(Difference(name, "changed"))
+            found.append(ChecksumMismatch(name, "changed"))
     here = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()}
-    return found + [Difference(name, "not in the list") for name in sorted(here - set(sums) - known)]
+    return found + [ChecksumMismatch(name, "not in the list") for name in sorted(here - set(sums) - known)]

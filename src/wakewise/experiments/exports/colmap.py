@@ -16,7 +16,7 @@ import numpy as np
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.geometry import Pose
 from wakewise.experiments.exports.colmap_points import OBSERVATION
-from wakewise.experiments.exports.records import Cloud, Photographs
+from wakewise.experiments.exports.records import Photographs, SparsePoints
 
 _OPENCV = 4  # COLMAP's number of the camera model
 _NONE = (np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
@@ -37,7 +37,7 @@ class _Model:
     errors_px: Array
 
 
-def write_colmap(folder: Path, photographs: Photographs, cloud: Cloud | None = None) -> int:
+def write_colmap(folder: Path, photographs: Photographs, cloud: SparsePoints | None = None) -> int:
     """Write images/, sparse/0/ (binary) and sparse_text/ into a folder that is there and empty.
 
     Returns how many observations of points it holds. Errors of points are those of the poses and the camera written
@@ -52,7 +52,7 @@ def write_colmap(folder: Path, photographs: Photographs, cloud: Cloud | None = N
     return sum(map(len, model.points))
 
 
-def _model(photographs: Photographs, cloud: Cloud | None) -> _Model:
+def _model(photographs: Photographs, cloud: SparsePoints | None) -> _Model:
     track = photographs.track
     inverses = [Pose(p, q).inverse() for p, q in zip(track.p_W_m, track.q, strict=True)]
     count = 0 if cloud is None else len(cloud.points_W_m)
@@ -85,7 +85,7 @@ def _projected(points_C_m: Array, params: Array) -> Array:
     return np.column_stack([fx * u + cx, fy * v + cy])
 
 
-def _write_binary(folder: Path, photographs: Photographs, model: _Model, cloud: Cloud | None) -> None:
+def _write_binary(folder: Path, photographs: Photographs, model: _Model, cloud: SparsePoints | None) -> None:
     folder.mkdir(parents=True)
     size = (photographs.width, photographs.height)
     (folder / "cameras.bin").write_bytes(struct.pack("<QIiQQ8d", 1, 1, _OPENCV, *size, *photographs.params))
@@ -106,7 +106,7 @@ def _write_binary(folder: Path, photographs: Photographs, model: _Model, cloud: 
                 file.write(head + track.tobytes())
 
 
-def _write_text(folder: Path, photographs: Photographs, model: _Model, cloud: Cloud | None) -> None:
+def _write_text(folder: Path, photographs: Photographs, model: _Model, cloud: SparsePoints | None) -> None:
     folder.mkdir(parents=True)
     camera = f"1 OPENCV {photographs.width} {photographs.height} {_numbers(photographs.params)}\n"
     (folder / "cameras.txt").write_text(f"# CAMERA_ID MODEL WIDTH HEIGHT PARAMS\n{camera}", encoding="utf-8")

@@ -9,7 +9,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.errors import InputError
-from wakewise.experiments.exports.records import Cloud
+from wakewise.experiments.exports.records import SparsePoints
 
 _POINT = struct.Struct("<Q3d3BdQ")
 _IMAGE = struct.Struct("<I7dI")
@@ -17,7 +17,7 @@ OBSERVATION = np.dtype([("pixel", "<f8", 2), ("point", "<u8")])
 """What images.bin holds of each observation; its point is the largest number where it belongs to none."""
 
 
-def read_points(path: Path) -> Cloud:
+def read_points(path: Path) -> SparsePoints:
     """Points, colours and errors of a points3D.bin, and where photographs saw them if images.bin lies beside it.
 
     Raises
@@ -39,7 +39,7 @@ def read_points(path: Path) -> Cloud:
     except struct.error:
         raise InputError(f"{path}: ends before the points that it promises; reconstruct the trial anew") from None
     beside = path.with_name("images.bin")
-    return Cloud(
+    return SparsePoints(
         points_W_m=np.array(points, dtype=np.float64).reshape(-1, 3),
         colours=np.array(colours, dtype=np.uint8).reshape(-1, 3),
         errors_px=np.array(errors, dtype=np.float64),

@@ -55,7 +55,7 @@ CONTEXT: dict[str, Any] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class About:
+class DatasetDescription:
     """What a data set is called, by whom, under which licence (an address), and when it was published (ISO date)."""
 
     name: str
@@ -112,7 +112,7 @@ class Column:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class RecordSet:
     """Records: the rows of a file or of every file of a set; `key` names the columns that no two rows share."""
 
     name: str
@@ -122,7 +122,9 @@ class Table:
     description: str
 
 
-def croissant(about: About, files: Sequence[FileObject | FileSet], tables: Sequence[Table]) -> dict[str, Any]:
+def croissant(
+    about: DatasetDescription, files: Sequence[FileObject | FileSet], tables: Sequence[RecordSet]
+) -> dict[str, Any]:
     """The metadata, ready for JSON."""
     return {
         "@context": CONTEXT,
@@ -165,7 +167,7 @@ def _file(one: FileObject | FileSet) -> dict[str, Any]:
     }
 
 
-def _table(table: Table) -> dict[str, Any]:
+def _table(table: RecordSet) -> dict[str, Any]:
     source = table.source
     where = {"fileSet": {"@id": source.name}} if isinstance(source, FileSet) else {"fileObject": {"@id": source.path}}
     return {

@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.experiments.exports.frames import flu_of, opengl_camera
-from wakewise.experiments.exports.records import Cloud, Photographs
+from wakewise.experiments.exports.records import Photographs, SparsePoints
 
 _NAMES = ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2")
 
 
-def write_nerfstudio(folder: Path, photographs: Photographs, cloud: Cloud | None = None) -> None:
+def write_nerfstudio(folder: Path, photographs: Photographs, cloud: SparsePoints | None = None) -> None:
     """Write transforms.json, images/ and, with a cloud, sparse_pc.ply into a folder that is there and empty."""
     (folder / "images").mkdir()
     frames = []
@@ -40,7 +40,7 @@ def write_nerfstudio(folder: Path, photographs: Photographs, cloud: Cloud | None
     (folder / "transforms.json").write_text(text + "\n", encoding="utf-8")
 
 
-def _write_ply(path: Path, cloud: Cloud) -> None:
+def _write_ply(path: Path, cloud: SparsePoints) -> None:
     row = np.dtype([("p", "<f8", 3), ("c", "u1", 3)])
     rows = np.empty(len(cloud.points_W_m), row)
     rows["p"], rows["c"] = flu_of(cloud.points_W_m), cloud.colours

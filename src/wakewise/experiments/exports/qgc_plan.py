@@ -19,7 +19,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_json
 from wakewise.core.geometry import euler_from_quat
-from wakewise.experiments.exports.records import Track
+from wakewise.experiments.exports.records import Trajectory
 
 # WGS 84 (NIMA TR8350.2): half of the larger axis, and the square of the eccentricity.
 _A_M, _E2 = 6378137.0, 6.69437999014e-3
@@ -28,7 +28,7 @@ _ARDUPILOT, _SUBMARINE = 3, 12
 
 
 @dataclass(frozen=True)
-class Origin:
+class GeodeticOrigin:
     """Where the world's origin lies: latitude and longitude in degrees, WGS 84, at the water's surface."""
 
     lat_deg: float
@@ -54,7 +54,7 @@ class Origin:
         return lats, (lons + 180.0) % 360.0 - 180.0
 
 
-def write_plan(path: Path, waypoints: Track, origin: Origin, speed_m_s: float) -> None:
+def write_plan(path: Path, waypoints: Trajectory, origin: GeodeticOrigin, speed_m_s: float) -> None:
     """Write a mission through the poses of a vehicle, in their order, at one speed."""
     lats, lons = origin.place(waypoints.p_W_m[:, 0], waypoints.p_W_m[:, 1])
     headings = np.degrees(euler_from_quat(waypoints.q)[:, 2]) % 360.0

@@ -14,7 +14,7 @@ from wakewise.core.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Track:
+class Trajectory:
     """Where something was: times (n,), positions (n, 3) and unit quaternions (w, x, y, z), shape (n, 4), in NED."""
 
     times_s: Array
@@ -32,7 +32,7 @@ class Track:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Telemetry:
+class ThrustRecord:
     """Thrusts (n, m), of m thrusters, and wrenches (n, 6), force and moment in FRD, at times (n,)."""
 
     times_s: Array
@@ -52,7 +52,7 @@ class Photographs:
     ----------
     files : tuple of Path
         One per pose of `track`; names differ.
-    track : Track
+    track : Trajectory
         Of the camera C with OpenCV axes: `q` is q_WC.
     width, height : int
         In pixels.
@@ -61,7 +61,7 @@ class Photographs:
     """
 
     files: tuple[Path, ...]
-    track: Track
+    track: Trajectory
     width: int
     height: int
     params: Array
@@ -75,7 +75,7 @@ class Photographs:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Cloud:
+class SparsePoints:
     """Points (n, 3) in NED, their colours (n, 3) as RGB bytes, and mean reprojection errors in pixels, shape (n,).
 
     `seen` says, by a photograph's name, at which pixels, shape (k, 2), which points, shape (k,), were observed in it.

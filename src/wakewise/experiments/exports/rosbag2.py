@@ -21,7 +21,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from wakewise.core.errors import InputError
 from wakewise.experiments.exports.frames import flu_of, ros_body, ros_optical
-from wakewise.experiments.exports.records import Photographs, Telemetry, Track
+from wakewise.experiments.exports.records import Photographs, ThrustRecord, Trajectory
 
 _NS = 1_000_000_000
 _BAG_VERSION = 8
@@ -35,9 +35,9 @@ Message = tuple[int, int, str, Any]
 
 def write_bag(
     folder: Path,
-    bodies: Mapping[str, Track],
-    telemetry: Telemetry | None = None,
-    cameras: Mapping[str, Track] | None = None,
+    bodies: Mapping[str, Trajectory],
+    telemetry: ThrustRecord | None = None,
+    cameras: Mapping[str, Trajectory] | None = None,
     photographs: Photographs | None = None,
 ) -> int:
     """Write a bag and return how many messages it holds.
@@ -99,7 +99,7 @@ class _Messages:
         stamped = self._new("geometry_msgs/TransformStamped", self._header(at_ns, "map"), child, transform)
         return self._new("tf2_msgs/TFMessage", [stamped])
 
-    def poses(self, who: str, track: Track) -> Iterator[Message]:
+    def poses(self, who: str, track: Trajectory) -> Iterator[Message]:
         """A body's poses and its transform."""
         positions, turns = ros_body(track.p_W_m, track.q)
         for time_s, p, q in zip(track.times_s.tolist(), positions.tolist(), turns.tolist(), strict=True):
@@ -108,14 +108,14 @@ class _Messages:
             yield at_ns, 0, "/tf", self._tf(at_ns, f"base_link{WHO[who]}", p, q)
             yield at_ns, 1, f"/{who}/pose", self._new("geometry_msgs/PoseStamped", self._header(at_ns, "map"), pose)
 
-    def cameras(self, who: str, track: Track) -> Iterator[Message]:
+    def cameras(self, who: str, track: Trajectory) -> Iterator[Message]:
         """The transforms of a camera."""
         positions, turns = ros_optical(track.p_W_m, track.q)
         for time_s, p, q in zip(track.times_s.tolist(), positions.tolist(), turns.tolist(), strict=True):
             at_ns = _ns(time_s)
             yield at_ns, 2, "/tf", self._tf(at_ns, f"camera_optical{WHO[who]}", p, q)
 
-    def telemetry(self, telemetry: Telemetry) -> Iterator[Message]:
+    def telemetry(self, telemetry: ThrustRecord) -> Iterator[Message]:
         """Thrusts and wrenches."""
         count = telemetry.thrusts_N.shape[1]
         axis = self._new("std_msgs/MultiArrayDimension", "thruster", count, count)

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.files import write_text
-from wakewise.experiments.exports.records import Track
+from wakewise.experiments.exports.records import Trajectory
 
 
-def write_tum(path: Path, track: Track, note: str) -> None:
+def write_tum(path: Path, track: Trajectory, note: str) -> None:
     """Write a trajectory; the format states no axes, so they stay ours (NED), and the first line says so.
 
     Parameters
     ----------
     path : Path
-    track : Track
+    track : Trajectory
     note : str
         What moved, and its axes; goes into the first line.
     """

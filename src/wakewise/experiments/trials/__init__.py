@@ -15,7 +15,7 @@ from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
     from wakewise.experiments.trials.metrics import DEFINITIONS, UNITS
-    from wakewise.experiments.trials.stages import Quiet, Watch
+    from wakewise.experiments.trials.stages import ProgressListener, SilentProgress
     from wakewise.experiments.trials.timing import BenchOptions
     from wakewise.experiments.trials.trial import compare_methods, run_trial
 
@@ -23,8 +23,8 @@ __all__ = [
     "DEFINITIONS",
     "UNITS",
     "BenchOptions",
-    "Quiet",
-    "Watch",
+    "ProgressListener",
+    "SilentProgress",
     "compare_methods",
     "run_trial",
 ]

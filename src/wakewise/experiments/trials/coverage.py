@@ -23,7 +23,7 @@ from wakewise.operation import Parts, read_scenario
 from wakewise.scene.missions import Coverage, patches_of
 from wakewise.scene.missions.coverage import HALF
 from wakewise.scene.missions.surface_patches import NORMAL_SHARE, REACH_M
-from wakewise.scene.missions.visibility import Lens
+from wakewise.scene.missions.visibility import CameraIntrinsics
 from wakewise.scene.targets import Target
 from wakewise.vision.evaluation import Crop, compare_surface, sample_surface
 from wakewise.vision.reconstruction import read_cloud
@@ -34,7 +34,7 @@ Shot = tuple[Pose, float | None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Agreement:
+class CoverageAgreement:
     """Patches as the guide saw them and as the model has them.
 
     Parameters
@@ -76,14 +76,16 @@ def shots_of(photos: pl.DataFrame) -> list[Shot]:
     return [(Pose(p, q), sharp) for p, q, sharp in zip(places, turns, photos["sharpness"].to_list(), strict=True)]
 
 
-def coverage_of(target: Target, lens: Lens, shots: Iterable[Shot], spent_ms: list[float] | None = None) -> Coverage:
+def coverage_of(
+    target: Target, lens: CameraIntrinsics, shots: Iterable[Shot], spent_ms: list[float] | None = None
+) -> Coverage:
     """The guide after a flight's photographs, in their order.
 
     Parameters
     ----------
     target : Target
         As it was found, which is what the crew believes.
-    lens : Lens
+    lens : CameraIntrinsics
         The camera.
     shots : iterable
         Estimated X_WC of each photograph and its sharpness, None where that is not known.
@@ -100,7 +102,7 @@ def coverage_of(target: Target, lens: Lens, shots: Iterable[Shot], spent_ms: lis
     return coverage
 
 
-def agreement_with(coverage: Coverage, parts: Parts, cloud_W_m: Array) -> Agreement:
+def agreement_with(coverage: Coverage, parts: Parts, cloud_W_m: Array) -> CoverageAgreement:
     """Patch by patch, what the guide saw well and what of the truth a model has within 3 mm.
 
     Parameters
@@ -122,7 +124,7 @@ def agreement_with(coverage: Coverage, parts: Parts, cloud_W_m: Array) -> Agreem
     patch = patches.patch[np.asarray(KDTree(own).query(asked)[1])]
     held = np.bincount(patch, minlength=patches.count)
     share = np.where(held > 0, np.bincount(patch, there, patches.count) / np.maximum(held, 1), -1.0)
-    return Agreement(
+    return CoverageAgreement(
         complete_share=share,
         complete=share > HALF,
         well=coverage.well,

@@ -17,11 +17,11 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import whole_folder
 from wakewise.core.optional_dependencies import need
 from wakewise.experiments.exports import (
-    Cloud,
-    Origin,
+    GeodeticOrigin,
     Photographs,
-    Telemetry,
-    Track,
+    SparsePoints,
+    ThrustRecord,
+    Trajectory,
     read_points,
     write_colmap,
     write_nerfstudio,
@@ -39,7 +39,7 @@ _WRENCH = ("X_N", "Y_N", "Z_N", "K_Nm", "M_Nm", "N_Nm")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Exported:
+class ExportResult:
     """What was written, and where."""
 
     to: str
@@ -48,8 +48,8 @@ class Exported:
 
 
 def export_trial(
-    folder: Path, to: str, *, out: Path | None = None, poses: str = "true", origin: Origin | None = None
-) -> Exported:
+    folder: Path, to: str, *, out: Path | None = None, poses: str = "true", origin: GeodeticOrigin | None = None
+) -> ExportResult:
     """Export a trial.
 
     Parameters
@@ -93,7 +93,7 @@ def export_trial(
         raise InputError(f"--out {path}: is not empty; give a folder that does not exist yet")
     make: dict[str, Callable[[Path, Path], dict[str, int]]] = {"tum": _tum, "rosbag2": _bag}
     holds = make[to](folder, path) if to in make else _photographs(folder, path, to, poses)
-    return Exported(to=to, path=path, holds=holds)
+    return ExportResult(to=to, path=path, holds=holds)
 
 
 def _tum(folder: Path, path: Path) -> dict[str, int]:
@@ -128,7 +128,7 @@ def _bag(folder: Path, path: Path) -> dict[str, int]:
 
 def _photographs(folder: Path, path: Path, to: str, poses: str) -> dict[str, int]:
     photographs = _photographs_of(folder, poses)
-    cloud: Cloud | None = None
+    cloud: SparsePoints | None = None
     with suppress(FileNotFoundError):
         cloud = read_points(folder / "sparse" / "points3D.bin")
     holds = {"photographs": len(photographs.files), "points": 0 if cloud is None else len(cloud.points_W_m)}
@@ -140,7 +140,7 @@ def _photographs(folder: Path, path: Path, to: str, poses: str) -> dict[str, int
     return holds
 
 
-def _plan(folder: Path, path: Path, origin: Origin | None) -> Exported:
+def _plan(folder: Path, path: Path, origin: GeodeticOrigin | None) -> ExportResult:
     if origin is None:
         raise InputError("--origin: missing; qgc-plan needs LAT,LON in degrees of where the world's origin lies")
     if path.is_dir():
@@ -155,7 +155,7 @@ def _plan(folder: Path, path: Path, origin: Origin | None) -> Exported:
     if route is None:
         raise InputError(f"{folder / 'steps.parquet'}: no photograph was taken, so there are no waypoints to make")
     write_plan(path, route, origin, _speed_m_s(steps))
-    return Exported(to="qgc-plan", path=path, holds={"waypoints": len(route.times_s)})
+    return ExportResult(to="qgc-plan", path=path, holds={"waypoints": len(route.times_s)})
 
 
 def _speed_m_s(steps: pl.DataFrame) -> float:
@@ -188,39 +188,39 @@ def _numbers(table: pl.DataFrame, columns: list[str]) -> Array:
     return numbers[np.isfinite(numbers).all(axis=1)]
 
 
-def _track(table: pl.DataFrame, begins: str) -> Track | None:
+def _track(table: pl.DataFrame, begins: str) -> Trajectory | None:
     """Poses of a table whose columns begin so, rows without a pose left out; None if none is left."""
     numbers = _numbers(table, ["time_s", *(f"{begins}_{what}" for what in _POSE)])
-    return Track(times_s=numbers[:, 0], p_W_m=numbers[:, 1:4], q=numbers[:, 4:]) if len(numbers) else None
+    return Trajectory(times_s=numbers[:, 0], p_W_m=numbers[:, 1:4], q=numbers[:, 4:]) if len(numbers) else None
 
 
-def _found(table: pl.DataFrame) -> dict[str, Track]:
+def _found(table: pl.DataFrame) -> dict[str, Trajectory]:
     tracks = {who: _track(table, begins) for who, begins in POSES.items()}
     return {who: track for who, track in tracks.items() if track is not None}
 
 
-def _bodies(steps: pl.DataFrame) -> dict[str, Track]:
+def _bodies(steps: pl.DataFrame) -> dict[str, Trajectory]:
     found = _found(steps)
     if not found:
         raise InputError("steps.parquet: holds neither true nor estimated poses that are numbers")
     return found
 
 
-def _cameras(folder: Path) -> dict[str, Track]:
+def _cameras(folder: Path) -> dict[str, Trajectory]:
     return _found(_images(folder)) if (folder / "images.csv").is_file() else {}
 
 
-def _most(tracks: dict[str, Track]) -> int:
+def _most(tracks: dict[str, Trajectory]) -> int:
     return max((len(track.times_s) for track in tracks.values()), default=0)
 
 
-def _telemetry(steps: pl.DataFrame) -> Telemetry | None:
+def _telemetry(steps: pl.DataFrame) -> ThrustRecord | None:
     count = sum(name.startswith("thrust_") for name in steps.columns)
     columns = ["time_s", *(f"thrust_{k + 1}_N" for k in range(count)), *(f"wrench_{axis}" for axis in _WRENCH)]
     numbers = _numbers(steps, columns)
     if not count or not len(numbers):
         return None
-    return Telemetry(times_s=numbers[:, 0], thrusts_N=numbers[:, 1:-6], wrenches_B=numbers[:, -6:])
+    return ThrustRecord(times_s=numbers[:, 0], thrusts_N=numbers[:, 1:-6], wrenches_B=numbers[:, -6:])
 
 
 def _images(folder: Path) -> pl.DataFrame:

@@ -141,7 +141,7 @@ _RATIOS = {
 
 
 @dataclass
-class Gathering:
+class MetricsCollector:
     """Figures as the stages hand them in; those that no stage could compute get a reason."""
 
     figures: Figures = field(default_factory=dict)

@@ -10,11 +10,11 @@ from wakewise.control import vehicle_layout
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.experiments.trials.metrics import Figures, Gathering
+from wakewise.experiments.trials.metrics import Figures, MetricsCollector
 from wakewise.operation import Parts
 from wakewise.simulation.tank import TankSettings, tank_ambient
 from wakewise.simulation.tank.grains import threshold_stress_Pa
-from wakewise.wake import WakeView
+from wakewise.wake import InfluenceModel
 
 INSTANTS = 400
 """At most so many control steps, spread evenly over the flight, are shared out anew."""
@@ -22,7 +22,7 @@ LOOKS = 200
 """Instants at which the water's own motion is looked at."""
 
 
-def add_yardsticks(gathering: Gathering, parts: Parts, steps: pl.DataFrame) -> None:
+def add_yardsticks(gathering: MetricsCollector, parts: Parts, steps: pl.DataFrame) -> None:
     """Add disturbance_flown, disturbance_least_thrusts, ambient_speed_m_s and grain_threshold_Pa, or why there is none.
 
     `steps` is the table of steps.parquet from the first leg on.
@@ -60,7 +60,7 @@ def sharing_figures(parts: Parts, steps: pl.DataFrame, instants: int = INSTANTS)
     known = np.isfinite(np.column_stack([thrusts, p, q])).all(axis=1)
     if not known.any():
         raise InputError("steps: no step has both a command and an estimate")
-    view = WakeView.of(vehicle, parts.region, parts.wake, parts.scenario.control.superposition)
+    view = InfluenceModel.of(vehicle, parts.region, parts.wake, parts.scenario.control.superposition)
     layout = vehicle_layout(vehicle)
     flown, least = [], []
     for T, place, turn in zip(thrusts[known], p[known], q[known], strict=True):

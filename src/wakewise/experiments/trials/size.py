@@ -15,7 +15,7 @@ from wakewise.core.errors import InputError
 from wakewise.scene.targets import MeshDistance
 from wakewise.vision.evaluation import Crop, evaluate_surface
 from wakewise.vision.evaluation.alignment import umeyama
-from wakewise.vision.evaluation.cloud_to_surface import Mesh
+from wakewise.vision.evaluation.cloud_to_surface import MeshArrays
 
 SIZE_FIGURES = ("scale_error_pct", "rmse_scaled_mm")
 SAMPLES = 5_000
@@ -24,7 +24,7 @@ SAMPLES = 5_000
 
 def size_figures(
     cloud_W_m: Array,
-    mesh: Mesh,
+    mesh: MeshArrays,
     crop: Crop,
     model_centres: Mapping[str, Array],
     true_centres: Mapping[str, Array],

@@ -17,7 +17,7 @@ from wakewise.core.interfaces import no_progress
 _NOT_MEASURED = ("the stages before it are kept", "; the disk of ", "can no longer be read")
 
 
-class Watch(Protocol):
+class ProgressListener(Protocol):
     """Shows a person how far a stage is."""
 
     def stage(self, name: str) -> AbstractContextManager[Callable[..., None]]:
@@ -29,8 +29,8 @@ class Watch(Protocol):
         ...
 
 
-class Quiet:
-    """A `Watch` that shows nothing."""
+class SilentProgress:
+    """A `ProgressListener` that shows nothing."""
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Callable[..., None]]:  # noqa: ARG002
@@ -42,7 +42,7 @@ class Quiet:
 
 
 @dataclass(frozen=True)
-class Ledger:
+class StageCosts:
     """What each stage cost, kept in stages.json so that a trial done in several sittings adds up."""
 
     path: Path

@@ -23,7 +23,7 @@ from typing import IO, Any
 from wakewise.core.errors import StageError, WakewiseError
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.run_lock import sweep
-from wakewise.experiments.trials.stages import Watch
+from wakewise.experiments.trials.stages import ProgressListener
 from wakewise.vision.reconstruction import ReconstructionSettings, mesh_model
 from wakewise.vision.texturing.textured import write_textured
 
@@ -87,7 +87,7 @@ class SurfaceMaker:
         if not self._asked and self._wanted and not self._meshed:
             self._asked = self._begin()
 
-    def make(self, watch: Watch, meanwhile: Callable[[str], None] | None = None) -> None:
+    def make(self, watch: ProgressListener, meanwhile: Callable[[str], None] | None = None) -> None:
         """Make what is missing, or wait for what is begun.
 
         `meanwhile("mesh")` is called beside the mesh and `meanwhile("colours")` beside these.

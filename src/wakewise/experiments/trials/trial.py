@@ -20,13 +20,13 @@ from wakewise.core.jit.precompile import is_warm, warm
 from wakewise.core.optional_dependencies import need
 from wakewise.core.run_lock import alone
 from wakewise.experiments.trials.coverage import FROM_MODEL, coverage_figures
-from wakewise.experiments.trials.metrics import Figures, Gathering, comparison
+from wakewise.experiments.trials.metrics import Figures, MetricsCollector, comparison
 from wakewise.experiments.trials.reference_values import add_yardsticks
 from wakewise.experiments.trials.size import SIZE_FIGURES, size_figures
-from wakewise.experiments.trials.stages import Ledger, Quiet, Watch, of_the_computer
+from wakewise.experiments.trials.stages import ProgressListener, SilentProgress, StageCosts, of_the_computer
 from wakewise.experiments.trials.surface import SurfaceMaker
 from wakewise.operation import (
-    Darkroom,
+    BackgroundRenderer,
     Parts,
     Scenario,
     fly_trial,
@@ -79,7 +79,7 @@ REGION_SHARE = 1.25
 def run_trial(
     flight: Parts | Scenario,
     folder: Path,
-    watch: Watch | None = None,
+    watch: ProgressListener | None = None,
     told: Callable[[Figures], None] | None = None,
     meanwhile: Callable[[str], None] | None = None,
 ) -> Figures:
@@ -103,7 +103,7 @@ def run_trial(
         If the disk is full, or a file cannot be read or written; the stages before it are kept.
     """
     need("a trial", "photos", "logs")
-    watch = watch or Quiet()
+    watch = watch or SilentProgress()
     parts = parts_of(flight)
     scenario = as_flown(parts)
     check_place(folder, scenario)
@@ -114,7 +114,7 @@ def run_trial(
             _ = parts.target
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
-    with Darkroom(parts, folder) as darkroom:
+    with BackgroundRenderer(parts, folder) as darkroom:
         if not _is_flown(folder):
             if not _by_hand(parts):
                 darkroom.ready()  # loads and makes its scene while this process looks through the parts
@@ -130,10 +130,15 @@ def run_trial(
 
 
 def _figures(
-    parts: Parts, scenario: Scenario, folder: Path, watch: Watch, darkroom: Darkroom, modelled: Callable[[], None]
+    parts: Parts,
+    scenario: Scenario,
+    folder: Path,
+    watch: ProgressListener,
+    darkroom: BackgroundRenderer,
+    modelled: Callable[[], None],
 ) -> Figures:
     """Run the stages that figures come from and write metrics.json; `modelled` is called when the model is there."""
-    ledger = Ledger(folder / "stages.json")
+    ledger = StageCosts(folder / "stages.json")
 
     def stage(name: str, product: str, work: Callable[[Callable[..., None]], None]) -> None:
         if (folder / product).exists():
@@ -151,7 +156,7 @@ def _figures(
     modelled()
     stage("evaluate", "score.json", lambda _: write_json(folder / "score.json", evaluate_trial(parts, folder)))
     figures = json.loads((folder / "score.json").read_text(encoding="utf-8"))
-    gathering = Gathering(figures=figures["figures"], reasons=figures["reasons"])
+    gathering = MetricsCollector(figures=figures["figures"], reasons=figures["reasons"])
     gathering.add({"method": scenario.method, "seed": scenario.seed})
     gathering.add({"from_outside": parts.from_outside})
     gathering.add({"wall_s": ledger.total("wall_s"), "cpu_s": ledger.total("cpu_s")})
@@ -169,7 +174,7 @@ def _by_hand(parts: Parts) -> bool:
     return parts.scenario.pilot == BY_HAND and "pilot" not in parts.given
 
 
-def _fly(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
+def _fly(parts: Parts, folder: Path, darkroom: BackgroundRenderer, progress: Callable[..., None]) -> None:
     """Fly, or put together what a flight by hand left that was cut off."""
     if gather(parts, folder):
         return
@@ -180,7 +185,7 @@ def _fly(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[...,
         fly_trial(parts, folder, progress, darkroom.take)
 
 
-def _photograph(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
+def _photograph(parts: Parts, folder: Path, darkroom: BackgroundRenderer, progress: Callable[..., None]) -> None:
     """Wait for the photographs that were begun during the flight, and render the others."""
     if not (folder / "exposures.npz").exists():
         raise StageError(f"{folder}: no photograph was taken in its flight, so there is nothing to make a model of")
@@ -192,7 +197,7 @@ def _photograph(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callab
 def compare_methods(
     flights: Mapping[str, Parts | Scenario],
     folder: Path,
-    watch: Watch | None = None,
+    watch: ProgressListener | None = None,
     meanwhile: Callable[[str, str], None] | None = None,
 ) -> Figures:
     """Run one trial per method, each in its own folder, and set their figures side by side (comparison.json).
@@ -266,7 +271,7 @@ def _forget_what_was_not_measured(folder: Path) -> None:
 
 def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     """Judge flight and model against the truth; what could not be computed gets a reason."""
-    gathering = Gathering()
+    gathering = MetricsCollector()
     steps = pl.read_parquet(folder / "steps.parquet")
     flown = steps.filter(pl.col("leg") != SETTLING)
     gathering.add(flight_figures(flown))

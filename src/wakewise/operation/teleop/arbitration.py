@@ -16,9 +16,17 @@ from wakewise.control.intent import FULL_M_S, FULL_RAD_S, HIGHEST_RAD, moved_on,
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState
 from wakewise.operation.teleop.assist_modes import elevation_rad, level_frame, sphere_frame, watching
-from wakewise.operation.teleop.collision_limiter import KeepOff
-from wakewise.operation.teleop.motion import STEEPEST_RAD, Attitude, Motion, followed, tilted, tilting, turning
-from wakewise.operation.teleop.operator_state import DeskState
+from wakewise.operation.teleop.collision_limiter import CollisionLimiter
+from wakewise.operation.teleop.motion import (
+    STEEPEST_RAD,
+    AttitudeReference,
+    MotionReference,
+    followed,
+    tilted,
+    tilting,
+    turning,
+)
+from wakewise.operation.teleop.operator_state import OperatorSettings
 from wakewise.scene.missions import CameraAim
 
 FASTER_M_S2, BRAKING_M_S2 = 0.15, 0.2
@@ -51,7 +59,7 @@ TILT_RAD_S = math.radians(40.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sphere:
+class StickFrame:
     """The frame of the sticks, shape (3, 3), as it was a step ago, and the orbit's radius where one is kept.
 
     `frame` is None where nobody steered before, and `orbits` tells whether it is that of an orbit. `change_m_s2`, shape
@@ -65,13 +73,15 @@ class Sphere:
     blocked_by: str | None = None
 
 
-def turned(motion: Motion, state: DeskState, axes: Array, target_W_m: Array, aim: CameraAim, dt_s: float) -> Motion:
+def turned(
+    motion: MotionReference, state: OperatorSettings, axes: Array, target_W_m: Array, aim: CameraAim, dt_s: float
+) -> MotionReference:
     """The motion with attitude and tilt a step on: by the sticks where they are held, else by the assist, else level.
 
     Parameters
     ----------
-    motion : Motion
-    state : DeskState
+    motion : MotionReference
+    state : OperatorSettings
     axes : ndarray, shape (5,)
         See `wakewise.operation.teleop.input.CONTROL_AXES`.
     target_W_m : ndarray, shape (3,)
@@ -80,7 +90,7 @@ def turned(motion: Motion, state: DeskState, axes: Array, target_W_m: Array, aim
     """
     turn, rise, place = float(axes[3]), float(axes[4]), motion.place_W_m
     yaw = float(motion.angles_rad[2])
-    wished = Attitude(angles_rad=np.array([0.0, 0.0, yaw]), rates_rad_s=np.zeros(3), tilt_rad=motion.tilt_rad)
+    wished = AttitudeReference(angles_rad=np.array([0.0, 0.0, yaw]), rates_rad_s=np.zeros(3), tilt_rad=motion.tilt_rad)
     if state.watch_target:
         wished = watching(place, motion.velocity_W_m_s, yaw, target_W_m, aim, dt_s)
     new = followed(motion, 0, wished, dt_s)
@@ -97,16 +107,16 @@ def turned(motion: Motion, state: DeskState, axes: Array, target_W_m: Array, aim
 
 
 def steered(
-    motion: Motion,
-    sphere: Sphere,
-    state: DeskState,
+    motion: MotionReference,
+    sphere: StickFrame,
+    state: OperatorSettings,
     axes: Array,
     target_W_m: Array,
     aim: CameraAim,
     estimate: BodyState,
     dt_s: float,
-    keep_off: KeepOff | None = None,
-) -> tuple[Motion, Sphere]:
+    keep_off: CollisionLimiter | None = None,
+) -> tuple[MotionReference, StickFrame]:
     """The motion with velocity and place a step on, and what the sticks go by at the next.
 
     On an orbit it is the camera that keeps to the sphere, and the place of the body follows from its turn.
@@ -114,7 +124,7 @@ def steered(
     eye, swing = motion.camera(aim)
     frame = sphere_frame(eye, target_W_m) if state.orbit else level_frame(float(motion.angles_rad[2]))
     if sphere.frame is None or state.orbit != sphere.orbits:
-        sphere = Sphere(frame=frame, orbits=state.orbit)
+        sphere = StickFrame(frame=frame, orbits=state.orbit)
     swing = swing if state.orbit else np.zeros(3)
     wish = FULL_M_S * state.share * np.asarray(axes[:3])
     if state.orbit and elevation_rad(eye, target_W_m) > HIGHEST_RAD:
@@ -138,7 +148,9 @@ def steered(
     velocity = slewed(motion.velocity_W_m_s, velocity, dt_s, HARDEST_M_S2)
     place = led(motion.place_W_m, 0.5 * (motion.velocity_W_m_s + velocity), estimate, dt_s)
     moved = replace(motion, place_W_m=place, velocity_W_m_s=velocity)
-    return moved, Sphere(frame=frame, change_m_s2=change, orbits=state.orbit, range_m=range_m, blocked_by=blocked_by)
+    return moved, StickFrame(
+        frame=frame, change_m_s2=change, orbits=state.orbit, range_m=range_m, blocked_by=blocked_by
+    )
 
 
 def answered(now_m_s: Array, change_m_s2: Array, wish_m_s: Array, dt_s: float) -> tuple[Array, Array]:

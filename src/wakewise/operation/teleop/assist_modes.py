@@ -16,7 +16,7 @@ from wakewise.core.geometry import (
     quat_from_matrix,
     quat_multiply,
 )
-from wakewise.operation.teleop.motion import STEEPEST_RAD, Attitude
+from wakewise.operation.teleop.motion import STEEPEST_RAD, AttitudeReference
 from wakewise.scene.missions import CameraAim
 from wakewise.scene.missions.orbit import R_FC
 
@@ -28,7 +28,7 @@ _ROUNDS = 3
 
 def watching(
     place_W_m: Array, velocity_W_m_s: Array, yaw_rad: float, target_W_m: Array, aim: CameraAim, dt_s: float
-) -> Attitude:
+) -> AttitudeReference:
     """Attitude and tilt with which a body at a place keeps its camera on a target: tilt first, pitch beyond its stops.
 
     Parameters
@@ -42,10 +42,12 @@ def watching(
     """
     angles, tilt = _watching(place_W_m, yaw_rad, target_W_m, aim)
     if not velocity_W_m_s.any():
-        return Attitude(angles_rad=angles, rates_rad_s=np.zeros(3), tilt_rad=tilt)
+        return AttitudeReference(angles_rad=angles, rates_rad_s=np.zeros(3), tilt_rad=tilt)
     before, tilt_before = _watching(place_W_m - dt_s * velocity_W_m_s, yaw_rad, target_W_m, aim)
     rates = (np.remainder(angles - before + math.pi, 2.0 * math.pi) - math.pi) / dt_s
-    return Attitude(angles_rad=angles, rates_rad_s=rates, tilt_rad=tilt, tilt_rad_s=(tilt - tilt_before) / dt_s)
+    return AttitudeReference(
+        angles_rad=angles, rates_rad_s=rates, tilt_rad=tilt, tilt_rad_s=(tilt - tilt_before) / dt_s
+    )
 
 
 def _watching(place_W_m: Array, yaw_rad: float, target_W_m: Array, aim: CameraAim) -> tuple[Array, float]:

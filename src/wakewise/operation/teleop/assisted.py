@@ -1,9 +1,9 @@
 """Assisted flight by hand: hands and desk become goals, which any method flies; and a controller that heeds the desk.
 
-The pilot holds one smooth `Motion`. Sticks ask for a velocity in the body's level frame, or along the sphere about the
-target; released, the motion brakes, and the place that is held lies ahead, where the vehicle can stop. The mission may
-take over and be left at any moment (see `scanning.py`). Whoever steers goes on from where the motion is, so goals never
-jump.
+The pilot holds one smooth `MotionReference`. Sticks ask for a velocity in the body's level frame, or along the sphere
+about the target; released, the motion brakes, and the place that is held lies ahead, where the vehicle can stop. The
+mission may take over and be left at any moment (see `scanning.py`). Whoever steers goes on from where the motion is, so
+goals never jump.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from wakewise.control.intent import PAPER_W_TRACK
 from wakewise.control.switching import Switched
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Controller, Goal
-from wakewise.operation.teleop.arbitration import BRAKING_M_S2, Sphere, steered, turned
-from wakewise.operation.teleop.collision_limiter import KeepOff
+from wakewise.operation.teleop.arbitration import BRAKING_M_S2, StickFrame, steered, turned
+from wakewise.operation.teleop.collision_limiter import CollisionLimiter
 from wakewise.operation.teleop.input import CENTRED, Controls, ControlSource
-from wakewise.operation.teleop.input.control_log import TraceWriter
-from wakewise.operation.teleop.motion import Motion
-from wakewise.operation.teleop.operator_state import WAYS, Desk, DeskState
-from wakewise.operation.teleop.resumable_mission import Mission, Scan
+from wakewise.operation.teleop.input.control_log import ControlLogWriter
+from wakewise.operation.teleop.motion import MotionReference
+from wakewise.operation.teleop.operator_state import WAYS, OperatorSettings, OperatorState
+from wakewise.operation.teleop.resumable_mission import ResumableMission, ScanState
 from wakewise.scene.missions import CameraAim
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ KEPT = 200
 
 
 @dataclass(frozen=True, kw_only=True)
-class Note:
+class OperatorMessage:
     """Something to say: "info", "warn" or "error", in words, and when."""
 
     level: str
@@ -60,8 +60,8 @@ class AssistedPilot:
     Parameters
     ----------
     source : ControlSource
-    desk : Desk
-    mission : Mission
+    desk : OperatorState
+    mission : ResumableMission
     target_W_m : ndarray, shape (3,)
         What the camera is kept on, and the middle of orbits.
     dt_s : float
@@ -79,39 +79,39 @@ class AssistedPilot:
         Asked for, as shaped.
     deviation_pct : float or None
         Of the estimated velocity from the one asked for, rms over the last seconds; None while none is asked for.
-    trace : TraceWriter
+    trace : ControlLogWriter
         Hands and desk of the whole flight, to be written beside its record.
-    state : DeskState
+    state : OperatorSettings
         What was set at the last step: the controller goes by it, so that a change from another thread in the middle of
         a step counts for the next one, and the record of a flight gives the same flight.
-    motion : Motion
+    motion : MotionReference
     """
 
     source: ControlSource
-    desk: Desk
-    mission: Mission
+    desk: OperatorState
+    mission: ResumableMission
     target_W_m: Array
     dt_s: float
-    begin: DeskState | None = None
-    keep_off: KeepOff | None = None
+    begin: OperatorSettings | None = None
+    keep_off: CollisionLimiter | None = None
     controls: Controls | None = None
-    trace: TraceWriter = field(default_factory=TraceWriter)
-    state: DeskState = field(init=False)
-    motion: Motion = field(init=False)
-    _scan: Scan = field(init=False)
+    trace: ControlLogWriter = field(default_factory=ControlLogWriter)
+    state: OperatorSettings = field(init=False)
+    motion: MotionReference = field(init=False)
+    _scan: ScanState = field(init=False)
     _mode: str = "hold"
     _dial: float = 0.0
-    _sphere: Sphere = field(default_factory=Sphere)
+    _sphere: StickFrame = field(default_factory=StickFrame)
     _asked: float = 0.0
     _missed: float = 0.0
     _there: bool = True
     _blocked_s: float = -math.inf
     _actions: deque[str] = field(default_factory=lambda: deque(maxlen=KEPT))
-    _notes: deque[Note] = field(default_factory=lambda: deque(maxlen=KEPT))
+    _notes: deque[OperatorMessage] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     def __post_init__(self) -> None:
         self.state = self.desk.state
-        self.motion, self._scan = Motion.at(self.mission.route.body(0.0, self.aim)), Scan()
+        self.motion, self._scan = MotionReference.at(self.mission.route.body(0.0, self.aim)), ScanState()
 
     @property
     def aim(self) -> CameraAim:
@@ -142,7 +142,7 @@ class AssistedPilot:
         """Photographs ("capture") and the end ("stop") asked for since the last call, in order."""
         return _emptied(self._actions)
 
-    def notes(self) -> tuple[Note, ...]:
+    def notes(self) -> tuple[OperatorMessage, ...]:
         """What there was to say since the last call."""
         return _emptied(self._notes)
 
@@ -177,7 +177,7 @@ class AssistedPilot:
         flying = self._scan.phase == "flying"
         return self.mission.route.leg_name(self._scan.mission_s) if flying else "back to the mission"
 
-    def _set(self, time_s: float) -> DeskState:
+    def _set(self, time_s: float) -> OperatorSettings:
         """What is set on the desk; where hands are played back, as it was set then."""
         recorded = getattr(self.source, "desk_at", None)
         played = None if recorded is None else recorded(time_s)
@@ -186,12 +186,12 @@ class AssistedPilot:
     def _begin(self, estimate: BodyState) -> None:
         if self.begin is not None:
             self.desk.set(**vars(self.begin))
-        self.motion = Motion.at(estimate, self.mission.route.tilt(0.0, self.aim)[0])
-        self._scan, self._mode = Scan(), "hold"
-        self._sphere, self._asked, self._missed, self._there = Sphere(), 0.0, 0.0, True
+        self.motion = MotionReference.at(estimate, self.mission.route.tilt(0.0, self.aim)[0])
+        self._scan, self._mode = ScanState(), "hold"
+        self._sphere, self._asked, self._missed, self._there = StickFrame(), 0.0, 0.0, True
         self._blocked_s = -math.inf
         self._dial = math.log(self.desk.state.w_track / PAPER_W_TRACK)
-        self.trace = TraceWriter()
+        self.trace = ControlLogWriter()
         self._actions.clear()
         self._notes.clear()
 
@@ -225,12 +225,12 @@ class AssistedPilot:
             if first:
                 self._scan, self.motion = self.mission.begun()
         elif self._mode == "scan":
-            self._sphere = Sphere()
+            self._sphere = StickFrame()
         words = {"operator": "operator flies", "hold": "holding the place", "scan": "the mission flies"}
         self._say("info", words[mode], time_s)
         self._mode = mode
 
-    def _move(self, state: DeskState, controls: Controls, time_s: float, estimate: BodyState) -> None:
+    def _move(self, state: OperatorSettings, controls: Controls, time_s: float, estimate: BodyState) -> None:
         if self._mode != "scan":
             axes = controls.axes if self._mode == "operator" else CENTRED.axes
             motion = turned(self.motion, state, axes, self.target_W_m, self.aim, self.dt_s)
@@ -261,10 +261,10 @@ class AssistedPilot:
         self._missed += share * (more - self._missed) if math.isfinite(more) else 0.0
 
     def _say(self, level: str, text: str, time_s: float) -> None:
-        self._notes.append(Note(level=level, text=text, time_s=time_s))
+        self._notes.append(OperatorMessage(level=level, text=text, time_s=time_s))
 
 
-def assisted(parts: Parts, source: ControlSource, desk: Desk, begin: DeskState | None = None) -> Parts:
+def assisted(parts: Parts, source: ControlSource, desk: OperatorState, begin: OperatorSettings | None = None) -> Parts:
     """Parts that hands and a desk fly: the pilot is the assisted one, the controller heeds the desk at each step.
 
     Parameters
@@ -272,7 +272,7 @@ def assisted(parts: Parts, source: ControlSource, desk: Desk, begin: DeskState |
     parts : Parts
         Their route is the mission that the mode `scan` flies.
     source : ControlSource
-    desk : Desk
+    desk : OperatorState
     begin : DeskState, optional
         What the desk is set to at time zero of each flight; None: it stays as it is.
 
@@ -286,13 +286,15 @@ def assisted(parts: Parts, source: ControlSource, desk: Desk, begin: DeskState |
     return flown.replace(controller=heeding(flown, lambda: pilot.state.method))
 
 
-def assisted_pilot(parts: Parts, source: ControlSource, desk: Desk, begin: DeskState | None = None) -> AssistedPilot:
+def assisted_pilot(
+    parts: Parts, source: ControlSource, desk: OperatorState, begin: OperatorSettings | None = None
+) -> AssistedPilot:
     """The pilot of `assisted`."""
     mission = parts.scenario.mission
     return AssistedPilot(
         source=source,
         desk=desk,
-        mission=Mission(
+        mission=ResumableMission(
             route=parts.route,
             aim=parts.aim,
             speed_m_s=mission.speed_m_s,
@@ -302,7 +304,7 @@ def assisted_pilot(parts: Parts, source: ControlSource, desk: Desk, begin: DeskS
         target_W_m=parts.found_target.centre_W_m,
         dt_s=1.0 / parts.control.rate_hz,
         begin=begin,
-        keep_off=KeepOff(
+        keep_off=CollisionLimiter(
             around=parts.surroundings, half_m=0.5 * np.array(parts.vehicle.size_m), braking_m_s2=BRAKING_M_S2
         ),
     )

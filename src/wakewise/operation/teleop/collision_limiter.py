@@ -22,7 +22,7 @@ FELT_M_S = 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class KeepOff:
+class CollisionLimiter:
     """What is solid, half the hull's size, shape (3,), and how hard the hull can brake."""
 
     around: Surroundings

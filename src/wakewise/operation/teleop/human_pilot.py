@@ -14,7 +14,15 @@ import numpy as np
 
 from wakewise.control.easing import slewed_rate
 from wakewise.control.intent import FULL_M_S, FULL_RAD_S
-from wakewise.control.operator_model import Person, PersonState, Sticks, View, begin, draw_person, steer
+from wakewise.control.operator_model import (
+    CameraMotion,
+    OperatorModel,
+    OperatorModelState,
+    StickDeflection,
+    begin,
+    draw_person,
+    steer,
+)
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, euler_from_quat, matrix_from_quat, quat_from_euler
 from wakewise.core.interfaces import BodyState, Goal, Pilot
@@ -24,7 +32,7 @@ from wakewise.operation.teleop.motion import TURN_RAD_S2
 
 ANSWER_S = 0.5
 """How much later the vehicle answers a velocity; estimate, from the trackers' bandwidth of two radians a second."""
-STICKS = Sticks(
+STICKS = StickDeflection(
     inertia=np.zeros(4),
     drag=np.zeros(4),
     full=np.array([FULL_M_S, FULL_M_S, FULL_M_S, FULL_RAD_S]),
@@ -55,8 +63,8 @@ class HumanPilot:
     target_W_m: Array
     dt_s: float
     seed: int
-    person: Person = field(init=False)
-    _state: PersonState = field(init=False)
+    person: OperatorModel = field(init=False)
+    _state: OperatorModelState = field(init=False)
     _place_W_m: Array = field(init=False)
     _velocity_m_s: Array = field(init=False)
     _change_m_s2: Array = field(init=False)
@@ -77,8 +85,8 @@ class HumanPilot:
         roll_rad, pitch_rad, _ = euler_from_quat(wished.X_WB.q)
         if time_s <= 0.0:
             self._begin(np.array(estimate.X_WB.p_m), float(euler_from_quat(estimate.X_WB.q)[2]))
-        view = View.of(estimate.X_WB, estimate.nu_B, self.X_BC)
-        wish = View.of(wished.X_WB, wished.nu_B, self.X_BC)
+        view = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
+        wish = CameraMotion.of(wished.X_WB, wished.nu_B, self.X_BC)
         self._state, asked = steer(
             self.person, self._state, self.dt_s, view, wish, watched(wished, self.X_BC, self.target_W_m)
         )

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.errors import InputError
-from wakewise.core.interfaces import ScalarGrid, Witness
+from wakewise.core.interfaces import ScalarGrid, TruthProvider
 from wakewise.core.jit.precompile import warm
 from wakewise.core.run_lock import alone
 from wakewise.operation.exposures import ExposureRecord
@@ -26,10 +26,10 @@ from wakewise.operation.flight_log import PARTS, FlightLog, hands_part, has_part
 from wakewise.operation.flying import FLIGHT_JOBS, WATER_EVERY_S, blamed, loop_of, recorder_of
 from wakewise.operation.loop import Step
 from wakewise.operation.parts import Parts
-from wakewise.operation.teleop.input.control_log import TraceWriter
+from wakewise.operation.teleop.input.control_log import ControlLogWriter
 from wakewise.operation.teleop.live_folder import gather
-from wakewise.operation.teleop.photo_trigger import Shutter
-from wakewise.operation.teleop.realtime_pacer import Pace
+from wakewise.operation.teleop.photo_trigger import PhotoTrigger
+from wakewise.operation.teleop.realtime_pacer import RealTimePacer
 from wakewise.operation.trial_folder import claim, flown_by_hand, write_truth
 
 SWITCH_S = 2e-4
@@ -69,9 +69,9 @@ class LiveFlight:
         *,
         folder: Path | None,
         paced: bool = True,
-        watch: Callable[[Step, Witness | None], None] | None = None,
+        watch: Callable[[Step, TruthProvider | None], None] | None = None,
         water_every_s: float = WATER_EVERY_S,
-        shutter: Shutter | None = None,
+        shutter: PhotoTrigger | None = None,
         checked: bool = True,
     ) -> None:
         if folder is not None and (folder / "steps.parquet").exists():
@@ -82,9 +82,9 @@ class LiveFlight:
         self._watch, self._water_every_s, self._checked = watch, water_every_s, checked
         self._told_to_stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="flight")
-        self._shutter = Shutter(parts) if shutter is None else shutter
+        self._shutter = PhotoTrigger(parts) if shutter is None else shutter
         self._exposures: list[ExposureRecord] = []
-        self.pace = Pace(self._told_to_stop.wait, paced)
+        self.pace = RealTimePacer(self._told_to_stop.wait, paced)
         self.preparing: str | None = "not begun"
         self.latest: Step | None = None
         self.fault: BaseException | None = None
@@ -187,11 +187,11 @@ class LiveFlight:
     def _keep_hands(self, part: int) -> None:
         """Put away what the hands did until now, of a pilot who has any."""
         pilot: Any = self.parts.pilot
-        if not isinstance(getattr(pilot, "trace", None), TraceWriter):
+        if not isinstance(getattr(pilot, "trace", None), ControlLogWriter):
             return
         if self.folder is not None and pilot.trace.frame().height:
             pilot.trace.write(hands_part(self.folder, part))
-        pilot.trace = TraceWriter()
+        pilot.trace = ControlLogWriter()
 
     def _is_over(self) -> bool:
         """Whether somebody said stop, or the program has ended round its flight."""

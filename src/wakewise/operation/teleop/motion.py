@@ -27,7 +27,7 @@ STEEPEST_RAD = math.radians(75.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
+class MotionReference:
     """A goal and its motion: place and velocity in W, roll, pitch and yaw and their rates, shape (3,) each, tilt."""
 
     place_W_m: Array
@@ -41,7 +41,7 @@ class Motion:
         freeze(self, place_W_m=(3,), velocity_W_m_s=(3,), angles_rad=(3,), rates_rad_s=(3,))
 
     @classmethod
-    def at(cls, body: BodyState, tilt_rad: float = 0.0) -> Motion:
+    def at(cls, body: BodyState, tilt_rad: float = 0.0) -> MotionReference:
         """At rest where a body is."""
         rest = np.zeros(3)
         angles = euler_from_quat(body.X_WB.q)
@@ -74,7 +74,7 @@ class Motion:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Attitude:
+class AttitudeReference:
     """Wished roll, pitch and yaw, shape (3,), and tilt of the camera, and how fast they change."""
 
     angles_rad: Array
@@ -83,14 +83,14 @@ class Attitude:
     tilt_rad_s: float = 0.0
 
 
-def turned_to(motion: Motion, wished: Attitude, dt_s: float, aim: CameraAim) -> Motion:
+def turned_to(motion: MotionReference, wished: AttitudeReference, dt_s: float, aim: CameraAim) -> MotionReference:
     """The motion with its attitude a step nearer to a wished one that moves; the tilt at its joint's rate."""
     for k in range(3):
         motion = followed(motion, k, wished, dt_s)
     return tilted(motion, wished, dt_s, aim)
 
 
-def followed(motion: Motion, k: int, wished: Attitude, dt_s: float) -> Motion:
+def followed(motion: MotionReference, k: int, wished: AttitudeReference, dt_s: float) -> MotionReference:
     """The motion with angle number k a step nearer to a wished one that moves."""
     angle, rate = eased_after(
         float(motion.angles_rad[k]),
@@ -104,7 +104,7 @@ def followed(motion: Motion, k: int, wished: Attitude, dt_s: float) -> Motion:
     return _with_angle(motion, k, angle, rate)
 
 
-def tilted(motion: Motion, wished: Attitude, dt_s: float, aim: CameraAim) -> Motion:
+def tilted(motion: MotionReference, wished: AttitudeReference, dt_s: float, aim: CameraAim) -> MotionReference:
     """The motion with its camera's joint a step nearer to a wished tilt that moves."""
     if aim.joint is None:
         return motion
@@ -114,7 +114,7 @@ def tilted(motion: Motion, wished: Attitude, dt_s: float, aim: CameraAim) -> Mot
     return replace(motion, tilt_rad=aim.joint.within(tilt), tilt_rad_s=rate)
 
 
-def tilting(motion: Motion, wished_rad_s: float, dt_s: float, aim: CameraAim) -> Motion:
+def tilting(motion: MotionReference, wished_rad_s: float, dt_s: float, aim: CameraAim) -> MotionReference:
     """The motion with its camera's joint turned at a wished rate, as far as its stops."""
     if aim.joint is None:
         return motion
@@ -125,14 +125,14 @@ def tilting(motion: Motion, wished_rad_s: float, dt_s: float, aim: CameraAim) ->
     return replace(motion, tilt_rad=tilt, tilt_rad_s=rate if tilt == asked else 0.0)
 
 
-def turning(motion: Motion, k: int, wished_rad_s: float, dt_s: float) -> Motion:
+def turning(motion: MotionReference, k: int, wished_rad_s: float, dt_s: float) -> MotionReference:
     """The motion with angle number k turned at a wished rate, which is reached at `TURN_RAD_S2`."""
     before = float(motion.rates_rad_s[k])
     rate = slewed_rate(before, wished_rad_s, dt_s, TURN_RAD_S2)
     return _with_angle(motion, k, float(motion.angles_rad[k]) + 0.5 * (before + rate) * dt_s, rate)
 
 
-def _with_angle(motion: Motion, k: int, angle_rad: float, rate_rad_s: float) -> Motion:
+def _with_angle(motion: MotionReference, k: int, angle_rad: float, rate_rad_s: float) -> MotionReference:
     angles, rates = np.array(motion.angles_rad), np.array(motion.rates_rad_s)
     angles[k], rates[k] = angle_rad, rate_rad_s
     return replace(motion, angles_rad=angles, rates_rad_s=rates)

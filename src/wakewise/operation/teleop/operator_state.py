@@ -32,7 +32,7 @@ TRANSIT, DELICATE = 10.0, 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class DeskState:
+class OperatorSettings:
     """What is set.
 
     Parameters
@@ -85,23 +85,23 @@ class DeskState:
         return self.gain * (PRECISE_SHARE if self.precise else 1.0)
 
 
-FIELDS: tuple[str, ...] = tuple(field.name for field in fields(DeskState))
+FIELDS: tuple[str, ...] = tuple(field.name for field in fields(OperatorSettings))
 """What can be set."""
 
 
-class Desk:
+class OperatorState:
     """Holds what is set; safe to read and to write from any thread."""
 
-    def __init__(self, state: DeskState | None = None) -> None:
+    def __init__(self, state: OperatorSettings | None = None) -> None:
         self._lock = threading.Lock()
-        self._state = state or DeskState()
+        self._state = state or OperatorSettings()
 
     @property
-    def state(self) -> DeskState:
+    def state(self) -> OperatorSettings:
         """What is set now."""
         return self._state
 
-    def set(self, **changes: Any) -> DeskState:
+    def set(self, **changes: Any) -> OperatorSettings:
         """Change some fields; returns what is set then.
 
         Raises
@@ -116,14 +116,14 @@ class Desk:
             self._state = replace(self._state, **changes)
             return self._state
 
-    def press(self, action: str) -> DeskState:
+    def press(self, action: str) -> OperatorSettings:
         """What a button does to what is set; one that does nothing to it changes nothing."""
         with self._lock:
             self._state = pressed(self._state, action)
             return self._state
 
 
-def pressed(state: DeskState, action: str) -> DeskState:
+def pressed(state: OperatorSettings, action: str) -> OperatorSettings:
     """What is set after a button (see `wakewise.operation.teleop.input.ACTIONS`)."""
     if action in MODES:
         return replace(state, mode=action)
@@ -142,7 +142,7 @@ def regime(w_track: float) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Meaning:
+class TrackingWeightMeaning:
     """What a `w_track` means: its regime, and in percent how far the vehicle deviates and how much wash it saves.
 
     The percentages are None where nobody has measured them.
@@ -153,7 +153,7 @@ class Meaning:
     saved_pct: float | None = None
 
 
-def meaning(w_track: float, measured: Mapping[float, tuple[float, float]] | None = None) -> Meaning:
+def meaning(w_track: float, measured: Mapping[float, tuple[float, float]] | None = None) -> TrackingWeightMeaning:
     """What a `w_track` means, from what was measured.
 
     Parameters
@@ -164,8 +164,8 @@ def meaning(w_track: float, measured: Mapping[float, tuple[float, float]] | None
         interpolated over the logarithm, beyond they stay as at the end.
     """
     if not measured:
-        return Meaning(regime=regime(w_track))
+        return TrackingWeightMeaning(regime=regime(w_track))
     at = sorted(measured)
     where = np.log(at)
     deviation, saved = (float(np.interp(math.log(w_track), where, [measured[w][k] for w in at])) for k in (0, 1))
-    return Meaning(regime=regime(w_track), deviation_pct=deviation, saved_pct=saved)
+    return TrackingWeightMeaning(regime=regime(w_track), deviation_pct=deviation, saved_pct=saved)

@@ -15,7 +15,7 @@ BY_HAND = "by hand"
 """What a stretch of flight is called where the pilot has no name for it."""
 
 
-class Shutter:
+class PhotoTrigger:
     """A `Timetable` that opens when asked, from any thread or by the pilot's own hands.
 
     A pilot may have a method `taken()`, which gives and clears what hands asked for since: "capture" is a photograph in

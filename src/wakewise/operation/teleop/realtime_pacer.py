@@ -16,7 +16,7 @@ KEPT = 3000
 """Steps that percentiles are taken over: the last minute at 50 Hz."""
 
 
-class Pace:
+class RealTimePacer:
     """Holds each step of `run_loop` back until its time has come; one thread steps, any may read.
 
     Parameters

@@ -11,18 +11,18 @@ from wakewise.core.errors import InputError
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario, read_scenario
 from wakewise.operation.teleop.assisted import assisted
-from wakewise.operation.teleop.input.control_log import TRACE_FILE, Trace, read_trace
-from wakewise.operation.teleop.input.script import Script
+from wakewise.operation.teleop.input.control_log import TRACE_FILE, ControlLog, read_trace
+from wakewise.operation.teleop.input.script import ScriptedInput
 from wakewise.operation.teleop.input.sources import hands_from
 from wakewise.operation.teleop.live import LiveFlight
-from wakewise.operation.teleop.operator_state import Desk
-from wakewise.operation.teleop.photo_trigger import Shutter
+from wakewise.operation.teleop.operator_state import OperatorState
+from wakewise.operation.teleop.photo_trigger import PhotoTrigger
 
 AFTER_S = 3.0
 """How long a flight goes on after the last entry of a script; estimate: from full stick to rest takes 1.5 s."""
 
 
-class RecordedShutter(Shutter):
+class ReplayedPhotoTrigger(PhotoTrigger):
     """Opens when it did in a flight before, whatever hands ask for, and ends with it.
 
     Parameters
@@ -46,7 +46,7 @@ class RecordedShutter(Shutter):
         return time_s
 
 
-class UntilShutter(Shutter):
+class TimedPhotoTrigger(PhotoTrigger):
     """One that ends a flight at `end_s`, if hands did not before."""
 
     def __init__(self, parts: Parts, end_s: float) -> None:
@@ -73,11 +73,11 @@ def fly_hands(parts: Parts, folder: Path) -> None:
         _ = parts.pilot  # which says so
         return
     hands = hands_from(Path(parts.scenario.controls))
-    end_s = hands.end_s if isinstance(hands, Trace) else 0.0
-    if isinstance(hands, Script):
+    end_s = hands.end_s if isinstance(hands, ControlLog) else 0.0
+    if isinstance(hands, ScriptedInput):
         end_s = hands.moments[-1].at_s + AFTER_S
-    flown = assisted(parts, hands, Desk())
-    LiveFlight(flown, folder=folder, paced=False, shutter=UntilShutter(flown, end_s)).run()
+    flown = assisted(parts, hands, OperatorState())
+    LiveFlight(flown, folder=folder, paced=False, shutter=TimedPhotoTrigger(flown, end_s)).run()
 
 
 def replay_of(folder: Path, out: Path | None, parts: Parts | Scenario | None = None) -> LiveFlight:
@@ -103,6 +103,6 @@ def replay_of(folder: Path, out: Path | None, parts: Parts | Scenario | None = N
             raise InputError(f"{folder}: has no {name}, the folder of a flight by hand is needed")
     parts = read_scenario(folder / "scenario.yaml") if parts is None else parts
     parts = parts if isinstance(parts, Parts) else parts.parts()
-    flown = assisted(parts, read_trace(folder / TRACE_FILE), Desk())
+    flown = assisted(parts, read_trace(folder / TRACE_FILE), OperatorState())
     steps = pl.read_parquet(folder / "steps.parquet", columns=["time_s", "exposing"])
-    return LiveFlight(flown, folder=out, paced=False, shutter=RecordedShutter(flown, steps))
+    return LiveFlight(flown, folder=out, paced=False, shutter=ReplayedPhotoTrigger(flown, steps))

@@ -18,7 +18,7 @@ from wakewise.control.easing import near_turn
 from wakewise.control.intent import slewed
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, euler_from_quat, quat_conjugate, quat_multiply
-from wakewise.operation.teleop.motion import Attitude, Motion, rates_of, tilting, turned_to, turning
+from wakewise.operation.teleop.motion import AttitudeReference, MotionReference, rates_of, tilting, turned_to, turning
 from wakewise.scene.missions import CameraAim, Leg, Route
 from wakewise.scene.missions.orbit import camera_pose, camera_twist
 from wakewise.scene.missions.route import rest_to_rest
@@ -29,7 +29,7 @@ REST_M_S, REST_RAD_S = 1e-9, 1e-9
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Scan:
+class ScanState:
     """Where a mission stands.
 
     `mission_s` is its own time and `pace` how fast that runs, `back` the way back to it, of which `back_s` is done.
@@ -43,7 +43,7 @@ class Scan:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Mission:
+class ResumableMission:
     """A route with what aims the camera, and how fast the way back to it is flown."""
 
     route: Route
@@ -57,14 +57,14 @@ class Mission:
         """Whether there is anything to fly."""
         return len(self.route.exposures_s) > 0
 
-    def begun(self) -> tuple[Scan, Motion]:
+    def begun(self) -> tuple[ScanState, MotionReference]:
         """At the mission's beginning, its clock running."""
-        scan = Scan(phase="flying", pace=1.0)
+        scan = ScanState(phase="flying", pace=1.0)
         return scan, self._on_route(
-            scan, Motion.at(self.route.body(0.0, self.aim), self.route.tilt(0.0, self.aim)[0]), 0.0
+            scan, MotionReference.at(self.route.body(0.0, self.aim), self.route.tilt(0.0, self.aim)[0]), 0.0
         )
 
-    def step(self, scan: Scan, motion: Motion, dt_s: float) -> tuple[Scan, Motion]:
+    def step(self, scan: ScanState, motion: MotionReference, dt_s: float) -> tuple[ScanState, MotionReference]:
         """A step on, from wherever the motion is."""
         if scan.phase == "stopping":
             motion = stopped(motion, dt_s, self.braking_m_s2, self.aim)
@@ -85,11 +85,11 @@ class Mission:
         scan = replace(scan, pace=pace, mission_s=scan.mission_s + 0.5 * (scan.pace + pace) * dt_s)
         return scan, self._on_route(scan, motion, dt_s)
 
-    def _on_route(self, scan: Scan, motion: Motion, dt_s: float) -> Motion:
+    def _on_route(self, scan: ScanState, motion: MotionReference, dt_s: float) -> MotionReference:
         place, rate = self.route.on_sphere(scan.mission_s)
         return self._led(motion, place, scan.pace * rate, dt_s)[0]
 
-    def _led(self, motion: Motion, place: Array, rate: Array, dt_s: float) -> tuple[Motion, bool]:
+    def _led(self, motion: MotionReference, place: Array, rate: Array, dt_s: float) -> tuple[MotionReference, bool]:
         """The motion with its camera at a place on the sphere, and whether it looks where it should.
 
         `place` and `rate` are azimuth, elevation and range and how fast they change, shape (3,).
@@ -100,7 +100,9 @@ class Mission:
         angles = euler_from_quat(q_WB)
         _, turned_B = self.aim.carried(tilt, tilt_rate)
         omega_B = Pose(X_WC.p_m, q_WB).R.T @ omega_W - turned_B
-        wished = Attitude(angles_rad=angles, rates_rad_s=rates_of(angles, omega_B), tilt_rad=tilt, tilt_rad_s=tilt_rate)
+        wished = AttitudeReference(
+            angles_rad=angles, rates_rad_s=rates_of(angles, omega_B), tilt_rad=tilt, tilt_rad_s=tilt_rate
+        )
         if dt_s > 0.0:
             motion = turned_to(motion, wished, dt_s, self.aim)
         else:
@@ -112,7 +114,7 @@ class Mission:
         place_B = X_WC.p_m - (eye - motion.place_W_m)
         return replace(motion, place_W_m=place_B, velocity_W_m_s=v_W - moves), bool(off < 1e-9)
 
-    def _way_back(self, scan: Scan, motion: Motion) -> Leg:
+    def _way_back(self, scan: ScanState, motion: MotionReference) -> Leg:
         away = motion.camera(self.aim)[0] - self.route.centre_W_m
         distance = float(np.linalg.norm(away))
         end, _ = self.route.on_sphere(scan.mission_s)
@@ -123,7 +125,7 @@ class Mission:
         return rest_to_rest("back to the mission", start, end, self.speed_m_s, self.acceleration_m_s2)
 
 
-def stopped(motion: Motion, dt_s: float, braking_m_s2: float, aim: CameraAim) -> Motion:
+def stopped(motion: MotionReference, dt_s: float, braking_m_s2: float, aim: CameraAim) -> MotionReference:
     """The motion a step nearer to rest, which it comes to ahead of where it is."""
     velocity = slewed(motion.velocity_W_m_s, np.zeros(3), dt_s, braking_m_s2)
     place = motion.place_W_m + 0.5 * dt_s * (motion.velocity_W_m_s + velocity)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wakewise.control.intent import FULL_M_S, FULL_RAD_S
-from wakewise.control.operator_model import Person, PersonState, View, begin, draw_person, steer
+from wakewise.control.operator_model import CameraMotion, OperatorModel, OperatorModelState, begin, draw_person, steer
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Pilot
@@ -18,7 +18,7 @@ from wakewise.operation.teleop.input import CENTRED, Controls
 
 
 @dataclass(kw_only=True, eq=False)
-class PersonsHands:
+class SimulatedOperatorInput:
     """A `ControlSource` with eyes: a drawn person who would like to see what a pilot says.
 
     Parameters
@@ -43,8 +43,8 @@ class PersonsHands:
     dt_s: float
     seed: int
     pressed: tuple[str, ...] = ("operator",)
-    person: Person = field(init=False)
-    _state: PersonState = field(init=False)
+    person: OperatorModel = field(init=False)
+    _state: OperatorModelState = field(init=False)
     _controls: Controls = CENTRED
 
     def __post_init__(self) -> None:
@@ -56,8 +56,8 @@ class PersonsHands:
         if time_s <= 0.0:
             self._state = begin(self.person)
         wished = self.wish.goal(time_s, estimate)
-        view = View.of(estimate.X_WB, estimate.nu_B, self.X_BC)
-        wish = View.of(wished.X_WB, wished.nu_B, self.X_BC)
+        view = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
+        wish = CameraMotion.of(wished.X_WB, wished.nu_B, self.X_BC)
         seen = watched(wished, self.X_BC, self.target_W_m)
         self._state, asked = steer(self.person, self._state, self.dt_s, view, wish, seen)
         full = share * np.array([FULL_M_S, FULL_M_S, FULL_M_S, FULL_RAD_S])

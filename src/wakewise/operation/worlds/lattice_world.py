@@ -23,14 +23,14 @@ import numpy as np
 
 from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError
-from wakewise.core.interfaces import BodyState, Measurement, Plant, ScalarGrid, Truth, WaterTruth, Witness
+from wakewise.core.interfaces import BodyState, Measurement, Plant, ScalarGrid, Truth, TruthProvider, WaterTruth
 from wakewise.robot.thrusters import electrical_power_W
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
-from wakewise.simulation.lattice.forced_lattice import LiveBox, disk_points
+from wakewise.simulation.lattice.forced_lattice import ForcedLattice, disk_points
 from wakewise.simulation.tank import Sensors, TankSettings, VehiclePlant
 from wakewise.simulation.tank.camera_joint import CameraJoint
-from wakewise.simulation.tank.sediment import SiltLaws
+from wakewise.simulation.tank.sediment import SiltProperties
 from wakewise.simulation.tank.settings import PLANT_STEP_S
 from wakewise.simulation.tank.water_truth import TargetProbes
 from wakewise.simulation.water import AmbientSum, SteadyCurrent
@@ -50,7 +50,7 @@ _MARGIN_M = 0.25  # the side takes the water's motion out over 0.2 m
 class _Water:
     """The box as `TargetProbes` looks at it: what is more than in the same box without a vehicle, None if at rest."""
 
-    def __init__(self, water: LiveBox, alone: LiveBox | None) -> None:
+    def __init__(self, water: ForcedLattice, alone: ForcedLattice | None) -> None:
         self._water, self._alone = water, alone
         self.steady = alone is None
 
@@ -65,7 +65,7 @@ class _Water:
 
 
 class LatticeWater:
-    """A `Plant` and its own `Witness`: vehicle and sensors of the tank in the lattice's water.
+    """A `Plant` and its own `TruthProvider`: vehicle and sensors of the tank in the lattice's water.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class LatticeWater:
         low = np.array([*(target.centre_W_m[:2] - 0.5 * across * cell_m), depth - cells[2] * cell_m])
         exit_m_s = math.sqrt(STRONGEST_N / (density * float(vehicle.disk_areas_m2.min())))
         diameter = math.sqrt(4.0 * float(vehicle.disk_areas_m2.mean()) / math.pi)
-        self._box = LiveBox(
+        self._box = ForcedLattice(
             low,
             cells,
             cell_m,
@@ -136,7 +136,7 @@ class LatticeWater:
         self._sensors = Sensors(settings.sensors, sensor_rng)
         self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, sensor_rng.spawn(1)[0])
         self._probes = TargetProbes(target, probe_rng)
-        self._laws = SiltLaws.of(
+        self._laws = SiltProperties.of(
             settings.silt.grain_m, settings.silt.grain_density_kg_m3, density, settings.silt.erosion_kg_m2_s
         )
         self._time = 0.0
@@ -155,7 +155,7 @@ class LatticeWater:
         return self._plant.state
 
     @property
-    def box(self) -> LiveBox:
+    def box(self) -> ForcedLattice:
         """The water."""
         return self._box
 
@@ -250,7 +250,7 @@ class LatticeWorld:
     tilt_rad: float = 0.0
     name: str = "lattice"
 
-    def begin(self) -> tuple[Plant, Witness | None]:
+    def begin(self) -> tuple[Plant, TruthProvider | None]:
         """Fresh water at its start, which is plant and witness in one."""
         water = LatticeWater(
             self.vehicle,

@@ -17,14 +17,14 @@ from pydantic import Field, ValidationError, model_validator
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import read_yaml
 from wakewise.core.settings import Settings, describe_faults, guess
-from wakewise.operation.randomization import Draw
+from wakewise.operation.randomization import FieldDistribution
 
 
 class WorldField(Settings):
     """One field of a world: its value or from where it is drawn, and the source of the number."""
 
     value: Any = Field(None, description="what the field is")
-    draw: Draw | None = Field(None, description="from where the seed draws it")
+    draw: FieldDistribution | None = Field(None, description="from where the seed draws it")
     source: str = Field(..., min_length=3, description="where the number comes from")
 
     @model_validator(mode="after")
@@ -56,7 +56,7 @@ class NamedWorld:
         return {name: field.value for name, field in self.file.fields.items() if field.draw is None}
 
     @property
-    def draws(self) -> dict[str, Draw]:
+    def draws(self) -> dict[str, FieldDistribution]:
         """Draws by dotted field."""
         return {name: field.draw for name, field in self.file.fields.items() if field.draw is not None}
 

@@ -14,7 +14,13 @@ from wakewise.core.interfaces import BodyState, World
 from wakewise.core.plugins import find
 from wakewise.operation.worlds.lattice_world import LatticeWorld, box_half_size_m
 from wakewise.operation.worlds.library import load_world, world_names
-from wakewise.operation.worlds.quasi_steady_world import InstantWorld, Jets, free_jet_field, lattice_jets, paper_jets
+from wakewise.operation.worlds.quasi_steady_world import (
+    Jets,
+    QuasiSteadyWorld,
+    free_jet_field,
+    lattice_jets,
+    paper_jets,
+)
 from wakewise.robot.vehicles import Vehicle, perturbed, with_drag
 from wakewise.simulation.tank import TankWorld
 
@@ -74,10 +80,10 @@ def _check_held(parts: Parts, name: str) -> None:
         )
 
 
-def _instant(name: str, jets: Callable[[float], Jets], parts: Parts) -> InstantWorld:
+def _instant(name: str, jets: Callable[[float], Jets], parts: Parts) -> QuasiSteadyWorld:
     seed = parts.scenario.seed
     _check_held(parts, name)
-    return InstantWorld(
+    return QuasiSteadyWorld(
         name=name,
         jets=jets(parts.scenario.tank.density_kg_m3),
         vehicle=true_vehicle(parts),

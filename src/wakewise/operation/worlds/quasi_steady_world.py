@@ -22,7 +22,16 @@ from functools import lru_cache
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.interfaces import BodyState, Measurement, Plant, ScalarGrid, Truth, WakeModel, WaterTruth, Witness
+from wakewise.core.interfaces import (
+    BodyState,
+    Measurement,
+    Plant,
+    ScalarGrid,
+    Truth,
+    TruthProvider,
+    WakeModel,
+    WaterTruth,
+)
 from wakewise.robot.thrusters import electrical_power_W
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
@@ -71,8 +80,8 @@ def lattice_jets(table: MeanField, density_kg_m3: float) -> Jets:
     return velocity
 
 
-class InstantWater:
-    """A `Plant` and its own `Witness`: plant and sensors of the tank, water without memory.
+class QuasiSteadyWater:
+    """A `Plant` and its own `TruthProvider`: plant and sensors of the tank, water without memory.
 
     Parameters
     ----------
@@ -178,8 +187,8 @@ class InstantWater:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class InstantWorld:
-    """`InstantWater` that begins alike each time; implements `wakewise.core.interfaces.World`.
+class QuasiSteadyWorld:
+    """`QuasiSteadyWater` that begins alike each time; implements `wakewise.core.interfaces.World`.
 
     Parameters as of `wakewise.simulation.tank.TankWorld`, and `jets`.
     """
@@ -193,9 +202,9 @@ class InstantWorld:
     draw: Callable[[], np.random.Generator]
     tilt_rad: float = 0.0
 
-    def begin(self) -> tuple[Plant, Witness | None]:
+    def begin(self) -> tuple[Plant, TruthProvider | None]:
         """A fresh world at its start, which is plant and witness in one."""
-        water = InstantWater(
+        water = QuasiSteadyWater(
             self.jets, self.vehicle, self.target, self.settings, self.start, self.draw(), self.tilt_rad
         )
         return water, water

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.robot.importers.xml import Place, PlacedError
+from wakewise.robot.importers.xml import PlacedError, SourceLocation
 
 TURN = 2.0 * math.pi + 0.01
 """Angles beyond this are no angles in radians that anybody writes, unless they are a few eighths of a turn."""
@@ -16,7 +16,7 @@ _EIGHTH = math.pi / 4.0
 _WHOLE = 1e-9
 
 
-def require_radians(angles: Array, place: Place, what: str) -> Array:
+def require_radians(angles: Array, place: SourceLocation, what: str) -> Array:
     """Return angles of a format that states radians, shape (3,); refuse those that can only be degrees.
 
     Raises
@@ -35,7 +35,7 @@ def require_radians(angles: Array, place: Place, what: str) -> Array:
     return angles
 
 
-def read_angles(rows: list[tuple[Array, Place]], what: str, key: str) -> tuple[list[Array], str]:
+def read_angles(rows: list[tuple[Array, SourceLocation]], what: str, key: str) -> tuple[list[Array], str]:
     """Angles in radians of a file whose format states no unit, and a note on how they were read ("" if none).
 
     All rows are of one unit, which the key may say (`..._deg`, `..._rad`). Else angles beyond a turn are degrees if all

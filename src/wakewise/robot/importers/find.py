@@ -24,7 +24,7 @@ from wakewise.robot.importers.wrench_rows import (
 from wakewise.robot.vehicles.check import AnyVehicle
 from wakewise.robot.vehicles.draft import VehicleDraft
 from wakewise.robot.vehicles.library import draft_names, load_draft
-from wakewise.robot.vehicles.mixing import Comparison, compare_either_frame, compare_signs, compare_with_ardusub
+from wakewise.robot.vehicles.mixing import MatrixComparison, compare_either_frame, compare_signs, compare_with_ardusub
 from wakewise.robot.vehicles.vehicle import Vehicle
 
 _OURS = re.compile(r"^(does_not_claim|thruster_layout):", re.MULTILINE)
@@ -120,7 +120,7 @@ def any_vehicle(name_or_path: str | Path) -> Vehicle:
     return draft.vehicle()
 
 
-def compare_with(vehicle: AnyVehicle, matrix: str, rows: str | None = None) -> Comparison:
+def compare_with(vehicle: AnyVehicle, matrix: str, rows: str | None = None) -> MatrixComparison:
     """Compare the geometry with a stated matrix: the word ardusub, or a file of numbers or YAML that holds one.
 
     What the file leaves open, such as whether forces or moments come first, is read as the geometry agrees best;

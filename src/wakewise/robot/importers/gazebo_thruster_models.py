@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.robot.importers.parsed_vehicle import QUESTION, Found, FoundThruster
-from wakewise.robot.importers.robot_description import Bodies, Joint
+from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle
+from wakewise.robot.importers.robot_description import Joint, RobotDescription
 from wakewise.robot.importers.urdf import origin
-from wakewise.robot.importers.xml import Element, Place, PlacedError, number, numbers
+from wakewise.robot.importers.xml import Element, PlacedError, SourceLocation, number, numbers
 
 GZ_RULE = "positive thrust pushes along the joint axis, whatever the sign of thrust_coefficient (gz-sim's Thruster)"
 UUV_RULE = "positive thrust pushes along the joint axis, +x of the thruster where none is given (UUV Simulator)"
@@ -28,7 +28,9 @@ def words(plugin: Element) -> str:
     return (plugin.attributes.get("filename", "") + " " + plugin.attributes.get("name", "")).lower()
 
 
-def plugin_thrusters(plugin: Element, bodies: Bodies, found: Found) -> list[tuple[FoundThruster, str, float]] | None:
+def plugin_thrusters(
+    plugin: Element, bodies: RobotDescription, found: ParsedVehicle
+) -> list[tuple[ParsedThruster, str, float]] | None:
     """Thrusters of one plugin with its rule and their order; None if its form is not known."""
     if "thruster" in words(plugin):
         if plugin.first("joint_name") is not None:
@@ -45,7 +47,7 @@ def plugin_thrusters(plugin: Element, bodies: Bodies, found: Found) -> list[tupl
     return None
 
 
-def _hippo(plugin: Element, bodies: Bodies) -> FoundThruster:
+def _hippo(plugin: Element, bodies: RobotDescription) -> ParsedThruster:
     name = plugin.value("link") or ""
     link = bodies.link(name)
     if link is None:
@@ -53,16 +55,16 @@ def _hippo(plugin: Element, bodies: Bodies) -> FoundThruster:
     sign = -1.0 if (plugin.value("propeller_direction") or "").lower() == "cw" else 1.0
     # The force acts at the link's centre of mass (gz-sim's AddWorldForce).
     p_m = link.X_BL.apply(link.p_LG_m)
-    return FoundThruster(short(link.name), p_m, sign * link.X_BL.R[:, 0], plugin.place, link.X_BL.R)
+    return ParsedThruster(short(link.name), p_m, sign * link.X_BL.R[:, 0], plugin.place, link.X_BL.R)
 
 
-def _orca(plugin: Element, bodies: Bodies, found: Found) -> list[FoundThruster]:
+def _orca(plugin: Element, bodies: RobotDescription, found: ParsedVehicle) -> list[ParsedThruster]:
     """Thrusters that stand in the plugin itself, each an origin in one link with its forces at full command."""
     name = plugin.value("link_name") or bodies.base
     link = bodies.link(name)
     if link is None:
         raise PlacedError(f"{plugin.place}: thruster plugin: link {name} is not in the file")
-    thrusters: list[FoundThruster] = []
+    thrusters: list[ParsedThruster] = []
     for i, element in enumerate(plugin.all("thruster")):
         X_BT = link.X_BL @ origin(element.first("origin"))
         ahead, astern = number_in(element, "pos_force"), number_in(element, "neg_force")
@@ -74,7 +76,7 @@ def _orca(plugin: Element, bodies: Bodies, found: Found) -> list[FoundThruster]:
                 f"or it pushes one way only"
             )
         sign = math.copysign(1.0, ahead)
-        thruster = FoundThruster(label, X_BT.p_m, sign * X_BT.R[:, 2], element.place, X_BT.R)
+        thruster = ParsedThruster(label, X_BT.p_m, sign * X_BT.R[:, 2], element.place, X_BT.R)
         thruster.max_forward_N, thruster.max_reverse_N = abs(ahead), abs(astern)
         thrusters.append(thruster)
     if np.any(np.abs(link.p_LG_m) > 1e-9):
@@ -93,7 +95,7 @@ def _checked_axis(axis: Array, where: str) -> Array:
     return axis / length
 
 
-def _gz(plugin: Element, bodies: Bodies) -> FoundThruster:
+def _gz(plugin: Element, bodies: RobotDescription) -> ParsedThruster:
     name = plugin.value("joint_name") or ""
     joint = bodies.joint(name)
     if joint is None or joint.axis is None:
@@ -110,7 +112,7 @@ def _gz(plugin: Element, bodies: Bodies) -> FoundThruster:
     return thruster
 
 
-def disk_area_m2(diameter_m: float, place: Place) -> float:
+def disk_area_m2(diameter_m: float, place: SourceLocation) -> float:
     """Area in m^2 of a propeller's disk.
 
     Raises
@@ -126,18 +128,18 @@ def disk_area_m2(diameter_m: float, place: Place) -> float:
     return 0.25 * math.pi * diameter_m**2
 
 
-def where_on(joint: Joint, bodies: Bodies) -> Array:
+def where_on(joint: Joint, bodies: RobotDescription) -> Array:
     """Where a thruster on a joint pushes: at the origin of the link that turns, wherever the joint itself is placed."""
     link = bodies.link(joint.child)
     return joint.X_BJ.p_m if link is None else link.X_BL.p_m
 
 
-def on_joint(joint: Joint, bodies: Bodies) -> FoundThruster:
+def on_joint(joint: Joint, bodies: RobotDescription) -> ParsedThruster:
     """A thruster that turns on a joint and pushes along its axis."""
     axis = joint.axis if joint.axis is not None else joint.X_BJ.R[:, 0]
     where = f"{joint.place}: joint {joint.name}"
     name = short(joint.child)
-    return FoundThruster(name, where_on(joint, bodies), _checked_axis(axis, where), joint.place, joint.X_BJ.R)
+    return ParsedThruster(name, where_on(joint, bodies), _checked_axis(axis, where), joint.place, joint.X_BJ.R)
 
 
 def short(name: str) -> str:
@@ -145,7 +147,7 @@ def short(name: str) -> str:
     return name.replace("::", "/").rpartition("/")[2] or name
 
 
-def _uuv(plugin: Element, bodies: Bodies) -> FoundThruster:
+def _uuv(plugin: Element, bodies: RobotDescription) -> ParsedThruster:
     link_name, joint_name = plugin.value("linkName"), plugin.value("jointName")
     joint = bodies.joint(joint_name) if joint_name else None
     link = bodies.link(link_name) if link_name else None
@@ -154,7 +156,7 @@ def _uuv(plugin: Element, bodies: Bodies) -> FoundThruster:
         if link is not None:
             thruster.name = short(link.name)
     elif link is not None:
-        thruster = FoundThruster(short(link.name), link.X_BL.p_m, link.X_BL.R[:, 0], plugin.place, link.X_BL.R)
+        thruster = ParsedThruster(short(link.name), link.X_BL.p_m, link.X_BL.R[:, 0], plugin.place, link.X_BL.R)
     else:
         raise PlacedError(f"{plugin.place}: thruster plugin: neither link {link_name} nor its joint is in the file")
     dynamics = plugin.first("dynamics")
@@ -165,7 +167,7 @@ def _uuv(plugin: Element, bodies: Bodies) -> FoundThruster:
     return thruster
 
 
-def _uuv_limits(plugin: Element, thruster: FoundThruster) -> None:
+def _uuv_limits(plugin: Element, thruster: ParsedThruster) -> None:
     """Limits: stated thrusts first, then the ends of a thrust table, then the command's ends through the curve."""
     high, low = number_in(plugin, "thrustMax"), number_in(plugin, "thrustMin")
     conversion = plugin.first("conversion")

@@ -14,8 +14,8 @@ from wakewise.robot.importers.gazebo_thruster_models import (
     where_on,
     words,
 )
-from wakewise.robot.importers.parsed_vehicle import QUESTION, Found, FoundThruster
-from wakewise.robot.importers.robot_description import THRUSTER_NAME, Bodies, Joint, moving_parts
+from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle
+from wakewise.robot.importers.robot_description import THRUSTER_NAME, Joint, RobotDescription, moving_parts
 from wakewise.robot.importers.xml import Element, PlacedError, numbers
 
 NAME_RULE = "inferred from names: positive thrust pushes along the axis of each joint that is called a thruster"
@@ -35,7 +35,7 @@ _NUMBERED = re.compile(r"\d+")
 _HAND_M = 0.15
 
 
-def read_thrusters(bodies: Bodies, found: Found) -> None:
+def read_thrusters(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Fill in the thrusters from plugins; where there are none, from joints that are called thrusters.
 
     Raises
@@ -91,7 +91,7 @@ def _title(plugin: Element) -> str:
     return (plugin.attributes.get("name") or plugin.attributes.get("filename") or "without a name")[:80]
 
 
-def _question_undriven(bodies: Bodies, found: Found) -> None:
+def _question_undriven(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Say which turning joints are called thrusters and are driven by no plugin."""
     driven = [t.p_m for t in found.thrusters]
     idle = [
@@ -108,7 +108,7 @@ def _question_undriven(bodies: Bodies, found: Found) -> None:
         )
 
 
-def question_steered(names: list[str], found: Found) -> None:
+def question_steered(names: list[str], found: ParsedVehicle) -> None:
     """Say which thrusters sit beyond a joint that moves: they are read as they point with the joint at zero."""
     if names:
         found.notes.append(
@@ -117,9 +117,9 @@ def question_steered(names: list[str], found: Found) -> None:
         )
 
 
-def _drop_repeats(found: Found, order: list[float]) -> None:
+def _drop_repeats(found: ParsedVehicle, order: list[float]) -> None:
     """Count a thruster once that two plugins drive, as files for two simulators do."""
-    seen: list[FoundThruster] = []
+    seen: list[ParsedThruster] = []
     for index in reversed(range(len(found.thrusters))):
         thruster = found.thrusters[index]
         same = [t for t in found.thrusters[:index] if t.name == thruster.name and np.array_equal(t.p_m, thruster.p_m)]
@@ -132,7 +132,7 @@ def _drop_repeats(found: Found, order: list[float]) -> None:
         )
 
 
-def _by_name(bodies: Bodies, unknown: list[Element], found: Found) -> None:
+def _by_name(bodies: RobotDescription, unknown: list[Element], found: ParsedVehicle) -> None:
     joints = [j for j in bodies.joints.values() if THRUSTER_NAME.search(short(j.child) + " " + short(j.name))]
     turning = [j for j in joints if j.axis is not None and j.kind in {"continuous", "revolute"}]
     fixed = [j for j in joints if j.kind == "fixed"]
@@ -153,7 +153,7 @@ def _by_name(bodies: Bodies, unknown: list[Element], found: Found) -> None:
         found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: joints with thruster names"
 
 
-def _one_each(joints: list[Joint], bodies: Bodies, found: Found) -> list[Joint]:
+def _one_each(joints: list[Joint], bodies: RobotDescription, found: ParsedVehicle) -> list[Joint]:
     """One joint per thruster: a propeller counts, the hull that carries it does not.
 
     Raises
@@ -196,7 +196,7 @@ def _alike(one: Joint, other: Joint) -> bool:
     return numbered[0] == numbered[1] and float(np.linalg.norm(one.X_BJ.p_m - other.X_BJ.p_m)) < _HAND_M
 
 
-def _freefloating(bodies: Bodies, found: Found) -> bool:
+def _freefloating(bodies: RobotDescription, found: ParsedVehicle) -> bool:
     """Freefloating Gazebo states a wrench per thruster, that is, a column of the matrix, and sometimes no place."""
     thrusters = [t for p in bodies.plugins if "freefloating" in words(p) for t in p.all("thruster")]
     if not thrusters:
@@ -216,7 +216,7 @@ def _freefloating(bodies: Bodies, found: Found) -> bool:
     return True
 
 
-def _ardupilot(bodies: Bodies, found: Found) -> None:
+def _ardupilot(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Thrust commands of ArduPilot's plugin: `multiplier * (u + offset)` newton for u from 0 to 1."""
     reversed_names, limited = [], 0
     for plugin in bodies.plugins:

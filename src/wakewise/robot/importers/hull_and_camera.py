@@ -8,8 +8,8 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
-from wakewise.robot.importers.parsed_vehicle import R_LINK_CAMERA, Found
-from wakewise.robot.importers.robot_description import Bodies, Link
+from wakewise.robot.importers.parsed_vehicle import R_LINK_CAMERA, ParsedVehicle
+from wakewise.robot.importers.robot_description import Link, RobotDescription
 
 _CAMERA = re.compile(r"(^|[_/:-])cam(era)?(_?\d+|_[a-z]+)?(_link|_frame)?$", re.IGNORECASE)
 _AHEAD = re.compile(
@@ -21,7 +21,7 @@ _OUTSIDE_M = 1e-3
 """So far a thruster's place may lie outside the outline, by rounding."""
 
 
-def read_outline(bodies: Bodies, found: Found) -> None:
+def read_outline(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Size and camera mount, where nothing else in the file states them."""
     if found.size_m is None:
         _read_size(bodies, found)
@@ -29,7 +29,7 @@ def read_outline(bodies: Bodies, found: Found) -> None:
         _read_camera_link(bodies, found)
 
 
-def _read_size(bodies: Bodies, found: Found) -> None:
+def _read_size(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """The box round the collision shapes of the base link, which is centred on its origin, as `Vehicle.size_m` is.
 
     Taken only where it holds every thruster, since collision shapes may be drawn for buoyancy or for contact alone.
@@ -66,7 +66,7 @@ def _reach(X_BS: Pose, half_m: Array | None) -> Array:
     return np.asarray(np.abs(X_BS.p_m) + np.abs(X_BS.R) @ half)
 
 
-def _read_camera_link(bodies: Bodies, found: Found) -> None:
+def _read_camera_link(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Camera mount by a link that is called one: its x axis looks ahead (ROS REP 103), or z of an optical frame."""
     optical = [link for name, link in bodies.links.items() if _OPTICAL.search(name)]
     plain = [link for name, link in bodies.links.items() if _CAMERA.search(name) and link not in optical]

@@ -8,9 +8,9 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.robot.importers.angles import read_angles, unit_of
-from wakewise.robot.importers.parsed_vehicle import QUESTION, Found, FoundThruster
+from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle
 from wakewise.robot.importers.robot_description import pose_of
-from wakewise.robot.importers.safe_yaml_nodes import Item
+from wakewise.robot.importers.safe_yaml_nodes import YamlNode
 from wakewise.robot.importers.thruster_checks import is_unit, require_count
 from wakewise.robot.importers.thruster_lists import (
     POSES,
@@ -33,7 +33,7 @@ _ANGLES = re.compile(
 )
 
 
-def read_geometry(entries: Entries, found: Found) -> bool:
+def read_geometry(entries: Entries, found: ParsedVehicle) -> bool:
     """Fill in thrusters from positions with directions or angles; False if the file places none.
 
     Raises
@@ -57,7 +57,7 @@ def read_geometry(entries: Entries, found: Found) -> bool:
     return True
 
 
-def _direction_matrix(entries: Entries) -> tuple[Item | None, str]:
+def _direction_matrix(entries: Entries) -> tuple[YamlNode | None, str]:
     for key in _DIRECTIONS:
         item = find(entries, (key,))
         if item is not None:
@@ -68,7 +68,7 @@ def _direction_matrix(entries: Entries) -> tuple[Item | None, str]:
     return None, ""
 
 
-def _from_matrices(positions: Item, directions: Item, key: str, entries: Entries, found: Found) -> None:
+def _from_matrices(positions: YamlNode, directions: YamlNode, key: str, entries: Entries, found: ParsedVehicle) -> None:
     places, axes, turned = _columns(positions, directions, key, found)
     if places.shape != axes.shape:
         raise PlacedError(
@@ -91,7 +91,7 @@ def _from_matrices(positions: Item, directions: Item, key: str, entries: Entries
         axis = unit_axis(axes[:, i], directions, name)
         if not turned:
             require_direction(axes[:, i], directions, name)
-        found.thrusters.append(FoundThruster(name, places[:, i], axis, directions.place, Rs[i]))
+        found.thrusters.append(ParsedThruster(name, places[:, i], axis, directions.place, Rs[i]))
 
 
 def listed_names(entries: Entries, columns: Array | None) -> list[str]:
@@ -106,7 +106,7 @@ def listed_names(entries: Entries, columns: Array | None) -> list[str]:
     return []
 
 
-def _columns(positions: Item, directions: Item, key: str, found: Found) -> tuple[Array, Array, bool]:
+def _columns(positions: YamlNode, directions: YamlNode, key: str, found: ParsedVehicle) -> tuple[Array, Array, bool]:
     """Positions and directions (or angles, then True), each 3 x n, by whichever way of writing makes directions unit.
 
     Three rows of n (as flat lists, too) and n rows of three are both in use; where a list reads both ways, directions
@@ -157,7 +157,7 @@ def _columns(positions: Item, directions: Item, key: str, found: Found) -> tuple
     return places[min(chosen, len(places) - 1)], ways[min(chosen, len(ways) - 1)], angles
 
 
-def _angular(item: Item) -> bool:
+def _angular(item: YamlNode) -> bool:
     """Whether every number may be an angle: within a turn and a half degree, in radians or in whole degrees."""
     values = np.abs(item.numbers("angles"))
     halves = np.abs(2.0 * values - np.round(2.0 * values)) < 1e-6
@@ -166,7 +166,7 @@ def _angular(item: Item) -> bool:
     return bool(nice.all() or (halves.all() and values.max(initial=0.0) <= 360.0))
 
 
-def _ways(item: Item, what: str) -> list[Array]:
+def _ways(item: YamlNode, what: str) -> list[Array]:
     """3 x n, the likelier way of reading first: flat lists and 3 x 3 matrices have two."""
     if item.is_matrix():
         matrix = item.rows(what)
@@ -185,7 +185,7 @@ def _ways(item: Item, what: str) -> list[Array]:
     return [flat.reshape(3, -1), flat.reshape(-1, 3).T]
 
 
-def _from_poses(entries: Entries, found: Found) -> bool:
+def _from_poses(entries: Entries, found: ParsedVehicle) -> bool:
     """Thrusters as rows of x, y, z, roll, pitch, yaw."""
     for path, item in entries:
         if not (POSES.match(path[-1]) and any("thruster" in key.lower() for key in path) and item.is_matrix()):
@@ -200,13 +200,13 @@ def _from_poses(entries: Entries, found: Found) -> bool:
         found.notes += [note] if note else []
         for i, (row, rpy) in enumerate(zip(rows, angles, strict=True)):
             R = pose_of(np.zeros(3), rpy).R
-            found.thrusters.append(FoundThruster(f"thruster{i}", row[:3], R[:, 0], item.place, R))
+            found.thrusters.append(ParsedThruster(f"thruster{i}", row[:3], R[:, 0], item.place, R))
         found.thrust_rule = TURN_RULE
         return True
     return False
 
 
-def _limits(entries: Entries, within: tuple[str, ...], found: Found) -> None:
+def _limits(entries: Entries, within: tuple[str, ...], found: ParsedVehicle) -> None:
     # A thruster's own limits are read with it; here are those of all.
     common = [(path, item) for path, item in entries if not within or path[: len(within)] != within]
     high, low = find(common, ("max_force", "max_thrust")), find(common, ("min_force", "min_thrust"))

@@ -10,13 +10,13 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.robot.importers.layouts import listed_names, read_geometry
 from wakewise.robot.importers.names import vote
-from wakewise.robot.importers.parsed_vehicle import QUESTION, Found, Frame
-from wakewise.robot.importers.safe_yaml_nodes import Item
+from wakewise.robot.importers.parsed_vehicle import QUESTION, Frame, ParsedVehicle
+from wakewise.robot.importers.safe_yaml_nodes import YamlNode
 from wakewise.robot.importers.thruster_checks import claims_in, require_count, require_same_count
 from wakewise.robot.importers.thruster_lists import LOOKS_LIKE_THRUSTERS
 from wakewise.robot.importers.unused_keys import not_read, title, words_in
 from wakewise.robot.importers.wrench_rows import (
-    Order,
+    WrenchOrder,
     component_in_comment,
     order_in_comment,
     order_of,
@@ -38,7 +38,7 @@ _BARE_WORDS = frozenset({"frame", "frames", "id", "tf", "name", "convention"})
 _UP_WORDS = re.compile(r"(^|[^a-z])(enu|flu|nwu)([^a-z]|$)", re.IGNORECASE)
 
 
-def read_yaml(root: Item, name: str, found: Found, rows: Order | None = None) -> None:
+def read_yaml(root: YamlNode, name: str, found: ParsedVehicle, rows: WrenchOrder | None = None) -> None:
     """Fill in what a YAML file says about a vehicle; `rows` is what the user says the rows of a matrix are.
 
     Raises
@@ -80,7 +80,7 @@ def read_yaml(root: Item, name: str, found: Found, rows: Order | None = None) ->
     found.notes += not_read(root)
 
 
-def read_matrix_only(root: Item, found: Found, rows: Order | None = None) -> None:
+def read_matrix_only(root: YamlNode, found: ParsedVehicle, rows: WrenchOrder | None = None) -> None:
     """Find the allocation matrix of a YAML file, for comparison with a geometry.
 
     Raises
@@ -100,7 +100,7 @@ _NEAR_LINES = 40
 """How far from the thrusters or the matrix a comment may stand that speaks of their frame."""
 
 
-def _holds_figures(item: Item) -> bool:
+def _holds_figures(item: YamlNode) -> bool:
     """Whether an item that no reader took is a list of numbers, of lists or of tables, or a table of tables."""
     if item.seen or any(below.seen for _, below in item.walk_all()):
         return False
@@ -108,7 +108,7 @@ def _holds_figures(item: Item) -> bool:
     return item.is_numbers() or any(not isinstance(member.value, str) for member in item.items()) or len(tables) > 1
 
 
-def _frame(root: Item, entries: Entries, found: Found, *, geometry: bool) -> tuple[Frame, str]:
+def _frame(root: YamlNode, entries: Entries, found: ParsedVehicle, *, geometry: bool) -> tuple[Frame, str]:
     """FRD or FLU from the file's own frames, names of thrusters, or a comment; else a guess that is questioned."""
     if found.frame_why:
         return found.frame, found.frame_why
@@ -152,7 +152,7 @@ def _frame(root: Item, entries: Entries, found: Found, *, geometry: bool) -> tup
     return "FLU", "inferred: ROS files state matrices in base_link, which is FLU; no key says so"
 
 
-def _named_frame(entries: Entries, found: Found) -> tuple[Frame, str] | None:
+def _named_frame(entries: Entries, found: ParsedVehicle) -> tuple[Frame, str] | None:
     """Frame that a key names: of the body before a bare frame before any other; keys of the world's frame do not count.
 
     Raises
@@ -160,7 +160,7 @@ def _named_frame(entries: Entries, found: Found) -> tuple[Frame, str] | None:
     InputError
         If two keys name different frames of the body.
     """
-    ranked: list[tuple[int, Frame, str, Item]] = []
+    ranked: list[tuple[int, Frame, str, YamlNode]] = []
     for path, item in entries:
         # Only names of frames tell; a topic may mention either.
         if not isinstance(item.value, str) or not re.search(r"frame|tf", " ".join(path), re.IGNORECASE):
@@ -201,7 +201,7 @@ def _rank(path: tuple[str, ...], value: str) -> int | None:
     return 0 if told else 1 if bare else 2
 
 
-def _geometry(found: Found) -> tuple[Array, Array]:
+def _geometry(found: ParsedVehicle) -> tuple[Array, Array]:
     """Places and axes, each (n, 3), of the thrusters; of a matrix what its columns along x and along z tell of them."""
     if found.thrusters or found.matrix is None:
         return np.array([t.p_m for t in found.thrusters]), np.array([t.axis for t in found.thrusters])
@@ -216,7 +216,7 @@ def _geometry(found: Found) -> tuple[Array, Array]:
     return places, force
 
 
-def _matrix(root: Item, entries: Entries, found: Found, rows: Order | None, *, flown: bool) -> bool:
+def _matrix(root: YamlNode, entries: Entries, found: ParsedVehicle, rows: WrenchOrder | None, *, flown: bool) -> bool:
     for path, item in entries:
         key = path[-1]
         if not _MATRIX_KEY.search(key) or _NOT_MATRIX.search(key):
@@ -241,7 +241,7 @@ def _matrix(root: Item, entries: Entries, found: Found, rows: Order | None, *, f
     return False
 
 
-def _numbers(key: str, item: Item, found: Found) -> tuple[Array | None, Order | None]:
+def _numbers(key: str, item: YamlNode, found: ParsedVehicle) -> tuple[Array | None, WrenchOrder | None]:
     """Numbers of a matrix as they stand, and their order where each row has a name; None if these are none."""
     named = order_of(list(item.table()), f"names of the rows of {key}") if len(item.table()) == 6 else None
     if named is not None:
@@ -276,7 +276,7 @@ def _numbers(key: str, item: Item, found: Found) -> tuple[Array | None, Order | 
     return None, None
 
 
-def _stated_order(root: Item, path: tuple[str, ...], item: Item, entries: Entries) -> Order | None:
+def _stated_order(root: YamlNode, path: tuple[str, ...], item: YamlNode, entries: Entries) -> WrenchOrder | None:
     """Order that a list of six names beside the matrix states, or a comment; None if none does, or several differ."""
     beside = [(p, e) for p, e in entries if p[:-1] == path[:-1]] or entries
     for key, entry in [*beside, *entries]:

@@ -31,7 +31,7 @@ _UPRIGHT = 0.7
 
 
 @dataclass(eq=False)
-class Votes:
+class AxisVotes:
     """Names for and against each axis: y to port, x ahead, and z up; a name that says nothing is in neither list."""
 
     port: tuple[list[str], list[str]] = field(default_factory=lambda: ([], []))
@@ -55,13 +55,13 @@ class Votes:
         return f"by the names {_some([*self.up[0], *self.up[1]])} {'up' if self.up[0] else 'down'} is along +z"
 
 
-def vote(names: Sequence[str], places: Array, axes: Array) -> Votes:
+def vote(names: Sequence[str], places: Array, axes: Array) -> AxisVotes:
     """Hold names against places, shape (n, 3), and axes of positive thrust, shape (n, 3), of one frame.
 
     Left and port, right and starboard speak of y; front and bow, back and stern of x; top and bottom of z, compared
     with one another; up and down of the force of a vertical thruster.
     """
-    votes = Votes()
+    votes = AxisVotes()
     letters = {letter for name in names for letter in _letters(name)}
     meanings = [_meaning(name, letters) for name in names]
     # Bow and stern speak of one another: bodies with their origin at the nose are about.

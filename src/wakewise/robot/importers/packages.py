@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from wakewise.core.errors import InputError
-from wakewise.robot.importers.xml import Place, PlacedError
+from wakewise.robot.importers.xml import PlacedError, SourceLocation
 
 MAX_FOLDERS = 3000
 """Folders looked into for one package."""
@@ -26,7 +26,7 @@ _LEAST_PARTS = 3
 _PACKAGE_NAME = re.compile(r"<name>\s*([A-Za-z0-9_.-]{1,200})\s*</name>")
 
 
-class Folders:
+class PackagePaths:
     """Finds packages near a file and keeps every path inside the folders that belong to it.
 
     Parameters
@@ -67,7 +67,7 @@ class Folders:
                 return f"; package {name} was found by its name in {folder}, --package {name}=DIR names another"
         return ""
 
-    def inside(self, path: Path, place: Place) -> Path:
+    def inside(self, path: Path, place: SourceLocation) -> Path:
         """The real path, links followed.
 
         Raises
@@ -88,7 +88,7 @@ class Folders:
             )
         return real
 
-    def locate(self, name: str, folder: Path, place: Place) -> Path:
+    def locate(self, name: str, folder: Path, place: SourceLocation) -> Path:
         """Path that a file means by `package://p/x`, `model://p/x`, `file://x`, an absolute or a relative path.
 
         Raises

@@ -12,7 +12,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.robot.importers.xml import Place, PlacedError
+from wakewise.robot.importers.xml import PlacedError, SourceLocation
 from wakewise.robot.vehicles.check import actuation
 from wakewise.robot.vehicles.draft import ThrusterDraft, VehicleDraft
 from wakewise.robot.vehicles.vehicle import Provenance
@@ -31,7 +31,7 @@ _AXES = {"x": 0, "y": 1, "z": 2}
 
 
 @dataclass(eq=False)
-class FoundThruster:
+class ParsedThruster:
     """A thruster in the file's body axes.
 
     `axis` is the force for positive thrust by the rule of the file's format; `R_BT` holds the axes of the thruster's
@@ -41,7 +41,7 @@ class FoundThruster:
     name: str
     p_m: Array
     axis: Array
-    place: Place
+    place: SourceLocation
     R_BT: Array | None = None
     max_forward_N: float | None = None
     max_reverse_N: float | None = None
@@ -50,7 +50,7 @@ class FoundThruster:
 
 
 @dataclass(eq=False)
-class Found:
+class ParsedVehicle:
     """Everything a reader found; None where the file says nothing. Axes are the file's own.
 
     `frame_doubt` is the note for a user who does not say the frame either, where it is a guess;
@@ -75,13 +75,13 @@ class Found:
     added_mass: Array | None = None
     linear_damping: Array | None = None
     quadratic_damping: Array | None = None
-    thrusters: list[FoundThruster] = field(default_factory=list)
+    thrusters: list[ParsedThruster] = field(default_factory=list)
     matrix: Array | None = None
     matrix_name: str = ""
     matrix_line: int | None = None
     column_names: list[str] = field(default_factory=list)
     raw_matrix: Array | None = None
-    claims: list[tuple[int, str, Place, bool]] = field(default_factory=list)
+    claims: list[tuple[int, str, SourceLocation, bool]] = field(default_factory=list)
     X_BC: Pose | None = None
     camera_fov_rad: float | None = None
     notes: list[str] = field(default_factory=list)
@@ -104,12 +104,12 @@ def wrench_rows_to_frd(matrix: Array) -> Array:
     return _FLIP_BOTH @ matrix + 0.0
 
 
-def make_draft(found: Found, convention: str, thrust: str) -> VehicleDraft:
+def make_draft(found: ParsedVehicle, convention: str, thrust: str) -> VehicleDraft:
     """Turn what was found into a draft in FRD.
 
     Parameters
     ----------
-    found : Found
+    found : ParsedVehicle
     convention : str
         "auto", "FLU" or "FRD".
     thrust : str
@@ -194,7 +194,7 @@ def symmetrised(matrix: Array, notes: list[str], what: str = "added mass") -> Ar
     return 0.5 * (matrix + matrix.T)
 
 
-def _unfilled(found: Found) -> list[str]:
+def _unfilled(found: ParsedVehicle) -> list[str]:
     """Take substitutions that nothing filled in, such as $(param robot_name), out of names; say which were there."""
     left: dict[str, None] = {}
 
@@ -214,7 +214,7 @@ _SUBSTITUTION = re.compile(r"\$\([^)]*\)|\$\{[^}]*\}")
 _FRAME_WORDS = {"FLU": "FLU (x forward, y left, z up), turned to FRD", "FRD": "FRD (x forward, y right, z down)"}
 
 
-def _thruster(found: FoundThruster, thrust: str, *, turn: bool) -> ThrusterDraft:
+def _thruster(found: ParsedThruster, thrust: str, *, turn: bool) -> ThrusterDraft:
     axis = found.axis
     forward, reverse = found.max_forward_N, found.max_reverse_N
     if thrust == "reversed":
@@ -245,7 +245,7 @@ THRUST_CHOICES = ("auto", "axis", "reversed", *sorted(_SIGNED))
 FRAME_CHOICES = ("auto", "FLU", "FRD")
 
 
-def _thrust_words(found: Found, thrust: str) -> str:
+def _thrust_words(found: ParsedVehicle, thrust: str) -> str:
     if thrust == "auto":
         return found.thrust_rule
     if thrust == "axis":
@@ -255,7 +255,7 @@ def _thrust_words(found: Found, thrust: str) -> str:
     return f"positive thrust pushes along {thrust} of each thruster's own frame (told)"
 
 
-def _stability(found: Found, frame: str) -> list[str]:
+def _stability(found: ParsedVehicle, frame: str) -> list[str]:
     """A vehicle that floats level has its buoyancy above its weight; otherwise the frame or the file is doubtful."""
     up = 1.0 if frame == "FLU" else -1.0
     if found.p_buoyancy_m is None or found.p_G_m is None:

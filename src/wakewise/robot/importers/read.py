@@ -15,16 +15,16 @@ from wakewise.robot.importers.gazebo_thruster_models import words
 from wakewise.robot.importers.gazebo_thrusters import read_thrusters
 from wakewise.robot.importers.hull_and_camera import read_outline
 from wakewise.robot.importers.matrices import read_matrix_only, read_yaml
-from wakewise.robot.importers.packages import Folders
+from wakewise.robot.importers.packages import PackagePaths
 from wakewise.robot.importers.parsed_vehicle import (
     FRAME_CHOICES,
     QUESTION,
     THRUST_CHOICES,
-    Found,
+    ParsedVehicle,
     make_draft,
     wrench_rows_to_frd,
 )
-from wakewise.robot.importers.robot_description import Bodies, read_camera, read_displacement, read_mass
+from wakewise.robot.importers.robot_description import RobotDescription, read_camera, read_displacement, read_mass
 from wakewise.robot.importers.safe_yaml_nodes import parse_yaml
 from wakewise.robot.importers.sdf import left_out, read_sdf
 from wakewise.robot.importers.stonefish import read_stonefish
@@ -41,12 +41,12 @@ from wakewise.robot.importers.wrench_rows import (
     ARDUSUB,
     FORCES_FIRST,
     MOMENTS_FIRST,
-    Order,
+    WrenchOrder,
     agreeing,
     nearest,
     told_order,
 )
-from wakewise.robot.importers.xacro import Xacro
+from wakewise.robot.importers.xacro import XacroExpander
 from wakewise.robot.importers.xml import Element, PlacedError, parse_xml, read_text
 from wakewise.robot.vehicles.draft import VehicleDraft
 from wakewise.robot.vehicles.vehicle import Provenance
@@ -127,30 +127,32 @@ def _read(
     path: Path,
     packages: Mapping[str, Path],
     arguments: Mapping[str, str],
-    order: Order | None,
+    order: WrenchOrder | None,
     *,
     skip_missing: bool,
-) -> Found:
+) -> ParsedVehicle:
     text = read_text(path)
     if not text.lstrip().startswith("<"):
         _refuse_toml(text, path)
-        found = Found(path.stem, "YAML", path, "FLU", "")
+        found = ParsedVehicle(path.stem, "YAML", path, "FLU", "")
         read_yaml(parse_yaml(text, path), path.name, found, order)
         return found
     if order is not None:
         raise InputError(f"{path}: holds no matrix, so rows {order.words} say nothing; they are for YAML files")
     root = parse_xml(text, path)
-    folders = Folders(path, packages)
+    folders = PackagePaths(path, packages)
     notes: list[str] = []
     macros: list[str] = []
     if _is_xacro(root):
-        xacro = Xacro(folders, arguments, skip_missing=skip_missing)
+        xacro = XacroExpander(folders, arguments, skip_missing=skip_missing)
         root = xacro.expand(root)
         notes, macros = xacro.notes, list(xacro.macros)
     elif arguments and root.tag != "scenario" and not _is_stonefish(root):
         raise InputError(f"{path}: has no xacro arguments, {', '.join(arguments)} cannot be set")
     if root.tag == "scenario" or (root.tag == "robot" and _is_stonefish(root)):
-        found = Found(path.stem, "Stonefish", path, "FRD", "by format: Stonefish worlds are NED and its bodies FRD")
+        found = ParsedVehicle(
+            path.stem, "Stonefish", path, "FRD", "by format: Stonefish worlds are NED and its bodies FRD"
+        )
         read_stonefish(root, folders, arguments, macros, found)
     elif root.tag == "robot":
         if not root.all("link") and macros:
@@ -197,8 +199,8 @@ def _is_stonefish(root: Element) -> bool:
     return root.first("base_link") is not None
 
 
-def _from_bodies(bodies: Bodies, kind: str, path: Path) -> Found:
-    found = Found(bodies.name, kind, path, "FLU", "")
+def _from_bodies(bodies: RobotDescription, kind: str, path: Path) -> ParsedVehicle:
+    found = ParsedVehicle(bodies.name, kind, path, "FLU", "")
     _detect_frame(bodies, found)
     read_mass(bodies, found)
     read_thrusters(bodies, found)
@@ -210,7 +212,7 @@ def _from_bodies(bodies: Bodies, kind: str, path: Path) -> Found:
     return found
 
 
-def _detect_frame(bodies: Bodies, found: Found) -> None:
+def _detect_frame(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """URDF and SDF bodies are FLU by ROS REP 103; ArduPilot's plugin and the base link's name can say otherwise."""
     for plugin in bodies.plugins:
         turn = plugin.value("modelXYZToAirplaneXForwardZDown")
@@ -254,7 +256,7 @@ def read_matrix(
     InputError
         If the file holds none or it has the wrong shape.
     """
-    found = Found(path.stem, "YAML", path, "FLU", "")
+    found = ParsedVehicle(path.stem, "YAML", path, "FLU", "")
     read_matrix_only(parse_yaml(read_text(path), path), found, told_order(rows))
     if found.matrix is None:
         raise InputError(f"{path}: holds no allocation matrix")

@@ -9,8 +9,8 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, quat_from_euler
-from wakewise.robot.importers.parsed_vehicle import QUESTION, R_LINK_CAMERA, Found
-from wakewise.robot.importers.xml import Element, Place, PlacedError, number, numbers
+from wakewise.robot.importers.parsed_vehicle import QUESTION, R_LINK_CAMERA, ParsedVehicle
+from wakewise.robot.importers.xml import Element, PlacedError, SourceLocation, number, numbers
 
 IDENTITY = Pose(np.zeros(3))
 
@@ -28,7 +28,7 @@ _MOVING = frozenset(
 
 
 @dataclass(eq=False)
-class Shape:
+class CollisionShape:
     """A collision shape; `X_LS` is its pose in its link, `half_m` half the box round it. A mesh has neither measure."""
 
     X_LS: Pose
@@ -41,7 +41,7 @@ class Link:
     """A rigid body: where it is, and what it weighs. Inertia is about its centre of mass, in the axes of the link."""
 
     name: str
-    place: Place
+    place: SourceLocation
     X_BL: Pose = IDENTITY
     mass_kg: float | None = None
     p_LG_m: Array = field(default_factory=lambda: np.zeros(3))
@@ -49,7 +49,7 @@ class Link:
     added_mass: Array | None = None
     computed: bool = False
     """Whether the simulator computes mass and inertia from shapes and densities, so that the file states none."""
-    shapes: list[Shape] = field(default_factory=list)
+    shapes: list[CollisionShape] = field(default_factory=list)
 
 
 @dataclass(eq=False)
@@ -61,12 +61,12 @@ class Joint:
     child: str
     X_BJ: Pose
     axis: Array | None
-    place: Place
+    place: SourceLocation
     parent: str = ""
 
 
 @dataclass(eq=False)
-class Camera:
+class CameraSensor:
     """A camera sensor: pose of its Gazebo frame (looks along x) and horizontal field of view."""
 
     name: str
@@ -75,7 +75,7 @@ class Camera:
 
 
 @dataclass(eq=False)
-class Bodies:
+class RobotDescription:
     """A vehicle's links and joints, its plugins, and its cameras; `base` is the link whose frame is the body."""
 
     name: str
@@ -83,7 +83,7 @@ class Bodies:
     links: dict[str, Link]
     joints: dict[str, Joint]
     plugins: list[Element]
-    cameras: list[Camera]
+    cameras: list[CameraSensor]
 
     def link(self, name: str) -> Link | None:
         """A link by name, with or without its scope."""
@@ -109,7 +109,7 @@ def inertia_matrix(values: dict[str, float]) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def checked_mass(text: str | None, place: Place, link: str) -> float:
+def checked_mass(text: str | None, place: SourceLocation, link: str) -> float:
     """A link's mass.
 
     Raises
@@ -163,10 +163,10 @@ def shape_half(tag: str, sizes: dict[str, Array]) -> Array | None:
             return None
 
 
-def collision_shape(X_LS: Pose, geometry: Element | None) -> Shape:
+def collision_shape(X_LS: Pose, geometry: Element | None) -> CollisionShape:
     """Shape of a `<geometry>` of URDF (attributes) or SDF (elements)."""
     if geometry is None or not geometry.children:
-        return Shape(X_LS, None)
+        return CollisionShape(X_LS, None)
     shape = geometry.children[0]
     counts = {"size": 3, "radii": 3, "radius": 1, "length": 1}
     sizes: dict[str, Array] = {}
@@ -174,10 +174,10 @@ def collision_shape(X_LS: Pose, geometry: Element | None) -> Shape:
         text = shape.attributes.get(key) or shape.value(key)
         if text is not None:
             sizes[key] = numbers(text, shape.place, f"{shape.tag} {key}", count)
-    return Shape(X_LS, shape_volume(shape.tag, sizes), shape_half(shape.tag, sizes))
+    return CollisionShape(X_LS, shape_volume(shape.tag, sizes), shape_half(shape.tag, sizes))
 
 
-def read_mass(bodies: Bodies, found: Found) -> None:
+def read_mass(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Mass, centre of gravity and inertia of all links together, as a simulator would move them.
 
     Raises
@@ -242,7 +242,7 @@ def read_mass(bodies: Bodies, found: Found) -> None:
     )
 
 
-def moving_parts(bodies: Bodies) -> set[str]:
+def moving_parts(bodies: RobotDescription) -> set[str]:
     """Links beyond a joint that moves, thrusters' own apart: an arm, not the hull."""
     edges: dict[str, list[tuple[str, bool]]] = {}
     for joint in bodies.joints.values():
@@ -278,7 +278,7 @@ def _require_inertia(link: Link) -> None:
         )
 
 
-def read_camera(bodies: Bodies, found: Found) -> None:
+def read_camera(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Mount and field of view of the first camera."""
     if not bodies.cameras:
         return
@@ -290,7 +290,7 @@ def read_camera(bodies: Bodies, found: Found) -> None:
     found.derived["camera_mount"] = f"{found.kind} {found.file.name}: sensor {camera.name}"
 
 
-def read_displacement(bodies: Bodies, found: Found) -> None:
+def read_displacement(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Displaced volume and centre of buoyancy from collision shapes, which Gazebo's buoyancy system weighs.
 
     Taken only where that makes the vehicle float within 30 % of its mass in fresh water, since collision shapes of

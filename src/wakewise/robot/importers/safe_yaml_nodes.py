@@ -12,7 +12,7 @@ import yaml
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-from wakewise.robot.importers.xml import Place, PlacedError, number
+from wakewise.robot.importers.xml import PlacedError, SourceLocation, number
 
 MAX_TEXT = 600_000
 """Longest YAML text that is read; parsing it takes a few seconds."""
@@ -22,30 +22,30 @@ MAX_DEPTH = 40
 
 
 @dataclass(eq=False)
-class Item:
+class YamlNode:
     """A value in a YAML file: text, a list of items, or a table of items.
 
     `seen` is set where a reader takes the value; `comments` are those of the whole file, at its root only.
     """
 
-    value: str | list[Item] | dict[str, Item]
-    place: Place
+    value: str | list[YamlNode] | dict[str, YamlNode]
+    place: SourceLocation
     seen: bool = False
-    comments: list[tuple[str, Place]] = field(default_factory=list)
+    comments: list[tuple[str, SourceLocation]] = field(default_factory=list)
 
-    def table(self) -> dict[str, Item]:
+    def table(self) -> dict[str, YamlNode]:
         """The table; empty if this is something else."""
         return self.value if isinstance(self.value, dict) else {}
 
-    def items(self) -> list[Item]:
+    def items(self) -> list[YamlNode]:
         """The list; empty if this is something else."""
         return self.value if isinstance(self.value, list) else []
 
-    def get(self, *keys: str) -> Item | None:
+    def get(self, *keys: str) -> YamlNode | None:
         """The first of these keys that the table has."""
         return next((self.table()[key] for key in keys if key in self.table()), None)
 
-    def walk(self, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Item]]:
+    def walk(self, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], YamlNode]]:
         """Every item below a table's keys with the keys that lead to it, outermost first."""
         for key, item in self.table().items():
             yield (*path, key), item
@@ -56,7 +56,7 @@ class Item:
         self.seen = True
         return self.value if isinstance(self.value, str) else ""
 
-    def unread(self, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Item]]:
+    def unread(self, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], YamlNode]]:
         """The outermost keys below this of which no reader took anything, with what leads to them."""
         members = list(self.table().items()) or [("", item) for item in self.items() if item.table()]
         for key, item in members:
@@ -67,7 +67,7 @@ class Item:
             else:
                 yield (*path, key), item
 
-    def walk_all(self) -> Iterator[tuple[tuple[str, ...], Item]]:
+    def walk_all(self) -> Iterator[tuple[tuple[str, ...], YamlNode]]:
         """Every item below this one, in tables and in lists."""
         for key, item in [*self.table().items(), *(("", item) for item in self.items())]:
             yield (key,), item
@@ -122,7 +122,7 @@ class Item:
             yield from item._flat(what)
 
 
-def parse_yaml(text: str, path: Path) -> Item:
+def parse_yaml(text: str, path: Path) -> YamlNode:
     """Parse YAML (or JSON) text.
 
     Raises
@@ -145,7 +145,7 @@ def parse_yaml(text: str, path: Path) -> Item:
     except RecursionError as fault:
         raise InputError(f"{path}: lists nested too deeply") from fault
     item.comments = [
-        (match[1].strip(), Place(path, i))
+        (match[1].strip(), SourceLocation(path, i))
         for i, line in enumerate(text.splitlines(), 1)
         if (match := _COMMENT.search(line))
     ]
@@ -157,22 +157,22 @@ class _Converter:
         self.path = path
         self.count = 0
 
-    def item(self, node: yaml.Node, depth: int) -> Item:
-        place = Place(self.path, node.start_mark.line + 1 if node.start_mark else 1)
+    def item(self, node: yaml.Node, depth: int) -> YamlNode:
+        place = SourceLocation(self.path, node.start_mark.line + 1 if node.start_mark else 1)
         self.count += 1
         if depth > MAX_DEPTH:
             raise PlacedError(f"{place}: nested more than {MAX_DEPTH} deep")
         if self.count > MAX_NODES:
             raise PlacedError(f"{place}: more than {MAX_NODES} values")
         if isinstance(node, yaml.SequenceNode):
-            return Item([self.item(child, depth + 1) for child in node.value], place)
+            return YamlNode([self.item(child, depth + 1) for child in node.value], place)
         if isinstance(node, yaml.MappingNode):
-            table: dict[str, Item] = {}
+            table: dict[str, YamlNode] = {}
             for key, child in node.value:
                 if isinstance(key, yaml.ScalarNode):
                     if key.value in table:
                         line = key.start_mark.line + 1 if key.start_mark else place.line
-                        raise PlacedError(f"{Place(self.path, line)}: {str(key.value)[:80]} stands twice")
+                        raise PlacedError(f"{SourceLocation(self.path, line)}: {str(key.value)[:80]} stands twice")
                     table[str(key.value)] = self.item(child, depth + 1)
-            return Item(table, place)
-        return Item(str(node.value), place)
+            return YamlNode(table, place)
+        return YamlNode(str(node.value), place)

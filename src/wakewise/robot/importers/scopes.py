@@ -6,11 +6,11 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from wakewise.robot.importers.xml import Element, Place, PlacedError
+from wakewise.robot.importers.xml import Element, PlacedError, SourceLocation
 
 
 @dataclass(frozen=True)
-class Parameter:
+class MacroParameter:
     """One parameter of a macro: `block` is "", "*" or "**"; `forward` takes the caller's value of the same name."""
 
     name: str
@@ -24,7 +24,7 @@ class Macro:
     """A macro as defined; `scope` is where."""
 
     name: str
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[MacroParameter, ...]
     body: Element
     scope: Scope
 
@@ -35,7 +35,7 @@ class Scope:
     def __init__(self, parent: Scope | None) -> None:
         self.parent = parent
         self.values: dict[str, Any] = {}
-        self.raws: dict[str, tuple[str, Place]] = {}
+        self.raws: dict[str, tuple[str, SourceLocation]] = {}
         self.blocks: dict[str, tuple[Element, bool]] = {}
         self.pending: set[str] = set()
 
@@ -47,7 +47,7 @@ class Scope:
             scope = scope.parent
         return scope
 
-    def set_raw(self, name: str, text: str, place: Place) -> None:
+    def set_raw(self, name: str, text: str, place: SourceLocation) -> None:
         """Keep a property's text; it is evaluated when it is first used."""
         self.values.pop(name, None)
         self.raws[name] = (text, place)
@@ -78,9 +78,9 @@ _PARAMETER = re.compile(
 )
 
 
-def parse_parameters(text: str, place: Place) -> tuple[Parameter, ...]:
+def parse_parameters(text: str, place: SourceLocation) -> tuple[MacroParameter, ...]:
     """Read a macro's parameter list, such as `prefix *origin id:=1 parent:=^|base_link`."""
-    found: list[Parameter] = []
+    found: list[MacroParameter] = []
     at = 0
     text = text.strip()
     while at < len(text):
@@ -93,7 +93,7 @@ def parse_parameters(text: str, place: Place) -> tuple[Parameter, ...]:
             default = default[1:-1]
         elif default == "" and match["forward"]:
             default = None
-        found.append(Parameter(match["name"], default, bool(match["forward"]), match["block"]))
+        found.append(MacroParameter(match["name"], default, bool(match["forward"]), match["block"]))
     return tuple(found)
 
 

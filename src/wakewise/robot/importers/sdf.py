@@ -8,12 +8,12 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
-from wakewise.robot.importers.packages import Folders
+from wakewise.robot.importers.packages import PackagePaths
 from wakewise.robot.importers.robot_description import (
     PART_NAME,
-    Bodies,
     Joint,
     Link,
+    RobotDescription,
     checked_mass,
     collision_shape,
     inertia_matrix,
@@ -25,7 +25,7 @@ MAX_INCLUDES = 40
 _MOMENTS = ("x", "y", "z", "p", "q", "r")
 
 
-def read_sdf(root: Element, folders: Folders, notes: list[str]) -> Bodies:
+def read_sdf(root: Element, folders: PackagePaths, notes: list[str]) -> RobotDescription:
     """Read an `<sdf>` element; of several models the one with the most thrusters is taken.
 
     Raises
@@ -67,7 +67,7 @@ def _thruster_count(model: Element) -> tuple[int, int]:
     return sum("thruster" in t for t in text), len(plugins)
 
 
-def _included(element: Element, folders: Folders, notes: list[str], depth: int) -> list[Element]:
+def _included(element: Element, folders: PackagePaths, notes: list[str], depth: int) -> list[Element]:
     """Models of an `<include>`; one that is not here is left out with a note."""
     uri = element.value("uri") or ""
     if depth > 5:
@@ -94,7 +94,7 @@ def _included(element: Element, folders: Folders, notes: list[str], depth: int) 
 class _Reader:
     """Places one model's links; frames are found by name and may be defined relative to one another."""
 
-    def __init__(self, model: Element, folders: Folders, notes: list[str]) -> None:
+    def __init__(self, model: Element, folders: PackagePaths, notes: list[str]) -> None:
         self.model = model
         self.folders = folders
         self.notes = notes
@@ -104,7 +104,7 @@ class _Reader:
         self.plugins: list[Element] = []
         self.includes = 0
 
-    def read(self) -> Bodies:
+    def read(self) -> RobotDescription:
         name = self.model.attributes.get("name", "") or "vehicle"
         self._collect(self.model, "", 0)
         if not self.links:
@@ -120,7 +120,7 @@ class _Reader:
                 if sensor.attributes.get("type") in CAMERA_TYPES:
                     cameras += [camera(sensor, X_BL)]
         joints = {key: self._joint(key, element, X_BM) for key, element in self.joints.items()}
-        return Bodies(name, base, links, joints, self.plugins, cameras)
+        return RobotDescription(name, base, links, joints, self.plugins, cameras)
 
     def _collect(self, model: Element, scope: str, depth: int) -> None:
         if depth > 5:

@@ -13,12 +13,12 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.robot.importers.expressions import evaluate
-from wakewise.robot.importers.packages import Folders
-from wakewise.robot.importers.parsed_vehicle import Found
-from wakewise.robot.importers.robot_description import Bodies, Joint, Link, checked_mass, read_mass
+from wakewise.robot.importers.packages import PackagePaths
+from wakewise.robot.importers.parsed_vehicle import ParsedVehicle
+from wakewise.robot.importers.robot_description import Joint, Link, RobotDescription, checked_mass, read_mass
 from wakewise.robot.importers.stonefish_thrusters import count, read_thrusters
 from wakewise.robot.importers.urdf import origin
-from wakewise.robot.importers.xml import Element, Place, PlacedError, number, numbers, parse_xml, read_text
+from wakewise.robot.importers.xml import Element, PlacedError, SourceLocation, number, numbers, parse_xml, read_text
 
 MAX_INCLUDES = 60
 _DEEPEST = 8
@@ -30,10 +30,10 @@ _SMALL = 0.02
 """Share of the mass whose centre or inertia may be unknown."""
 
 
-class Scenario:
+class StonefishReader:
     """Reads a scenario and its includes; what is not there is left out with a note: scenery is often elsewhere."""
 
-    def __init__(self, folders: Folders, arguments: Mapping[str, str], notes: list[str]) -> None:
+    def __init__(self, folders: PackagePaths, arguments: Mapping[str, str], notes: list[str]) -> None:
         self.folders = folders
         self.arguments = dict(arguments)
         self.notes = notes
@@ -108,7 +108,7 @@ def _evaluated(match: re.Match[str]) -> str:
 
 
 def read_stonefish(
-    root: Element, folders: Folders, arguments: Mapping[str, str], macros: list[str], found: Found
+    root: Element, folders: PackagePaths, arguments: Mapping[str, str], macros: list[str], found: ParsedVehicle
 ) -> None:
     """Fill in what a scenario says about its robot; `macros` are those of xacro that the file defines.
 
@@ -117,7 +117,7 @@ def read_stonefish(
     InputError
         If there is no robot, or a number is not one.
     """
-    scenario = Scenario(folders, arguments, found.notes)
+    scenario = StonefishReader(folders, arguments, found.notes)
     whole = Element("scenario", {}, root.place, [root]) if root.tag == "robot" else root
     robots = scenario.robots(whole, dict(arguments))
     if not robots:
@@ -145,7 +145,7 @@ def _density(root: Element) -> float | None:
     return None if water is None else number(water.attributes["density"], water.place, "density of the water")
 
 
-def _bodies(robot: Element, weights: dict[str, _Weight]) -> Bodies:
+def _bodies(robot: Element, weights: dict[str, _Weight]) -> RobotDescription:
     base_element = robot.first("base_link")
     elements = [e for e in robot.children if e.tag in {"base_link", "link"}]
     if not elements:
@@ -174,7 +174,7 @@ def _bodies(robot: Element, weights: dict[str, _Weight]) -> Bodies:
             here, step = steps[here]
             X = step @ X
         link.X_BL = X
-    return Bodies(robot.attributes.get("name", "robot"), base, links, joints, [], [])
+    return RobotDescription(robot.attributes.get("name", "robot"), base, links, joints, [], [])
 
 
 @dataclass(eq=False)
@@ -185,7 +185,7 @@ class _Weight:
     names the parts that state no mass.
     """
 
-    place: Place
+    place: SourceLocation
     mass_kg: float = 0.0
     centre_m: Array = field(default_factory=lambda: np.zeros(3))
     inertia_kg_m2: Array = field(default_factory=lambda: np.zeros((3, 3)))
@@ -238,7 +238,7 @@ def _compound(element: Element, name: str, depth: int) -> _Weight:
     return whole
 
 
-def _mass(bodies: Bodies, weights: dict[str, _Weight], found: Found) -> None:
+def _mass(bodies: RobotDescription, weights: dict[str, _Weight], found: ParsedVehicle) -> None:
     """Mass of all links, if all state one: what Stonefish computes from meshes is not guessed from what is stated."""
     unstated = [part for weight in weights.values() for part in weight.unstated]
     total = sum(weight.mass_kg for weight in weights.values())
@@ -264,7 +264,7 @@ def _mass(bodies: Bodies, weights: dict[str, _Weight], found: Found) -> None:
         )
 
 
-def _hydrodynamics(robot: Element, found: Found) -> None:
+def _hydrodynamics(robot: Element, found: ParsedVehicle) -> None:
     base = robot.first("base_link")
     if base is not None and base.first("hydrodynamics") is not None:
         found.notes.append(
@@ -274,7 +274,7 @@ def _hydrodynamics(robot: Element, found: Found) -> None:
     found.notes.append("added mass, damping and buoyancy: Stonefish computes them from meshes; not in the file")
 
 
-def _camera(robot: Element, bodies: Bodies, found: Found) -> None:
+def _camera(robot: Element, bodies: RobotDescription, found: ParsedVehicle) -> None:
     """First camera; Stonefish gives camera frames OpenCV axes, so the mount needs no turn."""
     for sensor in robot.all("sensor"):
         if "camera" in sensor.attributes.get("type", ""):

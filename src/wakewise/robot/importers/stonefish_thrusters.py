@@ -8,8 +8,8 @@ import numpy as np
 
 from wakewise.robot.importers.gazebo_thruster_models import disk_area_m2, short
 from wakewise.robot.importers.gazebo_thrusters import question_steered
-from wakewise.robot.importers.parsed_vehicle import QUESTION, Found, FoundThruster
-from wakewise.robot.importers.robot_description import Bodies, moving_parts
+from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle
+from wakewise.robot.importers.robot_description import RobotDescription, moving_parts
 from wakewise.robot.importers.urdf import origin
 from wakewise.robot.importers.xml import Element, PlacedError, number, numbers
 
@@ -31,17 +31,17 @@ def count(robot: Element) -> int:
     return sum(a.attributes.get("type") in KINDS for a in robot.all("actuator"))
 
 
-def read_thrusters(robot: Element, bodies: Bodies, density: float | None, found: Found) -> None:
+def read_thrusters(robot: Element, bodies: RobotDescription, density: float | None, found: ParsedVehicle) -> None:
     """Fill in the thrusters of a robot; other actuators are named as not read.
 
     Parameters
     ----------
     robot : Element
-    bodies : Bodies
+    bodies : RobotDescription
         Its links.
     density : float or None
         Density of the scenario's water in kg/m^3.
-    found : Found
+    found : ParsedVehicle
 
     Raises
     ------
@@ -86,17 +86,17 @@ def true(text: str | None) -> bool:
     return (text or "").strip() in {"true", "True", "TRUE", "1"}
 
 
-def _placed(actuator: Element, bodies: Bodies) -> FoundThruster:
+def _placed(actuator: Element, bodies: RobotDescription) -> ParsedThruster:
     name = actuator.attributes.get("name", "") or f"line {actuator.place.line}"
     link_element = actuator.first("link")
     link = bodies.link(link_element.attributes.get("name", "")) if link_element is not None else None
     if link is None:
         raise PlacedError(f"{actuator.place}: thruster {name} is on no link of the robot")
     X_BT = link.X_BL @ origin(actuator.first("origin"))
-    return FoundThruster(short(name), X_BT.p_m, X_BT.R[:, 0], actuator.place, X_BT.R)
+    return ParsedThruster(short(name), X_BT.p_m, X_BT.R[:, 0], actuator.place, X_BT.R)
 
 
-def _simple(actuator: Element, bodies: Bodies) -> FoundThruster:
+def _simple(actuator: Element, bodies: RobotDescription) -> ParsedThruster:
     """An ideal force along +x of its frame; a propeller's hand turns what is drawn, not what pushes."""
     thruster, specs = _placed(actuator, bodies), actuator.first("specs")
     if specs is None:
@@ -113,7 +113,9 @@ def _simple(actuator: Element, bodies: Bodies) -> FoundThruster:
     return thruster
 
 
-def _thruster(actuator: Element, bodies: Bodies, density: float | None, found: Found) -> FoundThruster:
+def _thruster(
+    actuator: Element, bodies: RobotDescription, density: float | None, found: ParsedVehicle
+) -> ParsedThruster:
     thruster = _placed(actuator, bodies)
     specs, propeller, model = (actuator.first(tag) for tag in ("specs", "propeller", "thrust_model"))
     kind = "" if model is None else model.attributes.get("type", "")
@@ -149,7 +151,7 @@ def _thruster(actuator: Element, bodies: Bodies, density: float | None, found: F
     return thruster
 
 
-def _lag(actuator: Element, thruster: FoundThruster) -> bool:
+def _lag(actuator: Element, thruster: ParsedThruster) -> bool:
     """Fill in the time constant of a first-order rotor; whether the rotor settles at the speed that is asked for."""
     rotor = actuator.first("rotor_dynamics")
     if rotor is None:

@@ -9,9 +9,9 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.robot.importers.names import contradictions, lying
-from wakewise.robot.importers.parsed_vehicle import QUESTION, Found
-from wakewise.robot.importers.safe_yaml_nodes import Item
-from wakewise.robot.importers.xml import Place, PlacedError
+from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedVehicle
+from wakewise.robot.importers.safe_yaml_nodes import YamlNode
+from wakewise.robot.importers.xml import PlacedError, SourceLocation
 from wakewise.robot.importers.yaml_parameters import Entries
 from wakewise.robot.vehicles.check import directions
 from wakewise.robot.vehicles.draft import MAX_THRUSTERS, VehicleDraft
@@ -33,7 +33,7 @@ _MANY = 6
 _DOF_KEY = re.compile(r"^(dofs?|num_dofs?|degrees_of_freedom)$", re.IGNORECASE)
 
 
-def question_inertia(found: Found) -> None:
+def question_inertia(found: ParsedVehicle) -> None:
     """Question principal moments of inertia of which one exceeds the sum of the others, as no body's does."""
     if found.inertia_kg_m2 is None:
         return
@@ -90,7 +90,7 @@ def require_force_columns(matrix: Array, what: str) -> None:
         )
 
 
-def require_same_count(entries: Entries, found: Found) -> None:
+def require_same_count(entries: Entries, found: ParsedVehicle) -> None:
     """Hold the number of thrusters against the file's own lists and counts of them.
 
     Raises
@@ -112,7 +112,7 @@ def require_same_count(entries: Entries, found: Found) -> None:
             raise PlacedError(f"{item.place}: {path[-1]} says {said} thrusters, but {what} {n}")
 
 
-def _said_count(path: tuple[str, ...], item: Item) -> int | None:
+def _said_count(path: tuple[str, ...], item: YamlNode) -> int | None:
     key = path[-1]
     inside = len(path) > 1 and re.fullmatch(r"thrusters?", path[-2], re.IGNORECASE)
     if isinstance(item.value, str):
@@ -126,9 +126,9 @@ def _said_count(path: tuple[str, ...], item: Item) -> int | None:
     return None
 
 
-def claims_in(entries: Entries) -> list[tuple[int, str, Place, bool]]:
+def claims_in(entries: Entries) -> list[tuple[int, str, SourceLocation, bool]]:
     """Axes that a YAML file's own words say its thrusters make: how many, the words, where, and whether they bind."""
-    said: list[tuple[int, str, Place, bool]] = []
+    said: list[tuple[int, str, SourceLocation, bool]] = []
     for path, item in entries:
         if not isinstance(item.value, str):
             continue
@@ -153,7 +153,7 @@ def claimed(words: str) -> int:
     return int(match[1]) if match else 6 if _FULL_WORDS.search(words) else 0
 
 
-def question_rank(found: Found, matrix: Array, name: str) -> list[str]:
+def question_rank(found: ParsedVehicle, matrix: Array, name: str) -> list[str]:
     """Hold the rank of an allocation matrix, shape (6, n), against what the file's own words claim.
 
     Returns
@@ -172,7 +172,7 @@ def question_rank(found: Found, matrix: Array, name: str) -> list[str]:
     for word in dict.fromkeys((name, found.file.stem)):
         axes = claimed(word)
         if axes:
-            claims.append((axes, f"the name {word[:60]}", Place(found.file, 1), False))
+            claims.append((axes, f"the name {word[:60]}", SourceLocation(found.file, 1), False))
     for axes, words, place, binds in claims:
         if axes > matrix.shape[1] and binds:
             raise PlacedError(
@@ -183,12 +183,12 @@ def question_rank(found: Found, matrix: Array, name: str) -> list[str]:
     return notes
 
 
-def question_names(found: Found, draft: VehicleDraft, *, told: bool) -> list[str]:
+def question_names(found: ParsedVehicle, draft: VehicleDraft, *, told: bool) -> list[str]:
     """Hold places and axes against the thrusters' own names, and a guess of axes against what any vehicle can do.
 
     Parameters
     ----------
-    found : Found
+    found : ParsedVehicle
     draft : VehicleDraft
         In FRD.
     told : bool

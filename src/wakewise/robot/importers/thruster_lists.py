@@ -10,9 +10,9 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.robot.importers.angles import read_angles, unit_of
-from wakewise.robot.importers.parsed_vehicle import QUESTION, Found, FoundThruster
+from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle
 from wakewise.robot.importers.robot_description import pose_of
-from wakewise.robot.importers.safe_yaml_nodes import Item
+from wakewise.robot.importers.safe_yaml_nodes import YamlNode
 from wakewise.robot.importers.thruster_checks import is_unit, require_count
 from wakewise.robot.importers.xml import PlacedError
 from wakewise.robot.importers.yaml_parameters import Entries, three
@@ -38,7 +38,7 @@ class _Placed:
     """A thruster of a list: where, and its direction or its angles (with the key that they stand under)."""
 
     name: str
-    item: Item
+    item: YamlNode
     p_m: Array
     axis: Array | None = None
     R: Array | None = None
@@ -46,7 +46,7 @@ class _Placed:
     key: str = ""
 
 
-def read_list(entries: Entries, found: Found) -> tuple[str, ...]:
+def read_list(entries: Entries, found: ParsedVehicle) -> tuple[str, ...]:
     """Thrusters as a list or table of tables, each with a position and a direction or angles, or with a pose.
 
     Returns the keys that lead to the list, () if there is none.
@@ -82,7 +82,7 @@ def read_list(entries: Entries, found: Found) -> tuple[str, ...]:
             axis = unit_axis(p.axis, p.item, p.name)
             if p.R is None:
                 require_direction(p.axis, p.item, p.name)
-            thruster = FoundThruster(label, p.p_m, axis, p.item.place, p.R)
+            thruster = ParsedThruster(label, p.p_m, axis, p.item.place, p.R)
             _sense(p.item, thruster, flipped)
             _bounds(p.item, thruster, bounded)
             found.thrusters.append(thruster)
@@ -93,7 +93,7 @@ def read_list(entries: Entries, found: Found) -> tuple[str, ...]:
     return ()
 
 
-def _sense(item: Item, thruster: FoundThruster, flipped: list[str]) -> None:
+def _sense(item: YamlNode, thruster: ParsedThruster, flipped: list[str]) -> None:
     """`flipped: true` turns a thruster's force round, as in robosub files; other words for it are not sure."""
     value = item.get("flipped")
     if value is None:
@@ -106,7 +106,7 @@ def _sense(item: Item, thruster: FoundThruster, flipped: list[str]) -> None:
         flipped.append(thruster.name)
 
 
-def _bounds(item: Item, thruster: FoundThruster, bounded: dict[str, None]) -> None:
+def _bounds(item: YamlNode, thruster: ParsedThruster, bounded: dict[str, None]) -> None:
     """Limits of a thruster's own, in newton, as two numbers or as a largest and a smallest thrust."""
     for key, value in item.table().items():
         if _BOUNDS.match(key) and len(value.items()) == 2 and value.is_numbers():
@@ -128,7 +128,7 @@ def _bounds(item: Item, thruster: FoundThruster, bounded: dict[str, None]) -> No
         return
 
 
-def _tell(flipped: list[str], bounded: dict[str, None], found: Found) -> None:
+def _tell(flipped: list[str], bounded: dict[str, None], found: ParsedVehicle) -> None:
     if flipped:
         found.notes.append(
             f"flipped: the thrust of {', '.join(flipped)[:300]} is turned round, as the file's word says"
@@ -140,20 +140,20 @@ def _tell(flipped: list[str], bounded: dict[str, None], found: Found) -> None:
 
 def _numbered(entries: Entries) -> Entries:
     """Tables `thruster_1`, `thruster_2` ... beside one another, as if they stood below `thrusters`."""
-    groups: dict[tuple[str, ...], dict[str, Item]] = {}
+    groups: dict[tuple[str, ...], dict[str, YamlNode]] = {}
     for path, item in entries:
         if _NUMBERED.match(path[-1]) and item.table():
             groups.setdefault(path[:-1], {})[path[-1]] = item
-    return [((*path, "thrusters"), Item(group, next(iter(group.values())).place)) for path, group in groups.items()]
+    return [((*path, "thrusters"), YamlNode(group, next(iter(group.values())).place)) for path, group in groups.items()]
 
 
 def _require_all_placed(
-    members: list[tuple[str, Item]],
+    members: list[tuple[str, YamlNode]],
     placed: list[_Placed | None],
-    tables: list[tuple[str, Item]],
+    tables: list[tuple[str, YamlNode]],
     *,
     listed: bool,
-    found: Found,
+    found: ParsedVehicle,
 ) -> None:
     """Refuse a list that places some thrusters and not others: none is dropped."""
     if listed and len(tables) != len(members):
@@ -168,7 +168,7 @@ def _require_all_placed(
         found.notes.append(f"{QUESTION}entry {name} beside the thrusters has no position; it is not taken for one")
 
 
-def _turn(located: list[_Placed], found: Found) -> None:
+def _turn(located: list[_Placed], found: ParsedVehicle) -> None:
     """Turn angles into frames; thrusters whose angles stand under one key share a unit."""
     for key in dict.fromkeys(p.key for p in located if p.angles is not None):
         group = [p for p in located if p.key == key and p.angles is not None]
@@ -187,7 +187,7 @@ def _turn(located: list[_Placed], found: Found) -> None:
             p.axis = p.R[:, 0]
 
 
-def _placed(name: str, member: Item) -> _Placed | None:
+def _placed(name: str, member: YamlNode) -> _Placed | None:
     pose_key = next((key for key in member.table() if POSES.match(key)), None)
     if pose_key is not None:
         pose = member.table()[pose_key]
@@ -209,7 +209,7 @@ def _placed(name: str, member: Item) -> _Placed | None:
     return _with_direction(_Placed(name, member, place), member)
 
 
-def _with_direction(placed: _Placed, member: Item) -> _Placed:
+def _with_direction(placed: _Placed, member: YamlNode) -> _Placed:
     item = member.get(*_DIRECTION_KEYS)
     if item is not None:
         placed.axis, placed.angles, placed.key = three(item, "direction"), None, ""
@@ -240,7 +240,7 @@ def _with_direction(placed: _Placed, member: Item) -> _Placed:
     return placed
 
 
-def _quaternion(item: Item, name: str) -> Array:
+def _quaternion(item: YamlNode, name: str) -> Array:
     w, x, y, z = (item.table()[part].scalar(f"{part} of {name}") for part in "wxyz")
     length = float(np.linalg.norm([w, x, y, z]))
     if abs(length - 1.0) > 0.01:
@@ -248,7 +248,7 @@ def _quaternion(item: Item, name: str) -> Array:
     return Pose(np.zeros(3), np.array([w, x, y, z]) / length).R
 
 
-def unit_axis(axis: Array, item: Item, name: str) -> Array:
+def unit_axis(axis: Array, item: YamlNode, name: str) -> Array:
     """An axis of length 1; refuses one of length 0."""
     length = float(np.linalg.norm(axis))
     if length < 1e-6:
@@ -256,7 +256,7 @@ def unit_axis(axis: Array, item: Item, name: str) -> Array:
     return axis / length
 
 
-def require_direction(row: Array, item: Item, name: str) -> None:
+def require_direction(row: Array, item: YamlNode, name: str) -> None:
     """Refuse what stands as a direction and can only be angles: entries of a twelfth of a half turn, or of degrees."""
     length = float(np.linalg.norm(row))
     twelfths = np.abs(row) / _TWELFTH

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from wakewise.robot.importers.parsed_vehicle import QUESTION
-from wakewise.robot.importers.safe_yaml_nodes import Item
+from wakewise.robot.importers.safe_yaml_nodes import YamlNode
 from wakewise.robot.importers.thruster_lists import LOOKS_LIKE_THRUSTERS
 
 _TURNING = re.compile(
@@ -37,7 +37,7 @@ def words_in(text: str) -> frozenset[str]:
     return frozenset(word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", text))
 
 
-def not_read(root: Item) -> list[str]:
+def not_read(root: YamlNode) -> list[str]:
     """Keys that no reader took, each once; those that may turn or stop a thrust, or name a unit, are questioned."""
     parents = {path[:-1] for path, item in root.walk() if item.seen or any(below.seen for _, below in item.walk_all())}
     plain: dict[str, list[tuple[str, ...]]] = {}
@@ -66,7 +66,7 @@ def _said(key: str, places: list[tuple[str, ...]]) -> str:
     return title(places[0]) if len(places) == 1 else f"{key[:60]} ({len(places)} times)"
 
 
-def _doubt(path: tuple[str, ...], item: Item, parents: set[tuple[str, ...]]) -> str:
+def _doubt(path: tuple[str, ...], item: YamlNode, parents: set[tuple[str, ...]]) -> str:
     """What an unread key may mean for what was read; "" if nothing."""
     key, texts = path[-1], [item.value, *(below.value for _, below in item.walk_all())]
     values = [text.strip().lower() for text in texts if isinstance(text, str)]

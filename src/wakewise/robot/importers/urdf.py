@@ -10,10 +10,10 @@ from wakewise.robot.importers.angles import require_radians
 from wakewise.robot.importers.robot_description import (
     IDENTITY,
     PART_NAME,
-    Bodies,
-    Camera,
+    CameraSensor,
     Joint,
     Link,
+    RobotDescription,
     checked_mass,
     collision_shape,
     inertia_matrix,
@@ -24,7 +24,7 @@ from wakewise.robot.importers.xml import Element, PlacedError, number, numbers
 CAMERA_TYPES = frozenset({"camera", "depth", "depth_camera", "rgbd_camera", "rgbd", "wideanglecamera", "multicamera"})
 
 
-def read_urdf(root: Element) -> Bodies:
+def read_urdf(root: Element) -> RobotDescription:
     """Read an expanded `<robot>` element.
 
     Raises
@@ -46,7 +46,7 @@ def read_urdf(root: Element) -> Bodies:
     reached = {name: link for name, link in links.items() if link.X_BL is not IDENTITY or name == base}
     placed = {name: _joint(name, e, reached) for name, e in joints if _end(e, "parent") in reached}
     plugins = [p for gazebo in root.all("gazebo") for p in gazebo.all("plugin")]
-    return Bodies(
+    return RobotDescription(
         name=root.attributes.get("name", "") or "vehicle",
         base=base,
         links=reached,
@@ -168,8 +168,8 @@ def _joint(name: str, element: Element, links: dict[str, Link]) -> Joint:
     return Joint(name, kind, child, X_BJ, axis, place, _end(element, "parent"))
 
 
-def _cameras(root: Element, links: dict[str, Link]) -> list[Camera]:
-    found: list[Camera] = []
+def _cameras(root: Element, links: dict[str, Link]) -> list[CameraSensor]:
+    found: list[CameraSensor] = []
     for gazebo in root.all("gazebo"):
         link = links.get(gazebo.attributes.get("reference", ""))
         for sensor in gazebo.all("sensor"):
@@ -178,12 +178,12 @@ def _cameras(root: Element, links: dict[str, Link]) -> list[Camera]:
     return found
 
 
-def camera(sensor: Element, X_BL: Pose) -> Camera:
+def camera(sensor: Element, X_BL: Pose) -> CameraSensor:
     """A Gazebo camera sensor on a link."""
     X_LS, _ = pose_element(sensor)
     fov = next((e for e in sensor.walk() if e.tag == "horizontal_fov" and e.text.strip()), None)
     fov_rad = None if fov is None else number(fov.text.strip(), fov.place, "horizontal_fov")
-    return Camera(sensor.attributes.get("name", "camera"), X_BL @ X_LS, fov_rad)
+    return CameraSensor(sensor.attributes.get("name", "camera"), X_BL @ X_LS, fov_rad)
 
 
 def pose_element(element: Element) -> tuple[Pose, str]:

@@ -8,8 +8,8 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.robot.importers.gazebo_thruster_models import short, words
-from wakewise.robot.importers.parsed_vehicle import Found, symmetrised
-from wakewise.robot.importers.robot_description import Bodies
+from wakewise.robot.importers.parsed_vehicle import ParsedVehicle, symmetrised
+from wakewise.robot.importers.robot_description import RobotDescription
 from wakewise.robot.importers.xml import Element, PlacedError, number, numbers
 
 _FORCES = "xyzkmn"
@@ -19,7 +19,7 @@ _LINEAR = re.compile(r"([xyzkmn])([UVWPQR])$")
 _QUADRATIC = re.compile(r"([xyzkmn])([UVWPQR])(?:abs)?([UVWPQR])$")
 
 
-def read_water(bodies: Bodies, found: Found) -> None:
+def read_water(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Fill in added mass, damping and buoyancy from the plugins.
 
     Raises
@@ -37,7 +37,7 @@ def read_water(bodies: Bodies, found: Found) -> None:
     _fluid_added_mass(bodies, found)
 
 
-def magnitude(matrix: Array, what: str, found: Found, *, negative: str) -> Array | None:
+def magnitude(matrix: Array, what: str, found: ParsedVehicle, *, negative: str) -> Array | None:
     """Turn coefficients to positive magnitudes by the sign of their diagonal; None if it has both signs.
 
     `negative` says what a negative diagonal is called, for the note.
@@ -52,7 +52,7 @@ def magnitude(matrix: Array, what: str, found: Found, *, negative: str) -> Array
     return None
 
 
-def _usable(matrix: Array | None, what: str, found: Found) -> Array | None:
+def _usable(matrix: Array | None, what: str, found: ParsedVehicle) -> Array | None:
     """A matrix whose symmetric part takes energy from the vehicle; else None and a note."""
     if matrix is None:
         return None
@@ -66,7 +66,7 @@ def _usable(matrix: Array | None, what: str, found: Found) -> Array | None:
 
 
 def store(
-    found: Found, *, added: Array | None = None, linear: Array | None = None, quadratic: Array | None = None
+    found: ParsedVehicle, *, added: Array | None = None, linear: Array | None = None, quadratic: Array | None = None
 ) -> None:
     """Check the three matrices of coefficients, whatever their sign, and keep the usable ones."""
     where = f"{found.kind} {found.file.name}"
@@ -95,7 +95,7 @@ def store(
             found.derived["damping"] = where
 
 
-def _gz(plugin: Element, found: Found) -> None:
+def _gz(plugin: Element, found: ParsedVehicle) -> None:
     added, linear, quadratic = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((6, 6))
     seen: set[str] = set()
     odd = []
@@ -129,7 +129,7 @@ def _gz(plugin: Element, found: Found) -> None:
         found.notes.append(f"water density of the file: {density} kg/m3")
 
 
-def _fluid_added_mass(bodies: Bodies, found: Found) -> None:
+def _fluid_added_mass(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Added mass that SDF 1.10 keeps in the inertial of a link."""
     holders = [link for link in bodies.links.values() if link.added_mass is not None and np.any(link.added_mass)]
     if not holders or (found.added_mass is not None and np.any(found.added_mass)):
@@ -141,7 +141,7 @@ def _fluid_added_mass(bodies: Bodies, found: Found) -> None:
     found.notes.append(f"added mass: fluid_added_mass of link {heaviest.name}")
 
 
-def _uuv(plugin: Element, bodies: Bodies, found: Found) -> None:
+def _uuv(plugin: Element, bodies: RobotDescription, found: ParsedVehicle) -> None:
     blocks = plugin.all("link")
     if not blocks:
         return
@@ -187,7 +187,7 @@ def _block(model: Element, tag: str) -> Array | None:
     raise PlacedError(f"{element.place}: {tag} has {len(values)} numbers, must have 6 or 36")
 
 
-def _uuv_buoyancy(block: Element, plugin: Element, bodies: Bodies, found: Found) -> None:
+def _uuv_buoyancy(block: Element, plugin: Element, bodies: RobotDescription, found: ParsedVehicle) -> None:
     link = bodies.link(block.attributes.get("name", ""))
     where = f"{found.kind} {found.file.name}: underwater object plugin"
     volume = block.first("volume")

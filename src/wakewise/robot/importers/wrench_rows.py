@@ -12,7 +12,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.robot.importers.parsed_vehicle import QUESTION, wrench_rows_to_frd
 from wakewise.robot.importers.thruster_checks import UNIT_SLACK, is_unit
-from wakewise.robot.importers.xml import Place, PlacedError
+from wakewise.robot.importers.xml import PlacedError, SourceLocation
 
 _WORDS = (
     ("surge", "x", "fx", "forcex", "xforce", "forward", "forceinx"),
@@ -30,7 +30,7 @@ ROWS_OPTION = "--rows roll,pitch,yaw,x,y,z"
 
 
 @dataclass(frozen=True)
-class Order:
+class WrenchOrder:
     """What the six numbers are, in the file's order: indices of surge ... yaw, and whether the third force is up."""
 
     places: tuple[int, ...]
@@ -47,12 +47,12 @@ class Order:
         return rows + 0.0
 
 
-FORCES_FIRST = Order((0, 1, 2, 3, 4, 5), words="forces first")
-MOMENTS_FIRST = Order((3, 4, 5, 0, 1, 2), words="moments first")
-ARDUSUB = Order((3, 4, 5, 2, 0, 1), throttle=True, words="roll, pitch, yaw, throttle, forward, lateral")
+FORCES_FIRST = WrenchOrder((0, 1, 2, 3, 4, 5), words="forces first")
+MOMENTS_FIRST = WrenchOrder((3, 4, 5, 0, 1, 2), words="moments first")
+ARDUSUB = WrenchOrder((3, 4, 5, 2, 0, 1), throttle=True, words="roll, pitch, yaw, throttle, forward, lateral")
 
 
-def order_of(labels: Sequence[str], why: str = "") -> Order | None:
+def order_of(labels: Sequence[str], why: str = "") -> WrenchOrder | None:
     """Order that six names state, such as roll, pitch, yaw, throttle, forward, lateral; None if they are other names.
 
     Throttle and lateral beside it are ArduSub's: up and to the right.
@@ -61,7 +61,7 @@ def order_of(labels: Sequence[str], why: str = "") -> Order | None:
     places = tuple(_COMPONENT.get(label, -1) for label in plain)
     if len(places) != 6 or sorted(places) != [0, 1, 2, 3, 4, 5]:
         return None
-    return Order(places, "throttle" in plain, ", ".join(label.strip() for label in labels), why)
+    return WrenchOrder(places, "throttle" in plain, ", ".join(label.strip() for label in labels), why)
 
 
 def order_of_one(label: str) -> bool:
@@ -69,7 +69,7 @@ def order_of_one(label: str) -> bool:
     return re.sub(r"[^a-z]", "", label.lower()) in _COMPONENT
 
 
-def told_order(rows: str | None) -> Order | None:
+def told_order(rows: str | None) -> WrenchOrder | None:
     """Order of the option `--rows`.
 
     Raises
@@ -88,7 +88,7 @@ def told_order(rows: str | None) -> Order | None:
     return order
 
 
-def order_in_comment(text: str) -> Order | None:
+def order_in_comment(text: str) -> WrenchOrder | None:
     """Order that six words beside one another in a comment state."""
     words = re.findall(r"[A-Za-z_]+", text)
     return next((order for i in range(len(words) - 5) if (order := order_of(words[i : i + 6])) is not None), None)
@@ -115,7 +115,9 @@ def is_signs(matrix: Array) -> bool:
     return signs and not bool(is_unit(np.linalg.norm(matrix[:3], axis=0)).all())
 
 
-def settle(raw: Array, order: Order | None, what: str, place: Place | None, notes: list[str]) -> tuple[Array, bool]:
+def settle(
+    raw: Array, order: WrenchOrder | None, what: str, place: SourceLocation | None, notes: list[str]
+) -> tuple[Array, bool]:
     """Wrench per thruster, shape (6, n), in the file's axes, and whether its order was stated.
 
     Of the ways of reading, those count in which every force has length 1 and no moment lies along its own force, as no
@@ -183,7 +185,7 @@ def _along(wrench: Array) -> bool:
     return bool((along > _TWIST_M).any())
 
 
-def _refuse(chosen: tuple[Array, str, Order], unit: bool, what: str) -> None:
+def _refuse(chosen: tuple[Array, str, WrenchOrder], unit: bool, what: str) -> None:
     matrix = chosen[0]
     if np.isin(matrix, (-1.0, 0.0, 1.0)).all():
         raise PlacedError(
@@ -199,7 +201,7 @@ def _refuse(chosen: tuple[Array, str, Order], unit: bool, what: str) -> None:
 
 
 def nearest(
-    raws: Iterable[Array], geometry: Array, orders: Sequence[Order], frames: Sequence[str]
+    raws: Iterable[Array], geometry: Array, orders: Sequence[WrenchOrder], frames: Sequence[str]
 ) -> tuple[Array, str]:
     """Of all ways of reading numbers, the one in FRD of which most entries agree with a geometry, shape (6, n).
 

@@ -6,20 +6,20 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from wakewise.core.errors import InputError
-from wakewise.robot.importers.packages import Folders, MissingFileError
+from wakewise.robot.importers.packages import MissingFileError, PackagePaths
 from wakewise.robot.importers.scopes import Macro, Scope, literal, parse_parameters
-from wakewise.robot.importers.xacro_text import Texts
-from wakewise.robot.importers.xml import MAX_ELEMENTS, Element, Place, PlacedError, parse_xml, read_text
+from wakewise.robot.importers.xacro_text import TextSubstitution
+from wakewise.robot.importers.xml import MAX_ELEMENTS, Element, PlacedError, SourceLocation, parse_xml, read_text
 
 _TRUE, _FALSE = frozenset({"true", "1", "yes"}), frozenset({"false", "0", "no", ""})
 
 
-class Xacro:
+class XacroExpander:
     """Expands one xacro document.
 
     Parameters
     ----------
-    folders : Folders
+    folders : PackagePaths
         Finds packages and keeps includes inside.
     arguments : mapping of str to str
         Values of `$(arg NAME)` that the user gave.
@@ -28,17 +28,17 @@ class Xacro:
         both are refused.
     """
 
-    def __init__(self, folders: Folders, arguments: Mapping[str, str], *, skip_missing: bool) -> None:
+    def __init__(self, folders: PackagePaths, arguments: Mapping[str, str], *, skip_missing: bool) -> None:
         self.folders = folders
         self.skip_missing = skip_missing
         self.told = dict(arguments)
-        self.texts = Texts(folders, arguments)
+        self.texts = TextSubstitution(folders, arguments)
         self.macros: dict[str, Macro] = {}
         self.notes: list[str] = []
         self.missing: list[str] = []
         self._including: list[Path] = []
         self._elements = 0
-        self._undefined: dict[str, Place] = {}
+        self._undefined: dict[str, SourceLocation] = {}
         self._searched = False
         self._declared_arguments: set[str] = set()
 
@@ -251,7 +251,7 @@ class Xacro:
         """Take macros from the files that lie where a missing include should be."""
         self._searched = True
         for name in list(self.missing):
-            place = Place(self.folders.file, 1)
+            place = SourceLocation(self.folders.file, 1)
             try:
                 folder = self.folders.locate(name, self.folders.file.parent, place).parent
             except InputError:

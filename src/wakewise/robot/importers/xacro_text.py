@@ -11,9 +11,9 @@ import yaml
 
 from wakewise.core.errors import InputError
 from wakewise.robot.importers.expressions import MAX_TEXT, evaluate
-from wakewise.robot.importers.packages import Folders
+from wakewise.robot.importers.packages import PackagePaths
 from wakewise.robot.importers.scopes import Scope, literal
-from wakewise.robot.importers.xml import Place, PlacedError, read_text
+from wakewise.robot.importers.xml import PlacedError, SourceLocation, read_text
 
 MAX_CALLS = 60
 """Macros, includes and properties within one another."""
@@ -22,25 +22,25 @@ MAX_TOTAL_TEXT = 20_000_000
 _PIECES = re.compile(r"\$\$+(?=[{(])|\$\{(?:[^{}]|\{[^{}]*\})*\}|\$\([^)]*\)|\$|[^$]+", re.DOTALL)
 
 
-class Texts:
+class TextSubstitution:
     """Puts values into the text of one document, and counts how deep and how long that gets.
 
     Parameters
     ----------
-    folders : Folders
+    folders : PackagePaths
         Finds packages, and keeps `load_yaml` inside.
     arguments : mapping of str to str
         Values of `$(arg NAME)`; the document adds its defaults.
     """
 
-    def __init__(self, folders: Folders, arguments: Mapping[str, str]) -> None:
+    def __init__(self, folders: PackagePaths, arguments: Mapping[str, str]) -> None:
         self.folders = folders
         self.arguments: dict[str, str] = dict(arguments)
         self._depth = 0
         self._length = 0
 
     @contextmanager
-    def deeper(self, place: Place) -> Iterator[None]:
+    def deeper(self, place: SourceLocation) -> Iterator[None]:
         """Count one more level while the block runs.
 
         Raises
@@ -56,11 +56,11 @@ class Texts:
         finally:
             self._depth -= 1
 
-    def string(self, text: str, scope: Scope, place: Place) -> str:
+    def string(self, text: str, scope: Scope, place: SourceLocation) -> str:
         """Text with its values put in."""
         return text if "$" not in text else _as_text(self.value(text, scope, place))
 
-    def value(self, text: str, scope: Scope, place: Place) -> Any:
+    def value(self, text: str, scope: Scope, place: SourceLocation) -> Any:
         """Value of a text with `${...}` and `$(...)` in it; a lone `${...}` keeps its type."""
         if "$" not in text:
             return text
@@ -82,7 +82,7 @@ class Texts:
             raise PlacedError(f"{place}: expands to more text than is read")
         return joined
 
-    def _expression(self, text: str, scope: Scope, place: Place) -> Any:
+    def _expression(self, text: str, scope: Scope, place: SourceLocation) -> Any:
         if "$(" in text:
             text = self.string(text, scope, place)
         functions = {
@@ -117,7 +117,7 @@ class Texts:
         owner.values[name] = value
         return value
 
-    def _substitution(self, text: str, scope: Scope, place: Place) -> Any:
+    def _substitution(self, text: str, scope: Scope, place: SourceLocation) -> Any:
         word, _, rest = text.strip().partition(" ")
         rest = self.string(rest.strip(), scope, place)
         match word:
@@ -138,12 +138,12 @@ class Texts:
             case _:
                 raise PlacedError(f"{place}: $({text[:40]}) is not read; arg, find, dirname, optenv and eval are")
 
-    def _named_argument(self, name: str, place: Place) -> str:
+    def _named_argument(self, name: str, place: SourceLocation) -> str:
         if name not in self.arguments:
             raise PlacedError(f"{place}: argument {name} has no value; give --arg {name}:=VALUE")
         return self.arguments[name]
 
-    def _load_yaml(self, name: str, place: Place) -> Any:
+    def _load_yaml(self, name: str, place: SourceLocation) -> Any:
         path = self.folders.locate(name, place.file.parent, place)
         try:
             return yaml.safe_load(read_text(path))

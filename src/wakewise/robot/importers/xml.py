@@ -27,7 +27,7 @@ _DECLARED = re.compile(rb"""^\s*<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)
 
 
 @dataclass(frozen=True)
-class Place:
+class SourceLocation:
     """A file and a line in it, for messages."""
 
     file: Path
@@ -51,7 +51,7 @@ class Element:
 
     tag: str
     attributes: dict[str, str]
-    place: Place
+    place: SourceLocation
     children: list[Element] = field(default_factory=list)
     text: str = ""
 
@@ -161,8 +161,8 @@ class _Builder:
         self.parser.StartDoctypeDeclHandler = self._doctype
         self.parser.EntityDeclHandler = self._doctype
 
-    def _here(self) -> Place:
-        return Place(self.path, self.parser.CurrentLineNumber)
+    def _here(self) -> SourceLocation:
+        return SourceLocation(self.path, self.parser.CurrentLineNumber)
 
     def _doctype(self, *_: object) -> None:
         raise PlacedError(f"{self._here()}: declares a document type or entity, vehicle files must not")
@@ -194,7 +194,7 @@ class _Builder:
             self.stack[-1].text += data
 
 
-def number(text: str, place: Place, what: str) -> float:
+def number(text: str, place: SourceLocation, what: str) -> float:
     """Turn text into a finite number.
 
     Raises
@@ -213,7 +213,7 @@ def number(text: str, place: Place, what: str) -> float:
     return value
 
 
-def numbers(text: str, place: Place, what: str, count: int | None = None) -> Array:
+def numbers(text: str, place: SourceLocation, what: str, count: int | None = None) -> Array:
     """Turn text of numbers parted by blanks or commas into an array; `count` fixes how many."""
     parts = text.replace(",", " ").split()
     if count is not None and len(parts) != count:

@@ -8,18 +8,18 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
-from wakewise.robot.importers.parsed_vehicle import Found
+from wakewise.robot.importers.parsed_vehicle import ParsedVehicle
 from wakewise.robot.importers.robot_description import PART_NAME, inertia_matrix
-from wakewise.robot.importers.safe_yaml_nodes import Item
+from wakewise.robot.importers.safe_yaml_nodes import YamlNode
 from wakewise.robot.importers.water import store
 from wakewise.robot.importers.xml import PlacedError
 
 _MASS = ("mass", "mass_kg")
-Entries = list[tuple[tuple[str, ...], Item]]
+Entries = list[tuple[tuple[str, ...], YamlNode]]
 """Every item of a file with the keys that lead to it."""
 
 
-def find(entries: Entries, keys: Sequence[str], inside: str = "") -> Item | None:
+def find(entries: Entries, keys: Sequence[str], inside: str = "") -> YamlNode | None:
     """First item under one of the keys, in their order; `inside` names a key that must lead to it."""
     for key in keys:
         for path, item in entries:
@@ -28,7 +28,7 @@ def find(entries: Entries, keys: Sequence[str], inside: str = "") -> Item | None
     return None
 
 
-def three(item: Item, what: str) -> Array:
+def three(item: YamlNode, what: str) -> Array:
     """Three numbers, from a list or from a table of x, y, z (or roll, pitch, yaw)."""
     if item.table():
         keys = next((k for k in (("x", "y", "z"), ("roll", "pitch", "yaw")) if all(i in item.table() for i in k)), None)
@@ -38,7 +38,7 @@ def three(item: Item, what: str) -> Array:
     return item.numbers(what, 3)
 
 
-def read_parameters(entries: Entries, found: Found) -> bool:
+def read_parameters(entries: Entries, found: ParsedVehicle) -> bool:
     """Fill in mass, inertia, buoyancy and coefficients under the names that controllers use; False if there are none.
 
     Raises
@@ -85,7 +85,7 @@ def read_parameters(entries: Entries, found: Found) -> bool:
     return len(found.derived) > known
 
 
-def _of_the_vehicle(entries: Entries, found: Found) -> Entries:
+def _of_the_vehicle(entries: Entries, found: ParsedVehicle) -> Entries:
     """Entries that speak of the vehicle, outermost first, not of an arm or another part of it.
 
     Raises
@@ -114,7 +114,7 @@ def _of_the_vehicle(entries: Entries, found: Found) -> Entries:
     return sorted(whole, key=lambda entry: entry[0][: len(home)] != home)
 
 
-def _number(entries: Entries, keys: Sequence[str]) -> tuple[float, Item] | None:
+def _number(entries: Entries, keys: Sequence[str]) -> tuple[float, YamlNode] | None:
     item = find(entries, keys)
     return None if item is None or not isinstance(item.value, str) else (item.scalar(keys[0]), item)
 
@@ -131,7 +131,7 @@ def _six(entries: Entries, keys: Sequence[str]) -> Array | None:
     raise PlacedError(f"{item.place}: {keys[0]} has {len(values)} numbers, must have 6 or 36")
 
 
-def _inertia(entries: Entries, found: Found) -> None:
+def _inertia(entries: Entries, found: ParsedVehicle) -> None:
     table = find(entries, ("inertial", "inertia"))
     moments = find(entries, ("moments_of_inertia", "inertia_diagonal"))
     whole = find(entries, ("mass_matrix", "mass_inertia_matrix"))
@@ -149,13 +149,13 @@ def _inertia(entries: Entries, found: Found) -> None:
     found.derived["inertia"] = f"{found.kind} {found.file.name}:{item.place.line}"
 
 
-def _require_definite(inertia: Array, item: Item) -> None:
+def _require_definite(inertia: Array, item: YamlNode) -> None:
     lowest = float(np.linalg.eigvalsh(0.5 * (inertia + inertia.T))[0])
     if lowest <= 0.0:
         raise PlacedError(f"{item.place}: inertia has smallest eigenvalue {lowest:g}, must be positive definite")
 
 
-def _from_mass_matrix(item: Item, found: Found) -> None:
+def _from_mass_matrix(item: YamlNode, found: ParsedVehicle) -> None:
     """Mass and inertia from a rigid body's 6 x 6 matrix; its coupling blocks must be m S(r_g)."""
     matrix = item.numbers("mass_matrix", 36).reshape(6, 6)
     mass = float(matrix[0, 0])
@@ -185,7 +185,7 @@ def _from_mass_matrix(item: Item, found: Found) -> None:
         found.notes.append(f"mass matrix: states the centre of gravity at {np.round(offset, 6).tolist()} m")
 
 
-def _weights(entries: Entries, found: Found) -> None:
+def _weights(entries: Entries, found: ParsedVehicle) -> None:
     """Weight and buoyancy are said, not used: newton or kilogram and the density are left to guess."""
     weight, buoyancy = _number(entries, ("weight",)), _number(entries, ("buoyancy",))
     if weight is not None and found.mass_kg is not None:

@@ -26,7 +26,7 @@ RIPPLE_SHARE = 0.3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
+class FittedParameter:
     """A fitted parameter; `standard_error` is None where the data do not bound it."""
 
     name: str
@@ -36,7 +36,7 @@ class Estimate:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Candidate:
+class LagCandidate:
     """How well one model did."""
 
     name: str
@@ -63,7 +63,7 @@ class LagFit:
     delay_s: float
     gain: float
     offset_N: float
-    estimates: tuple[Estimate, ...]
+    estimates: tuple[FittedParameter, ...]
     r2: float
     r2_raw: float
     r2_ceiling: float
@@ -72,7 +72,7 @@ class LagFit:
     measured_delay_error_s: float | None
     average_s: float
     window_s: tuple[float, float]
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[LagCandidate, ...]
 
     @property
     def mean_delay_s(self) -> float:
@@ -86,7 +86,7 @@ class LagFit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Family:
+class LagFamily:
     """A kind of lag: how free parameters become a model, and where a search for them may start."""
 
     name: str
@@ -96,25 +96,25 @@ class Family:
 
 
 FAMILIES = (
-    Family(
+    LagFamily(
         name=FirstOrderLag.name,
         fields=(("time_constant_s", "s"),),
         model=lambda p: FirstOrderLag(time_constant_s=p[0]),
         starts=lambda scale_s: ((scale_s,),),
     ),
-    Family(
+    LagFamily(
         name=RotorLag.name,
         fields=(("time_constant_s", "s"),),
         model=lambda p: RotorLag(time_constant_s=p[0]),
         starts=lambda scale_s: ((scale_s,),),
     ),
-    Family(
+    LagFamily(
         name=SecondOrderLag.name,
         fields=(("natural_rad_s", "rad/s"), ("damping_ratio", "1")),
         model=lambda p: SecondOrderLag(natural_rad_s=p[0], damping_ratio=p[1]),
         starts=lambda scale_s: tuple((2.0 * z / scale_s, z) for z in (0.3, 0.7, 1.5)),
     ),
-    Family(
+    LagFamily(
         name=SplitLag.name,
         fields=(("time_constant_s", "s"), ("direct_share", "1")),
         model=lambda p: SplitLag(time_constant_s=p[0], direct_share=p[1]),
@@ -205,7 +205,7 @@ def identify_lag(
         average_s=record.block * record.dt_s if record.block > 1 else 0.0,
         window_s=(float(record.time_s[0]), float(record.time_s[-1])),
         candidates=tuple(
-            Candidate(
+            LagCandidate(
                 name=fit.family.name,
                 r2=1.0 - fit.cost / spread,
                 bic=bic,
@@ -220,7 +220,7 @@ def identify_lag(
 class _Fit:
     """One family fitted: `values` are offset, gain, delay and the model's own, `residual` measured - model averages."""
 
-    family: Family
+    family: LagFamily
     model: LagModel
     values: Array
     predicted: Array
@@ -229,7 +229,7 @@ class _Fit:
     cost: float
     dt_s: float
 
-    def estimates(self) -> tuple[Estimate, ...]:
+    def estimates(self) -> tuple[FittedParameter, ...]:
         """Parameters with Newey-West standard errors."""
         names = (("offset_N", "N"), ("gain", "N per unit of command"), ("delay_s", "s"), *self.family.fields)
         errors = newey_west_errors(self.jacobian, self.residual)
@@ -237,7 +237,7 @@ class _Fit:
         unseen = {"delay_s"} if self.values[2] < 1e-3 * self.dt_s else set()
         unseen |= {"time_constant_s"} if self.values[3] < self.dt_s and len(self.values) == 4 else set()
         return tuple(
-            Estimate(
+            FittedParameter(
                 name=name,
                 unit=unit,
                 value=float(value),
@@ -292,7 +292,7 @@ def _lagged(model: LagModel, delay_s: float, command: Array, dt_s: float) -> Arr
     return model.response(held, dt_s)
 
 
-def _fit(family: Family, record: _Record) -> _Fit:
+def _fit(family: LagFamily, record: _Record) -> _Fit:
     measured = record.averages(record.thrust_N)
     after_s = record.time_s[-1] - record.time_s[int(np.argmax(np.diff(record.command) != 0.0))]
     longest_s = max(float(after_s), 10.0 * record.dt_s)

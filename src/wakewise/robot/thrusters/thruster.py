@@ -18,7 +18,7 @@ REACH_M = 10.0
 _ZERO_ALLOWED = frozenset({"max_forward_N", "max_reverse_N", "time_constant_s"})
 
 
-class Mounted(Protocol):
+class ThrusterPlacement(Protocol):
     """Anything with a thruster's name, place and axis."""
 
     @property
@@ -34,7 +34,7 @@ class Mounted(Protocol):
         """Direction of the force, shape (3,)."""
 
 
-def mount(record: Mounted) -> None:
+def mount(record: ThrusterPlacement) -> None:
     """Check and freeze place and axis of a frozen record, and give the axis unit length (call in `__post_init__`).
 
     Raises

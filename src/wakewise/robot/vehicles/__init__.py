@@ -46,7 +46,7 @@ from wakewise.robot.vehicles.mixing import (
     compare_with_ardusub,
     mixing_disagreements,
 )
-from wakewise.robot.vehicles.parameters import Parameter, parameters
+from wakewise.robot.vehicles.parameters import ParameterRow, parameters
 from wakewise.robot.vehicles.perturbation import perturbed
 from wakewise.robot.vehicles.tilt import TiltJoint
 from wakewise.robot.vehicles.vehicle import Vehicle
@@ -56,7 +56,7 @@ __all__ = [
     "ARDUSUB_VECTORED_6DOF",
     "DragCase",
     "Hydrodynamics",
-    "Parameter",
+    "ParameterRow",
     "RigidBody",
     "ThrusterDraft",
     "TiltJoint",

@@ -25,7 +25,7 @@ FOAM_KG_M3, LEAD_KG_M3 = 192.0, 11340.0
 Coordinate = Annotated[float, Field(ge=-5.0, le=5.0)]
 
 
-class Block(Settings):
+class BallastBlock(Settings):
     """One block of ballast on the vehicle, which everybody knows of."""
 
     float_N: float = Field(ge=-5000.0, le=5000.0, description="what it lifts in water, a negative one is lead")
@@ -34,13 +34,13 @@ class Block(Settings):
     )
 
 
-def with_blocks(vehicle: Vehicle, blocks: Sequence[Block]) -> Vehicle:
+def with_blocks(vehicle: Vehicle, blocks: Sequence[BallastBlock]) -> Vehicle:
     """The vehicle with blocks of ballast fixed to it.
 
     Parameters
     ----------
     vehicle : Vehicle
-    blocks : sequence of Block
+    blocks : sequence of BallastBlock
         Places of null mean the centre of buoyancy of the vehicle without them.
 
     Examples
@@ -91,7 +91,7 @@ def ballasted(vehicle: Vehicle, float_N: float, shift_mm: float = 0.0) -> Vehicl
     if not abs(float_N) <= 5000.0:
         raise InputError(f"ballast: {float_N:g} N, a block has -5000 to 5000 N")
     shifted = replace(vehicle, p_BG_m=vehicle.p_BG_m + np.array([1e-3 * shift_mm, 0.0, 0.0]))
-    return with_blocks(shifted, [Block(float_N=float_N)])
+    return with_blocks(shifted, [BallastBlock(float_N=float_N)])
 
 
 def _moved(mass_kg: float, away_m: Array) -> Array:

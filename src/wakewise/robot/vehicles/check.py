@@ -24,7 +24,7 @@ AnyVehicle = Vehicle | VehicleDraft
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Failure:
+class RemainingAuthority:
     """What is left when one thruster gives nothing.
 
     Parameters
@@ -47,7 +47,7 @@ class Failure:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Directions:
+class WrenchDirections:
     """The wrench directions a matrix can make, in coordinates where a moment counts as its force at a mean lever."""
 
     scale: Array
@@ -65,7 +65,7 @@ class Directions:
         return float(np.linalg.norm(outside)) < PURE
 
 
-def directions(matrix: Array, scale: Array | None = None, floor: float | None = None) -> Directions:
+def directions(matrix: Array, scale: Array | None = None, floor: float | None = None) -> WrenchDirections:
     """Find the directions that an allocation matrix, shape (6, n), can make.
 
     `scale` and `floor` (the smallest singular value that counts) are those of the whole vehicle when `matrix` is what
@@ -74,11 +74,11 @@ def directions(matrix: Array, scale: Array | None = None, floor: float | None = 
     if scale is None:
         scale = _lever_scale(matrix)
     if matrix.shape[1] == 0:
-        return Directions(scale=scale, basis=np.zeros((6, 0)))
+        return WrenchDirections(scale=scale, basis=np.zeros((6, 0)))
     U, singular, _ = np.linalg.svd(matrix * scale[:, None], full_matrices=False)
     if floor is None:
         floor = WEAK * float(singular[0])
-    return Directions(scale=scale, basis=U[:, singular > floor])
+    return WrenchDirections(scale=scale, basis=U[:, singular > floor])
 
 
 def allocation_rank(vehicle: AnyVehicle) -> int:
@@ -119,7 +119,7 @@ def achievable_wrench(vehicle: AnyVehicle) -> Array:
     return pure_wrench(vehicle.allocation_matrix, directions(vehicle.allocation_matrix), *limits)
 
 
-def pure_wrench(matrix: Array, able: Directions, lower_N: Array, upper_N: Array) -> Array:
+def pure_wrench(matrix: Array, able: WrenchDirections, lower_N: Array, upper_N: Array) -> Array:
     """Largest pure wrench along each axis, shape (6, 2), by a linear program in the directions that exist.
 
     An axis that is not one of them has zeros.
@@ -148,7 +148,7 @@ def free_wrench(matrix: Array, lower_N: Array, upper_N: Array) -> Array:
     return np.stack([np.minimum(low, high).sum(axis=1), np.maximum(low, high).sum(axis=1)], axis=1)
 
 
-def failures(vehicle: AnyVehicle) -> list[Failure]:
+def failures(vehicle: AnyVehicle) -> list[RemainingAuthority]:
     """What is left after each single thruster failure, one record per thruster."""
     matrix, limits = vehicle.allocation_matrix, thrust_limits_N(vehicle)
     scale, floor = _measure(matrix)
@@ -163,7 +163,7 @@ def failures(vehicle: AnyVehicle) -> list[Failure]:
             kept = pure_wrench(rest, able, *(np.delete(limit, j) for limit in limits))
             left = np.divide(100.0 * kept, full, out=np.full((6, 2), np.nan), where=np.abs(full) > 1e-9)
         lost = tuple(name for i, name in enumerate(WRENCH_AXES) if whole.holds(i) and not able.holds(i))
-        found.append(Failure(thruster=j + 1, rank=able.rank, lost=lost, left_pct=left))
+        found.append(RemainingAuthority(thruster=j + 1, rank=able.rank, lost=lost, left_pct=left))
     return found
 
 

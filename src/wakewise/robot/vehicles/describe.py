@@ -23,11 +23,11 @@ from wakewise.robot.vehicles.check import (
     pure_wrench,
 )
 from wakewise.robot.vehicles.draft import VehicleDraft
-from wakewise.robot.vehicles.mixing import ARDUSUB_FRAMES, Comparison, compare_matrix, compare_with_ardusub
+from wakewise.robot.vehicles.mixing import ARDUSUB_FRAMES, MatrixComparison, compare_matrix, compare_with_ardusub
 from wakewise.robot.vehicles.vehicle import Vehicle
 
 
-def check_report(vehicle: AnyVehicle, comparison: Comparison | None = None) -> dict[str, Any]:
+def check_report(vehicle: AnyVehicle, comparison: MatrixComparison | None = None) -> dict[str, Any]:
     """Say what the geometry allows, what each failure takes, and where a stated matrix disagrees.
 
     Without a `comparison` the matrix that the vehicle's own file ships is compared, if it ships one beside its
@@ -180,7 +180,7 @@ def as_draft(vehicle: AnyVehicle) -> VehicleDraft:
     return VehicleDraft.of(vehicle) if isinstance(vehicle, Vehicle) else vehicle
 
 
-def _own_comparison(draft: VehicleDraft) -> Comparison | None:
+def _own_comparison(draft: VehicleDraft) -> MatrixComparison | None:
     if not draft.thrusters:
         return None
     if draft.shipped_matrix is not None:

@@ -53,7 +53,7 @@ FLU = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True, kw_only=True)
-class Disagreement:
+class MatrixDisagreement:
     """One entry of a stated matrix that the geometry does not bear out.
 
     `stated` and `geometry` are values of an allocation matrix (N/N, N m/N), or signs where only signs were stated.
@@ -82,7 +82,7 @@ class Disagreement:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Comparison:
+class MatrixComparison:
     """A stated matrix against the geometry: how many entries were compared, which disagree, and what explains it.
 
     `commands` says what else each single command makes with this geometry, one line per command.
@@ -90,7 +90,7 @@ class Comparison:
 
     stated_by: str
     compared: int
-    disagreements: tuple[Disagreement, ...]
+    disagreements: tuple[MatrixDisagreement, ...]
     notes: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()
 
@@ -106,7 +106,7 @@ def factors_as_wrench(factors: Array) -> Array:
     return np.stack([forward, lateral, -throttle, roll, pitch, yaw])
 
 
-def mixing_disagreements(vehicle: AnyVehicle, factors: Array, height_m: float = 0.0) -> list[Disagreement]:
+def mixing_disagreements(vehicle: AnyVehicle, factors: Array, height_m: float = 0.0) -> list[MatrixDisagreement]:
     """Compare a mixer's signs, ArduSub's columns, shape (n, 6), with the allocation matrix built from the geometry.
 
     `height_m` is the z coordinate of the point about which moments are taken.
@@ -122,7 +122,7 @@ def mixing_disagreements(vehicle: AnyVehicle, factors: Array, height_m: float = 
     return _entries(vehicle, np.sign(factors_as_wrench(factors)), _signs(vehicle, height_m), np.full(6, 0.5))
 
 
-def compare_with_ardusub(vehicle: AnyVehicle) -> Comparison:
+def compare_with_ardusub(vehicle: AnyVehicle) -> MatrixComparison:
     """Compare with the signs of ArduSub's vectored frame that has as many motors; see `compare_signs`.
 
     Raises
@@ -138,7 +138,7 @@ def compare_with_ardusub(vehicle: AnyVehicle) -> Comparison:
     return compare_signs(vehicle, factors_as_wrench(factors), f"ArduSub, frame {frame} (signs)")
 
 
-def compare_signs(vehicle: AnyVehicle, stated: Array, stated_by: str) -> Comparison:
+def compare_signs(vehicle: AnyVehicle, stated: Array, stated_by: str) -> MatrixComparison:
     """Compare the signs of a stated mixer, shape (6, n), FRD, with moments about the height of horizontal thrusters.
 
     Motor factors such as ArduSub's give horizontal thrusters no roll or pitch, that is, they take them as level with
@@ -163,7 +163,7 @@ def compare_signs(vehicle: AnyVehicle, stated: Array, stated_by: str) -> Compari
             f"couplings: {_summary(at_origin)}"
         )
     notes += _explanations(stated, _signs(vehicle, height_m), found)
-    return Comparison(
+    return MatrixComparison(
         stated_by=stated_by,
         compared=stated.size,
         disagreements=tuple(found),
@@ -172,7 +172,7 @@ def compare_signs(vehicle: AnyVehicle, stated: Array, stated_by: str) -> Compari
     )
 
 
-def compare_matrix(vehicle: AnyVehicle, stated: Array, stated_by: str) -> Comparison:
+def compare_matrix(vehicle: AnyVehicle, stated: Array, stated_by: str) -> MatrixComparison:
     """Compare a stated allocation matrix, shape (6, n), FRD, moments about the origin, entry by entry.
 
     Raises
@@ -183,7 +183,7 @@ def compare_matrix(vehicle: AnyVehicle, stated: Array, stated_by: str) -> Compar
     _require_shape(vehicle, stated, stated_by)
     matrix = vehicle.allocation_matrix
     found = _entries(vehicle, stated, matrix, _tolerance(stated, matrix)[:, 0])
-    return Comparison(
+    return MatrixComparison(
         stated_by=stated_by,
         compared=stated.size,
         disagreements=tuple(found),
@@ -224,7 +224,7 @@ def command_effects(vehicle: AnyVehicle, thrusts: Array) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def compare_either_frame(vehicle: AnyVehicle, stated: Array, stated_by: str) -> Comparison:
+def compare_either_frame(vehicle: AnyVehicle, stated: Array, stated_by: str) -> MatrixComparison:
     """Compare a matrix whose frame is not sure: as it is, or turned between z up and z down if that agrees better."""
     plain = compare_matrix(vehicle, stated, stated_by)
     turned = compare_matrix(vehicle, stated * FLU[:, None], stated_by)
@@ -268,7 +268,7 @@ def _tolerance(a: Array, b: Array) -> Array:
     return np.array(ROUNDING * np.maximum(largest, floor))[:, None]
 
 
-def _entries(vehicle: AnyVehicle, stated: Array, geometry: Array, tolerance: Array) -> list[Disagreement]:
+def _entries(vehicle: AnyVehicle, stated: Array, geometry: Array, tolerance: Array) -> list[MatrixDisagreement]:
     names = [t.name for t in vehicle.thrusters] or [str(j + 1) for j in range(stated.shape[1])]
     found = []
     for j in range(stated.shape[1]):
@@ -285,14 +285,14 @@ def _entries(vehicle: AnyVehicle, stated: Array, geometry: Array, tolerance: Arr
             else:
                 fault = f"off by {100.0 * (said / built - 1.0):+.1f} %"
             found.append(
-                Disagreement(
+                MatrixDisagreement(
                     row=WRENCH_AXES[i], thruster=j + 1, name=names[j], stated=said, geometry=built, fault=fault
                 )
             )
     return found
 
 
-def _explanations(stated: Array, geometry: Array, found: list[Disagreement]) -> list[str]:
+def _explanations(stated: Array, geometry: Array, found: list[MatrixDisagreement]) -> list[str]:
     """What one cause would explain disagreements: reversed thrusters, another order, another reference point."""
     if not found:
         return []
@@ -338,7 +338,7 @@ def _best_point(stated: Array, geometry: Array) -> Array:
     return np.asarray(point)
 
 
-def _summary(found: list[Disagreement]) -> str:
+def _summary(found: list[MatrixDisagreement]) -> str:
     rows = sorted({d.row for d in found}, key=WRENCH_AXES.index)
     thrusters = sorted({d.thruster for d in found})
     return f"{' and '.join(rows)} of thrusters {', '.join(map(str, thrusters))}"

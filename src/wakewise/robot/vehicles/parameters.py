@@ -15,7 +15,7 @@ from wakewise.robot.vehicles.vehicle import thrust_steps
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameter:
+class ParameterRow:
     """One row; `value` is None where the file says nothing."""
 
     quantity: str
@@ -25,14 +25,14 @@ class Parameter:
     estimate: bool
 
 
-def parameters(draft: VehicleDraft) -> list[Parameter]:
+def parameters(draft: VehicleDraft) -> list[ParameterRow]:
     """All parameters of a vehicle but the places of its thrusters, in the order of a vehicle file."""
     origin = {p.group: p for p in draft.provenance}
 
-    def row(group: str, quantity: str, value: str | None, unit: str) -> Parameter:
+    def row(group: str, quantity: str, value: str | None, unit: str) -> ParameterRow:
         found = origin.get(group)
         stated = value is not None
-        return Parameter(
+        return ParameterRow(
             quantity=quantity,
             value=value,
             unit=unit,
@@ -93,18 +93,18 @@ def parameters(draft: VehicleDraft) -> list[Parameter]:
     return [r for r in rows if r.value is not None or r.quantity != "thrust table"]
 
 
-def _drag_case(case: DragCase) -> list[Parameter]:
+def _drag_case(case: DragCase) -> list[ParameterRow]:
     """What another source has for the drag of translation."""
 
-    def row(quantity: str, matrix: Array, unit: str) -> Parameter:
+    def row(quantity: str, matrix: Array, unit: str) -> ParameterRow:
         value = _matrix(matrix[:3, :3])
         what = f"drag case {case.name}, {quantity}: surge, sway, heave"
-        return Parameter(quantity=what, value=value, unit=unit, source=case.source, estimate=case.estimate)
+        return ParameterRow(quantity=what, value=value, unit=unit, source=case.source, estimate=case.estimate)
 
     return [row("linear", case.linear_damping, "N s/m"), row("quadratic", case.quadratic_damping, "N s2/m2")]
 
 
-def _least(draft: VehicleDraft, row: Callable[..., Parameter]) -> list[Parameter]:
+def _least(draft: VehicleDraft, row: Callable[..., ParameterRow]) -> list[ParameterRow]:
     """Least thrusts, by the table or as stated; no row where thrust is taken as continuous."""
     steps = thrust_steps(draft.curve, draft.least_thrust)
     if steps is None:
@@ -113,7 +113,7 @@ def _least(draft: VehicleDraft, row: Callable[..., Parameter]) -> list[Parameter
     return [row(group, "least thrust: forward, reverse", f"{steps.least_forward_N:g}, {steps.least_reverse_N:g}", "N")]
 
 
-def _tilt(draft: VehicleDraft, row: Callable[..., Parameter]) -> list[Parameter]:
+def _tilt(draft: VehicleDraft, row: Callable[..., ParameterRow]) -> list[ParameterRow]:
     """Stops and rate of the camera's joint; no row where the camera is fixed."""
     if draft.tilt is None:
         return []

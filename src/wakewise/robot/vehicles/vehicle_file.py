@@ -49,7 +49,7 @@ class Group(Settings):
     estimate: bool = Field(default=False, description="true if nobody published or measured these numbers")
 
 
-class Body(Group):
+class BodyGroup(Group):
     """Size and mass of the vehicle."""
 
     size_m: PositiveThree | None = Field(
@@ -185,7 +185,7 @@ class Mount(Settings):
     time_constant_s: NotNegative | None = Field(default=None, description="in place of thruster_lag.time_constant_s")
 
 
-class Layout(Group):
+class LayoutGroup(Group):
     """Where the thrusters are."""
 
     mounts: Annotated[list[Mount], Field(min_length=1)] = Field(description="one for each thruster, in their order")
@@ -243,7 +243,7 @@ class VehicleFile(Settings):
     source: Text = Field(description="where the numbers come from, as a whole")
     does_not_claim: Text = Field(description="what must not be concluded from these numbers")
     notes: list[Text] = Field(default=[], description="what is odd about the source's numbers")
-    body: Body | None = None
+    body: BodyGroup | None = None
     inertia: Inertia | None = None
     buoyancy: Buoyancy | None = None
     added_mass: AddedMass | None = None
@@ -254,7 +254,7 @@ class VehicleFile(Settings):
     thruster_lag: ThrusterLag | None = None
     thruster_curve: ThrusterCurve | None = None
     thruster_least: ThrusterLeast | None = None
-    thruster_layout: Layout | None = None
+    thruster_layout: LayoutGroup | None = None
     shipped_matrix: ShippedMatrix | None = None
     camera_mount: CameraMount | None = None
     camera_tilt: CameraTilt | None = None

@@ -10,28 +10,28 @@ to go next (`reachability.py`), `coverage_gaps.py` why a part was not seen.
 from wakewise.scene.missions.aim import CameraAim, aim_of
 from wakewise.scene.missions.clearance import TankBounds, check_clearance, check_tilt
 from wakewise.scene.missions.coverage import Coverage
-from wakewise.scene.missions.coverage_gaps import Missed, missed
+from wakewise.scene.missions.coverage_gaps import CoverageGaps, missed
 from wakewise.scene.missions.orbit import Orbit, layered_orbits
-from wakewise.scene.missions.reachability import Views, reachable_views
+from wakewise.scene.missions.reachability import CandidateViews, reachable_views
 from wakewise.scene.missions.route import SETTLING, Leg, Route, RoutePilot, open_route, plan_route
 from wakewise.scene.missions.settings import MissionSettings
-from wakewise.scene.missions.surface_patches import Patches, patches_of
-from wakewise.scene.missions.visibility import Need
+from wakewise.scene.missions.surface_patches import SurfacePatches, patches_of
+from wakewise.scene.missions.visibility import VisibilityCriteria
 
 __all__ = [
     "SETTLING",
     "CameraAim",
+    "CandidateViews",
     "Coverage",
+    "CoverageGaps",
     "Leg",
-    "Missed",
     "MissionSettings",
-    "Need",
     "Orbit",
-    "Patches",
     "Route",
     "RoutePilot",
+    "SurfacePatches",
     "TankBounds",
-    "Views",
+    "VisibilityCriteria",
     "aim_of",
     "check_clearance",
     "check_tilt",

@@ -19,9 +19,9 @@ from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.jit.njit import njit
-from wakewise.scene.missions.reachability import Views, way_words
-from wakewise.scene.missions.surface_patches import Patches
-from wakewise.scene.missions.visibility import Lens, Need, well_shown
+from wakewise.scene.missions.reachability import CandidateViews, way_words
+from wakewise.scene.missions.surface_patches import SurfacePatches
+from wakewise.scene.missions.visibility import CameraIntrinsics, VisibilityCriteria, well_shown
 
 Counts = NDArray[np.uint8]
 
@@ -41,8 +41,8 @@ class Coverage:
 
     Parameters
     ----------
-    patches : Patches
-    need : Need
+    patches : SurfacePatches
+    need : VisibilityCriteria
     centres_W_m : ndarray, shape (k, 3)
         Where the photographs that count were taken from.
     shows : ndarray of bool, shape (k, n)
@@ -51,7 +51,7 @@ class Coverage:
         With how many others it makes a pair at each sample.
     level : ndarray of uint8, shape (n,)
         How far each sample has come: 0, `SHOWN`, `PAIRED` or `WELL`.
-    views : Views
+    views : CandidateViews
         From where the next photographs could be taken.
     joins : ndarray of uint8, shape (c, n)
         With how many photographs each of them would make a pair at each sample.
@@ -61,26 +61,28 @@ class Coverage:
         Sharpness of the sharpest so far.
     """
 
-    patches: Patches
-    need: Need = field(default_factory=Need)
+    patches: SurfacePatches
+    need: VisibilityCriteria = field(default_factory=VisibilityCriteria)
     centres_W_m: Array
     shows: BoolArray
     partners: Counts
     level: Counts
-    views: Views
+    views: CandidateViews
     joins: Counts
     photos: int = 0
     blurred: int = 0
     sharpest: float = 0.0
 
     @classmethod
-    def begin(cls, patches: Patches, views: Views | None = None, need: Need | None = None) -> Coverage:
+    def begin(
+        cls, patches: SurfacePatches, views: CandidateViews | None = None, need: VisibilityCriteria | None = None
+    ) -> Coverage:
         """Nothing seen yet; without views (`reachable_views`) nothing can be said of where to go next."""
         n = len(patches.points_W_m)
-        views = views or Views.none(patches)
+        views = views or CandidateViews.none(patches)
         return cls(
             patches=patches,
-            need=need or Need(),
+            need=need or VisibilityCriteria(),
             centres_W_m=np.empty((0, 3)),
             shows=np.empty((0, n), dtype=np.bool_),
             partners=np.empty((0, n), dtype=np.uint8),
@@ -89,17 +91,17 @@ class Coverage:
             joins=np.zeros((len(views.places), n), dtype=np.uint8),
         )
 
-    def seen(self, X_WC: Pose, camera: Lens, sharpness: float | None = None) -> Coverage:
+    def seen(self, X_WC: Pose, camera: CameraIntrinsics, sharpness: float | None = None) -> Coverage:
         """The coverage with one photograph more.
 
         Parameters
         ----------
         X_WC : Pose
             Where it was taken from, as it is believed.
-        camera : Lens
+        camera : CameraIntrinsics
         sharpness : float, optional
             In any unit that is higher for sharper ones and the same for all of a flight. A photograph less than
-            `Need.sharp` times as sharp as the sharpest before it does not count. None: it is sharp.
+            `VisibilityCriteria.sharp` times as sharp as the sharpest before it does not count. None: it is sharp.
 
         Raises
         ------

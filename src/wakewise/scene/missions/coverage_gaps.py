@@ -10,13 +10,13 @@ import numpy as np
 
 from wakewise.core.geometry import Pose
 from wakewise.scene.missions.coverage import Coverage
-from wakewise.scene.missions.visibility import Lens, well_shown
+from wakewise.scene.missions.visibility import CameraIntrinsics, well_shown
 
 GRAZING_RAD = math.radians(87.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Missed:
+class CoverageGaps:
     """Shares of the surface that are not seen well, 0 to 1, by the first reason that holds; they add up to the rest.
 
     Parameters
@@ -34,7 +34,7 @@ class Missed:
     seldom: float
 
 
-def missed(coverage: Coverage, taken_from: Iterable[Pose], lens: Lens) -> Missed:
+def missed(coverage: Coverage, taken_from: Iterable[Pose], lens: CameraIntrinsics) -> CoverageGaps:
     """Sort what is not seen well by why.
 
     Parameters
@@ -43,7 +43,7 @@ def missed(coverage: Coverage, taken_from: Iterable[Pose], lens: Lens) -> Missed
         After photographs.
     taken_from : iterable of Pose
         X_WC of those of them that were sharp; half of the time of counting them first is spent again.
-    lens : Lens
+    lens : CameraIntrinsics
     """
     patches = coverage.patches
     lenient = replace(coverage.need, incidence_rad=GRAZING_RAD, pixel_m=math.inf)
@@ -52,7 +52,7 @@ def missed(coverage: Coverage, taken_from: Iterable[Pose], lens: Lens) -> Missed
         glimpsed |= well_shown(patches, X_WC, lens, lenient)
     shown, left = coverage.level > 0, ~coverage.covered
     glimpsed |= shown
-    return Missed(
+    return CoverageGaps(
         unseen=float((left & ~glimpsed).mean()),
         poorly=float((left & glimpsed & ~shown).mean()),
         seldom=float((left & shown).mean()),

@@ -13,8 +13,8 @@ from wakewise.core.geometry import Pose
 from wakewise.scene.missions.aim import CameraAim
 from wakewise.scene.missions.clearance import TankBounds, gaps_of
 from wakewise.scene.missions.orbit import camera_pose
-from wakewise.scene.missions.surface_patches import Patches
-from wakewise.scene.missions.visibility import Lens, Need, well_shown
+from wakewise.scene.missions.surface_patches import SurfacePatches
+from wakewise.scene.missions.visibility import CameraIntrinsics, VisibilityCriteria, well_shown
 
 AZIMUTHS = 24
 ELEVATIONS_DEG = (10.0, 25.0, 40.0, 55.0, 70.0)
@@ -25,7 +25,7 @@ LEAST_WAY_M, LEAST_TURN_DEG = 0.03, 5.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Views:
+class CandidateViews:
     """Camera places about a centre, and what a photograph from each would show well.
 
     Parameters
@@ -45,7 +45,7 @@ class Views:
         freeze(self, centre_W_m=(3,), places=(None, 3))
 
     @classmethod
-    def none(cls, patches: Patches) -> Views:
+    def none(cls, patches: SurfacePatches) -> CandidateViews:
         """No view at all: coverage is counted, but nothing can be said of where to go."""
         n = len(patches.points_W_m)
         return cls(centre_W_m=np.zeros(3), places=np.empty((0, 3)), shows=np.empty((0, n), dtype=np.bool_))
@@ -117,8 +117,8 @@ def _pitch(X_WC: Pose) -> float:
 
 
 def reachable_views(
-    patches: Patches,
-    camera: Lens,
+    patches: SurfacePatches,
+    camera: CameraIntrinsics,
     *,
     centre_W_m: Array,
     ranges_m: tuple[float, ...],
@@ -127,16 +127,16 @@ def reachable_views(
     bounds: TankBounds,
     target_W_m: Array,
     clearance_m: float,
-    need: Need | None = None,
-) -> Views:
+    need: VisibilityCriteria | None = None,
+) -> CandidateViews:
     """Views on spheres of these ranges at which the hull keeps clear of floor, walls, surface and target.
 
     Takes about five milliseconds a view, half a second in all for one range.
 
     Parameters
     ----------
-    patches : Patches
-    camera : Lens
+    patches : SurfacePatches
+    camera : CameraIntrinsics
     centre_W_m : ndarray, shape (3,)
         What the views look at.
     ranges_m : tuple of float
@@ -152,7 +152,7 @@ def reachable_views(
     """
     if not all(math.isfinite(r) and r > 0.0 for r in ranges_m):
         raise InputError(f"coverage: ranges {ranges_m} m, each must be above 0")
-    need = need or Need()
+    need = need or VisibilityCriteria()
     places, shows = [], []
     for range_m in ranges_m:
         for elevation_deg in ELEVATIONS_DEG:
@@ -164,5 +164,5 @@ def reachable_views(
                     places.append((float(azimuth), elevation, range_m))
                     shows.append(well_shown(patches, X_WC, camera, need))
     if not places:
-        return Views.none(patches)
-    return Views(centre_W_m=centre_W_m, places=np.array(places), shows=np.array(shows))
+        return CandidateViews.none(patches)
+    return CandidateViews(centre_W_m=centre_W_m, places=np.array(places), shows=np.array(shows))

@@ -30,7 +30,7 @@ ROUNDS = 6
 SEED = 0
 
 
-class Surface(Protocol):
+class TriangleSurface(Protocol):
     """Triangles: vertices, shape (n, 3), in m, and faces, shape (m, 3), counter-clockwise seen from outside."""
 
     @property
@@ -45,7 +45,7 @@ class Surface(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Patches:
+class SurfacePatches:
     """Samples spread evenly over a surface, the patch that each belongs to, and the surface itself, which hides.
 
     Parameters
@@ -117,13 +117,13 @@ class Patches:
 
 
 def patches_of(
-    surface: Surface, bed_z_m: float | None = None, count: int = PATCHES, per_patch: int = SAMPLES_PER_PATCH
-) -> Patches:
+    surface: TriangleSurface, bed_z_m: float | None = None, count: int = PATCHES, per_patch: int = SAMPLES_PER_PATCH
+) -> SurfacePatches:
     """Cut the part of a surface that counts in evaluations into patches of about the same area.
 
     Parameters
     ----------
-    surface : Surface
+    surface : TriangleSurface
         In the world: a target's mesh where it is believed to be, or a model's.
     bed_z_m : float, optional
         Depth of the bed; what stands less than `CLEARANCE_M` above it does not count. None: all counts.
@@ -154,7 +154,7 @@ def patches_of(
     points = a + (b - a) * (root * (1.0 - v))[:, None] + (c - a) * (root * v)[:, None]
     normals = cross[face] / twice_area[face, None]
     shield, off_m = _shield(np.asarray(surface.vertices_m), np.asarray(surface.faces))
-    return Patches(
+    return SurfacePatches(
         points_W_m=points,
         normals=normals,
         patch=_clustered(points, normals, count, rng),

@@ -12,7 +12,7 @@ from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.jit.njit import njit
-from wakewise.scene.missions.surface_patches import Patches
+from wakewise.scene.missions.surface_patches import SurfacePatches
 
 GRID = 224
 """Cells of the depth picture over the longer side of the target's box in the photograph."""
@@ -20,10 +20,11 @@ LEAST_AHEAD = 0.05
 """What is nearer than this share of the distance to the samples' middle is taken for nothing: no target is there."""
 
 
-class Lens(Protocol):
+class CameraIntrinsics(Protocol):
     """What is asked of a camera: the size of its picture, and pixels per unit of slope in water in its middle.
 
-    Distortion is left out: it moves the picture's edge by a few pixels, where `Need.margin` is kept anyway.
+    Distortion is left out: it moves the picture's edge by a few pixels, where `VisibilityCriteria.margin` is kept
+    anyway.
     """
 
     @property
@@ -43,7 +44,7 @@ class Lens(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Need:
+class VisibilityCriteria:
     """What a place on the surface needs to be in the model.
 
     Parameters
@@ -79,16 +80,16 @@ class Need:
             )
 
 
-def well_shown(patches: Patches, X_WC: Pose, lens: Lens, need: Need) -> BoolArray:
+def well_shown(patches: SurfacePatches, X_WC: Pose, lens: CameraIntrinsics, need: VisibilityCriteria) -> BoolArray:
     """Which samples a sharp photograph shows well enough, shape (n,).
 
     Parameters
     ----------
-    patches : Patches
+    patches : SurfacePatches
     X_WC : Pose
         Camera, as it is believed to be.
-    lens : Lens
-    need : Need
+    lens : CameraIntrinsics
+    need : VisibilityCriteria
     """
     R, f = X_WC.R, float(lens.focal_px)
     ahead = float((patches.points_W_m.mean(axis=0) - X_WC.p_m) @ R[:, 2])

@@ -10,27 +10,27 @@ its water). `corals.py` and `soft.py` with `fields.py` grow corals, `mesh.py` re
 
 from wakewise.scene.targets.corals import coral, coral_kinds, soft_kinds, stony_kinds
 from wakewise.scene.targets.distance import MeshDistance
-from wakewise.scene.targets.elasticity import Sway, Tissue, turned_normals
+from wakewise.scene.targets.elasticity import BendingModes, TissueProperties, turned_normals
 from wakewise.scene.targets.find import find_mesh, find_target, is_mesh_file
-from wakewise.scene.targets.fragility import Delicacy, delicacy
-from wakewise.scene.targets.fragility_marks import Marks, read_marks, read_vertex_scores
+from wakewise.scene.targets.fragility import Fragility, delicacy
+from wakewise.scene.targets.fragility_marks import FragilityMarks, read_marks, read_vertex_scores
 from wakewise.scene.targets.mesh import Mesh, load_mesh, read_mesh, write_mesh
-from wakewise.scene.targets.region import Measure, Region, region_measure, sample_region
+from wakewise.scene.targets.region import DenseQuadrature, Region, region_measure, sample_region
 from wakewise.scene.targets.sampling import sampling_error_pct
 from wakewise.scene.targets.target import Target, place_on_bed
 from wakewise.scene.targets.tissues import TISSUES
 
 __all__ = [
     "TISSUES",
-    "Delicacy",
-    "Marks",
-    "Measure",
+    "BendingModes",
+    "DenseQuadrature",
+    "Fragility",
+    "FragilityMarks",
     "Mesh",
     "MeshDistance",
     "Region",
-    "Sway",
     "Target",
-    "Tissue",
+    "TissueProperties",
     "coral",
     "coral_kinds",
     "delicacy",

@@ -16,7 +16,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.settings import seed_number
 from wakewise.scene.targets.fields import (
     BURIED_M,
-    Grid,
+    DistanceGrid,
     add_cones,
     add_dome,
     add_plates,
@@ -86,7 +86,7 @@ def _to_size(mesh: Mesh) -> Mesh:
     return Mesh((mesh.vertices_m - middle) * (LARGEST_DIMENSION_M / float(np.max(high - low))), mesh.faces)
 
 
-def _branching(rng: np.random.Generator) -> Grid:
+def _branching(rng: np.random.Generator) -> DistanceGrid:
     """Staghorn-like bush (Acropora): a trunk that forks four times, each generation thinner, bent towards the light."""
     segments: list[Segment] = []
 
@@ -113,14 +113,16 @@ def _branching(rng: np.random.Generator) -> Grid:
     start, end = np.array([s[0] for s in segments]), np.array([s[1] for s in segments])
     radii = np.array([s[2:] for s in segments])
     width = float(radii.max())
-    grid = Grid.around(np.minimum(start, end).min(axis=0) - width, np.maximum(start, end).max(axis=0) + width, 0.0011)
+    grid = DistanceGrid.around(
+        np.minimum(start, end).min(axis=0) - width, np.maximum(start, end).max(axis=0) + width, 0.0011
+    )
     add_cones(grid.values, grid.origin_m, grid.spacing_m, start, end, radii[:, 0], radii[:, 1], 0.006)
     roughen(grid.values, grid.origin_m, grid.spacing_m, 0.0011, 0.006, 5)
     cut_below(grid, -BURIED_M)
     return grid
 
 
-def _brain(rng: np.random.Generator) -> Grid:
+def _brain(rng: np.random.Generator) -> DistanceGrid:
     """Brain coral (Platygyra, Diploria): a dome with meandering valleys, 9 mm from ridge to ridge and 3.5 mm deep."""
     radii = np.array([0.075, 0.075 * rng.uniform(0.86, 0.96), 0.062])
     chart_cells, cell_m = 320, 0.0009
@@ -128,7 +130,7 @@ def _brain(rng: np.random.Generator) -> Grid:
     # Rounded ridges, narrower valleys: as the corallites stand in life.
     relief = 0.0035 * (np.sqrt(0.5 * (pattern + 1.0)) - 1.0)
     margin = 0.006
-    grid = Grid.around(np.append(-radii[:2] - margin, -BURIED_M), radii + margin, 0.001)
+    grid = DistanceGrid.around(np.append(-radii[:2] - margin, -BURIED_M), radii + margin, 0.001)
     seed = int(rng.integers(1, 1_000_000))
     add_dome(grid.values, grid.origin_m, grid.spacing_m, radii, relief, cell_m, 0.005, seed)
     roughen(grid.values, grid.origin_m, grid.spacing_m, 0.0003, 0.003, seed + 7)
@@ -136,7 +138,7 @@ def _brain(rng: np.random.Generator) -> Grid:
     return grid
 
 
-def _plate(rng: np.random.Generator) -> Grid:
+def _plate(rng: np.random.Generator) -> DistanceGrid:
     """Plate coral of the vase-like sort (Turbinaria): wavy plates that rise and flare round a stalk in two whorls.
 
     Steep enough that the undersides can be seen from beside and the insides from above, as a survey from orbits needs.
@@ -156,7 +158,7 @@ def _plate(rng: np.random.Generator) -> Grid:
             wave, phase = rng.uniform(0.003, 0.005), rng.uniform(0.0, 2 * np.pi)
             shape.append([scale * length, scale * half_width, 0.010, 0.0066, 0.12, 0.55, wave, phase])
     reach = 0.1
-    grid = Grid.around(np.array([-reach, -reach, -BURIED_M]), np.array([reach, reach, reach + 0.01]), 0.0012)
+    grid = DistanceGrid.around(np.array([-reach, -reach, -BURIED_M]), np.array([reach, reach, reach + 0.01]), 0.0012)
     foot = np.array([[0.0, 0.0, -BURIED_M], [0.0, 0.0, -BURIED_M]])
     top = np.array([[0.0, 0.0, 0.02], [0.0, 0.0, 0.004]])
     lower, upper = np.array([0.016, 0.03]), np.array([0.012, 0.016])
@@ -168,7 +170,11 @@ def _plate(rng: np.random.Generator) -> Grid:
     return grid
 
 
-_STONY: dict[str, Callable[[np.random.Generator], Grid]] = {"branching": _branching, "brain": _brain, "plate": _plate}
+_STONY: dict[str, Callable[[np.random.Generator], DistanceGrid]] = {
+    "branching": _branching,
+    "brain": _brain,
+    "plate": _plate,
+}
 _SOFT: dict[str, Callable[[np.random.Generator], Mesh]] = {
     "anemone": anemone,
     "gorgonian": gorgonian,

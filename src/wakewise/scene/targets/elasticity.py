@@ -39,7 +39,7 @@ _TIP_SHARE = 0.92  # a rounded tip has no stiffness at its very end: above this 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tissue:
+class TissueProperties:
     """What a soft target is made of; where the numbers come from is in `wakewise.scene.targets.tissues`.
 
     `stiffness_Pa` is Young's modulus of the section as it is drawn, `density_kg_m3` that of the tissue, `drag` the
@@ -54,8 +54,8 @@ class Tissue:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sway:
-    """Stems of a target and their modes; make it with `Sway.of`.
+class BendingModes:
+    """Stems of a target and their modes; make it with `BendingModes.of`.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class Sway:
         freeze(self, moved_water_kg=(k, 2), stress_Pa_m=(k, 2))
 
     @classmethod
-    def of(cls, target: Target, tissue: Tissue, water_kg_m3: float) -> Sway:
+    def of(cls, target: Target, tissue: TissueProperties, water_kg_m3: float) -> BendingModes:
         """Stems and modes of a target.
 
         Raises
@@ -173,7 +173,8 @@ def _along(ways: Array, axes: Array) -> Array:
 
 
 def ways_m(tips: Array, shape: Array, drop: Array, axes: Array) -> Array:
-    """How far points have moved, shape (n, 3): `Sway.moved` where each one's tip and all about its stem is known.
+    """How far points have moved, shape (n, 3): `BendingModes.moved` where each one's tip and all about its stem is
+    known.
 
     `tips`, `shape` and `drop`, shape (n, 2), and `axes`, shape (n, 2, 2), are those of each point's own stem.
     """
@@ -210,7 +211,9 @@ def _stems(places: Array, faces: IntArray) -> tuple[IntArray, Array]:
     return stem, top[high]
 
 
-def _modes(places: Array, faces: IntArray, height: float, tissue: Tissue, water_kg_m3: float) -> dict[str, Array]:
+def _modes(
+    places: Array, faces: IntArray, height: float, tissue: TissueProperties, water_kg_m3: float
+) -> dict[str, Array]:
     """Both modes of one stem; `places` has heights as third coordinate."""
     step = height / NODES
     middles = (np.arange(NODES) + 0.5) * step

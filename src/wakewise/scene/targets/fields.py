@@ -22,7 +22,7 @@ BURIED_M = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class DistanceGrid:
     """Signed distances in metres, negative inside, at `origin_m + spacing_m * (i, j, k)`; filled by the kernels."""
 
     origin_m: Array
@@ -30,14 +30,14 @@ class Grid:
     values: np.ndarray
 
     @classmethod
-    def around(cls, low_m: Array, high_m: Array, spacing_m: float) -> Grid:
+    def around(cls, low_m: Array, high_m: Array, spacing_m: float) -> DistanceGrid:
         """Grid that holds the box from `low_m` to `high_m` with four cells to spare, OUTSIDE_M everywhere."""
         origin = np.asarray(low_m, dtype=np.float64) - 4 * spacing_m
         shape = np.ceil((np.asarray(high_m) - origin) / spacing_m).astype(int) + 5
         return cls(origin, spacing_m, np.full(shape, OUTSIDE_M, dtype=np.float32))
 
 
-def zero_surface(grid: Grid) -> Mesh:
+def zero_surface(grid: DistanceGrid) -> Mesh:
     """Largest closed piece of the surface where the field is zero, oriented outward."""
     from skimage.measure import marching_cubes
 
@@ -209,7 +209,7 @@ def add_plates(values, origin, spacing, base, along, across, shape, blend):  # t
                     values[ix, iy, iz] = smooth_min(values[ix, iy, iz], gap, blend)
 
 
-def cut_below(grid: Grid, z_m: float) -> None:
+def cut_below(grid: DistanceGrid, z_m: float) -> None:
     """Take away all that lies deeper than `z_m`, so that the solid ends in a flat foot."""
     z = grid.origin_m[2] + grid.spacing_m * np.arange(grid.values.shape[2])
     np.maximum(grid.values, (z_m - z).astype(np.float32), out=grid.values)

@@ -38,7 +38,7 @@ COARSE = 3000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Delicacy:
+class Fragility:
     """How delicate a mesh is, vertex by vertex.
 
     Parameters
@@ -67,7 +67,7 @@ class Delicacy:
         return float(area @ np.mean(self.score[mesh.faces] >= DELICATE_FROM, axis=1) / area.sum())
 
 
-def delicacy(mesh: Mesh, marked: Array | None = None) -> Delicacy:
+def delicacy(mesh: Mesh, marked: Array | None = None) -> Fragility:
     """Find the delicate features of a mesh.
 
     Parameters
@@ -94,7 +94,7 @@ def delicacy(mesh: Mesh, marked: Array | None = None) -> Delicacy:
     sharp = np.clip((curvature - SHARP_PER_M[0]) / (SHARP_PER_M[1] - SHARP_PER_M[0]), 0.0, 1.0)
     score = 1.0 - (1.0 - thin) * (1.0 - sharp)
     score = score if marked is None else np.maximum(score, marked)
-    return Delicacy(thickness_m=thickness, curvature_per_m=curvature, score=score)
+    return Fragility(thickness_m=thickness, curvature_per_m=curvature, score=score)
 
 
 def vertex_normals(mesh: Mesh) -> Array:

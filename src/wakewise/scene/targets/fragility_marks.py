@@ -22,7 +22,7 @@ LARGEST_M = 10.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Marks:
+class FragilityMarks:
     """Balls inside which the surface is delicate.
 
     Parameters
@@ -58,7 +58,7 @@ class Marks:
         return scores
 
 
-def read_marks(path: Path | str) -> Marks:
+def read_marks(path: Path | str) -> FragilityMarks:
     """Read marks from a CSV file with the columns x_m, y_m, z_m, radius_m and weight (1 where left out).
 
     Raises
@@ -94,7 +94,7 @@ def read_marks(path: Path | str) -> Marks:
     if not values:
         raise InputError(f"{path}: no marks below the header, needs at least one")
     table = np.array(values)
-    return Marks(centres_m=table[:, :3], radii_m=table[:, 3], weights=table[:, 4])
+    return FragilityMarks(centres_m=table[:, :3], radii_m=table[:, 3], weights=table[:, 4])
 
 
 def _value(path: Path, line: int, name: str, row: list[str], place: dict[str, int]) -> float:

@@ -29,7 +29,7 @@ from scipy.spatial import KDTree
 from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.core.errors import InputError
 from wakewise.scene.targets.distance import MeshDistance
-from wakewise.scene.targets.fragility import Delicacy
+from wakewise.scene.targets.fragility import Fragility
 from wakewise.scene.targets.mesh import Mesh
 from wakewise.scene.targets.rays import Rays
 from wakewise.scene.targets.sampling import cell_middles, centroidal, relaxed, reweighted
@@ -84,7 +84,7 @@ class Region:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Measure:
+class DenseQuadrature:
     """The region as very many weighted points, surface first: what few points are to stand for.
 
     Parameters
@@ -106,7 +106,7 @@ class Measure:
 
 
 def sample_region(
-    target: Target, n: int, rng: np.random.Generator, delicacy: Delicacy | None = None, gain: float = 0.0
+    target: Target, n: int, rng: np.random.Generator, delicacy: Fragility | None = None, gain: float = 0.0
 ) -> Region:
     """Draw the region's sample points: a third on the surface, the others in the water round it.
 
@@ -137,7 +137,7 @@ def sample_region(
     if not POINTS_ALLOWED[0] <= n <= POINTS_ALLOWED[1]:
         raise InputError(f"region points {n}: allowed {POINTS_ALLOWED[0]} to {POINTS_ALLOWED[1]}")
     count = max(PER_POINT[0] * n, int(np.clip(PER_POINT[1] * n, *MEASURE_POINTS)))
-    solid = Solid(target.mesh)
+    solid = InsideTest(target.mesh)
     measure = region_measure(target, count, count, rng, delicacy, gain, solid)
     s = measure.on_surface
     surface, water = measure.points_W_m[:s], measure.points_W_m[s:]
@@ -166,10 +166,10 @@ def region_measure(
     on_surface: int,
     in_water: int,
     rng: np.random.Generator,
-    delicacy: Delicacy | None = None,
+    delicacy: Fragility | None = None,
     gain: float = 0.0,
-    solid: Solid | None = None,
-) -> Measure:
+    solid: InsideTest | None = None,
+) -> DenseQuadrature:
     """Very many evenly spread points of surface and water with the paper's weights; a reference for fewer.
 
     Parameters
@@ -198,11 +198,11 @@ def region_measure(
         )
     score = None if delicacy is None or gain == 0.0 else delicacy.score
     surface, surface_score = _surface_points(target, on_surface, rng, score)
-    water, distance, nearest = _water_points(target, solid or Solid(target.mesh), surface, in_water, rng)
+    water, distance, nearest = _water_points(target, solid or InsideTest(target.mesh), surface, in_water, rng)
     dry = np.full(len(surface), 0.5 / len(surface)) * (1.0 + gain * surface_score)
     # Distance to the nearest of many surface points is a fraction of a millimetre too long: 0.3 % of weight at most.
     wet = 0.5 / len(water) * np.exp(-distance / DECAY_M) * (1.0 + gain * surface_score[nearest])
-    return Measure(
+    return DenseQuadrature(
         points_W_m=np.concatenate([surface, water]), weights=np.concatenate([dry, wet]), on_surface=len(surface)
     )
 
@@ -234,7 +234,7 @@ def _surface_points(target: Target, count: int, rng: np.random.Generator, score:
 
 
 def _water_points(
-    target: Target, solid: Solid, surface: Array, count: int, rng: np.random.Generator
+    target: Target, solid: InsideTest, surface: Array, count: int, rng: np.random.Generator
 ) -> tuple[Array, Array, IntArray]:
     """Points spread evenly over the water within the shell, their distances, and their nearest surface points."""
     low, high = surface.min(axis=0) - SHELL_M, surface.max(axis=0) + SHELL_M
@@ -255,7 +255,7 @@ def _water_points(
     return points, distance, np.concatenate([part[2] for part in found])[:count]
 
 
-def _in_water(points: Array, target: Target, solid: Solid, water: Array) -> tuple[Array, Array]:
+def _in_water(points: Array, target: Target, solid: InsideTest, water: Array) -> tuple[Array, Array]:
     """Points, those that left the region put back on its nearest water, and their exact distances to the surface."""
     measure = MeshDistance(target.mesh.vertices_m, target.mesh.faces)
     distance = measure(points)
@@ -267,7 +267,7 @@ def _in_water(points: Array, target: Target, solid: Solid, water: Array) -> tupl
     return points, distance
 
 
-class Solid:
+class InsideTest:
     """Tells the flesh from the water: a point is inside when the first face straight above it is seen from behind.
 
     A closed mesh is judged right. So is a scan that is open towards the bed, where a count of crossings could not be.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.scene.targets.fields import BURIED_M, Grid, add_cones, cut_below, roughen, zero_surface
+from wakewise.scene.targets.fields import BURIED_M, DistanceGrid, add_cones, cut_below, roughen, zero_surface
 from wakewise.scene.targets.mesh import Mesh
 
 Segment = tuple[Array, Array, float, float]
@@ -136,7 +136,7 @@ def _united(segments: list[Segment], spacing_m: float, blend_m: float, rough_m: 
     radii = np.array([s[2:] for s in segments])
     width = float(radii.max())
     low, high = np.minimum(start, end).min(axis=0) - width, np.maximum(start, end).max(axis=0) + width
-    grid = Grid.around(low, high, spacing_m)
+    grid = DistanceGrid.around(low, high, spacing_m)
     add_cones(grid.values, grid.origin_m, grid.spacing_m, start, end, radii[:, 0], radii[:, 1], blend_m)
     roughen(grid.values, grid.origin_m, grid.spacing_m, rough_m, 0.004, seed)
     cut_below(grid, -BURIED_M)

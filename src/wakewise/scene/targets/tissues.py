@@ -17,7 +17,7 @@ tan(delta) is about 0.3 and the damping half of that, 0.15 of critical: by analo
 
 from __future__ import annotations
 
-from wakewise.scene.targets.elasticity import Tissue
+from wakewise.scene.targets.elasticity import TissueProperties
 
 _DAMPING = 0.15
 
@@ -27,12 +27,12 @@ _DAMPING = 0.15
 # seconds of a passing wake it is about 0.1 MPa. The column is a tube of water: with a wall of a fifth of its radius, an
 # estimate, its section has 1 - 0.8^4 = 0.59 of a full one's stiffness: 0.06 MPa. Flow forces on such anemones: M. A. R.
 # Koehl 1977, J. Exp. Biol. 69, 87, doi 10.1242/jeb.69.1.87. Density: 98 % sea water, an estimate.
-ANEMONE = Tissue(stiffness_Pa=6e4, density_kg_m3=1030.0, drag=1.2, damping=_DAMPING)
+ANEMONE = TissueProperties(stiffness_Pa=6e4, density_kg_m3=1030.0, drag=1.2, damping=_DAMPING)
 
 # Soft coral (Sinularia flexibilis and its like): mesogloea as above, made stiffer by sclerites, which does not tell its
 # species apart (M.-C. Lin and C.-F. Dai 1997, Zool. Stud. 36, 58: flexible colonies bend down in flow). 0.3 MPa, three
 # times the bare mesogloea, is an estimate. Density: a tenth of the volume is calcite of 2700 kg/m3, an estimate.
-SOFT_CORAL = Tissue(stiffness_Pa=3e5, density_kg_m3=1200.0, drag=1.2, damping=_DAMPING)
+SOFT_CORAL = TissueProperties(stiffness_Pa=3e5, density_kg_m3=1200.0, drag=1.2, damping=_DAMPING)
 
 # Gorgonian: a horny axis in a soft rind. The axis is a tanned collagen whose stiffness varies with sclerotization and
 # calcification (K. Jeyasuria and J. C. Lewis 1987, Coral Reefs 5, 213, as told by J. C. Lewis et al. 1992, Biol. Bull.
@@ -40,7 +40,7 @@ SOFT_CORAL = Tissue(stiffness_Pa=3e5, density_kg_m3=1200.0, drag=1.2, damping=_D
 # estimates, gives 1/81 of it over the whole section: 12 MPa. Density of rind and axis together: an estimate. That such
 # colonies bend over and sway with the swell, at a low frequency, is observed (M. Boudina, F. P. Gosselin and S. Etienne
 # 2021, J. Fluid Mech., doi 10.1017/jfm.2021.252).
-GORGONIAN = Tissue(stiffness_Pa=1.2e7, density_kg_m3=1200.0, drag=1.2, damping=_DAMPING)
+GORGONIAN = TissueProperties(stiffness_Pa=1.2e7, density_kg_m3=1200.0, drag=1.2, damping=_DAMPING)
 
 # Seagrass (eelgrass, turtle grass). Strips of low-density polyethylene, whose modulus is 0.3 GPa, stand for eelgrass in
 # flumes as they bend alike (J. Lei and H. Nepf 2019, J. Fluids Struct. 87, 137); leaves of cold regions are ten times
@@ -49,9 +49,9 @@ GORGONIAN = Tissue(stiffness_Pa=1.2e7, density_kg_m3=1200.0, drag=1.2, damping=_
 # procedural blades are drawn with, and 0.32 of its area: 8 MPa, and 0.32 of the buoyancy of a leaf of 850 kg/m3 with
 # its air, an estimate. Such a blade lies down in the current of an open meadow; it is for still tanks and light
 # currents.
-SEAGRASS = Tissue(stiffness_Pa=8e6, density_kg_m3=952.0, drag=1.95, damping=_DAMPING)
+SEAGRASS = TissueProperties(stiffness_Pa=8e6, density_kg_m3=952.0, drag=1.95, damping=_DAMPING)
 
-TISSUES: dict[str, Tissue] = {
+TISSUES: dict[str, TissueProperties] = {
     "anemone": ANEMONE,
     "gorgonian": GORGONIAN,
     "seagrass": SEAGRASS,

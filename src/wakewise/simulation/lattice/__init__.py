@@ -11,7 +11,7 @@ computation, `forced_lattice.py` with `forced_lattice_kernel.py` water for a fli
 jets that cross and `deflected_jet.py` past a box.
 """
 
-from wakewise.simulation.lattice.cases import CASES, Case, DiskJet, case_hash, find_case
+from wakewise.simulation.lattice.cases import CASES, DiskJet, LatticeCase, case_hash, find_case
 from wakewise.simulation.lattice.compute import compute_mean_field, compute_run
 from wakewise.simulation.lattice.flow import LatticeFlow
 from wakewise.simulation.lattice.meanfield import MeanField, load_mean_field, save_mean_field
@@ -19,8 +19,8 @@ from wakewise.simulation.lattice.run import LatticeRun
 
 __all__ = [
     "CASES",
-    "Case",
     "DiskJet",
+    "LatticeCase",
     "LatticeFlow",
     "LatticeRun",
     "MeanField",

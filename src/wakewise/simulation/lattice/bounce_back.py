@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import BoolArray
-from wakewise.simulation.lattice.cases import Case
+from wakewise.simulation.lattice.cases import LatticeCase
 from wakewise.simulation.lattice.stencil import OPPOSITE, VELOCITIES, Lattice, origin, plane_size
 
 
-def solid_cells(case: Case) -> BoolArray:
+def solid_cells(case: LatticeCase) -> BoolArray:
     """Cells of a case, shape (nx, ny, nz), whose middles lie in its solid boxes."""
     solid = np.zeros(case.cells, np.bool_)
     for low, high in case.boxes_D:
@@ -27,7 +27,7 @@ def solid_cells(case: Case) -> BoolArray:
     return solid
 
 
-class Bodies:
+class BounceBackLinks:
     """Where the populations lie that meet solid cells, in a lattice made by `still_water`.
 
     Parameters

@@ -79,7 +79,7 @@ class DiskJet:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Case:
+class LatticeCase:
     """Jets in a box of still water with open faces, perhaps a floor that the first jet strikes, and solid boxes.
 
     Parameters
@@ -160,12 +160,12 @@ class Case:
         n = [round((b - a) * self.cells_per_D) for a, b in zip(self.low_D, self.high_D, strict=True)]
         return n[0], n[1], n[2]
 
-    def resolved(self, cells_per_D: int) -> Case:
+    def resolved(self, cells_per_D: int) -> LatticeCase:
         """The same case on another grid."""
         return replace(self, cells_per_D=cells_per_D)
 
 
-def case_hash(case: Case) -> str:
+def case_hash(case: LatticeCase) -> str:
     """Digest of everything that decides the flow: the case and the version of the solver."""
     stated = asdict(case)
     for jet in stated["jets"]:
@@ -183,14 +183,14 @@ def case_hash(case: Case) -> str:
 _FREE_BOX: tuple[_Corner, _Corner] = ((-3.0, -5.5, -5.5), (11.0, 5.5, 5.5))
 
 
-def _crossing_at(angle_deg: float, back_D: float, half_D: tuple[float, float]) -> Case:
+def _crossing_at(angle_deg: float, back_D: float, half_D: tuple[float, float]) -> LatticeCase:
     """Jets that cross at an angle 6 D from both disks, the bisector along x, 9 D of it behind the crossing.
 
     `back_D` of the box lie before the crossing, and `half_D` on either side of it along y and z.
     """
     turn_deg = 0.5 * angle_deg
     x, y = (round(6.0 * f(math.radians(turn_deg)), 4) for f in (math.cos, math.sin))
-    return Case(
+    return LatticeCase(
         name=f"crossing-{angle_deg:g}",
         jets=(DiskJet(turn_deg=turn_deg), DiskJet(turn_deg=-turn_deg, position_D=(0.0, 2 * y, 0.0))),
         low_D=(x - back_D, y - half_D[0], -half_D[1]),
@@ -199,10 +199,10 @@ def _crossing_at(angle_deg: float, back_D: float, half_D: tuple[float, float]) -
     )
 
 
-def _past_box(name: str, gap_D: float, side_D: float) -> Case:
+def _past_box(name: str, gap_D: float, side_D: float) -> LatticeCase:
     """A jet along x whose axis runs so far above the top of a solid cube, z down, which begins 3 D from the disk."""
     half = 0.5 * side_D
-    return Case(
+    return LatticeCase(
         name=name,
         jets=(DiskJet(),),
         low_D=(-3.0, -5.0, -5.0),
@@ -212,15 +212,15 @@ def _past_box(name: str, gap_D: float, side_D: float) -> Case:
     )
 
 
-def _cases() -> dict[str, Case]:
+def _cases() -> dict[str, LatticeCase]:
     swirling = DiskJet(torque=T200_TORQUE)
     plain = DiskJet()
     return {
         case.name: case
         for case in (
-            Case(name="free", jets=(plain,), low_D=_FREE_BOX[0], high_D=_FREE_BOX[1]),
-            Case(name="swirl", jets=(swirling,), low_D=_FREE_BOX[0], high_D=_FREE_BOX[1]),
-            Case(
+            LatticeCase(name="free", jets=(plain,), low_D=_FREE_BOX[0], high_D=_FREE_BOX[1]),
+            LatticeCase(name="swirl", jets=(swirling,), low_D=_FREE_BOX[0], high_D=_FREE_BOX[1]),
+            LatticeCase(
                 name="long",
                 jets=(plain,),
                 low_D=(-3.0, -5.5, -5.5),
@@ -229,7 +229,7 @@ def _cases() -> dict[str, Case]:
                 develop=70.0,
                 average=150.0,
             ),
-            Case(
+            LatticeCase(
                 name="floor",
                 jets=(plain,),
                 low_D=(-3.0, -6.0, -6.0),
@@ -238,7 +238,7 @@ def _cases() -> dict[str, Case]:
                 cells_per_D=7,
                 develop=60.0,
             ),
-            Case(
+            LatticeCase(
                 name="stop",
                 jets=(replace(plain, stop=40.0),),
                 average=10.0,
@@ -246,14 +246,14 @@ def _cases() -> dict[str, Case]:
                 low_D=_FREE_BOX[0],
                 high_D=_FREE_BOX[1],
             ),
-            Case(
+            LatticeCase(
                 name="twin",
                 jets=(replace(plain, position_D=(0.0, -2 / 3, 0.0)), replace(plain, position_D=(0.0, 2 / 3, 0.0))),
                 cells_per_D=6,
                 low_D=(-3.0, -5.0, -4.0),
                 high_D=(15.0, 5.0, 4.0),
             ),
-            Case(
+            LatticeCase(
                 name="head-on",
                 jets=(plain, replace(plain, position_D=(10.0, 0.0, 0.0), along=-1)),
                 low_D=(-3.0, -6.0, -6.0),
@@ -261,7 +261,7 @@ def _cases() -> dict[str, Case]:
                 sponge_D=1.0,
                 cells_per_D=6,
             ),
-            Case(
+            LatticeCase(
                 name="crossing",
                 jets=(plain, replace(plain, axis="y", position_D=(6.0, -6.0, 0.0))),
                 low_D=(-3.0, -9.0, -5.0),
@@ -274,7 +274,7 @@ def _cases() -> dict[str, Case]:
             _past_box("grazing-box", 0.5, 4.0),
             _past_box("grazing-target", 0.5, 2.5),
             _past_box("struck-target", -1.25, 2.5),
-            Case(
+            LatticeCase(
                 name="four",
                 jets=(replace(plain, strength=4.0),),
                 cells_per_D=6,
@@ -292,7 +292,7 @@ beside a cube of 0.24 m, and half of one beside one of 0.15 m; `struck-target`: 
 the thrust."""
 
 
-def find_case(name: str) -> Case:
+def find_case(name: str) -> LatticeCase:
     """Look a case up.
 
     Raises

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.simulation.lattice.cases import Case, case_hash
+from wakewise.simulation.lattice.cases import LatticeCase, case_hash
 from wakewise.simulation.lattice.laws import figures
 from wakewise.simulation.lattice.meanfield import MeanField, mean_field
 from wakewise.simulation.lattice.run import LatticeRun
@@ -19,13 +19,13 @@ _CHECKPOINT_S = 300.0
 
 
 def compute_run(
-    case: Case, cache: Path | None = None, progress: Progress = no_progress, device: str = "cpu"
+    case: LatticeCase, cache: Path | None = None, progress: Progress = no_progress, device: str = "cpu"
 ) -> LatticeRun:
     """Run a case to its end.
 
     Parameters
     ----------
-    case : Case
+    case : LatticeCase
     cache : Path or None
         Folder for a checkpoint every five minutes, from which a run that was stopped goes on; it is left there, so that
         a finished run need not be repeated. None keeps nothing.
@@ -56,7 +56,7 @@ def compute_run(
 
 
 def compute_mean_field(
-    case: Case, cache: Path | None = None, progress: Progress = no_progress, device: str = "cpu"
+    case: LatticeCase, cache: Path | None = None, progress: Progress = no_progress, device: str = "cpu"
 ) -> MeanField:
     """Mean field of a case with its figures; arguments as `compute_run`."""
     run = compute_run(case, cache, progress, device)

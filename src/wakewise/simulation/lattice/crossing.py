@@ -16,7 +16,7 @@ from scipy.ndimage import map_coordinates
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.simulation.lattice.cases import Case, case_hash, find_case
+from wakewise.simulation.lattice.cases import LatticeCase, case_hash, find_case
 from wakewise.simulation.lattice.meanfield import DATA
 from wakewise.simulation.lattice.run import LatticeRun
 
@@ -28,7 +28,7 @@ _STEP_D = 0.05
 _UP = np.array([0.0, 0.0, 1.0])
 
 
-def _bisector(case: Case) -> tuple[Array, Array]:
+def _bisector(case: LatticeCase) -> tuple[Array, Array]:
     """Unit vectors along the bisector of a case's two jets and across it in their plane, from the first's side."""
     first, second = (np.array(jet.direction) for jet in case.jets)
     along, across = first + second, second - first
@@ -172,7 +172,7 @@ def load_crossing(path: Path = DATA / "crossing.npz") -> CrossingField:
     return field
 
 
-def is_crossing(case: Case) -> bool:
+def is_crossing(case: LatticeCase) -> bool:
     """Whether a case is two jets that cross in a plane of constant z."""
     if len(case.jets) != 2:
         return False
@@ -181,7 +181,7 @@ def is_crossing(case: Case) -> bool:
     return level and abs(one[0] * two[1] - one[1] * two[0]) > 1e-6
 
 
-def crossing_place(case: Case) -> Array:
+def crossing_place(case: LatticeCase) -> Array:
     """Where the axes of a case's two jets cross, shape (3,)."""
     if not is_crossing(case):
         raise InputError(f"lattice case {case.name!r}: not two jets that cross in a plane, as the figures need")

@@ -26,7 +26,7 @@ from wakewise.simulation.lattice.stencil import OPEN, Lattice, smagorinsky_facto
 
 
 class CudaEngine:
-    """As `wakewise.simulation.lattice.engines.ProcessorEngine`, on the first graphics card."""
+    """As `wakewise.simulation.lattice.engines.CpuEngine`, on the first graphics card."""
 
     def __init__(self, tau_x: Array, tau_yz: Array, eddies: float, faces: IntArray) -> None:
         self._cells = (len(tau_x) - 2, tau_yz.shape[0] - 2, tau_yz.shape[1] - 2)

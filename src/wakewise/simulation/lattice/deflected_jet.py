@@ -12,7 +12,7 @@ import numpy as np
 from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.simulation.lattice.cases import Case, case_hash, find_case
+from wakewise.simulation.lattice.cases import LatticeCase, case_hash, find_case
 from wakewise.simulation.lattice.crossing import speeds_at
 from wakewise.simulation.lattice.meanfield import DATA
 from wakewise.simulation.lattice.run import LatticeRun
@@ -24,7 +24,7 @@ _TABLES = ("along", "down", "beside")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PastField:
+class DeflectedJetField:
     """Mean flow of a jet along x past a box below it, in units of D and U0; z is down and 0 on the jet's axis.
 
     Parameters
@@ -72,7 +72,7 @@ class PastField:
         return np.asarray(np.any((points_D <= low) | (points_D >= high), axis=-1))
 
 
-def past_field(run: LatticeRun) -> PastField:
+def past_field(run: LatticeRun) -> DeflectedJetField:
     """Mean flow of a run of one jet along x past one box below it.
 
     Raises
@@ -91,7 +91,7 @@ def past_field(run: LatticeRun) -> PastField:
     upright = _X_D[:, None, None] * [1.0, 0, 0] + _Z_D[:, None] * [0, 0, 1.0]
     level = _X_D[:, None, None] * [1.0, 0, 0] + _Y_D[:, None] * [0, 1.0, 0]
     both = seen(level, (1, 0, 0)), seen(level * [1, -1, 1], (1, 0, 0))
-    return PastField(
+    return DeflectedJetField(
         case=run.case.name,
         hash=case_hash(run.case),
         cells_per_D=run.case.cells_per_D,
@@ -111,12 +111,12 @@ def momentum(along: Array, y_D: Array, z_D: Array) -> Array:
     return np.asarray((along * np.abs(along)).sum((1, 2)) * cell / (math.pi / 4))
 
 
-def past_figures(field: PastField, along: Array | None = None) -> dict[str, Any]:
+def past_figures(field: DeflectedJetField, along: Array | None = None) -> dict[str, Any]:
     """Speed and place of the fastest water in the plane y = 0, at every whole diameter down the jet.
 
     Parameters
     ----------
-    field : PastField
+    field : DeflectedJetField
     along : ndarray, shape (n, m), or None
         Speeds of another water at the field's places; None for the field's own. What it has in the box is left out.
 
@@ -144,12 +144,12 @@ def past_figures(field: PastField, along: Array | None = None) -> dict[str, Any]
     }
 
 
-def is_past_box(case: Case) -> bool:
+def is_past_box(case: LatticeCase) -> bool:
     """Whether a case is one jet along x past one box."""
     return len(case.boxes_D) == 1 and [jet.direction for jet in case.jets] == [(1.0, 0.0, 0.0)]
 
 
-def save_past_box(path: Path, field: PastField) -> None:
+def save_past_box(path: Path, field: DeflectedJetField) -> None:
     """Write a field in steps of 2^-14, so that it packs well, whole or not at all."""
     with whole_file(path) as temporary:
         np.savez_compressed(
@@ -162,7 +162,7 @@ def save_past_box(path: Path, field: PastField) -> None:
         )
 
 
-def load_past_box(name: str = "past-box", folder: Path = DATA) -> PastField:
+def load_past_box(name: str = "past-box", folder: Path = DATA) -> DeflectedJetField:
     """A field by the name of its case, `past-box` or `grazing-box`.
 
     Raises
@@ -173,7 +173,7 @@ def load_past_box(name: str = "past-box", folder: Path = DATA) -> PastField:
     path = folder / f"{name}.npz"
     with np.load(path, allow_pickle=False) as data:
         arrays = {key: data[key] for key in data.files if key not in ("case", "hash", "cells_per_D")}
-        field = PastField(
+        field = DeflectedJetField(
             case=str(data["case"]), hash=str(data["hash"]), cells_per_D=int(data["cells_per_D"]), **arrays
         )
     now = case_hash(find_case(name).resolved(field.cells_per_D))

@@ -10,14 +10,14 @@ from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.optional_dependencies import has, how_to_install
 from wakewise.simulation.lattice.averages import MOMENTS, accumulate
-from wakewise.simulation.lattice.bounce_back import Bodies
+from wakewise.simulation.lattice.bounce_back import BounceBackLinks
 from wakewise.simulation.lattice.kernel import push, step, velocity
 from wakewise.simulation.lattice.stencil import Lattice, box, plane_row, still_water
 
 DEVICES = ("cpu", "cuda", "auto")
 
 
-class Engine(Protocol):
+class LatticeEngine(Protocol):
     """Populations of all cells and their sums over time, wherever they are kept; lattice units."""
 
     def advance(self, pushes: list[tuple[IntArray, Array]]) -> None:
@@ -44,7 +44,7 @@ class Engine(Protocol):
         """Go on from there."""
 
 
-class ProcessorEngine:
+class CpuEngine:
     """The lattice on the processor's cores.
 
     Parameters
@@ -66,12 +66,12 @@ class ProcessorEngine:
         self._now, self._next = still_water(self._cells), still_water(self._cells)
         self._tau_x, self._tau_yz = tau_x.astype(np.float32), plane_row(tau_yz)
         self._eddies, self._faces = eddies, faces
-        self._bodies = Bodies(solid) if solid is not None and solid.any() else None
+        self._bodies = BounceBackLinks(solid) if solid is not None and solid.any() else None
         self._field = np.zeros((4, *self._cells), np.float32)
         self._sums = np.zeros((MOMENTS, *self._cells))
 
     def advance(self, pushes: list[tuple[IntArray, Array]]) -> None:
-        """As `Engine`."""
+        """As `LatticeEngine`."""
         _, ny, nz = self._cells
         if self._bodies:
             self._bodies.turn_back(self._now)
@@ -83,38 +83,38 @@ class ProcessorEngine:
         self._now, self._next = self._next, self._now
 
     def field(self) -> Lattice:
-        """As `Engine`."""
+        """As `LatticeEngine`."""
         velocity(self._now, *self._cells[1:], self._field)
         return self._field
 
     def along_x(self, y: int, z: int) -> Array:
-        """As `Engine`."""
+        """As `LatticeEngine`."""
         return self.field()[1, :, y - 1 : y + 1, z - 1 : z + 1].mean((1, 2)).astype(np.float64)
 
     def accumulate(self) -> None:
-        """As `Engine`."""
+        """As `LatticeEngine`."""
         accumulate(self.field(), self._sums)
 
     @property
     def sums(self) -> Array:
-        """As `Engine`."""
+        """As `LatticeEngine`."""
         return self._sums
 
     @property
     def populations(self) -> Lattice:
-        """As `Engine`; a view."""
+        """As `LatticeEngine`; a view."""
         return box(self._now, *self._cells[1:])[:, 1:-1, 1:-1, 1:-1]
 
     def restore(self, populations: Lattice, sums: Array) -> None:
-        """As `Engine`."""
+        """As `LatticeEngine`."""
         self.populations[:] = populations
         self._sums[:] = sums
 
 
 def make_engine(
     device: str, tau_x: Array, tau_yz: Array, eddies: float, faces: IntArray, solid: BoolArray | None = None
-) -> Engine:
-    """The engine for a device by name; "auto" is a graphics card if there is one. Other arguments: `ProcessorEngine`.
+) -> LatticeEngine:
+    """The engine for a device by name; "auto" is a graphics card if there is one. Other arguments: `CpuEngine`.
 
     Bodies are for processors only.
 
@@ -130,7 +130,7 @@ def make_engine(
     if device == "cuda" and why_not:
         raise InputError(f"lattice device 'cuda': {why_not}; allowed here: cpu, auto")
     if device == "cpu" or why_not:
-        return ProcessorEngine(tau_x, tau_yz, eddies, faces, solid)
+        return CpuEngine(tau_x, tau_yz, eddies, faces, solid)
     from wakewise.simulation.lattice.cuda_engine import CudaEngine
 
     return CudaEngine(tau_x, tau_yz, eddies, faces)

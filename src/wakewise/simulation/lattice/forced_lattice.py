@@ -52,7 +52,7 @@ def still_populations(velocity_cells: Array) -> Array:
     return WEIGHTS * (3.0 * VELOCITIES @ u + np.einsum("iab,a,b->i", SHAPES, u, u))
 
 
-class LiveBox:
+class ForcedLattice:
     """Water in a box; `advance` moves it on, `velocity` looks at it.
 
     Parameters
@@ -124,7 +124,7 @@ class LiveBox:
         self._pushed = np.zeros((nx, ny, nz, 3))
         self.time_s = 0.0
 
-    def copy(self) -> LiveBox:
+    def copy(self) -> ForcedLattice:
         """The same water now, which goes its own way from here."""
         return copy.deepcopy(self)
 

@@ -14,7 +14,7 @@ from wakewise.core.arrays import Array, IntArray, frozen
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_file
 from wakewise.simulation.lattice.bounce_back import solid_cells
-from wakewise.simulation.lattice.cases import AXES, Case, DiskJet, case_hash
+from wakewise.simulation.lattice.cases import AXES, DiskJet, LatticeCase, case_hash
 from wakewise.simulation.lattice.engines import make_engine
 from wakewise.simulation.lattice.stencil import OPEN, WALL, smagorinsky_factor
 
@@ -65,7 +65,7 @@ def _shares(lines: list[Array], half: float, radius: float, frame: Array | None)
 class Disk:
     """The cells of one disk, their share of its force, and the slowly changing patches of its load."""
 
-    def __init__(self, case: Case, jet: DiskJet, rng: np.random.Generator) -> None:
+    def __init__(self, case: LatticeCase, jet: DiskJet, rng: np.random.Generator) -> None:
         n = case.cells_per_D
         # The jet's own axes, its own first; a turn of the box's, so that what is right-handed stays so.
         turn = np.roll(np.arange(3), -AXES.index(jet.axis))
@@ -126,12 +126,12 @@ class LatticeRun:
 
     Parameters
     ----------
-    case : Case
+    case : LatticeCase
     device : str
         "cpu", "cuda" (a graphics card, which needs the extra `gpu`) or "auto": the card if there is one.
     """
 
-    def __init__(self, case: Case, device: str = "cpu") -> None:
+    def __init__(self, case: LatticeCase, device: str = "cpu") -> None:
         self.case = case
         n, s = case.cells_per_D, case.lattice_speed / math.sqrt(max(jet.strength for jet in case.jets))
         self.speed = s
@@ -260,7 +260,7 @@ class LatticeRun:
             )
 
     @classmethod
-    def restored(cls, case: Case, path: Path, device: str = "cpu") -> LatticeRun:
+    def restored(cls, case: LatticeCase, path: Path, device: str = "cpu") -> LatticeRun:
         """A run of `case` from where `save` left it, or from the start if the file is missing or of another case."""
         run = cls(case, device)
         if not path.exists():

@@ -18,14 +18,14 @@ from wakewise.simulation.tank.grains import beam_attenuation_per_m
 from wakewise.simulation.tank.plant import VehiclePlant
 from wakewise.simulation.tank.sensors import Sensors
 from wakewise.simulation.tank.settings import TankSettings, ThrusterFailure
-from wakewise.simulation.tank.station_keeping import Holding, holding
+from wakewise.simulation.tank.station_keeping import StationKeepingDemand, holding
 from wakewise.simulation.tank.tank import Tank, tank_ambient
 from wakewise.simulation.tank.tether import Tether
 from wakewise.simulation.tank.world import TankWorld
 
 __all__ = [
-    "Holding",
     "Sensors",
+    "StationKeepingDemand",
     "Tank",
     "TankSettings",
     "TankWorld",

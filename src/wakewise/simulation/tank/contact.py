@@ -14,7 +14,7 @@ _NONE = np.zeros((0, 3))
 _TOUCH_M = 1e-6  # a hull that was set back onto something still touches it
 
 
-class Surroundings:
+class CollisionGeometry:
     """Floor, walls and target round a box-shaped hull.
 
     Contact is inelastic and without friction: the hull is set back out of what it is in, along the shortest way for
@@ -92,7 +92,7 @@ class Surroundings:
 def clear(around: Array, p_W_m: Array, R_WB: Array) -> bool:
     """Whether a hull, by a quick look, surely touches nothing.
 
-    `around` is `Surroundings.packed`; `p_W_m` is the hull's place (the first three numbers), `R_WB` its attitude.
+    `around` is `CollisionGeometry.packed`; `p_W_m` is the hull's place (the first three numbers), `R_WB` its attitude.
     """
     half, room, middle, radius, ball = around[0:3], around[3:6], around[6:9], around[9], around[10]
     away2, inside = 0.0, p_W_m[2] + ball <= room[2]

@@ -23,7 +23,7 @@ DEPTH_M, SLOPES = 0.62, (1.05, 0.8)
 _STEP_S = 0.25
 
 
-class Drifting(Protocol):
+class FlakeAdvector(Protocol):
     """Water that knows which part of its motion the thrusters made."""
 
     def excess_velocity(self, points_W_m: Array) -> Array:
@@ -56,7 +56,7 @@ class Flakes:
         self._excess: Array = np.zeros((n, 3))
         self._time = 0.0
 
-    def move(self, time_s: float, water: Drifting) -> Array:
+    def move(self, time_s: float, water: FlakeAdvector) -> Array:
         """Carry them on to a time; return the velocity of the water at each, shape (n, 3)."""
         steps = max(1, int(np.ceil((time_s - self._time) / _STEP_S - 1e-9)))
         dt = (time_s - self._time) / steps
@@ -70,7 +70,7 @@ class Flakes:
         velocity: Array = self._excess + self._ambient.velocity(self.p_W_m, time_s)
         return velocity
 
-    def before(self, X_WC: Pose, time_s: float, water: Drifting) -> FlakeCloud:
+    def before(self, X_WC: Pose, time_s: float, water: FlakeAdvector) -> FlakeCloud:
         """Carry them on to a time and tell which are before a camera."""
         velocity = self.move(time_s, water)
         whole = FlakeCloud(

@@ -9,7 +9,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 
 
-class Lasting:
+class GaussMarkovProcess:
     """Three independent processes of standard deviation `sigma` whose values forget themselves within `lasts_s`.
 
     Exact between any two times: x(t + dt) = a x(t) + sigma sqrt(1 - a^2) n with a = exp(-dt / lasts_s), so that the

@@ -9,7 +9,7 @@ from wakewise.scene.targets import Target
 from wakewise.simulation.tank.settings import MAX_PARCELS, TankSettings
 from wakewise.simulation.water import AmbientSum
 from wakewise.simulation.water.blockage import Blockage
-from wakewise.simulation.water.round_jet_closure import SWIRLING, Spreading
+from wakewise.simulation.water.round_jet_closure import SWIRLING, JetSpreading
 from wakewise.simulation.water.water import Water
 
 
@@ -27,7 +27,7 @@ def tank_water(
         half_size_m=(length / 2, width / 2),
         turbulence=settings.jets.turbulence,
         max_parcels=MAX_PARCELS,
-        spreading=SWIRLING if settings.jets.swirl else Spreading.of_width(settings.jets.half_width_growth),
+        spreading=SWIRLING if settings.jets.swirl else JetSpreading.of_width(settings.jets.half_width_growth),
         body=Blockage.of(target),
         wake_life=settings.jets.wake_life,
     )

@@ -16,7 +16,7 @@ from wakewise.robot.thrusters import saturate, thruster_lag
 from wakewise.robot.vehicles import Vehicle, compile_body
 from wakewise.robot.vehicles.kernels import rotate
 from wakewise.robot.vehicles.runge_kutta import rk4_kernel
-from wakewise.simulation.tank.contact import Surroundings, clear
+from wakewise.simulation.tank.contact import CollisionGeometry, clear
 from wakewise.simulation.tank.settings import PLANT_STEP_S, ThrusterFailure
 from wakewise.simulation.tank.tether import Tether
 from wakewise.simulation.tank.thrust_losses import FailingThrusters, inflow_factors
@@ -32,7 +32,7 @@ class VehiclePlant:
     The ambient water acts at the body origin as if it were uniform: drag and added mass go with the velocity relative
     to it, and water that speeds up pushes with (rho V + M_A) du/dt (Morison's equation for a small body). The water
     that its own jets set in motion acts on it only through `inflow_W_m_s`, if that is given. Floor, walls and target
-    stop it; see `Surroundings`.
+    stop it; see `CollisionGeometry`.
 
     Thrusters do what their speed controllers can: a command below the least thrust turns no propeller, one above it is
     that of the nearest pulse (`Vehicle.thrust_steps`).
@@ -75,7 +75,7 @@ class VehiclePlant:
         self._body = compile_body(vehicle, density_kg_m3)
         self._density = density_kg_m3
         self._ambient = ambient
-        self._surroundings = Surroundings(vehicle.size_m, size_m, target_W_m)
+        self._surroundings = CollisionGeometry(vehicle.size_m, size_m, target_W_m)
         self._failing = FailingThrusters(failures, len(vehicle.thrusters))
         self._tether = tether
         self._time = 0.0

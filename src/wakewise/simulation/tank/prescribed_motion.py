@@ -25,7 +25,7 @@ from wakewise.simulation.water.hullwake import HullPush
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Way:
+class PrescribedPath:
     """Where a body was: times, shape (k,), from 0 on and rising; places, shape (k, 3), attitudes (k, 4), twists (k, 6).
 
     Attitudes are unit quaternions X_WB, twists are in the body.
@@ -40,16 +40,16 @@ class Way:
         k = len(self.times_s)
         freeze(self, times_s=(k,), p_WB_m=(k, 3), q_WB=(k, 4), nu_B=(k, 6))
 
-    def at(self, times_s: Array) -> Way:
+    def at(self, times_s: Array) -> PrescribedPath:
         """The same way at other times within it; in between it goes straight."""
         columns = np.hstack([self.p_WB_m, self.q_WB * _one_sided(self.q_WB)[:, None], self.nu_B])
         found = np.stack([np.interp(times_s, self.times_s, column) for column in columns.T], axis=1)
         q = found[:, 3:7] / np.linalg.norm(found[:, 3:7], axis=1, keepdims=True)
-        return Way(times_s=times_s, p_WB_m=found[:, :3], q_WB=q, nu_B=found[:, 7:])
+        return PrescribedPath(times_s=times_s, p_WB_m=found[:, :3], q_WB=q, nu_B=found[:, 7:])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LedTank:
+class PrescribedMotionTank:
     """A tank without its vehicle's freedom: who is led, which way, in which water, and where that is looked at.
 
     Parameters
@@ -59,7 +59,7 @@ class LedTank:
     target : Target
     settings : TankSettings
     ambient : AmbientSum
-    way : Way
+    way : PrescribedPath
         Kept at the water's own steps.
     points_W_m : ndarray, shape (n, 3)
         On the target's surface.
@@ -69,7 +69,7 @@ class LedTank:
     target: Target
     settings: TankSettings
     ambient: AmbientSum
-    way: Way
+    way: PrescribedPath
     points_W_m: Array
 
     def __post_init__(self) -> None:

@@ -14,7 +14,7 @@ from wakewise.core.geometry import Pose
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Mesh, Target
 from wakewise.simulation.lattice import LatticeFlow, MeanField, load_mean_field
-from wakewise.simulation.tank.contact import Surroundings
+from wakewise.simulation.tank.contact import CollisionGeometry
 from wakewise.simulation.tank.probe_tables import ThrustHistory
 from wakewise.simulation.water.blockage import Blockage
 from wakewise.simulation.water.round_jet_closure import PLAIN, SWIRLING
@@ -28,7 +28,7 @@ _SURFACE_AWAY_M = 20.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Probed:
+class ProbeResult:
     """Velocities of the water, shape (k, n, 3), at times, shape (k,), and points, shape (n, 3), in the world.
 
     `known`, shape (k, n), says where the flow says anything; where it does not, velocities are zeros without meaning.
@@ -69,7 +69,7 @@ def probe(
     swirl: bool = False,
     density_kg_m3: float = TRIM_WATER_KG_M3,
     seed: int = 0,
-) -> Probed:
+) -> ProbeResult:
     """Find the flow of a vehicle that is held at one pose while its thrusters push as told, in water at rest before.
 
     Thrusts are what the thrusters give: there is no lag, no limit and no loss. Water is without walls and surface;
@@ -160,7 +160,7 @@ def probe(
             body=None if target is None else Blockage.of(_lifted(target, float(lift[2]))),
         )
         values = _parcels(water, origins + lift, axes, history, points + lift, times)
-    return Probed(times_s=times, points_W_m=points, velocities_m_s=values, known=known)
+    return ProbeResult(times_s=times, points_W_m=points, velocities_m_s=values, known=known)
 
 
 def _lifted(target: Target, by_m: float) -> Target:
@@ -243,7 +243,7 @@ def _in_a_box(table: MeanField, flow: LatticeFlow, points: Array) -> BoolArray:
 def _check_clear(vehicle: Vehicle, X_WB: Pose, target: Target) -> None:
     nowhere = (math.inf, math.inf, math.inf)
     points = np.concatenate([target.mesh.vertices_m, target.mesh.triangles_m.mean(axis=1)])
-    if Surroundings(vehicle.size_m, nowhere, points).touches(X_WB.p_m, X_WB.R):
+    if CollisionGeometry(vehicle.size_m, nowhere, points).touches(X_WB.p_m, X_WB.R):
         where = ", ".join(f"{v:g}" for v in X_WB.p_m)
         raise InputError(f"pose: hull of {vehicle.name} at ({where}) m is inside the target {target.name}, move it off")
 

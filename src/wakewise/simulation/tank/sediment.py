@@ -56,7 +56,7 @@ _FINEST_LOAD_KG_M2 = 0.1  # thicker beds give up particles as fine as those of t
 
 
 @dataclass(frozen=True, kw_only=True)
-class SiltLaws:
+class SiltProperties:
     """What the silt, or sand, is made of; `sand` says that van Rijn's pickup lifts it and not Partheniades' rate.
 
     `stress_intensity` is the rms of the bed's stress over its mean. Of the load on the bed, `firm_kg_m2` lies lowest
@@ -87,7 +87,7 @@ class SiltLaws:
         settling_m_s: float | None = None,
         stress_intensity: float = 0.0,
         firm_kg_m2: float = 0.0,
-    ) -> SiltLaws:
+    ) -> SiltProperties:
         """Laws of a grain: its own threshold and settling speed unless given, ten times that threshold where firm.
 
         `pickup` is auto, partheniades or van-rijn.
@@ -133,7 +133,7 @@ class Silt:
 
     Parameters
     ----------
-    laws : SiltLaws
+    laws : SiltProperties
     load_kg_m2 : float
         On every part of the bed at the start.
     size_m : tuple of three floats
@@ -148,7 +148,7 @@ class Silt:
 
     def __init__(
         self,
-        laws: SiltLaws,
+        laws: SiltProperties,
         load_kg_m2: float,
         size_m: tuple[float, float, float],
         max_particles: int,

@@ -27,7 +27,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import Measurement
 from wakewise.core.jit.njit import njit
-from wakewise.simulation.tank.gauss_markov import Lasting
+from wakewise.simulation.tank.gauss_markov import GaussMarkovProcess
 from wakewise.simulation.tank.settings import SensorSettings, Span
 
 OUTLIER_M, OUTLIER_RAD = 0.1, 0.2
@@ -73,9 +73,9 @@ class Sensors:
         def drawn(span: Span, stream: np.random.Generator) -> float:
             return float(stream.uniform(*span))
 
-        self._place_off = Lasting(drawn(s.pose_slow_m, place), drawn(s.pose_slow_s, place), place)
-        self._turn_off = Lasting(drawn(s.pose_slow_rad, turn), drawn(s.pose_slow_s, turn), turn)
-        self._track_off = Lasting(drawn(s.tracking_slow_m, track), drawn(s.pose_slow_s, track), track)
+        self._place_off = GaussMarkovProcess(drawn(s.pose_slow_m, place), drawn(s.pose_slow_s, place), place)
+        self._turn_off = GaussMarkovProcess(drawn(s.pose_slow_rad, turn), drawn(s.pose_slow_s, turn), turn)
+        self._track_off = GaussMarkovProcess(drawn(s.tracking_slow_m, track), drawn(s.pose_slow_s, track), track)
         self._stamp_late_s = drawn(s.pose_stamp_late_s, when)
         self._far_rng, self._walk_rng = far, walk
         self._depth_bias_m = float(depth.normal(0.0, s.depth_bias_m))

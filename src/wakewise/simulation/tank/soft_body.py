@@ -24,12 +24,12 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.errors import InputError
-from wakewise.core.interfaces import Current, Posture
+from wakewise.core.interfaces import Current, TargetDeformation
 from wakewise.core.jit.njit import njit
-from wakewise.scene.targets import Sway, Target
+from wakewise.scene.targets import BendingModes, Target
 from wakewise.scene.targets.elasticity import BENDS_TO, ways_m
 from wakewise.simulation.tank.probes import surface_samples
-from wakewise.simulation.water.water_snapshot import Instant
+from wakewise.simulation.water.water_snapshot import WaterSnapshot
 
 _POINTS = 300
 _PER_RADIAN = 4.0
@@ -42,7 +42,7 @@ _LEAST_KEPT = 0.1  # share of its height that a piece of a stem keeps at least
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Loose:
+class UnanchoredTarget:
     """A target that lies on the bed and is not held there.
 
     `weight_N` is its weight in water, `friction` the coefficient between it and the bed.
@@ -53,19 +53,20 @@ class Loose:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Yielding:
+class TargetCompliance:
     """How a target gives way: `sway` if it bends, with the coefficient `drag`, and `loose` if it can slide."""
 
     drag: float
-    sway: Sway | None = None
-    loose: Loose | None = None
+    sway: BendingModes | None = None
+    loose: UnanchoredTarget | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pieces:
+class SurfaceElements:
     """Surface of a target in pieces: `points_W_m` (n, 3), outward `areas_m2` (n, 3), and the stem of each, `stem` (n,).
 
-    `shape`, `slope` and `drop` (n, 2) are those of the stem's modes there (see `Sway.at`), zero where nothing moves.
+    `shape`, `slope` and `drop` (n, 2) are those of the stem's modes there (see `BendingModes.at`), zero where nothing
+    moves.
     """
 
     points_W_m: Array
@@ -80,7 +81,7 @@ class Pieces:
         freeze(self, points_W_m=(n, 3), areas_m2=(n, 3), shape=(n, 2), slope=(n, 2), drop=(n, 2))
 
     @classmethod
-    def of(cls, target: Target, sway: Sway | None) -> Pieces:
+    def of(cls, target: Target, sway: BendingModes | None) -> SurfaceElements:
         """Pieces of equal area of the part above the bed; the same target always gives the same."""
         points, areas, faces = surface_samples(target, _POINTS, np.random.default_rng(0))
         stem = np.full(len(points), -1, dtype=np.int64)
@@ -92,13 +93,13 @@ class Pieces:
 
 
 @dataclass(eq=False)
-class Swaying:
+class TargetMotion:
     """Moves a target through the water's steps.
 
     Parameters
     ----------
     target : Target
-    yielding : Yielding
+    yielding : TargetCompliance
     density_kg_m3 : float
         Of the water.
     ambient : Current
@@ -106,14 +107,14 @@ class Swaying:
     """
 
     target: Target
-    yielding: Yielding
+    yielding: TargetCompliance
     density_kg_m3: float
     ambient: Current
     tips_m: Array = field(init=False)
     speeds_m_s: Array = field(init=False)
     alone_m: Array = field(init=False)
     shift_m: Array = field(init=False)
-    _pieces: Pieces = field(init=False)
+    _pieces: SurfaceElements = field(init=False)
     _before: Array | None = field(init=False, default=None)
     _ambient_before: Array | None = field(init=False, default=None)
     _alone_m_s: Array = field(init=False)
@@ -124,7 +125,7 @@ class Swaying:
         self.drag_kg_m3 = self.yielding.drag * self.density_kg_m3
         stems = 0 if self.sway is None else len(self.sway.height_m)
         self.tips_m, self.speeds_m_s, self.shift_m = np.zeros((stems, 2)), np.zeros((stems, 2)), np.zeros(2)
-        self._pieces = Pieces.of(self.target, self.sway)
+        self._pieces = SurfaceElements.of(self.target, self.sway)
         self._modes = _modes(self.sway)
         pieces = self._pieces
         self._middles_W_m = np.array([pieces.points_W_m[pieces.stem == k].mean(axis=0) for k in range(stems)])
@@ -133,7 +134,7 @@ class Swaying:
             self.tips_m = standing_m(pieces, self.sway, self.drag_kg_m3, water)
         self.alone_m, self._alone_m_s = self.tips_m, self.speeds_m_s
 
-    def step(self, now: Instant, dt_s: float) -> None:
+    def step(self, now: WaterSnapshot, dt_s: float) -> None:
         """Go on by the water's step that ends at this instant."""
         points = self._pieces.points_W_m + np.append(self.shift_m, 0.0)
         ambient = self.ambient.velocity(points, now.time_s)
@@ -157,7 +158,7 @@ class Swaying:
             self.shift_m = self.shift_m + dt_s * slid
 
     def _swung(
-        self, sway: Sway, tips: Array, speeds: Array, load: Array, before: Array, water: Array, dt_s: float
+        self, sway: BendingModes, tips: Array, speeds: Array, load: Array, before: Array, water: Array, dt_s: float
     ) -> tuple[Array, Array, Array]:
         """Tips and their speeds after a step through water, shape (n, 3) each, and the drag on the whole, (3,)."""
         pieces, force = self._pieces, np.zeros(3)
@@ -169,7 +170,7 @@ class Swaying:
         )  # fmt: skip
         return tips, speeds, force
 
-    def posture(self) -> Posture:
+    def posture(self) -> TargetDeformation:
         """Where the target is now, and how far its surface has come from its shape at rest."""
         away = alone = np.zeros((len(self._pieces.points_W_m), 3))
         stress = 0.0
@@ -181,7 +182,7 @@ class Swaying:
             )
             stress = float(np.hypot.reduce(self.tips_m * self.sway.stress_Pa_m, axis=1).max())
         far = np.linalg.norm(away, axis=1)
-        return Posture(
+        return TargetDeformation(
             tips_m=self.tips_m,
             tip_speeds_m_s=self.speeds_m_s,
             shift_m=self.shift_m,
@@ -202,7 +203,7 @@ class Swaying:
         return np.asarray(self.sway.moved_water_kg * np.einsum("kij,kj->ki", self.sway.axes_W, gained[:, :2]))
 
 
-def substeps(sway: Sway, dt_s: float) -> int:
+def substeps(sway: BendingModes, dt_s: float) -> int:
     """Into how many steps a step of the water is divided; modes faster than the water is known follow it at once."""
     fastest = min(float(sway.frequency_Hz.max()), fastest_Hz(dt_s))
     return max(2, math.ceil(_PER_RADIAN * 2.0 * math.pi * fastest * dt_s))
@@ -213,13 +214,15 @@ def fastest_Hz(flow_step_s: float) -> float:
     return 0.5 / flow_step_s
 
 
-def check_sway(target: Target, sway: Sway, drag: float, water_m_s: Array, density_kg_m3: float, step_s: float) -> None:
+def check_sway(
+    target: Target, sway: BendingModes, drag: float, water_m_s: Array, density_kg_m3: float, step_s: float
+) -> None:
     """Refuse a target that is too stiff or too soft to be moved by the water's steps.
 
     Parameters
     ----------
     target : Target
-    sway : Sway
+    sway : BendingModes
     drag : float
     water_m_s : ndarray, shape (3,)
         The fastest current that it stands in.
@@ -239,7 +242,7 @@ def check_sway(target: Target, sway: Sway, drag: float, water_m_s: Array, densit
             f"target.sway: {target.name} swings at {slowest:.3g} Hz or more, but water known each {1e3 * step_s:g} ms "
             f"moves what swings below {known:g} Hz; too stiff: let target.sway be none, or target.stiffness_Pa less"
         )
-    tips = standing_m(Pieces.of(target, sway), sway, drag * density_kg_m3, water_m_s)
+    tips = standing_m(SurfaceElements.of(target, sway), sway, drag * density_kg_m3, water_m_s)
     share = float((np.linalg.norm(tips, axis=1) / sway.height_m).max())
     if share > BENDS_TO:
         raise InputError(
@@ -248,7 +251,7 @@ def check_sway(target: Target, sway: Sway, drag: float, water_m_s: Array, densit
         )
 
 
-def check_loose(target: Target, yielding: Yielding, water_m_s: Array, density_kg_m3: float) -> None:
+def check_loose(target: Target, yielding: TargetCompliance, water_m_s: Array, density_kg_m3: float) -> None:
     """Refuse a target that its current, (3,), carries away before any thruster turns.
 
     Raises
@@ -258,7 +261,7 @@ def check_loose(target: Target, yielding: Yielding, water_m_s: Array, density_kg
     """
     if yielding.loose is None:
         return
-    areas = Pieces.of(target, None).areas_m2
+    areas = SurfaceElements.of(target, None).areas_m2
     push_N = drag_N(np.broadcast_to(water_m_s, areas.shape), areas, yielding.drag * density_kg_m3)
     pushed, holds = float(np.hypot(push_N[0], push_N[1])), yielding.loose.friction * yielding.loose.weight_N
     if pushed > holds:
@@ -268,7 +271,7 @@ def check_loose(target: Target, yielding: Yielding, water_m_s: Array, density_kg
         )
 
 
-def standing_m(pieces: Pieces, sway: Sway, drag_kg_m3: float, water_m_s: Array) -> Array:
+def standing_m(pieces: SurfaceElements, sway: BendingModes, drag_kg_m3: float, water_m_s: Array) -> Array:
     """Ways of the tips, shape (k, 2), in which a stream of even velocity, (3,), or (n, 3) at the pieces, holds them."""
     tips, speeds = np.zeros((len(sway.height_m), 2)), np.zeros((len(sway.height_m), 2))
     modes, none, force = _modes(sway), np.zeros((len(sway.height_m), 2)), np.zeros(3)
@@ -302,7 +305,7 @@ def slide_m_s(force_N: Array, water_m_s: Array, holds_N: float) -> Array:
     return np.asarray(along * abs(float(water_m_s @ along)) * (1.0 - math.sqrt(holds_N / push)))
 
 
-def _modes(sway: Sway | None) -> Array:
+def _modes(sway: BendingModes | None) -> Array:
     """Mass, stiffness, hardening, damping and farthest way of each mode, shape (k, 2, 5)."""
     if sway is None:
         return np.zeros((0, 2, 5))

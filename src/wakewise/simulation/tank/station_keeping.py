@@ -25,7 +25,7 @@ _SOME_N, _SOME_N_m = 0.05, 0.005
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Holding:
+class StationKeepingDemand:
     """The hardest of the loads that a vehicle was asked to hold against: of water that passes, and of its own weight.
 
     Parameters
@@ -85,7 +85,7 @@ def holding(
     trim_N: float = 0.0,
     more_drag: float = 0.0,
     q_WB: Array | None = None,
-) -> Holding | None:
+) -> StationKeepingDemand | None:
     """Find the hardest load to hold against; None if there is none.
 
     The drag of the water that passes, as the vehicle's own model has it and the share `more_drag` on top, its weight,
@@ -118,12 +118,12 @@ def holding(
     different = {tuple(np.round(case.load, 3)): case for case in cases}.values()
     # A vehicle that cannot make every moment leaves roll and pitch to its weight.
     kept = list(range(6)) if allocation_rank(vehicle) == 6 else [0, 1, 2, 5]
-    hardest: Holding | None = None
+    hardest: StationKeepingDemand | None = None
     for case in sorted(different, key=lambda case: -case.size)[:_MOST]:
         if case.size > _NONE:
             share = _share(vehicle, case.load, kept)
             if hardest is None or share < hardest.share:
-                hardest = Holding(
+                hardest = StationKeepingDemand(
                     passing_B_m_s=case.flow,
                     drag_N=case.drag[:3],
                     share=share,

@@ -11,7 +11,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import BodyState, FlakeCloud, Measurement, Posture, ScalarGrid, WaterTruth
+from wakewise.core.interfaces import BodyState, FlakeCloud, Measurement, ScalarGrid, TargetDeformation, WaterTruth
 from wakewise.robot.thrusters import electrical_power_W
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
@@ -22,19 +22,19 @@ from wakewise.simulation.tank.grains import STRESS_INTENSITY, speed_at_stress_m_
 from wakewise.simulation.tank.initial_water import tank_water
 from wakewise.simulation.tank.plant import VehiclePlant
 from wakewise.simulation.tank.probes import surface_points
-from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
+from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltProperties
 from wakewise.simulation.tank.sensors import Sensors
 from wakewise.simulation.tank.settings import MAX_SILT_PARTICLES, TankSettings
-from wakewise.simulation.tank.soft_body import Swaying, Yielding
+from wakewise.simulation.tank.soft_body import TargetCompliance, TargetMotion
 from wakewise.simulation.tank.swell import Swell
 from wakewise.simulation.tank.tether import Tether
 from wakewise.simulation.tank.water_truth import TargetProbes
-from wakewise.simulation.tank.worker_thread import Lane
+from wakewise.simulation.tank.worker_thread import WorkerThread
 from wakewise.simulation.water import AiryWave, AmbientSum
 from wakewise.simulation.water.hullwake import HullPush
 from wakewise.simulation.water.induction import impulse_velocity
 from wakewise.simulation.water.water import Water
-from wakewise.simulation.water.water_snapshot import Instant
+from wakewise.simulation.water.water_snapshot import WaterSnapshot
 
 GRID_SPACING_M = 0.05
 _GRID_HALF_M = 0.8
@@ -86,7 +86,7 @@ class Tank:
         start: BodyState,
         rng: np.random.Generator,
         tilt_rad: float = 0.0,
-        yielding: Yielding | None = None,
+        yielding: TargetCompliance | None = None,
         beside: bool = True,
     ) -> None:
         depth = settings.size_m[2]
@@ -111,7 +111,7 @@ class Tank:
         )
         self._water = tank_water(vehicle, target, settings, self.ambient, water_rng)
         silt = settings.silt
-        laws = SiltLaws.of(
+        laws = SiltProperties.of(
             silt.grain_m,
             silt.grain_density_kg_m3,
             settings.density_kg_m3,
@@ -136,7 +136,7 @@ class Tank:
         self._flake_rng = probe_rng.spawn(1)[0]
         self._swaying = None
         if yielding is not None:
-            self._swaying = Swaying(target, yielding, settings.density_kg_m3, self.ambient)
+            self._swaying = TargetMotion(target, yielding, settings.density_kg_m3, self.ambient)
         self._time = 0.0
         self._flow_steps = 0
         self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
@@ -148,7 +148,7 @@ class Tank:
         self._muddy = self._silt.total_kg > 0.0
         self._touching = ""
         self._measured: WaterTruth | None = None
-        self._water_lane, self._silt_lane = Lane("water", beside), Lane("silt", beside)
+        self._water_lane, self._silt_lane = WorkerThread("water", beside), WorkerThread("silt", beside)
         self._turbidity_per_m = self._probes.turbidity_per_m(laws, self._silt_grid())
 
     @property
@@ -280,7 +280,7 @@ class Tank:
             )
         return self._measured
 
-    def posture(self) -> Posture | None:
+    def posture(self) -> TargetDeformation | None:
         """How a soft or a loose target stands after the water's last step; None of one that nothing moves."""
         self._catch_up()
         return None if self._swaying is None else self._swaying.posture()
@@ -344,7 +344,7 @@ class Tank:
             impulse_W_N_s=0.5 * dt_s * (before_N + self._drag_before_N),
         )
 
-    def _move_silt(self, now: Instant) -> None:
+    def _move_silt(self, now: WaterSnapshot) -> None:
         """Move the silt by its whole step with the water of the step's middle, which makes the step of second order."""
         circles = np.concatenate([now.stirred_bed(self._stirring_speed), self.ambient.stirred_bed()])
         self._silt.step(now, circles, self._silt_every * self.settings.flow_step_s)
@@ -370,7 +370,7 @@ def _streams(rng: np.random.Generator) -> list[np.random.Generator]:
     return rng.spawn(5)
 
 
-def _swell(ambient: AmbientSum, laws: SiltLaws) -> Swell | None:
+def _swell(ambient: AmbientSum, laws: SiltProperties) -> Swell | None:
     """The ambient water's wave over this bed, if there is one."""
     for part in ambient.parts:
         if isinstance(part, AiryWave):
@@ -378,7 +378,7 @@ def _swell(ambient: AmbientSum, laws: SiltLaws) -> Swell | None:
     return None
 
 
-def _say_when_it_clears(settings: TankSettings, laws: SiltLaws) -> None:
+def _say_when_it_clears(settings: TankSettings, laws: SiltProperties) -> None:
     """Warn that grains which are in the water at the start will not stay there."""
     clears_s = settings.size_m[2] / laws.settling_m_s
     if settings.silt.suspended_mg_l > 0.0 and clears_s < _SOON_S:

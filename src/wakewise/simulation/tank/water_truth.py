@@ -13,7 +13,7 @@ from wakewise.core.jit.njit import njit
 from wakewise.scene.targets import Target
 from wakewise.simulation.tank.grains import beam_attenuation_per_m, friction_velocity_m_s
 from wakewise.simulation.tank.probes import bed_points, surface_points, water_points
-from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M, SiltLaws
+from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M, SiltProperties
 from wakewise.simulation.tank.swell import Swell
 
 CLOSE_M = 0.3
@@ -62,7 +62,7 @@ class TargetProbes:
     def measure(
         self,
         water: ExcessFlow,
-        laws: SiltLaws,
+        laws: SiltProperties,
         silt: ScalarGrid | None,
         camera_W_m: Array,
         density_kg_m3: float,
@@ -74,7 +74,7 @@ class TargetProbes:
         Parameters
         ----------
         water : ExcessFlow
-        laws : SiltLaws
+        laws : SiltProperties
         silt : ScalarGrid or None
             Concentration in kg/m3; None for clear water.
         camera_W_m : ndarray, shape (3,)
@@ -121,13 +121,13 @@ class TargetProbes:
             self._steady = water, velocity
         return self._steady[1]
 
-    def turbidity_per_m(self, laws: SiltLaws, silt: ScalarGrid | None) -> float:
+    def turbidity_per_m(self, laws: SiltProperties, silt: ScalarGrid | None) -> float:
         """Mean beam attenuation by silt near the target's centre, 1/m."""
         if silt is None:
             return 0.0
         return _attenuation(laws, float(concentration_at(silt, self._water_W_m).mean()))
 
-    def ray_optical_depth(self, laws: SiltLaws, silt: ScalarGrid | None, camera_W_m: Array) -> float:
+    def ray_optical_depth(self, laws: SiltProperties, silt: ScalarGrid | None, camera_W_m: Array) -> float:
         """Line integral of the beam attenuation by silt from the camera to the target, mean over rays."""
         if silt is None:
             return 0.0
@@ -216,5 +216,5 @@ def _p95(values: Array) -> float:
     return float(ordered[below] + (place - below) * (ordered[above] - ordered[below]))
 
 
-def _attenuation(laws: SiltLaws, amount: float) -> float:
+def _attenuation(laws: SiltProperties, amount: float) -> float:
     return float(beam_attenuation_per_m(amount, laws.grain_m, laws.grain_density_kg_m3))

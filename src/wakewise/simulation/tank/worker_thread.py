@@ -11,7 +11,7 @@ from functools import cache
 from wakewise.simulation.water.blocked_sums import cores
 
 
-class Lane:
+class WorkerThread:
     """Does one piece of work after another, in the order in which they were given, on a thread of its own.
 
     Where there is one core only, or nothing is to be done `beside` who asked, each is done at once. Threads are shared

@@ -9,16 +9,25 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import BodyState, FlakeCloud, Plant, Posture, ScalarGrid, Truth, WaterTruth, Witness
+from wakewise.core.interfaces import (
+    BodyState,
+    FlakeCloud,
+    Plant,
+    ScalarGrid,
+    TargetDeformation,
+    Truth,
+    TruthProvider,
+    WaterTruth,
+)
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
 from wakewise.simulation.tank.settings import TankSettings
-from wakewise.simulation.tank.soft_body import Yielding
+from wakewise.simulation.tank.soft_body import TargetCompliance
 from wakewise.simulation.tank.tank import Tank
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TankWitness:
+class TankTruth:
     """Reads the truth from the simulated tank, for the record."""
 
     tank: Tank
@@ -50,7 +59,7 @@ class TankWitness:
         """Visible flakes before a camera now."""
         return self.tank.flakes(X_WC)
 
-    def posture(self) -> Posture | None:
+    def posture(self) -> TargetDeformation | None:
         """How a soft or a loose target stands now; None of one that nothing moves."""
         return self.tank.posture()
 
@@ -82,7 +91,7 @@ class TankWorld:
     draw: Callable[[], np.random.Generator]
     name: str = "tank"
     tilt_rad: float = 0.0
-    yielding: Yielding | None = None
+    yielding: TargetCompliance | None = None
 
     def tank(self, beside: bool = True) -> Tank:
         """A fresh tank at its start, with all that it knows; its water moves `beside` the vehicle, or after it."""
@@ -97,7 +106,7 @@ class TankWorld:
             beside,
         )
 
-    def begin(self) -> tuple[Plant, Witness | None]:
+    def begin(self) -> tuple[Plant, TruthProvider | None]:
         """A fresh tank at its start, as plant and witness."""
         tank = self.tank(beside=False)  # a flight has a controller
-        return tank, TankWitness(tank=tank)
+        return tank, TankTruth(tank=tank)

@@ -51,10 +51,10 @@ _MERGE_L2 = 2.0
 _MERGE_ERROR_M_S, _FARTHEST_L2 = 1.5e-3, 6.0
 
 
-class Layers(NamedTuple):
+class RingBuffers(NamedTuple):
     """Room for the rings of all planes, of which the first so many are in use; the step writes into it.
 
-    `plane`, shape (n,), is the number of each ring's plane; the others are as in `Rings`.
+    `plane`, shape (n,), is the number of each ring's plane; the others are as in `WallJetRings`.
     """
 
     plane: IntArray
@@ -65,7 +65,7 @@ class Layers(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Rings:
+class WallJetRings:
     """Rings of the wall jets on one plane, in its own frame.
 
     Parameters
@@ -84,7 +84,7 @@ class Rings:
     lean: Array
 
     @classmethod
-    def none(cls) -> Rings:
+    def none(cls) -> WallJetRings:
         """No rings at all."""
         return cls(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
 
@@ -99,24 +99,24 @@ class Rings:
         heading, kappa = leaning(self.lean)
         return heading, kappa
 
-    def take(self, keep: np.ndarray) -> Rings:
+    def take(self, keep: np.ndarray) -> WallJetRings:
         """Those that a mask or an index array picks."""
-        return Rings(self.centre_m[keep], self.radius_m[keep], self.impulse_m4_s[keep], self.lean[keep])
+        return WallJetRings(self.centre_m[keep], self.radius_m[keep], self.impulse_m4_s[keep], self.lean[keep])
 
     @classmethod
-    def of(cls, layers: Layers, count: int, plane: int) -> Rings:
+    def of(cls, layers: RingBuffers, count: int, plane: int) -> WallJetRings:
         """A copy of those of the first `count` that lie on a plane."""
         on = np.flatnonzero(layers.plane[:count] == plane)
         return cls(layers.centre[on], layers.radius[on], layers.impulse[on], layers.lean[on])
 
-    def layers(self) -> Layers:
+    def layers(self) -> RingBuffers:
         """A copy as the only plane's."""
         copies = (a.copy() for a in (self.centre_m, self.radius_m, self.impulse_m4_s, self.lean))
-        return Layers(np.zeros(self.count, np.int64), *copies)
+        return RingBuffers(np.zeros(self.count, np.int64), *copies)
 
-    def joined(self, later: Rings) -> Rings:
+    def joined(self, later: WallJetRings) -> WallJetRings:
         """These followed by the later ones."""
-        return Rings(
+        return WallJetRings(
             np.concatenate([self.centre_m, later.centre_m]),
             np.concatenate([self.radius_m, later.radius_m]),
             np.concatenate([self.impulse_m4_s, later.impulse_m4_s]),
@@ -124,15 +124,15 @@ class Rings:
         )
 
 
-def rings_from_strikes(position_m: Array, impulse_m4_s: Array, sigma_m: Array) -> Rings:
+def rings_from_strikes(position_m: Array, impulse_m4_s: Array, sigma_m: Array) -> WallJetRings:
     """Rings that take over from parcels (arrays as in `Parcels`, in the plane's frame) which have come down to it."""
     size = np.linalg.norm(impulse_m4_s, axis=1)
     lean = impulse_m4_s[:, :2] / np.where(size > 0, size, 1.0)[:, None]
-    return Rings(position_m[:, :2].copy(), STRIKE_HEIGHT * sigma_m, size, lean)
+    return WallJetRings(position_m[:, :2].copy(), STRIKE_HEIGHT * sigma_m, size, lean)
 
 
 def ring_velocity(
-    points_W_m: Array, rings: Rings, bed_z_m: float, least_m: float = 0.0, *, exact: bool = False
+    points_W_m: Array, rings: WallJetRings, bed_z_m: float, least_m: float = 0.0, *, exact: bool = False
 ) -> Array:
     """Velocity of the rings, shape (n, 3), at points, shape (n, 3); zero if there are none.
 
@@ -142,7 +142,7 @@ def ring_velocity(
     return packed_velocity(points_W_m, packed_rings(rings, least_m), bed_z_m, exact=exact)
 
 
-def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0, stretch: float = 1.0) -> Array:
+def packed_rings(rings: WallJetRings, least_m: float = 0.0, per_height: float = 0.0, stretch: float = 1.0) -> Array:
     """One row per ring, as the kernel reads it, for several calls of `packed_velocity`, shape (n, 15).
 
     A layer has the thickness hypot(0.093 R, least_m), or `stretch` times 0.093 R in that. It is slower in proportion to
@@ -209,13 +209,13 @@ def planes_velocity(points_W_m: Array, planes: Array, starts: IntArray, packed: 
     return out
 
 
-def ring_strength(rings: Rings) -> Array:
+def ring_strength(rings: WallJetRings) -> Array:
     """A of each ring in m2/s, shape (n,): such that rings sent at a steady rate add up to u_max = 1.16 sqrt(M) / r."""
     strength: Array = STRENGTH * rings.impulse_m4_s / rings.radius_m**2
     return strength
 
 
-def layer_speed(rings: Rings) -> Array:
+def layer_speed(rings: WallJetRings) -> Array:
     """Speed at the bed under each ring's crest, shape (n,), from all rings that lie on the same ground.
 
     Rings about one centre that lean the same way add up in full, from whichever jets they came. Rings about different
@@ -227,8 +227,8 @@ def layer_speed(rings: Rings) -> Array:
 
 
 def grown(
-    rings: Rings, current_m_s: Array, dt_s: float, least_m: float = 0.0, stretch: float = 1.0
-) -> tuple[Rings, Array]:
+    rings: WallJetRings, current_m_s: Array, dt_s: float, least_m: float = 0.0, stretch: float = 1.0
+) -> tuple[WallJetRings, Array]:
     """Rings of one plane after dt_s, and the layer speed they had, shape (n,); see `grow_layers`.
 
     The current is a velocity in the plane's frame, shape (3,) or (n, 3).
@@ -236,17 +236,17 @@ def grown(
     layers, speed = rings.layers(), np.empty(rings.count)
     current = np.ascontiguousarray(np.broadcast_to(current_m_s, (rings.count, 3)))
     grow_layers(layers, rings.count, current, np.array([least_m]), np.array([stretch]), dt_s, speed)
-    return Rings.of(layers, rings.count, 0), speed
+    return WallJetRings.of(layers, rings.count, 0), speed
 
 
-def coarsened(rings: Rings) -> Rings:
+def coarsened(rings: WallJetRings) -> WallJetRings:
     """Rings of one plane that are near each other made one; see `merge_layers`."""
     layers = rings.layers()
-    return Rings.of(layers, merge_layers(layers, rings.count), 0)
+    return WallJetRings.of(layers, merge_layers(layers, rings.count), 0)
 
 
 @njit(apart=True, nogil=True)
-def kept_rings(layers: Layers, count: int, keep: np.ndarray) -> int:
+def kept_rings(layers: RingBuffers, count: int, keep: np.ndarray) -> int:
     """Close the ranks: of the first `count`, only those that a mask picks stay; how many they are."""
     left = 0
     for j in range(count):
@@ -259,7 +259,7 @@ def kept_rings(layers: Layers, count: int, keep: np.ndarray) -> int:
 
 
 @njit(apart=True, nogil=True)
-def layer_speeds(layers: Layers, count: int) -> Array:
+def layer_speeds(layers: RingBuffers, count: int) -> Array:
     """As `layer_speed`, each among those of its own plane."""
     out, per_L = np.empty(count), 1.0 / LOG_WIDTH
     heading, kappa = leaning(layers.lean[:count])
@@ -290,13 +290,13 @@ def layer_speeds(layers: Layers, count: int) -> Array:
 
 @njit(apart=True, nogil=True)
 def grow_layers(
-    layers: Layers, count: int, current_m_s: Array, least_m: Array, stretch: Array, dt_s: float, speed_m_s: Array
+    layers: RingBuffers, count: int, current_m_s: Array, least_m: Array, stretch: Array, dt_s: float, speed_m_s: Array
 ) -> None:
     """Let rings run out for dt_s, in place. Exact in dt for a speed that falls as 1/R.
 
     Parameters
     ----------
-    layers : Layers
+    layers : RingBuffers
     count : int
     current_m_s : ndarray, shape (count, 3)
         Velocity of the current in each ring's plane's frame, which carries the centres.
@@ -317,7 +317,7 @@ def grow_layers(
 
 
 @njit(apart=True, nogil=True)
-def merge_layers(layers: Layers, count: int) -> int:
+def merge_layers(layers: RingBuffers, count: int) -> int:
     """Rings of a plane that are near each other in centre, radius and direction made one; how many are left.
 
     Kept are their impulse, the part of it along the plane, the centre of impulse, and the flow that they carry, which

@@ -31,7 +31,7 @@ _SIGMA, _DEPTH = 0.8, 1.4
 _DAMPING = 1e-4  # of the mean square singular value: strengths stay of the order of the flow
 
 
-class BodyRows(NamedTuple):
+class PackedBlockage(NamedTuple):
     """A `Blockage` as the compiled step takes it; of no body all are empty.
 
     `points` and `normals`, shape (k, 3), are as in `Blockage`, and `answers`, shape (k, s), its response the other way
@@ -51,7 +51,7 @@ class BodyRows(NamedTuple):
     piece: float
 
     @classmethod
-    def none(cls) -> BodyRows:
+    def none(cls) -> PackedBlockage:
         """No body."""
         v = np.zeros((0, 3))
         return cls(v, v, np.zeros((0, 0)), np.zeros((4, 0), np.float32), np.zeros(0), np.zeros(4), SINGLE, 0.0, 0.0)
@@ -82,7 +82,7 @@ class Blockage:
     response: Array
     bed_z_m: float
     piece_m2: float
-    rows: BodyRows = field(init=False, repr=False)
+    rows: PackedBlockage = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         k, s = len(self.points_m), len(self.sigmas_m)
@@ -91,7 +91,7 @@ class Blockage:
         both = FixedSources(np.concatenate([self.sources_m, images]), np.tile(self.sigmas_m, 2))
         middle = np.mean(self.points_m, axis=0)
         radius = float(np.linalg.norm(self.points_m - middle, axis=1).max())
-        rows = BodyRows(
+        rows = PackedBlockage(
             np.ascontiguousarray(self.points_m, dtype=np.float64),
             np.ascontiguousarray(self.normals, dtype=np.float64),
             np.ascontiguousarray(self.response.T, dtype=np.float64),
@@ -150,7 +150,7 @@ class Blockage:
 
 
 @njit(apart=True, nogil=True)
-def answer(body: BodyRows, undisturbed_m_s: Array) -> Array:
+def answer(body: PackedBlockage, undisturbed_m_s: Array) -> Array:
     """Strengths, shape (s,): see `Blockage.strengths_m3_s`. In one order, whatever the number of threads."""
     out = np.zeros(body.answers.shape[1])
     for p in range(body.answers.shape[0]):
@@ -174,7 +174,7 @@ def any_near(ball: Array, points: Array) -> bool:
 
 
 @njit(apart=True, nogil=True)
-def near_body(body: BodyRows, points: Array) -> IntArray:
+def near_body(body: PackedBlockage, points: Array) -> IntArray:
     """Indices of the points, shape (n, 3), that feel the body."""
     found = np.empty(points.shape[0], np.int64)
     count = 0
@@ -187,7 +187,7 @@ def near_body(body: BodyRows, points: Array) -> IntArray:
 
 
 @njit(apart=True, nogil=True)
-def add_body(body: BodyRows, points: Array, strengths_m3_s: Array, out: Array) -> None:
+def add_body(body: PackedBlockage, points: Array, strengths_m3_s: Array, out: Array) -> None:
     """Add to `out` what the body's sources add at points, both shape (n, 3)."""
     near = near_body(body, points)
     if near.shape[0] == 0:

@@ -20,10 +20,10 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import assign, njit
-from wakewise.simulation.water.bedjets import STRIKE_HEIGHT, Layers
+from wakewise.simulation.water.bedjets import STRIKE_HEIGHT, RingBuffers
 from wakewise.simulation.water.crossing_jets import LEAST_SPEED_M_S, WIDEST
-from wakewise.simulation.water.parcels import CENTRE_SPEED, Jets, kept_only
-from wakewise.simulation.water.walljets import SPREADS_FASTER, Planes, start_ring
+from wakewise.simulation.water.parcels import CENTRE_SPEED, ParcelBuffers, kept_only
+from wakewise.simulation.water.walljets import SPREADS_FASTER, JetPlanes, start_ring
 
 _SAME_PLACE = 1.0  # sheets of the same two jets closer than this many sigma are one
 _SAME_NORMAL = math.cos(math.radians(15))
@@ -32,7 +32,7 @@ _MOST_SHEETS = 8  # that are remembered, so that the rings of one meeting add up
 
 @njit(apart=True, nogil=True)
 def turn_aside(
-    jets: Jets, count: int, streams: int, planes: Planes, faces: int, layers: Layers, rings: int
+    jets: ParcelBuffers, count: int, streams: int, planes: JetPlanes, faces: int, layers: RingBuffers, rings: int
 ) -> tuple[int, int, float]:
     """Take from the first `count` parcels what meets head-on, and start its rings behind the first `rings`.
 
@@ -81,9 +81,9 @@ def turn_aside(
 
 @njit(apart=True, nogil=True)
 def _sheet(
-    planes: Planes,
+    planes: JetPlanes,
     faces: int,
-    layers: Layers,
+    layers: RingBuffers,
     rings: int,
     stream_a: int,
     stream_b: int,

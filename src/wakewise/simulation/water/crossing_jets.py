@@ -32,7 +32,7 @@ import numpy as np
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import njit
 from wakewise.simulation.water.bedjets import STRIKE_HEIGHT
-from wakewise.simulation.water.parcels import CENTRE_SPEED, Jets, kept_only
+from wakewise.simulation.water.parcels import CENTRE_SPEED, ParcelBuffers, kept_only
 
 RAYS = 4
 """Into so many parcels two turn: an even number, so that none keeps to the bisector."""
@@ -63,7 +63,7 @@ def ray_azimuths(lean: float, phase: float, out: Array) -> None:
 
 
 @njit(nogil=True)
-def fan_out(jets: Jets, count: int, streams: int, met: int) -> tuple[int, int]:
+def fan_out(jets: ParcelBuffers, count: int, streams: int, met: int) -> tuple[int, int]:
     """Turn what crosses among the first `count` parcels into rays behind them; parcels and meetings there are then.
 
     Streams below `streams` are the thrusters' own; only those meet. `met` is how many meetings there were before.
@@ -105,7 +105,7 @@ def fan_out(jets: Jets, count: int, streams: int, met: int) -> tuple[int, int]:
 
 @njit(nogil=True)
 def _rays(
-    jets: Jets,
+    jets: ParcelBuffers,
     count: int,
     a: int,
     b: int,

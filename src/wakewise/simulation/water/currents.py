@@ -18,7 +18,7 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Current
-from wakewise.simulation.water.faces import Room
+from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.fourier_turbulence import add_modes
 from wakewise.simulation.water.induction import impulse_velocity
 from wakewise.simulation.water.round_jet_closure import PLAIN
@@ -131,7 +131,7 @@ class PumpJet:
         inside = row[:, 2] >= 0.0
         impulse = np.array(impulses)[:, None] * unit
         row, impulse, size = row[inside], impulse[inside], np.array(sigmas)[inside]
-        room = Room.of(self.bed_z_m, (math.inf, math.inf), surface=False)
+        room = TankFaces.of(self.bed_z_m, (math.inf, math.inf), surface=False)
         object.__setattr__(self, "_row", (row, size))
         object.__setattr__(self, "_sources", room.with_images(row, impulse, size))
 

@@ -21,7 +21,7 @@ LEAST_IMAGE_M_S = 5e-5
 
 
 @dataclass(frozen=True)
-class Face:
+class TankFace:
     """A plane across one of the world's axes.
 
     Parameters
@@ -84,17 +84,17 @@ class Face:
 
 
 @dataclass(frozen=True)
-class Room:
+class TankFaces:
     """The faces there are: none in open water; the bed, or all six, in a tank."""
 
-    faces: tuple[Face, ...]
+    faces: tuple[TankFace, ...]
 
     @classmethod
-    def of(cls, bed_z_m: float, half_size_m: tuple[float, float], surface: bool) -> Room:
+    def of(cls, bed_z_m: float, half_size_m: tuple[float, float], surface: bool) -> TankFaces:
         """Bed, surface at z = 0 and walls at +- half_size; infinite ones are left out."""
-        faces = [Face("bed", 2, 1, bed_z_m)] + ([Face("surface", 2, -1, 0.0)] if surface else [])
+        faces = [TankFace("bed", 2, 1, bed_z_m)] + ([TankFace("surface", 2, -1, 0.0)] if surface else [])
         for axis, half in enumerate(half_size_m):
-            faces += [Face(f"wall {'xy'[axis]}{'-+'[side > 0]}", axis, side, side * half) for side in (-1, 1)]
+            faces += [TankFace(f"wall {'xy'[axis]}{'-+'[side > 0]}", axis, side, side * half) for side in (-1, 1)]
         return cls(tuple(face for face in faces if math.isfinite(face.at_m)))
 
     @cached_property

@@ -28,7 +28,7 @@ import math
 
 from wakewise.core.arrays import Array
 from wakewise.core.jit.njit import njit
-from wakewise.simulation.water.blockage import BodyRows
+from wakewise.simulation.water.blockage import PackedBlockage
 
 _BEFORE, _WITHIN = 1.0, 0.7  # sigma before the surface where half of what strikes has turned, and over how many it does
 _REACH = 3.0  # standard deviations beyond which nothing meets a surface
@@ -37,7 +37,7 @@ _LEAST_LEFT = 0.05  # of the slipstream: what is left of it can still strike
 
 
 @njit(nogil=True)
-def lead_round(body: BodyRows, x: Array, u: Array, answer: Array) -> None:
+def lead_round(body: PackedBlockage, x: Array, u: Array, answer: Array) -> None:
     """Turn the velocity u of the jets' own water at a parcel, in place, the way that the body's answer there says.
 
     All shape (3,); `answer` is changed as well.
@@ -63,7 +63,7 @@ def lead_round(body: BodyRows, x: Array, u: Array, answer: Array) -> None:
 
 
 @njit(nogil=True)
-def _draw_none(body: BodyRows, x: Array, answer: Array) -> None:
+def _draw_none(body: PackedBlockage, x: Array, answer: Array) -> None:
     """Take from the answer at x what of it points to the body: against the normals near by, the nearest most."""
     P, N = body.points, body.normals
     a = b = c = 0.0
@@ -81,7 +81,7 @@ def _draw_none(body: BodyRows, x: Array, answer: Array) -> None:
 
 
 @njit(nogil=True)
-def strike_body(body: BodyRows, before: Array, x: Array, flow: Array, sigma: float, impulse: Array) -> float:
+def strike_body(body: PackedBlockage, before: Array, x: Array, flow: Array, sigma: float, impulse: Array) -> float:
     """Turn aside what of a parcel strikes the body on its way from `before` to `x`; the length its impulse loses.
 
     Parameters
@@ -118,7 +118,7 @@ def strike_body(body: BodyRows, before: Array, x: Array, flow: Array, sigma: flo
 
 
 @njit(nogil=True)
-def _met(body: BodyRows, x: Array, a: float, b: float, c: float, sigma: float) -> tuple[float, float]:
+def _met(body: PackedBlockage, x: Array, a: float, b: float, c: float, sigma: float) -> tuple[float, float]:
     """Share of a slipstream along (a, b, c) that has met the body when its parcel is at x, and its growth per metre."""
     P, N = body.points, body.normals
     per = 1.0 / sigma

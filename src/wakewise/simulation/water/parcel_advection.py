@@ -12,7 +12,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import njit
-from wakewise.simulation.water.parcels import Jets
+from wakewise.simulation.water.parcels import ParcelBuffers
 from wakewise.simulation.water.round_jet_closure import CORE_END_D, FIRST_D, WAKE_ENTRAINMENT
 
 EMISSION_SPACING = 0.6  # of the first sigma: Gaussians this close add up to a smooth row (ripple below 1e-6)
@@ -196,7 +196,7 @@ def count_sent(impulses_m4_s: Array, dt_s: float, areas_m2: Array, spacing_m: Ar
 
 @njit(apart=True, nogil=True)
 def send(
-    jets: Jets,
+    jets: ParcelBuffers,
     count: int,
     slugs: tuple[IntArray, IntArray, Array, Array, Array],
     areas_m2: Array,
@@ -210,7 +210,7 @@ def send(
 
     Parameters
     ----------
-    jets : Jets
+    jets : ParcelBuffers
     count : int
     slugs : tuple
         What `slugs` returned.

@@ -14,7 +14,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import njit
-from wakewise.simulation.water.faces import Room
+from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.induction import impulse_velocity
 from wakewise.simulation.water.round_jet_closure import FIRST_D, disk_share
 
@@ -25,7 +25,7 @@ CENTRE_SPEED = 2 / (3 * (2 * math.pi) ** 1.5)
 """Speed at the centre of a parcel of unit impulse and size: two thirds of its impulse's density there."""
 
 
-class Jets(NamedTuple):
+class ParcelBuffers(NamedTuple):
     """Room for parcels, oldest first, of which the first so many are in use; the step writes into it.
 
     Fields as of `Parcels`, each as long as there is room.
@@ -124,17 +124,17 @@ class Parcels:
         """Those that a mask or an index array picks."""
         return Parcels(*(getattr(self, field.name)[keep] for field in fields(self)))
 
-    def with_room(self, room: int) -> Jets:
+    def with_room(self, room: int) -> ParcelBuffers:
         """A copy with room for so many."""
         columns = [
             np.zeros((room, *np.shape(getattr(self, f.name))[1:]), getattr(self, f.name).dtype) for f in fields(self)
         ]
         for column, field in zip(columns, fields(self), strict=True):
             column[: self.count] = getattr(self, field.name)
-        return Jets(*columns)
+        return ParcelBuffers(*columns)
 
     @classmethod
-    def of(cls, jets: Jets, count: int) -> Parcels:
+    def of(cls, jets: ParcelBuffers, count: int) -> Parcels:
         """A copy of the first so many."""
         copies: tuple[Any, ...] = tuple(column[:count].copy() for column in jets)
         return cls(*copies)
@@ -153,12 +153,12 @@ def parcel_velocity(
     bed_z_m : float
         The plane z = bed_z_m, through which nothing flows; infinite for water without a bed.
     """
-    room = Room.of(bed_z_m, (math.inf, math.inf), surface=False)
+    room = TankFaces.of(bed_z_m, (math.inf, math.inf), surface=False)
     return confined_velocity(points_W_m, positions_m, impulses_m4_s, sigmas_m, room)
 
 
 def confined_velocity(
-    points_W_m: Array, positions_m: Array, impulses_m4_s: Array, sigmas_m: Array, room: Room
+    points_W_m: Array, positions_m: Array, impulses_m4_s: Array, sigmas_m: Array, room: TankFaces
 ) -> Array:
     """Velocity of parcels and of their images in a room's faces; arguments as `parcel_velocity`."""
     sources = room.with_images(positions_m, impulses_m4_s, sigmas_m)
@@ -213,7 +213,7 @@ def merged_across(parcels: Parcels, spacing: float) -> Parcels:
 
 
 @njit(apart=True, nogil=True)
-def kept_only(jets: Jets, count: int, keep: np.ndarray) -> int:
+def kept_only(jets: ParcelBuffers, count: int, keep: np.ndarray) -> int:
     """Close the ranks: of the first `count`, only those that a mask picks stay; how many they are."""
     left = 0
     for i in range(count):
@@ -231,7 +231,7 @@ def kept_only(jets: Jets, count: int, keep: np.ndarray) -> int:
 
 
 @njit(apart=True, nogil=True)
-def merge_rows(jets: Jets, count: int, spacing: float) -> int:
+def merge_rows(jets: ParcelBuffers, count: int, spacing: float) -> int:
     """Pairs of successive parcels of one jet closer than `spacing` sigma made one; their impulse is conserved.
 
     For old parcels `row_widening` makes the distance longer. How many are left.
@@ -245,7 +245,7 @@ def merge_rows(jets: Jets, count: int, spacing: float) -> int:
 
 
 @njit(apart=True, nogil=True)
-def merge_across(jets: Jets, count: int, spacing: float) -> int:
+def merge_across(jets: ParcelBuffers, count: int, spacing: float) -> int:
     """Pairs of far-travelled parcels of different jets, alike in size and direction and very close, made one.
 
     Parcels are sorted into cells of half the spacing at most, level by level of size; neighbours in a cell may merge.
@@ -271,7 +271,7 @@ def merge_across(jets: Jets, count: int, spacing: float) -> int:
 
 
 @njit(apart=True, nogil=True)
-def _merge(jets: Jets, count: int, order: IntArray, label: IntArray, spacing: float) -> int:
+def _merge(jets: ParcelBuffers, count: int, order: IntArray, label: IntArray, spacing: float) -> int:
     """Walk through parcels in an order; each may take up the one before it with the same label."""
     labels = 0
     for j in order:

@@ -20,8 +20,8 @@ bent over, so that it moves sideways to its own length, a jet spreads as a line 
 top-hat profile grows by 0.34 of the path (J. H. W. Lee and V. H. Chu, Turbulent Jets and Plumes: A Lagrangian Approach,
 Kluwer 3). In between both add up, each weighted with how much of the motion is along the row and across it.
 
-*Width.* A world may have jets of any width between those two (`Spreading.of_width`). Momentum is kept at any of them,
-since eta and not the spread carries it, and the volume flux follows: Q/Q0 = 4 spread x/D, 0.32 x/D without swirl.
+*Width.* A world may have jets of any width between those two (`JetSpreading.of_width`). Momentum is kept at any of
+them, since eta and not the spread carries it, and the volume flux follows: Q/Q0 = 4 spread x/D, 0.32 x/D without swirl.
 
 *Life.* What a thruster leaves in the water when it stops dies sooner here than in the lattice
 (`wakewise.simulation.water.water`). A parcel that is slower than its row would be if that were still fed, f = u / (u0
@@ -55,7 +55,7 @@ WAKE_ENTRAINMENT = 1.14**3 / 3
 
 
 @dataclass(frozen=True)
-class Spreading:
+class JetSpreading:
     """Length of the core in diameters, and growth of sigma with the path beyond it."""
 
     core_D: float
@@ -72,7 +72,7 @@ class Spreading:
         return self.spread * _HALF_WIDTHS
 
     @classmethod
-    def of_width(cls, half_width_growth: float) -> Spreading:
+    def of_width(cls, half_width_growth: float) -> JetSpreading:
         """The jet whose half width grows so with the path: `PLAIN` at 0.094, `SWIRLING` at 0.1766.
 
         The far cone starts at the disk without swirl and 0.73 D before it for a propeller's jet, as their two cores
@@ -84,7 +84,7 @@ class Spreading:
         return cls(core_D=CORE_END_D / spread + tip_D, spread=spread)
 
 
-def _tip_D(spreading: Spreading) -> float:
+def _tip_D(spreading: JetSpreading) -> float:
     """Where the far cone of a jet has its tip, in diameters down the jet."""
     return spreading.core_D - CORE_END_D / spreading.spread
 
@@ -92,10 +92,10 @@ def _tip_D(spreading: Spreading) -> float:
 _HALF_WIDTHS = math.sqrt(2 * math.log(2))
 """Half width of a Gaussian over its sigma."""
 _PLAIN_SPREAD = 0.094 / _HALF_WIDTHS
-PLAIN = Spreading(core_D=CORE_END_D / _PLAIN_SPREAD, spread=_PLAIN_SPREAD)
+PLAIN = JetSpreading(core_D=CORE_END_D / _PLAIN_SPREAD, spread=_PLAIN_SPREAD)
 """Without swirl: beyond the core sigma is 0.0798 of the whole path."""
 
-SWIRLING = Spreading(core_D=2.6, spread=0.15)
+SWIRLING = JetSpreading(core_D=2.6, spread=0.15)
 """A propeller's jet: wide and soon slow. Its turning about the axis is left out; what it does to the width is in."""
 
 
@@ -134,7 +134,7 @@ def travel(
     diameter_m: Array,
     speed_m_s: Array,
     dt_s: float | Array,
-    spreading: Spreading = PLAIN,
+    spreading: JetSpreading = PLAIN,
     spread: float | Array | None = None,
 ) -> tuple[Array, Array]:
     """Path that parcels cover in dt_s and their size after it, shapes (n,), given the water's speed at their centres.

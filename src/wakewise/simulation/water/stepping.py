@@ -13,18 +13,18 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import assign, assign_rows, njit
-from wakewise.simulation.water.bedjets import STRIKE_HEIGHT, Layers
+from wakewise.simulation.water.bedjets import STRIKE_HEIGHT, RingBuffers
 from wakewise.simulation.water.bedjets_sums import sum_planes
-from wakewise.simulation.water.blockage import BodyRows, add_body, answer
+from wakewise.simulation.water.blockage import PackedBlockage, add_body, answer
 from wakewise.simulation.water.clusters import clustered, sum_field
 from wakewise.simulation.water.colliding_jets import turn_aside
 from wakewise.simulation.water.crossing_jets import fan_out
 from wakewise.simulation.water.faces import mirrored
 from wakewise.simulation.water.jet_deflection import lead_round, strike_body
 from wakewise.simulation.water.parcel_advection import drift, due, fade_gusts, send, slugs
-from wakewise.simulation.water.parcels import MERGE_SPACING, Jets, kept_only, merge_across, merge_rows
+from wakewise.simulation.water.parcels import MERGE_SPACING, ParcelBuffers, kept_only, merge_across, merge_rows
 from wakewise.simulation.water.space_order import ordered
-from wakewise.simulation.water.walljets import Planes, grow, ring_places, start_ring, thin, wall_rows
+from wakewise.simulation.water.walljets import JetPlanes, grow, ring_places, start_ring, thin, wall_rows
 
 _MANY = 800  # parcels; with more, old ones of different jets merge over distances that grow in proportion
 # Steps after which different jets and rings are looked through for what may become one, and after which the body's
@@ -33,7 +33,7 @@ _EVERY = 2
 _STEEPEST_GRAZE = math.sin(math.radians(10))  # parcels that come in flatter than this slide along the face
 
 
-class Laws(NamedTuple):
+class WaterConstants(NamedTuple):
     """What stays the same from step to step.
 
     Parameters
@@ -61,7 +61,7 @@ class Laws(NamedTuple):
     constants: np.ndarray
 
 
-class Thrusters(NamedTuple):
+class JetSources(NamedTuple):
     """What the thrusters are, and what of theirs waits to be sent.
 
     `areas` and `spacing` (of parcels at the disk, in m), shape (t,); `waiting_impulse` (m4/s) and `waiting_slug` (the
@@ -74,7 +74,7 @@ class Thrusters(NamedTuple):
     waiting_slug: Array
 
 
-class Tally(NamedTuple):
+class StepCounters(NamedTuple):
     """Counts, changed in place.
 
     `rows`, shape (2,), is how many parcels and rings there are, `steps`, shape (3,), how many steps there were, at
@@ -119,7 +119,7 @@ def flow_at(
 
 
 @njit(nogil=True)
-def places_of(jets: Jets, layers: Layers, planes: Planes, rows: IntArray, disks: Array) -> Array:
+def places_of(jets: ParcelBuffers, layers: RingBuffers, planes: JetPlanes, rows: IntArray, disks: Array) -> Array:
     """Where a step must know the ambient water: at the parcels, the rings and the disks, one after another."""
     n, r = rows[0], rows[1]
     out = np.empty((n + r + disks.shape[0], 3))
@@ -131,13 +131,13 @@ def places_of(jets: Jets, layers: Layers, planes: Planes, rows: IntArray, disks:
 
 @njit(nogil=True)
 def advance(
-    jets: Jets,
-    layers: Layers,
-    planes: Planes,
-    body: BodyRows,
-    laws: Laws,
-    thrusters: Thrusters,
-    tally: Tally,
+    jets: ParcelBuffers,
+    layers: RingBuffers,
+    planes: JetPlanes,
+    body: PackedBlockage,
+    laws: WaterConstants,
+    thrusters: JetSources,
+    tally: StepCounters,
     places: Array,
     ambient: Array,
     body_to_ambient: Array,
@@ -151,11 +151,11 @@ def advance(
     ----------
     jets, layers : Jets, Layers
         With room for what is sent, for three of each that cross, and for a ring of each of those.
-    planes : Planes
-    body : BodyRows
-    laws : Laws
-    thrusters : Thrusters
-    tally : Tally
+    planes : JetPlanes
+    body : PackedBlockage
+    laws : WaterConstants
+    thrusters : JetSources
+    tally : StepCounters
     places, ambient : ndarray, shape (n + r + t, 3)
         What `places_of` said, and the ambient water's velocity there, to which the body's answer is added.
     body_to_ambient : ndarray, shape (s,)
@@ -196,14 +196,14 @@ def advance(
 
 @njit(apart=True, nogil=True)
 def _drift(
-    jets: Jets,
+    jets: ParcelBuffers,
     n: int,
-    layers: Layers,
+    layers: RingBuffers,
     r: int,
-    planes: Planes,
-    body: BodyRows,
-    laws: Laws,
-    tally: Tally,
+    planes: JetPlanes,
+    body: PackedBlockage,
+    laws: WaterConstants,
+    tally: StepCounters,
     ambient: Array,
     noise: Array,
 ) -> int:
@@ -250,12 +250,12 @@ def _carrying(
     impulse: Array,
     sigma: Array,
     look: IntArray,
-    layers: Layers,
+    layers: RingBuffers,
     r: int,
-    planes: Planes,
-    body: BodyRows,
-    laws: Laws,
-    tally: Tally,
+    planes: JetPlanes,
+    body: PackedBlockage,
+    laws: WaterConstants,
+    tally: StepCounters,
 ) -> Array:
     """Velocity of the jets' water at some of the parcels, led round the body, shape (k, 3)."""
     rows, starts = clustered(*mirrored(X, impulse, sigma, planes.walls))
@@ -279,7 +279,9 @@ def _carrying(
 
 
 @njit(apart=True, nogil=True)
-def _strike(jets: Jets, count: int, planes: Planes, face: int, layers: Layers, rings: int) -> tuple[int, int, float]:
+def _strike(
+    jets: ParcelBuffers, count: int, planes: JetPlanes, face: int, layers: RingBuffers, rings: int
+) -> tuple[int, int, float]:
     """Hand parcels that come up to a face over to wall jets; parcels and rings left, and the impulse handed over."""
     axis, at, side = int(planes.walls[face, 0]), planes.walls[face, 1], planes.walls[face, 2]
     X, m, sigma = jets.position, jets.impulse, jets.sigma

@@ -11,7 +11,7 @@ from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import assign, assign_rows, njit
 from wakewise.simulation.water.bedjets import (
     STRIKE_HEIGHT,
-    Layers,
+    RingBuffers,
     fill_row,
     grow_layers,
     kept_rings,
@@ -19,7 +19,7 @@ from wakewise.simulation.water.bedjets import (
     merge_layers,
 )
 from wakewise.simulation.water.bedjets_sums import COLUMNS, finish_rows, leaning, with_images
-from wakewise.simulation.water.faces import Face, Room, longer
+from wakewise.simulation.water.faces import TankFace, TankFaces, longer
 
 LEAST_RING_IMAGE_M_S = 2e-4  # images whose crest would not reach this speed at the wall are left out
 _MOST = 400  # rings
@@ -32,12 +32,13 @@ SPREADS_FASTER = 3.0
 _SHEETS = 128  # room for planes in which jets meet: those remembered, and those whose rings still run
 
 
-class Planes(NamedTuple):
+class JetPlanes(NamedTuple):
     """What rings run along: the faces first, then room for the planes in which jets meet.
 
     `frames`, shape (p, 14), are as in `bedjets.planes_velocity`; `thickness` and `stretch` the `least_m` and `stretch`
     of `bedjets.packed_rings`, and `per_height` its own; `key`, shape (p, 2), tells which two jets meet there, and
-    `used` when that was last looked up, 0 if it is forgotten. `walls`, shape (f, 4), are the faces as `Room.walls`.
+    `used` when that was last looked up, 0 if it is forgotten. `walls`, shape (f, 4), are the faces as
+    `TankFaces.walls`.
     """
 
     frames: Array
@@ -49,7 +50,7 @@ class Planes(NamedTuple):
     walls: Array
 
     @classmethod
-    def of(cls, room: Room) -> Planes:
+    def of(cls, room: TankFaces) -> JetPlanes:
         """The faces of a room, and no meeting yet."""
         many, faces = len(room.faces) + _SHEETS, len(room.faces)
         planes = cls(
@@ -68,7 +69,7 @@ class Planes(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class WallRows:
+class PackedRings:
     """Rings and their images at one instant, packed for the kernel; arguments of `bedjets.planes_velocity`."""
 
     planes: Array
@@ -80,7 +81,7 @@ class WallRows:
         return 2 * points * len(self.packed)
 
 
-def _per_height(face: Face, room: Room) -> float:
+def _per_height(face: TankFace, room: TankFaces) -> float:
     """One over the distance from a face to the opposite one; 0 without one."""
     opposite = [other for other in room.faces if other.axis == face.axis and other.side != face.side]
     return 1.0 / abs(opposite[0].at_m - face.at_m) if opposite else 0.0
@@ -88,7 +89,7 @@ def _per_height(face: Face, room: Room) -> float:
 
 @njit(apart=True, nogil=True)
 def start_ring(
-    layers: Layers, count: int, planes: Planes, plane: int, position: Array, impulse: Array, sigma: float
+    layers: RingBuffers, count: int, planes: JetPlanes, plane: int, position: Array, impulse: Array, sigma: float
 ) -> int:
     """Let a parcel that has come down to a plane go on as a ring behind the first `count`; how many there are then."""
     f = planes.frames[plane]
@@ -104,7 +105,7 @@ def start_ring(
 
 
 @njit(apart=True, nogil=True)
-def ring_places(layers: Layers, count: int, planes: Planes) -> Array:
+def ring_places(layers: RingBuffers, count: int, planes: JetPlanes) -> Array:
     """Centres of the first `count` rings in the world, shape (count, 3)."""
     out = np.empty((count, 3))
     for j in range(count):
@@ -117,7 +118,13 @@ def ring_places(layers: Layers, count: int, planes: Planes) -> Array:
 
 @njit(apart=True, nogil=True)
 def grow(
-    layers: Layers, count: int, planes: Planes, places: Array, ambient: Array, dt_s: float, rest_speed_m_s: float
+    layers: RingBuffers,
+    count: int,
+    planes: JetPlanes,
+    places: Array,
+    ambient: Array,
+    dt_s: float,
+    rest_speed_m_s: float,
 ) -> int:
     """Let rings run out for dt_s, carried along their planes by the ambient water at their centres; how many are left.
 
@@ -147,7 +154,7 @@ def grow(
 
 
 @njit(apart=True, nogil=True)
-def thin(layers: Layers, count: int) -> int:
+def thin(layers: RingBuffers, count: int) -> int:
     """Make neighbouring rings of a plane one; of too many, let the slowest go. How many are left."""
     count = merge_layers(layers, count)
     if count > _MOST:
@@ -158,8 +165,8 @@ def thin(layers: Layers, count: int) -> int:
 
 
 @njit(apart=True, nogil=True)
-def wall_rows(layers: Layers, count: int, planes: Planes) -> tuple[Array, IntArray, Array]:
-    """Planes with rings, where each one's rings start, and the rings with their images, as `WallRows` has them."""
+def wall_rows(layers: RingBuffers, count: int, planes: JetPlanes) -> tuple[Array, IntArray, Array]:
+    """Planes with rings, where each one's rings start, and the rings with their images, as `PackedRings` has them."""
     heading, kappa = leaning(layers.lean[:count])
     faces, many = planes.walls.shape[0], planes.frames.shape[0]
     on = np.zeros(many, np.int64)
@@ -189,7 +196,7 @@ def wall_rows(layers: Layers, count: int, planes: Planes) -> tuple[Array, IntArr
 
 
 @njit(nogil=True)
-def _fill_row(row: Array, layers: Layers, j: int, planes: Planes, heading: Array, kappa: float) -> None:
+def _fill_row(row: Array, layers: RingBuffers, j: int, planes: JetPlanes, heading: Array, kappa: float) -> None:
     p = layers.plane[j]
     fill_row(
         row,

@@ -25,19 +25,19 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import Current
-from wakewise.simulation.water.bedjets import Layers, Rings
-from wakewise.simulation.water.blockage import Blockage, BodyRows
+from wakewise.simulation.water.bedjets import RingBuffers, WallJetRings
+from wakewise.simulation.water.blockage import Blockage, PackedBlockage
 from wakewise.simulation.water.crossing_jets import RAYS
-from wakewise.simulation.water.faces import Room
+from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.hullwake import HullPush, HullWake
 from wakewise.simulation.water.induction import SINGLE
 from wakewise.simulation.water.parcel_advection import EMISSION_SPACING, count_sent
 from wakewise.simulation.water.parcels import GUST_PER_TURBULENCE, MERGE_SPACING, Parcels, merged, merged_across
-from wakewise.simulation.water.round_jet_closure import PLAIN, PUFF_SPREAD, Spreading, first_sigma_m
+from wakewise.simulation.water.round_jet_closure import PLAIN, PUFF_SPREAD, JetSpreading, first_sigma_m
 from wakewise.simulation.water.space_order import curve
-from wakewise.simulation.water.stepping import Laws, Tally, Thrusters, advance, places_of
-from wakewise.simulation.water.walljets import Planes, WallRows, wall_rows
-from wakewise.simulation.water.water_snapshot import Instant
+from wakewise.simulation.water.stepping import JetSources, StepCounters, WaterConstants, advance, places_of
+from wakewise.simulation.water.walljets import JetPlanes, PackedRings, wall_rows
+from wakewise.simulation.water.water_snapshot import WaterSnapshot
 
 _ROOM = 512  # parcels and rings to begin with; there is always room for a ring of each parcel
 
@@ -90,7 +90,7 @@ class Water:
         Parcels are retired once neither they nor their neighbours move water faster than this at their centre.
     max_parcels : int
         Above this, rows are made coarser until they fit, which is logged.
-    spreading : Spreading
+    spreading : JetSpreading
         `closure.PLAIN`, or `closure.SWIRLING` for a propeller's wide jet.
     body : Blockage or None
         A solid body on the bed.
@@ -111,7 +111,7 @@ class Water:
         turbulence: float = 0.0,
         rest_speed_m_s: float = 1e-3,
         max_parcels: int = 4096,
-        spreading: Spreading = PLAIN,
+        spreading: JetSpreading = PLAIN,
         body: Blockage | None = None,
         wake_life: float = 1.0,
     ) -> None:
@@ -119,27 +119,27 @@ class Water:
         self._density = density_kg_m3
         self._bed = bed_z_m
         self._ambient = ambient or _Uniform(np.zeros(3) if current_W_m_s is None else np.array(current_W_m_s, float))
-        self._room = Room.of(bed_z_m, half_size_m, surface=math.isfinite(bed_z_m))
+        self._room = TankFaces.of(bed_z_m, half_size_m, surface=math.isfinite(bed_z_m))
         self._gust_scale = turbulence * GUST_PER_TURBULENCE
         self._rest_speed = rest_speed_m_s
         self._max_parcels = max_parcels
         self._spreading = spreading
         self._wake_life = wake_life
         self._body = body
-        self._body_rows = BodyRows.none() if body is None else body.rows
+        self._body_rows = PackedBlockage.none() if body is None else body.rows
         self._rng = rng
         self._time = 0.0
         self._jets = Parcels.none().with_room(_ROOM)
-        self._layers = Layers(*(_with_room(column, 2 * _ROOM) for column in Rings.none().layers()))
-        self._planes = Planes.of(self._room)
+        self._layers = RingBuffers(*(_with_room(column, 2 * _ROOM) for column in WallJetRings.none().layers()))
+        self._planes = JetPlanes.of(self._room)
         spacing = EMISSION_SPACING * first_sigma_m(np.sqrt(4 * areas / math.pi))
         streams = (len(areas), 2)
-        self._thrusters = Thrusters(areas, spacing, np.zeros(streams), np.zeros(streams))
+        self._thrusters = JetSources(areas, spacing, np.zeros(streams), np.zeros(streams))
         self._hull = HullWake(2 * len(areas), density_kg_m3)
         sources = self._body_rows.answers.shape[1]
-        self._tally = Tally(np.zeros(2, np.int64), np.array([0, -1, 0]), np.zeros(sources), np.zeros(3))
+        self._tally = StepCounters(np.zeros(2, np.int64), np.array([0, -1, 0]), np.zeros(sources), np.zeros(3))
         self._forced_merges = 0
-        self._now: Instant | None = None
+        self._now: WaterSnapshot | None = None
         self._answer_to_steady: Array | None = None
 
     @property
@@ -163,7 +163,7 @@ class Water:
         return self.now.parcels
 
     @property
-    def rings(self) -> Rings:
+    def rings(self) -> WallJetRings:
         """The wall jets on the bed at this instant."""
         return self.now.rings
 
@@ -182,15 +182,15 @@ class Water:
         )
 
     @property
-    def now(self) -> Instant:
+    def now(self) -> WaterSnapshot:
         """The flow at this instant; it stays as it is when the water moves on."""
         if self._now is None:
             parcels, rings = self._tally.rows.tolist()
-            self._now = Instant(
+            self._now = WaterSnapshot(
                 time_s=self._time,
                 parcels=Parcels.of(self._jets, parcels),
-                rings=Rings.of(self._layers, rings, 0) if math.isfinite(self._bed) else Rings.none(),
-                rows=WallRows(*wall_rows(self._layers, rings, self._planes)),
+                rings=WallJetRings.of(self._layers, rings, 0) if math.isfinite(self._bed) else WallJetRings.none(),
+                rows=PackedRings(*wall_rows(self._layers, rings, self._planes)),
                 room=self._room,
                 bed_z_m=self._bed,
                 ambient=self._ambient,
@@ -267,11 +267,11 @@ class Water:
         self._time += dt_s
         self._now = None
 
-    def _laws(self, dt_s: float) -> Laws:
+    def _laws(self, dt_s: float) -> WaterConstants:
         spread = self._spreading
         puff, wake_stream = max(PUFF_SPREAD, spread.spread), 2 * len(self._thrusters.areas)
         drift = np.array([spread.core_spread, spread.spread, puff, dt_s, self._wake_life])
-        return Laws(drift, wake_stream, self._rest_speed, self._gust_scale > 0.0, self._bed, curve(), SINGLE)
+        return WaterConstants(drift, wake_stream, self._rest_speed, self._gust_scale > 0.0, self._bed, curve(), SINGLE)
 
     def _ambient_velocity(self, places_W_m: Array) -> Array:
         """Velocity of the ambient water at places, both shape (n, 3)."""
@@ -298,7 +298,7 @@ class Water:
             self._jets = Parcels.of(self._jets, int(self._tally.rows[0])).with_room(2 * parcels)
         if int(self._tally.rows[1]) + parcels > len(self._layers.radius):
             room = 2 * (int(self._tally.rows[1]) + parcels)
-            self._layers = Layers(*(_with_room(column, room) for column in self._layers))
+            self._layers = RingBuffers(*(_with_room(column, room) for column in self._layers))
 
     def _append(self, parcels: Parcels) -> None:
         """Add parcels behind those there are; those behind a face are set on it."""

@@ -15,20 +15,20 @@ from scipy.special import i0
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.interfaces import Current
 from wakewise.core.jit.njit import njit
-from wakewise.simulation.water.bedjets import Rings, layer_speed
+from wakewise.simulation.water.bedjets import WallJetRings, layer_speed
 from wakewise.simulation.water.bedjets_sums import LOG_WIDTH, REACH
 from wakewise.simulation.water.blockage import Blockage
 from wakewise.simulation.water.blocked_sums import over_points
 from wakewise.simulation.water.clusters import ImpulseField
-from wakewise.simulation.water.faces import Room
+from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.induction import SINGLE
 from wakewise.simulation.water.parcels import CENTRE_SPEED, Parcels, gusty_impulse_m4_s
 from wakewise.simulation.water.space_order import in_space
 from wakewise.simulation.water.stepping import flow_at
-from wakewise.simulation.water.walljets import WallRows
+from wakewise.simulation.water.walljets import PackedRings
 
 
-class Instant:
+class WaterSnapshot:
     """Flow of all jets and of the ambient water, with the answer of a body to both.
 
     Parameters
@@ -36,11 +36,11 @@ class Instant:
     time_s : float
     parcels : Parcels
         The free jets.
-    rings : Rings
+    rings : WallJetRings
         The wall jets on the bed.
-    rows : WallRows
+    rows : PackedRings
         All wall jets with their images.
-    room : Room
+    room : TankFaces
     bed_z_m : float
         Infinite for none.
     ambient : Current
@@ -56,9 +56,9 @@ class Instant:
         *,
         time_s: float,
         parcels: Parcels,
-        rings: Rings,
-        rows: WallRows,
-        room: Room,
+        rings: WallJetRings,
+        rows: PackedRings,
+        room: TankFaces,
         bed_z_m: float,
         ambient: Current,
         body: Blockage | None,

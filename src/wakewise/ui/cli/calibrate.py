@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import Bars, print_json, print_table, shown
+from wakewise.ui.cli.console import ProgressBars, print_json, print_table, shown
 from wakewise.ui.cli.options import Json
 
 Photos = Annotated[Path, typer.Argument(help="Folder of photographs of one ChArUco board.")]
@@ -39,7 +39,7 @@ def calibrate(
 
     need("wakewise calibrate", "photos")
     from wakewise.core.files import write_json, write_text
-    from wakewise.vision.reconstruction import Board
+    from wakewise.vision.reconstruction import CalibrationBoard
     from wakewise.vision.reconstruction import calibrate as solve
     from wakewise.vision.reconstruction.calibration import cameras_txt
 
@@ -48,8 +48,10 @@ def calibrate(
     columns, cross, rows = board.lower().partition("x")
     if not (cross and columns.isdigit() and rows.isdigit()):
         raise InputError(f"--board: '{board}', must be COLUMNSxROWS such as 11x8")
-    with Bars().stage("calibrate"):
-        squares = Board(columns=int(columns), rows=int(rows), square_m=1e-3 * square_mm, marker_m=1e-3 * marker_mm)
+    with ProgressBars().stage("calibrate"):
+        squares = CalibrationBoard(
+            columns=int(columns), rows=int(rows), square_m=1e-3 * square_mm, marker_m=1e-3 * marker_mm
+        )
         found = solve(photos, squares, model)
     figures = found.summary()
     if out is not None and out.suffix.lower() == ".txt":

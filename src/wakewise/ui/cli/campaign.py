@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import Bars, plain, print_json, print_table, shown
+from wakewise.ui.cli.console import ProgressBars, plain, print_json, print_table, shown
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
-    from wakewise.experiments.campaigns.engines import Engine
+    from wakewise.experiments.campaigns.engines import TrialExecutor
     from wakewise.experiments.campaigns.table import Results
 
 app = typer.Typer(
@@ -126,7 +126,7 @@ def run_campaign(
         from wakewise.experiments.trials.trial import JOBS
 
         jobs = JOBS
-    bars = Bars()
+    bars = ProgressBars()
     with bars.stage("plan") as progress:
         progress(0, 1, "checking every combination")
         trials = planned(campaign, str(file))
@@ -229,7 +229,7 @@ def print_example() -> None:
     typer.echo(example(), nl=False)
 
 
-def _engine(name: str, scheduler: str | None, workers: int | None) -> Engine:
+def _engine(name: str, scheduler: str | None, workers: int | None) -> TrialExecutor:
     """The engine that the options name.
 
     Raises
@@ -239,17 +239,17 @@ def _engine(name: str, scheduler: str | None, workers: int | None) -> Engine:
     """
     from wakewise.core.errors import InputError
     from wakewise.experiments.campaigns.definition import close_to
-    from wakewise.experiments.campaigns.engines import Processes
+    from wakewise.experiments.campaigns.engines import ProcessExecutor
 
     if name == "dask":
-        from wakewise.experiments.campaigns.cluster import Dask
+        from wakewise.experiments.campaigns.cluster import DaskExecutor
 
-        return Dask(scheduler, workers)
+        return DaskExecutor(scheduler, workers)
     if name != "processes":
         raise InputError(f"--engine: '{name}', {close_to(name, ['processes', 'dask'])}allowed: processes, dask")
     if scheduler is not None:
         raise InputError("--scheduler: only with --engine dask")
-    return Processes(workers)
+    return ProcessExecutor(workers)
 
 
 def _folder(path: Path) -> Path:

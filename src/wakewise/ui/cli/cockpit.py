@@ -29,7 +29,7 @@ from wakewise.ui.cli.options import (
 
 if TYPE_CHECKING:
     from wakewise.operation.teleop.input import ControlSource
-    from wakewise.ui.cockpit.session import Session
+    from wakewise.ui.cockpit.session import CockpitSession
 
 Port = Annotated[int, typer.Option("--port", help="Port of the page; 0 takes any that is free.", min=0, max=65535)]
 Host = Annotated[
@@ -87,8 +87,8 @@ def cockpit(
 
     need("wakewise cockpit", "cockpit")
     from wakewise.operation import load_scenario
-    from wakewise.ui.cockpit.server import Server
-    from wakewise.ui.cockpit.session import Session
+    from wakewise.ui.cockpit.server import CockpitServer
+    from wakewise.ui.cockpit.session import CockpitSession
     from wakewise.ui.web.origin_check import is_loopback, origin_of
 
     origins = tuple(origin_of(text) for text in origin or ())
@@ -97,8 +97,8 @@ def cockpit(
     folder = out or default_folder(resolved, "cockpit")
     with ExitStack() as stack:
         device = stack.enter_context(_gamepad(mapping)) if gamepad or mapping is not None else None
-        session = Session(resolved, folder, device=device, scene=is_loopback(host))
-        server = Server(session, host, port, origins=origins)
+        session = CockpitSession(resolved, folder, device=device, scene=is_loopback(host))
+        server = CockpitServer(session, host, port, origins=origins)
         server.start()
         stack.callback(server.stop)
         stack.callback(session.stop)
@@ -118,7 +118,7 @@ def cockpit(
         print_json({"address": server.address, "flights": [str(kept) for kept in session.flown]})
 
 
-def _watch(session: Session) -> None:
+def _watch(session: CockpitSession) -> None:
     """Say what is being prepared, until the session is over."""
     began_s, told = time.monotonic(), None
     from wakewise.core.jit.precompile import is_warm

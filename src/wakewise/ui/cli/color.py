@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wakewise.ui.cli.console import Bars, print_json
+from wakewise.ui.cli.console import ProgressBars, print_json
 from wakewise.ui.cli.options import Json
 
 Photos = Annotated[Path, typer.Argument(help="Folder of photographs, or of a finished trial.")]
@@ -40,7 +40,7 @@ def colour(photos: Photos, out: Out = None, model: Model = None, json: Json = Fa
     folder = photos / "images" if (photos / "images").is_dir() else photos
     model = model or (photos if folder != photos else None)
     into = out or photos.with_name(f"{photos.resolve().name}-colour")
-    with Bars().stage("colour") as progress:
+    with ProgressBars().stage("colour") as progress:
         done = correct_photos(folder, into, model=model, progress=progress)
     if json:
         print_json(done.summary() | {"folder": str(into)})

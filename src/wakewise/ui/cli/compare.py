@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import Bars, no_report, print_json, print_table, shown, unit_beside
+from wakewise.ui.cli.console import ProgressBars, no_report, print_json, print_table, shown, unit_beside
 from wakewise.ui.cli.options import (
     Json,
     Out,
@@ -71,7 +71,7 @@ def compare(
     changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)
     scenarios = {name: load_scenario(preset, scenario, changes | {"method": name}) for name in names}
     folder = out or default_folder(scenarios[names[0]], "compare")
-    result = api.compare(scenarios, folder, Bars())
+    result = api.compare(scenarios, folder, ProgressBars())
     figures = result.figures
     if json:
         print_json(figures)

@@ -35,7 +35,7 @@ def _stderr() -> Console:
     return Console(stderr=True, highlight=False)
 
 
-class Bars:
+class ProgressBars:
     """A `Watch` that shows a progress bar while a stage runs and leaves one line behind it.
 
     Where standard error is no terminal that line is written, and one now and then before it, so that a log shows life.
@@ -112,7 +112,7 @@ def write_page(name: str, write: Callable[[], Any]) -> bool:
     """
     from wakewise.experiments.trials.reporting import report_attempt
 
-    with report_attempt() as attempt, Bars().stage(name):
+    with report_attempt() as attempt, ProgressBars().stage(name):
         write()
     if INTERRUPTED.is_set():
         raise KeyboardInterrupt

@@ -151,7 +151,7 @@ def _against_reference(
     import numpy as np
 
     from wakewise.vision.evaluation import error_colours
-    from wakewise.vision.reconstruction import Cloud as Points
+    from wakewise.vision.reconstruction import OrientedPointCloud as Points
     from wakewise.vision.reconstruction import write_cloud
 
     try:

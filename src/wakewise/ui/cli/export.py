@@ -9,7 +9,7 @@ import typer
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import print_json
-from wakewise.ui.cli.export_dataset import DatasetWords, export_dataset
+from wakewise.ui.cli.export_dataset import DatasetOptions, export_dataset
 from wakewise.ui.cli.options import Json
 
 Trial = Annotated[
@@ -109,7 +109,7 @@ def export(
     A data set takes all trials of a folder, what a controller could know apart from the truth, with Croissant metadata,
     check sums and a data sheet; it goes on where it was cut off.
     """
-    words = DatasetWords(
+    words = DatasetOptions(
         licence=licence,
         creators=tuple(creator or ()),
         name=name,
@@ -138,10 +138,10 @@ def export(
             raise InputError(
                 f"export --to {to or 'FORMAT'}: give the folder of a trial; --vehicle is for auv_controllers"
             )
-        from wakewise.experiments.exports import Origin
+        from wakewise.experiments.exports import GeodeticOrigin
         from wakewise.experiments.trials.export import export_trial
 
-        place = None if origin is None else Origin(*_two(origin))
+        place = None if origin is None else GeodeticOrigin(*_two(origin))
         done = export_trial(trial, to, out=out, poses=poses, origin=place)
         path, holds = done.path, done.holds
     if json:

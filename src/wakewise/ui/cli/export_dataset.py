@@ -9,14 +9,14 @@ from typing import Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import Bars, print_json
+from wakewise.ui.cli.console import ProgressBars, print_json
 
 LISTED = 5
 """Trials that were left out are listed up to so many; DATASHEET.md lists all."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class DatasetWords:
+class DatasetOptions:
     """What the options that go with --to dataset said."""
 
     licence: str | None = None
@@ -36,7 +36,7 @@ class DatasetWords:
                 raise InputError(f"--{names.get(one.name, one.name)}: goes with --to dataset only, not with {to}")
 
 
-def export_dataset(folder: Path, out: Path | None, words: DatasetWords, json: bool) -> None:
+def export_dataset(folder: Path, out: Path | None, words: DatasetOptions, json: bool) -> None:
     """Make a data set, or check one."""
     if words.check:
         _check(folder, words, out, json)
@@ -54,7 +54,7 @@ def export_dataset(folder: Path, out: Path | None, words: DatasetWords, json: bo
         version=words.version or "1.0.0",
         answers=words.answers,
     )
-    with Bars().stage("trials") as progress:
+    with ProgressBars().stage("trials") as progress:
         built = build_dataset(folder, path, told, progress)
     facts: dict[str, Any] = {
         "to": "dataset",
@@ -81,12 +81,12 @@ def export_dataset(folder: Path, out: Path | None, words: DatasetWords, json: bo
         typer.echo(f"open            {', '.join(unsaid)}: DATASHEET.md asks, --answers FILE tells")
 
 
-def _check(folder: Path, words: DatasetWords, out: Path | None, json: bool) -> None:
+def _check(folder: Path, words: DatasetOptions, out: Path | None, json: bool) -> None:
     from wakewise.experiments.trials.dataset import check_dataset
 
     if out is not None or any(getattr(words, one.name) for one in fields(words) if one.name != "check"):
         raise InputError("--check: takes the folder of a data set and no other option")
-    with Bars().stage("check sums") as progress:
+    with ProgressBars().stage("check sums") as progress:
         checked = check_dataset(folder, progress)
     amiss = checked.differences
     if json:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import Bars, print_json, write_page
+from wakewise.ui.cli.console import ProgressBars, print_json, write_page
 from wakewise.ui.cli.options import Json
 
 Trial = Annotated[
@@ -67,7 +67,7 @@ def film(
         raise InputError("film: give either the folder of a trial, or --rows with the folder of a comparison")
     if rows is not None:
         path = out or rows / "rows.png"
-        with Bars().stage("rows") as progress:
+        with ProgressBars().stage("rows") as progress:
             write_rows(rows, path, times_s=_times(at), progress=progress)
         if path.parent == rows and (rows / "comparison.html").is_file():
             write_page("report", lambda: write_comparison(compared_trials(rows), rows))
@@ -75,7 +75,7 @@ def film(
         if view not in VIEWS:
             raise InputError(f"--view: '{view}', allowed are {', '.join(VIEWS)}")
         path = out or trial / "film.mp4"
-        with Bars().stage("film") as progress:
+        with ProgressBars().stage("film") as progress:
             write_film(trial, path, seconds=seconds, fps=fps, view=view, progress=progress)
         if path.parent == trial and path.name in FILMS and (trial / "report.html").is_file():
             write_page("report", lambda: write_report(trial))

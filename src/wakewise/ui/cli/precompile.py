@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wakewise.ui.cli.console import Bars, print_json
+from wakewise.ui.cli.console import ProgressBars, print_json
 from wakewise.ui.cli.options import Json
 
 Processes = Annotated[
@@ -23,7 +23,7 @@ def warm(processes: Processes = None, json: Json = False) -> None:
 
     began = time.perf_counter()
     there = is_warm()
-    with Bars().stage("compile") as progress:
+    with ProgressBars().stage("compile") as progress:
         made = compile_all(progress=progress, processes=processes)
     took_s = time.perf_counter() - began
     for line in made.amiss:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import Bars, print_json, print_table, shown
+from wakewise.ui.cli.console import ProgressBars, print_json, print_table, shown
 from wakewise.ui.cli.options import Json
 from wakewise.ui.cli.reconstruct_log import logged
 from wakewise.ui.cli.reconstruct_options import (
@@ -109,7 +109,12 @@ def reconstruct_photos(
     import numpy as np
 
     from wakewise.operation.scenario import check_scenario, parse_overrides
-    from wakewise.vision.reconstruction import Wishes, read_known_cameras, read_reference_cameras, reconstruct
+    from wakewise.vision.reconstruction import (
+        ReconstructionRequest,
+        read_known_cameras,
+        read_reference_cameras,
+        reconstruct,
+    )
 
     changes = ({"mesh": False} if no_mesh else {}) | parse_overrides(sets or [])
     settings = check_scenario({"reconstruction": changes}, "--set").reconstruction
@@ -125,7 +130,7 @@ def reconstruct_photos(
         return
     for line in beside(photos):
         typer.echo(f"wakewise: {line}", err=True)
-    with logged(out) as log, Bars().stage("reconstruct") as progress:
+    with logged(out) as log, ProgressBars().stage("reconstruct") as progress:
         model = reconstruct(
             photos,
             out,
@@ -144,7 +149,7 @@ def reconstruct_photos(
         from wakewise.core.errors import StageError
         from wakewise.vision.texturing.textured import write_textured
 
-        with Bars().stage("colours") as progress, suppress(StageError):
+        with ProgressBars().stage("colours") as progress, suppress(StageError):
             write_textured(out, photos, out / "mesh.glb", progress=progress)
     for line in remarks(model):
         typer.echo(f"wakewise: {line}", err=True)
@@ -161,7 +166,7 @@ def reconstruct_photos(
             lens=lenses,
             lens_patterns=patterns,
             reference_positions=places,
-            wishes=Wishes(masks=masks, crop=wishes.crop),
+            wishes=ReconstructionRequest(masks=masks, crop=wishes.crop),
             progress=tell,
         )
 

@@ -10,7 +10,7 @@ import typer
 from wakewise.core.errors import InputError
 
 if TYPE_CHECKING:
-    from wakewise.vision.reconstruction import Model, Wishes
+    from wakewise.vision.reconstruction import Model, ReconstructionRequest
 
 Until = Literal["sparse", "dense", "mesh"]
 
@@ -55,34 +55,34 @@ def wishes_of(
     until: Until | None,
     fixes: str | None,
     photos: Path,
-) -> Wishes:
+) -> ReconstructionRequest:
     """All of them, checked; `photos` are those of which fixes are read."""
     from dataclasses import replace
 
     import numpy as np
 
-    from wakewise.vision.reconstruction import Box, Wishes
-    from wakewise.vision.reconstruction.scale import Bars, exif_fixes, parse_bar, read_bars, read_fixes
+    from wakewise.vision.reconstruction import CropBox, ReconstructionRequest
+    from wakewise.vision.reconstruction.scale import ScaleBars, exif_fixes, parse_bar, read_bars, read_fixes
 
     given = None if bars is None else read_bars(bars)
     if bar:
         listed = tuple(parse_bar(words) for words in bar)
-        given = Bars(bars=listed) if given is None else replace(given, bars=(*given.bars, *listed))
+        given = ScaleBars(bars=listed) if given is None else replace(given, bars=(*given.bars, *listed))
     if masks is not None and not masks.is_dir():
         raise InputError(f"--masks {masks}: is no folder; masks are images in a folder, named like the photos")
     weak = None if fixes is None else exif_fixes(photos) if fixes == "exif" else read_fixes(Path(fixes))
-    return Wishes(
+    return ReconstructionRequest(
         bars=given,
         fixes=weak,
         masks=masks,
-        crop=None if crop is None else Box(low=np.array(crop[:3]), high=np.array(crop[3:])),
+        crop=None if crop is None else CropBox(low=np.array(crop[:3]), high=np.array(crop[3:])),
         until=until or "mesh",
     )
 
 
 def frames_of(photos: Path, out: Path) -> Path:
     """The folder of photographs: what was given, or frames of the film that was given, which are counted."""
-    from wakewise.ui.cli.console import Bars as Progress
+    from wakewise.ui.cli.console import ProgressBars as Progress
     from wakewise.vision.reconstruction.video_frames import is_film, take_frames
 
     if not is_film(photos):
@@ -98,7 +98,7 @@ def look_first(photos: Path, out: Path, threads: int, json: bool) -> None:
     """Leave `out/look.html` and `look.json`, and say what to shoot again."""
     from wakewise.core.files import write_json
     from wakewise.core.optional_dependencies import need
-    from wakewise.ui.cli.console import Bars as Progress
+    from wakewise.ui.cli.console import ProgressBars as Progress
     from wakewise.ui.cli.console import print_json, write_page
     from wakewise.ui.reports.photo_preview import write_look
     from wakewise.vision.reconstruction.photo_preview import look_at

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import Bars
+from wakewise.ui.cli.console import ProgressBars
 
 if TYPE_CHECKING:
     from wakewise.core.arrays import Array
@@ -45,7 +45,7 @@ def write_outputs(kinds: list[str] | None, out: Path, photos: Path, model: Model
     """Write them; a line on each."""
     lines = []
     for kind in dict.fromkeys(kinds or []):
-        with Bars().stage(kind) as progress:
+        with ProgressBars().stage(kind) as progress:
             if kind == "texture":
                 from wakewise.vision.texturing.atlas import write_atlas
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import Bars, no_report, print_json, print_table, reasons_once, shown, unit_beside
+from wakewise.ui.cli.console import ProgressBars, no_report, print_json, print_table, reasons_once, shown, unit_beside
 from wakewise.ui.cli.options import (
     Json,
     Out,
@@ -102,7 +102,7 @@ def scan(
         if scenario is not None or out is not None or changes:
             raise InputError("--resume: goes on as the folder says, so give nothing beside it but --json")
         resolved, folder = read_scenario(resume / "scenario.yaml"), resume
-    result = trial(resolved, folder, Bars(), print_json if json else partial(_print_figures, resolved))
+    result = trial(resolved, folder, ProgressBars(), print_json if json else partial(_print_figures, resolved))
     if not json:
         _say_trim(folder)
     if no_report(result.report_fault) and not json:

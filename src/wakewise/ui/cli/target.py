@@ -137,14 +137,14 @@ def _sway(target: Target) -> dict[str, object] | None:
     import numpy as np
 
     from wakewise.core.constants import TRIM_WATER_KG_M3
-    from wakewise.scene.targets import TISSUES, Sway
-    from wakewise.simulation.tank.soft_body import Pieces, standing_m
+    from wakewise.scene.targets import TISSUES, BendingModes
+    from wakewise.simulation.tank.soft_body import SurfaceElements, standing_m
 
     if target.name not in TISSUES:
         return None
     tissue = TISSUES[target.name]
-    sway = Sway.of(target, tissue, TRIM_WATER_KG_M3)
-    pieces = Pieces.of(target, sway)
+    sway = BendingModes.of(target, tissue, TRIM_WATER_KG_M3)
+    pieces = SurfaceElements.of(target, sway)
     tips = {}
     for speed in STREAMS_M_S:
         streams = speed * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -13,7 +13,7 @@ from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
     from wakewise.robot.vehicles import VehicleDraft
-    from wakewise.robot.vehicles.mixing import Comparison
+    from wakewise.robot.vehicles.mixing import MatrixComparison
 
 File = Annotated[
     Path,
@@ -136,7 +136,7 @@ def _said(draft: VehicleDraft, topic: str) -> str | None:
     return next((note.removeprefix(topic) for note in draft.notes if note.startswith(topic)), None)
 
 
-def _facts(draft: VehicleDraft, comparison: Comparison | None, out: Path | None) -> dict[str, Any]:
+def _facts(draft: VehicleDraft, comparison: MatrixComparison | None, out: Path | None) -> dict[str, Any]:
     from wakewise.robot.vehicles import allocation_rank
 
     has_matrix = bool(draft.thrusters) or draft.shipped_matrix is not None
@@ -174,7 +174,7 @@ def _facts(draft: VehicleDraft, comparison: Comparison | None, out: Path | None)
     }
 
 
-def _why(has_matrix: bool, comparison: Comparison | None) -> dict[str, str]:
+def _why(has_matrix: bool, comparison: MatrixComparison | None) -> dict[str, str]:
     why = {"unknown values": "null where the file says nothing; see missing"}
     if not has_matrix:
         why["rank"] = "the file holds neither thrusters nor a matrix"
@@ -203,7 +203,7 @@ def _row(values: Any) -> str:
     return "  ".join(f"{value:.5g}" for value in values)
 
 
-def _tell(draft: VehicleDraft, comparison: Comparison | None, out: Path | None) -> None:
+def _tell(draft: VehicleDraft, comparison: MatrixComparison | None, out: Path | None) -> None:
     from rich.table import Table
 
     typer.echo(f"{draft.title}\n")

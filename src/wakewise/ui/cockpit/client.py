@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from websockets.asyncio.server import ServerConnection
 
-from wakewise.ui.cockpit.view_model import Picture
+from wakewise.ui.cockpit.view_model import CameraPicture
 
 _MOST_WAITING = 64
 """Notes that wait for a client at most; of more the oldest are lost to it."""
@@ -35,7 +35,7 @@ class Client:
     """When the message that is on its way was given to the socket; None between messages."""
     _words: deque[str] = field(default_factory=lambda: deque(maxlen=_MOST_WAITING))
     _state: str | None = None
-    _picture: Picture | None = None
+    _picture: CameraPicture | None = None
     _something: asyncio.Event = field(default_factory=asyncio.Event)
     _allowance: float = BURST
     _allowed_at_s: float = 0.0
@@ -59,7 +59,7 @@ class Client:
         self._state = text
         self._something.set()
 
-    def picture(self, picture: Picture, now_s: float) -> None:
+    def picture(self, picture: CameraPicture, now_s: float) -> None:
         """Put a picture into the outbox; the next one waits until this one was seen."""
         self._picture, self.unseen, self.pictured_s = picture, picture.number, now_s
         self._something.set()

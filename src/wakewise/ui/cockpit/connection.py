@@ -15,7 +15,7 @@ from websockets.datastructures import Headers
 from websockets.exceptions import SecurityError
 from websockets.http11 import Response
 
-from wakewise.ui.web.pending import Pending
+from wakewise.ui.web.pending import PendingConnections
 
 _LONGEST_LINE = 8192
 _LINGER_S = 1.0
@@ -25,7 +25,7 @@ _LINGER_S = 1.0
 class PageConnection(ServerConnection):
     """One connection; it waits in `pending` from the first byte until `named`."""
 
-    def __init__(self, *args: Any, pending: Pending, **kwargs: Any) -> None:
+    def __init__(self, *args: Any, pending: PendingConnections, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.head_only = False
         self._pending, self._number = pending, 0

@@ -1,7 +1,7 @@
 """Who has the helm: one lease, renewed by the sticks of its holder, and what of those sticks may be flown.
 
-`Helm` is a pure state machine: each move takes a time of one clock that never goes back and gives the next state. Its
-rules are those that others learnt with sticks in browsers (docs/research-log/0044):
+`ControlLease` is a pure state machine: each move takes a time of one clock that never goes back and gives the next
+state. Its rules are those that others learnt with sticks in browsers (docs/research-log/0044):
 
 - One holder. The helm is taken where it is free or has lapsed (`LAPSE_S` without sticks), else the holder is asked and
   may hand it over; nothing forces it out of a hand that flies.
@@ -32,7 +32,7 @@ _COMPARED = 250
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Hands:
+class HolderInput:
     """What the holder's sticks last said, when that came, and when by this side's clock it was sent.
 
     `quickest_s` is the least difference of the two clocks over the last messages, the way of the fastest of them and
@@ -48,12 +48,12 @@ class Hands:
     before_s: float = math.inf
     compared: int = 0
 
-    def then(self, seq: int, t_s: float, axes: Array, now_s: float) -> Hands:
+    def then(self, seq: int, t_s: float, axes: Array, now_s: float) -> HolderInput:
         """The next message."""
         forget = self.compared >= _COMPARED
         quickest = min(now_s - t_s, math.inf if forget else self.quickest_s)
         before = self.quickest_s if forget else self.before_s
-        return Hands(
+        return HolderInput(
             seq=seq,
             axes=axes,
             sent_s=t_s + min(quickest, before),
@@ -65,7 +65,7 @@ class Hands:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Helm:
+class ControlLease:
     """Who holds the helm, with which lease, who asks for it, and the hands of the holder.
 
     `armed` tells whether the sticks are flown: not after a pause, until they were let go.
@@ -75,7 +75,7 @@ class Helm:
     lease: str | None = None
     renewed_s: float = -math.inf
     asked_by: str | None = None
-    hands: Hands = field(default_factory=Hands)
+    hands: HolderInput = field(default_factory=HolderInput)
     armed: bool = True
     pressed: tuple[str, ...] = ()
 
@@ -88,7 +88,7 @@ class Helm:
         fresh = self.armed and self.held(now_s) and now_s - self.hands.sent_s <= STALE_S
         return self.hands.axes if fresh else np.zeros_like(CENTRED.axes)
 
-    def ask(self, client: str, now_s: float, lease: str, force: bool = False) -> tuple[Helm, str]:
+    def ask(self, client: str, now_s: float, lease: str, force: bool = False) -> tuple[ControlLease, str]:
         """A client asks for the helm, to be given under a new `lease`; the answer in words.
 
         It is given where it is free or has lapsed. Else the holder is asked; whoever would `force` it is refused.
@@ -103,7 +103,7 @@ class Helm:
             return self, "somebody else has asked already"
         return replace(self, asked_by=client), "asked; the holder must agree"
 
-    def consent(self, client: str, to: str, yes: bool, now_s: float, lease: str) -> tuple[Helm, str]:
+    def consent(self, client: str, to: str, yes: bool, now_s: float, lease: str) -> tuple[ControlLease, str]:
         """The holder's answer to the client who asked."""
         if client != self.holder or not self.held(now_s):
             return self, "not yours to give"
@@ -113,13 +113,17 @@ class Helm:
             return replace(self, asked_by=None), "the holder keeps the helm"
         return self._given(to, now_s, lease), "the helm was handed over"
 
-    def left(self, client: str) -> Helm:
+    def left(self, client: str) -> ControlLease:
         """A client gives the helm back, or is gone: its sticks are zero at once."""
         if client == self.holder:
-            return replace(self, holder=None, lease=None, renewed_s=-math.inf, hands=Hands(), armed=True, pressed=())
+            return replace(
+                self, holder=None, lease=None, renewed_s=-math.inf, hands=HolderInput(), armed=True, pressed=()
+            )
         return replace(self, asked_by=None) if client == self.asked_by else self
 
-    def moved(self, client: str, lease: str, seq: int, t_ms: float, axes: Array, now_s: float) -> tuple[Helm, bool]:
+    def moved(
+        self, client: str, lease: str, seq: int, t_ms: float, axes: Array, now_s: float
+    ) -> tuple[ControlLease, bool]:
         """Sticks came in; whether they were taken."""
         if not self.may(client, lease, now_s) or seq <= self.hands.seq or not math.isfinite(t_ms):
             return self, False
@@ -128,7 +132,7 @@ class Helm:
         armed = (self.armed and not paused) or not axes.any()
         return replace(self, hands=hands, armed=armed, renewed_s=now_s), True
 
-    def press(self, client: str, lease: str, what: str, now_s: float) -> tuple[Helm, bool]:
+    def press(self, client: str, lease: str, what: str, now_s: float) -> tuple[ControlLease, bool]:
         """A button of the holder; whether it counts."""
         if not self.may(client, lease, now_s) or len(self.pressed) >= _MOST_PRESSED:
             return self, False
@@ -139,11 +143,11 @@ class Helm:
         helm = self.tick(now_s)
         return client == helm.holder and lease == helm.lease
 
-    def tick(self, now_s: float) -> Helm:
+    def tick(self, now_s: float) -> ControlLease:
         """Time has passed: a lease that lapsed long ago is void."""
         if self.holder is not None and now_s - self.renewed_s > FORGET_S:
             return replace(self.left(self.holder), asked_by=None)
         return self
 
-    def _given(self, client: str, now_s: float, lease: str) -> Helm:
-        return Helm(holder=client, lease=lease, renewed_s=now_s)
+    def _given(self, client: str, now_s: float, lease: str) -> ControlLease:
+        return ControlLease(holder=client, lease=lease, renewed_s=now_s)

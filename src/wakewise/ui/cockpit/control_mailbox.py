@@ -17,7 +17,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.operation.teleop.input.controls import Controls, ControlSource
-from wakewise.ui.cockpit.control_lease import Helm
+from wakewise.ui.cockpit.control_lease import ControlLease
 
 DEVICE = "gamepad"
 """The client whose sticks are plugged into this computer."""
@@ -25,7 +25,7 @@ _KEPT = 1024
 
 
 @dataclass(frozen=True, kw_only=True)
-class Holding:
+class ControlOwnership:
     """Who has the helm: ids of clients, the lease that only the holder is to be told, and whether its sticks count."""
 
     holder: str | None
@@ -35,7 +35,7 @@ class Holding:
     armed: bool
 
 
-class Seat:
+class ControlMailbox:
     """The helm of one flight, and the sticks as the flight reads them.
 
     Parameters
@@ -49,7 +49,7 @@ class Seat:
     def __init__(self, clock: Callable[[], float] = time.monotonic, device: ControlSource | None = None) -> None:
         self.clock = clock
         self._device = device
-        self._helm = Helm()
+        self._helm = ControlLease()
         self._lock = threading.Lock()
         self._unflown_s: float | None = None
         self._flown = ("", -1)
@@ -57,12 +57,12 @@ class Seat:
         self._device_lease, self._device_seq = "", 0
 
     @property
-    def holding(self) -> Holding:
+    def holding(self) -> ControlOwnership:
         """Who has the helm now."""
         with self._lock:
             self._helm = helm = self._helm.tick(self.clock())
             flying = helm.held(self.clock())
-            return Holding(
+            return ControlOwnership(
                 holder=helm.holder, lease=helm.lease, asked_by=helm.asked_by, flying=flying, armed=helm.armed
             )
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import ScalarGrid, Witness
+from wakewise.core.interfaces import ScalarGrid, TruthProvider
 from wakewise.operation.loop import Step
 from wakewise.robot.vehicles import Vehicle
 
@@ -32,7 +32,7 @@ _LEAST_ASKED_M_S = 0.005
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Moment:
+class FlightSnapshot:
     """One step of a flight as it is shown.
 
     `thrusts_N`, shape (n,), are the commanded ones in the mean of the last steps; `true_m_s`, shape (points,), the
@@ -50,7 +50,7 @@ class Moment:
     silt: ScalarGrid | None
 
 
-class Lookout:
+class SnapshotRecorder:
     """Called as `(step, witness)` at each step; `now` is the newest moment, for any thread.
 
     Parameters
@@ -83,7 +83,7 @@ class Lookout:
         self._silt: ScalarGrid | None = None
         self._true_s = self._silt_s = self._sampled_s = -np.inf
         self._followed: deque[tuple[Array, Array]] = deque(maxlen=round(WINDOW_S / SAMPLED_S))
-        self.now: Moment | None = None
+        self.now: FlightSnapshot | None = None
         self._looked_s = -np.inf
 
     def look(self) -> None:
@@ -95,7 +95,7 @@ class Lookout:
         """Whether somebody has looked of late."""
         return time.monotonic() - self._looked_s < LOOKS_S
 
-    def __call__(self, step: Step, witness: Witness | None) -> None:
+    def __call__(self, step: Step, witness: TruthProvider | None) -> None:
         """Take down a step."""
         self._given()
         now_s = step.time_s
@@ -113,7 +113,7 @@ class Lookout:
         if witness is not None and self.looked_at:
             self._ask(now_s, witness)
         tilt_rad = step.truth.tilt_rad if step.truth is not None else step.tilt_rad
-        self.now = Moment(
+        self.now = FlightSnapshot(
             step=step,
             thrusts_N=np.mean(self._thrusts, axis=0),
             asked_W_m_s=asked_W,
@@ -125,7 +125,7 @@ class Lookout:
             silt=self._silt,
         )
 
-    def _ask(self, now_s: float, witness: Witness) -> None:
+    def _ask(self, now_s: float, witness: TruthProvider) -> None:
         """Ask for the true water, now and then."""
         if now_s >= self._silt_s + SILT_EVERY_S:
             self._silt_s, self._silt = now_s, witness.silt()

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from wakewise.ui.web.blueos import Offer
-from wakewise.ui.web.files import Files
+from wakewise.ui.web.blueos import ServiceDescription
+from wakewise.ui.web.files import StaticFiles
 
 PAGE = Path(__file__).with_name("page")
-OFFER = Offer(
+OFFER = ServiceDescription(
     name="Wakewise",
     description="Fly an underwater vehicle by hand while its wash leaves the target still.",
     widget="Wakewise: gentle flight",
 )
 
 
-def page_files() -> Files:
+def page_files() -> StaticFiles:
     """The page, and what ground stations ask for."""
-    return Files(folder=PAGE, more=OFFER.files())
+    return StaticFiles(folder=PAGE, more=OFFER.files())

@@ -20,8 +20,8 @@ import numpy as np
 from wakewise.core.errors import StageError
 from wakewise.core.interfaces import no_progress
 from wakewise.operation import Scenario
-from wakewise.ui.cockpit.server import Server
-from wakewise.ui.cockpit.session import Session
+from wakewise.ui.cockpit.server import CockpitServer
+from wakewise.ui.cockpit.session import CockpitSession
 
 STICKS_HZ = 25.0
 BEGIN_WITHIN_S = 180.0
@@ -29,7 +29,7 @@ _SETTLES_S = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reaction:
+class LoopTiming:
     """How a flight under a page kept its time.
 
     `latency_ms_*` count from a message's arrival at the server to thrusts that know of it on their way to the plant;
@@ -58,7 +58,7 @@ def measure(
     pictures: bool = True,
     busy: int = 0,
     progress: Callable[..., None] = no_progress,
-) -> Reaction:
+) -> LoopTiming:
     """Fly for a while with a page that holds the helm.
 
     Parameters
@@ -75,8 +75,8 @@ def measure(
     StageError
         If no flight came about.
     """
-    session = Session(scenario, None, pictures=pictures)
-    server = Server(session)
+    session = CockpitSession(scenario, None, pictures=pictures)
+    server = CockpitServer(session)
     server.start()
     began_s = time.monotonic()
     session.start()
@@ -99,7 +99,7 @@ def measure(
         live, lookout = session.live, session.lookout
         if live is None or lookout is None or not len(waits_ms):
             raise StageError("latency: no stick was flown")
-        return Reaction(
+        return LoopTiming(
             latency_ms_p50=float(np.percentile(waits_ms, 50)),
             latency_ms_p99=float(np.percentile(waits_ms, 99)),
             late_ms_p99=1e3 * live.pace.late_s(),

@@ -41,7 +41,7 @@ _METERED = 8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class View:
+class CameraState:
     """Where the camera truly is, and the silt before it; None leaves that as it was. `width_px`: of the picture."""
 
     X_WC: Pose
@@ -49,7 +49,7 @@ class View:
     width_px: int | None = None
 
 
-class Width:
+class PictureWidth:
     """How wide the next picture may be, by how long the last ones took.
 
     The time of a picture goes with its pixels, thus with the square of its width: one step narrower where the mean of
@@ -103,7 +103,7 @@ class LiveCamera:
         self, scenario: Scenario, target: Target | None = None, widths_px: tuple[int, ...] = WIDTHS_PX
     ) -> None:
         self._begin = (scenario, target, widths_px[0])
-        self._width = Width(widths_px)
+        self._width = PictureWidth(widths_px)
         self._process: subprocess.Popen[bytes] | None = None
         self._answers: queue.Queue[bytes | None] = queue.Queue()
         self._waited_for, self._last = 0, b""
@@ -123,7 +123,7 @@ class LiveCamera:
         self._send(pickle.dumps(self._begin))
         self._waited_for = 1  # its word that the scene is ready
 
-    def draw(self, view: View, timeout_s: float = 2.0) -> bytes | None:
+    def draw(self, view: CameraState, timeout_s: float = 2.0) -> bytes | None:
         """Draw a view as a JPEG; None while the scene is not ready, or where a picture does not come in time.
 
         Raises
@@ -194,7 +194,7 @@ def _read(pipe: IO[bytes]) -> bytes | None:
     return message if len(message) == size else None
 
 
-class Easel:
+class PictureRenderer:
     """Draws small pictures of one scene, one after the other."""
 
     def __init__(self, scenario: Scenario, target: Target | None, width_px: int) -> None:
@@ -209,7 +209,7 @@ class Easel:
         self._silt: ScalarGrid | None = None
         self._seen: deque[float] = deque(maxlen=_METERED)
         self._rng = np.random.default_rng(parts.scenario.seed)
-        self._first = View(X_WC=parts.start.X_WB @ parts.vehicle.X_BC)
+        self._first = CameraState(X_WC=parts.start.X_WB @ parts.vehicle.X_BC)
 
     def warm(self) -> None:
         """Draw a picture for nobody: the first one reads kernels, which takes as long as dozens of others."""
@@ -221,7 +221,7 @@ class Easel:
         height = max(16, round(width_px * self._given.height / self._given.width))
         return self._given.model_copy(update={"width": width_px, "height": height})
 
-    def draw(self, view: View) -> Any:
+    def draw(self, view: CameraState) -> Any:
         """The picture, RGB, shape (h, w, 3), uint8."""
         from wakewise.vision.imaging.auto_exposure import brightness, divided, settled
         from wakewise.vision.imaging.optics import haze_between, through_water
@@ -254,7 +254,7 @@ def serve(pipe: IO[bytes], answers: IO[bytes]) -> None:
     first = _read(pipe)
     if first is None:
         return
-    easel = Easel(*pickle.loads(first))
+    easel = PictureRenderer(*pickle.loads(first))
     easel.warm()
     _write(answers, b"ready")
     with suppress(OSError):

@@ -12,7 +12,7 @@ from wakewise.scene.missions import Coverage
 from wakewise.ui.cockpit.state import number, rounded
 
 
-class LiveGuide:
+class LiveCoverage:
     """Follows the photographs of one flight by where the vehicle believes that they were taken.
 
     One thread hands in photographs, another asks; making the guide takes about a second.

@@ -1,8 +1,8 @@
 """What a page may say, read strictly: a message of known type and shape, or one line that says what is wrong with it.
 
-Nothing that comes over the wire raises: what cannot be used becomes `Amiss`, which the server answers and counts. Axes
-of the sticks are the exception to strictness: numbers of any size, and what is no number (NaN), are made harmless by
-`wakewise.operation.teleop.input.controls.shaped`, as for any other device.
+Nothing that comes over the wire raises: what cannot be used becomes `InvalidMessage`, which the server answers and
+counts. Axes of the sticks are the exception to strictness: numbers of any size, and what is no number (NaN), are made
+harmless by `wakewise.operation.teleop.input.controls.shaped`, as for any other device.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Hello:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HelmWish:
+class ControlRequest:
     """A client asks for the helm, or gives it back."""
 
     want: bool
@@ -41,7 +41,7 @@ class HelmWish:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Consent:
+class ControlConsent:
     """The holder's answer to client `to`, who asked for the helm."""
 
     to: str
@@ -49,7 +49,7 @@ class Consent:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sticks:
+class StickMessage:
     """Axes made harmless, shape (5,), with their number and the client's own clock in ms."""
 
     seq: int
@@ -59,7 +59,7 @@ class Sticks:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Press:
+class ButtonPress:
     """One of `wakewise.operation.teleop.input.controls.ACTIONS`."""
 
     what: str
@@ -67,7 +67,7 @@ class Press:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DeskChange:
+class SettingsChange:
     """Settings of the desk, whose values the desk itself judges."""
 
     changes: dict[str, str | float | bool]
@@ -75,44 +75,44 @@ class DeskChange:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seen:
+class PictureAck:
     """A picture has been shown."""
 
     frame: int
 
 
 @dataclass(frozen=True, kw_only=True)
-class Amiss:
+class InvalidMessage:
     """What is wrong with a message, in one line."""
 
     why: str
 
 
-Message = Hello | HelmWish | Consent | Sticks | Press | DeskChange | Seen
+Message = Hello | ControlRequest | ControlConsent | StickMessage | ButtonPress | SettingsChange | PictureAck
 
 
 class _Wrong(Exception):  # noqa: N818  (it never leaves this file)
     pass
 
 
-def read_message(raw: str | bytes) -> Message | Amiss:
+def read_message(raw: str | bytes) -> Message | InvalidMessage:
     """Read one message; never raises."""
     if isinstance(raw, bytes):
-        return Amiss(why="a binary message: only text is read here")
+        return InvalidMessage(why="a binary message: only text is read here")
     try:
         told = json.loads(raw)
     except (ValueError, RecursionError):
-        return Amiss(why="not JSON")
+        return InvalidMessage(why="not JSON")
     if not isinstance(told, dict):
-        return Amiss(why="not an object with a type")
+        return InvalidMessage(why="not an object with a type")
     kind = told.get("type")
     reader = _READERS.get(kind) if isinstance(kind, str) else None
     if reader is None:
-        return Amiss(why=f"type: {_shown(kind)}, allowed {', '.join(_READERS)}")
+        return InvalidMessage(why=f"type: {_shown(kind)}, allowed {', '.join(_READERS)}")
     try:
         return reader(told)
     except _Wrong as fault:
-        return Amiss(why=f"{kind}: {fault}")
+        return InvalidMessage(why=f"{kind}: {fault}")
 
 
 def _hello(told: dict[str, Any]) -> Hello:
@@ -124,15 +124,15 @@ def _hello(told: dict[str, Any]) -> Hello:
     return Hello(token=token, name=name or "somebody", wants=wants, lease=lease)
 
 
-def _helm(told: dict[str, Any]) -> HelmWish:
-    return HelmWish(want=_flag(told, "want"), force=_flag({"force": False} | told, "force"))
+def _helm(told: dict[str, Any]) -> ControlRequest:
+    return ControlRequest(want=_flag(told, "want"), force=_flag({"force": False} | told, "force"))
 
 
-def _consent(told: dict[str, Any]) -> Consent:
-    return Consent(to=_word(told, "to"), yes=_flag(told, "yes"))
+def _consent(told: dict[str, Any]) -> ControlConsent:
+    return ControlConsent(to=_word(told, "to"), yes=_flag(told, "yes"))
 
 
-def _sticks(told: dict[str, Any]) -> Sticks:
+def _sticks(told: dict[str, Any]) -> StickMessage:
     axes = told.get("axes")
     if not isinstance(axes, list) or len(axes) != len(CONTROL_AXES):
         raise _Wrong(f"axes must be {len(CONTROL_AXES)} numbers")
@@ -140,17 +140,17 @@ def _sticks(told: dict[str, Any]) -> Sticks:
     if not abs(t_ms) <= _LARGEST:  # what is no number, too
         raise _Wrong("t must be a time in ms")
     values = [_number(value, "axes") for value in axes]
-    return Sticks(seq=_whole(told, "seq"), t_ms=t_ms, axes=shaped(values), lease=_word(told, "lease"))
+    return StickMessage(seq=_whole(told, "seq"), t_ms=t_ms, axes=shaped(values), lease=_word(told, "lease"))
 
 
-def _press(told: dict[str, Any]) -> Press:
+def _press(told: dict[str, Any]) -> ButtonPress:
     what = told.get("what")
     if what not in ACTIONS:
         raise _Wrong(f"what {_shown(what)}, allowed {', '.join(ACTIONS)}")
-    return Press(what=what, lease=_word(told, "lease"))
+    return ButtonPress(what=what, lease=_word(told, "lease"))
 
 
-def _desk(told: dict[str, Any]) -> DeskChange:
+def _desk(told: dict[str, Any]) -> SettingsChange:
     changes = told.get("set")
     if not isinstance(changes, dict) or not 0 < len(changes) <= _FIELDS:
         raise _Wrong("set must be an object of fields and values")
@@ -159,11 +159,11 @@ def _desk(told: dict[str, Any]) -> DeskChange:
             raise _Wrong(f"set.{_shown(name)} must be a number, a word or true or false")
         if not isinstance(value, str | bool):
             changes[name] = _number(value, "set")
-    return DeskChange(changes=changes, lease=_word(told, "lease"))
+    return SettingsChange(changes=changes, lease=_word(told, "lease"))
 
 
-def _seen(told: dict[str, Any]) -> Seen:
-    return Seen(frame=_whole(told, "frame"))
+def _seen(told: dict[str, Any]) -> PictureAck:
+    return PictureAck(frame=_whole(told, "frame"))
 
 
 _READERS: dict[str, Callable[[dict[str, Any]], Message]] = {

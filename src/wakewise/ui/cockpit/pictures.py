@@ -7,19 +7,19 @@ import contextlib
 from collections.abc import Callable, Iterable
 
 from wakewise.ui.cockpit.client import Client
-from wakewise.ui.cockpit.view_model import Show
+from wakewise.ui.cockpit.view_model import ViewModel
 
 PICTURE_EVERY_S = 1.0 / 15.0
 OLD_S = 0.3
 """A picture that nobody could take for so long is drawn anew."""
 
 
-async def show_pictures(show: Show, clients: Callable[[], Iterable[Client]], seen: asyncio.Event) -> None:
+async def show_pictures(show: ViewModel, clients: Callable[[], Iterable[Client]], seen: asyncio.Event) -> None:
     """Draw pictures for as long as somebody looks, until cancelled.
 
     Parameters
     ----------
-    show : Show
+    show : ViewModel
         Its `picture` is called in a thread.
     clients : callable
         Who may look now.

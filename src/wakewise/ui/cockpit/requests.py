@@ -11,14 +11,14 @@ from websockets.http11 import Request, Response
 from websockets.typing import Subprotocol
 
 from wakewise.ui.cockpit.connection import PageConnection, answer
-from wakewise.ui.web.files import Files
-from wakewise.ui.web.origin_check import TOKEN_HEADER, Caller, Gate, page_headers
+from wakewise.ui.web.files import StaticFiles
+from wakewise.ui.web.origin_check import TOKEN_HEADER, OriginCheck, RequestOrigin, page_headers
 
 SUBPROTOCOL, TOKEN_PREFIX = Subprotocol("wakewise"), "token."
 """What a page offers with its handshake: a browser can say its token there, and nowhere else in that request."""
 
 
-def respond(connection: PageConnection, request: Request, files: Files, gate: Gate) -> Response | None:
+def respond(connection: PageConnection, request: Request, files: StaticFiles, gate: OriginCheck) -> Response | None:
     """The response to a request; None where a socket may open."""
     caller = _caller(connection, request)
     file = files.at(request.path)
@@ -40,16 +40,16 @@ def respond(connection: PageConnection, request: Request, files: Files, gate: Ga
     return answer(http.HTTPStatus.OK, file.body, file.kind, more)
 
 
-def wrong(token: str | None, gate: Gate) -> str | None:
+def wrong(token: str | None, gate: OriginCheck) -> str | None:
     """What is wrong with a token, in words; None if nothing."""
     if gate.fits(token):
         return None
     return "the token is wrong" if token else "a token is needed: open the address that was printed"
 
 
-def _caller(connection: ServerConnection, request: Request) -> Caller:
+def _caller(connection: ServerConnection, request: Request) -> RequestOrigin:
     peer = connection.remote_address
-    return Caller(
+    return RequestOrigin(
         address=str(peer[0]) if peer else "",
         host=_only(request.headers, "Host"),
         origin=_only(request.headers, "Origin"),

@@ -41,12 +41,12 @@ def speed_colours(speeds_m_s: Array) -> Array:
     return np.round(np.stack(channels, axis=-1)).astype(np.uint8)
 
 
-def open_scene(vehicle: Vehicle, points_W_m: Array) -> Scene | None:
+def open_scene(vehicle: Vehicle, points_W_m: Array) -> ViserScene | None:
     """The scene of a flight; None where viser is not installed."""
-    return Scene(vehicle, points_W_m) if has_viser() else None
+    return ViserScene(vehicle, points_W_m) if has_viser() else None
 
 
-class Scene:
+class ViserScene:
     """A scene that is kept up to date; all of it in world NED.
 
     Parameters

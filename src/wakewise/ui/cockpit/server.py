@@ -1,8 +1,8 @@
 """The page's server: files and a socket on one port, in a thread and an event loop of its own.
 
-It shows what a `Show` knows ten times a second and takes sticks for its seat. The flight never waits for a client, nor
-does one client for another: each has an outbox in which only the newest state and one picture wait, and one that does
-not read is let go. What clients say is in `messages`, who may come in `gate`, who may fly `helm`.
+It shows what a `ViewModel` knows ten times a second and takes sticks for its seat. The flight never waits for a client,
+nor does one client for another: each has an outbox in which only the newest state and one picture wait, and one that
+does not read is let go. What clients say is in `messages`, who may come in `gate`, who may fly `helm`.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ from websockets.http11 import Request, Response
 from wakewise.core.errors import InputError
 from wakewise.ui.cockpit.client import Client
 from wakewise.ui.cockpit.connection import PageConnection
-from wakewise.ui.cockpit.control_mailbox import DEVICE, Holding
+from wakewise.ui.cockpit.control_mailbox import DEVICE, ControlOwnership
 from wakewise.ui.cockpit.ground_station_listing import page_files
 from wakewise.ui.cockpit.messages import (
     MOST_BYTES,
-    Amiss,
-    Consent,
-    DeskChange,
+    ButtonPress,
+    ControlConsent,
+    ControlRequest,
     Hello,
-    HelmWish,
+    InvalidMessage,
     Message,
-    Press,
-    Seen,
-    Sticks,
+    PictureAck,
+    SettingsChange,
+    StickMessage,
     read_message,
 )
 from wakewise.ui.cockpit.pictures import show_pictures
 from wakewise.ui.cockpit.requests import SUBPROTOCOL, respond, wrong
-from wakewise.ui.cockpit.view_model import Note, Show, as_json
+from wakewise.ui.cockpit.view_model import StatusMessage, ViewModel, as_json
 from wakewise.ui.web.addresses import page_addresses
-from wakewise.ui.web.files import Files
-from wakewise.ui.web.origin_check import Gate, is_loopback, same
-from wakewise.ui.web.pending import Pending
+from wakewise.ui.web.files import StaticFiles
+from wakewise.ui.web.origin_check import OriginCheck, is_loopback, same
+from wakewise.ui.web.pending import PendingConnections
 
 PROTOCOL = 1
 STATE_EVERY_S = 0.1
@@ -63,12 +63,12 @@ _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
 
 
-class Server:
+class CockpitServer:
     """Serves one show.
 
     Parameters
     ----------
-    show : Show
+    show : ViewModel
     host : str
         Address to listen at; this computer's own unless asked otherwise.
     port : int
@@ -83,18 +83,18 @@ class Server:
 
     def __init__(
         self,
-        show: Show,
+        show: ViewModel,
         host: str = "127.0.0.1",
         port: int = 0,
         token: str | None = None,
-        files: Files | None = None,
+        files: StaticFiles | None = None,
         origins: tuple[str, ...] = (),
     ) -> None:
         self.show, self.host, self.port = show, host, port
         self.token = token or secrets.token_urlsafe(16)
         self.clients: dict[str, Client] = {}
         self._files = files or page_files()
-        self._gate = Gate(port=port, token=self.token, origins=origins)
+        self._gate = OriginCheck(port=port, token=self.token, origins=origins)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._listening: Listening | None = None
         self._thread: threading.Thread | None = None
@@ -102,9 +102,9 @@ class Server:
         self._seen = asyncio.Event()
         self._fault: OSError | None = None
         self._over: asyncio.Event | None = None
-        self._told: Holding | None = None
+        self._told: ControlOwnership | None = None
         self._last_lease: str | None = None
-        self._pending = Pending()
+        self._pending = PendingConnections()
         self._edition = -1
         self._count = 0
 
@@ -235,10 +235,12 @@ class Server:
             self.show.seat.left(client.id)
             self._tell_helm("the page was closed")
 
-    def _refused(self, first: Message | Amiss) -> tuple[int, str] | None:
+    def _refused(self, first: Message | InvalidMessage) -> tuple[int, str] | None:
         """Code and words with which a client is let go for its first message; None where it may stay."""
         if not isinstance(first, Hello):
-            return _REFUSED, f"say hello first: {first.why}"[:120] if isinstance(first, Amiss) else "say hello first"
+            return _REFUSED, f"say hello first: {first.why}"[:120] if isinstance(
+                first, InvalidMessage
+            ) else "say hello first"
         if first.token is not None and (why := wrong(first.token, self._gate)):
             return _REFUSED, why
         comes_back = first.lease is not None and self._last_lease is not None and same(first.lease, self._last_lease)
@@ -246,7 +248,7 @@ class Server:
             return _FULL, "too many pages are open"
         return None
 
-    def _greet(self, client: Client, hello: Message | Amiss) -> None:
+    def _greet(self, client: Client, hello: Message | InvalidMessage) -> None:
         assert isinstance(hello, Hello)
         client.name, client.greeted = self._free_name(hello.name), True
         client.tell(self._welcome(client))
@@ -268,30 +270,30 @@ class Server:
             {"type": "welcome", "id": client.id, "name": client.name, "protocol": PROTOCOL, **self.show.welcome()}
         )
 
-    def _heed(self, client: Client, message: Message | Amiss) -> None:
+    def _heed(self, client: Client, message: Message | InvalidMessage) -> None:
         """Do what a client asks for, as far as it may."""
         seat = self.show.seat
         match message:
-            case Amiss():
+            case InvalidMessage():
                 client.amiss += 1
-                client.tell(Note(text=f"a message was not understood: {message.why}", level="warn").message())
-            case Sticks():
+                client.tell(StatusMessage(text=f"a message was not understood: {message.why}", level="warn").message())
+            case StickMessage():
                 seat.moved(client.id, message.lease, message.seq, message.t_ms, message.axes)
-            case Seen():
+            case PictureAck():
                 client.seen(message.frame)
                 self._seen.set()
-            case Press():
+            case ButtonPress():
                 seat.press(client.id, message.lease, message.what)
-            case DeskChange():
+            case SettingsChange():
                 if seat.may(client.id, message.lease):
                     self._set_desk(client, message.changes)
-            case HelmWish(want=True):
+            case ControlRequest(want=True):
                 words = seat.ask(client.id, message.force)
                 self._tell_helm(words, always=client)
-            case HelmWish():
+            case ControlRequest():
                 seat.left(client.id)
                 self._tell_helm("the helm was given back")
-            case Consent():
+            case ControlConsent():
                 self._tell_helm(seat.consent(client.id, message.to, message.yes), always=client)
             case Hello():
                 client.tell(self._welcome(client))
@@ -300,7 +302,7 @@ class Server:
         try:
             self.show.set_desk(changes)
         except InputError as fault:
-            client.tell(Note(text=str(fault), level="warn").message())
+            client.tell(StatusMessage(text=str(fault), level="warn").message())
 
     def _tell_helm(self, why: str, always: Client | None = None) -> None:
         """Tell everybody of a change at the helm, and `always` this one how it stands."""
@@ -311,7 +313,9 @@ class Server:
             self._last_lease = holding.lease
         if before is not None and holding.holder != before.holder:
             name = self._named(holding.holder)
-            self._to_all(Note(text="nobody has the helm" if name is None else f"{name} has the helm").message())
+            self._to_all(
+                StatusMessage(text="nobody has the helm" if name is None else f"{name} has the helm").message()
+            )
         asking = self.clients.get(holding.asked_by or "")
         told = {
             "type": "helm",
@@ -339,7 +343,9 @@ class Server:
                 self._tell_all()
             except Exception as fault:  # what is shown may be at fault, the helm must be looked after all the same
                 if (said := f"{type(fault).__name__}: {fault}") != amiss:
-                    self._to_all(Note(text=f"the page cannot be told how it stands ({said})", level="error").message())
+                    self._to_all(
+                        StatusMessage(text=f"the page cannot be told how it stands ({said})", level="error").message()
+                    )
                 amiss = said
             due_s = max(due_s + STATE_EVERY_S, self._loop.time())
             await asyncio.sleep(due_s - self._loop.time())

@@ -22,21 +22,21 @@ from wakewise.operation import Parts, Scenario
 from wakewise.operation.teleop.assisted import AssistedPilot, assisted
 from wakewise.operation.teleop.input.controls import CENTRED, ControlSource
 from wakewise.operation.teleop.live import LiveFlight
-from wakewise.operation.teleop.operator_state import MODES, RANGES, WAYS, Desk, DeskState, regime
-from wakewise.ui.cockpit.control_mailbox import Seat
-from wakewise.ui.cockpit.flight_snapshot import Lookout
-from wakewise.ui.cockpit.live_camera import LiveCamera, View
-from wakewise.ui.cockpit.live_coverage import LiveGuide
-from wakewise.ui.cockpit.scene import Scene, open_scene
-from wakewise.ui.cockpit.state import Instruments, described, number, rounded, told_scenario
-from wakewise.ui.cockpit.view_model import Note, Picture
-from wakewise.ui.cockpit.wake_readout import Gauges
+from wakewise.operation.teleop.operator_state import MODES, RANGES, WAYS, OperatorSettings, OperatorState, regime
+from wakewise.ui.cockpit.control_mailbox import ControlMailbox
+from wakewise.ui.cockpit.flight_snapshot import SnapshotRecorder
+from wakewise.ui.cockpit.live_camera import CameraState, LiveCamera
+from wakewise.ui.cockpit.live_coverage import LiveCoverage
+from wakewise.ui.cockpit.scene import ViserScene, open_scene
+from wakewise.ui.cockpit.state import StateEncoder, described, number, rounded, told_scenario
+from wakewise.ui.cockpit.view_model import CameraPicture, StatusMessage
+from wakewise.ui.cockpit.wake_readout import WakeReadout
 
 TENDED_S, SCENE_EVERY_S = 0.05, 0.2
 _MOST_NOTES = 200
 
 
-class Session:
+class CockpitSession:
     """Flights of one scenario; the `Show` of a server.
 
     Parameters
@@ -68,9 +68,9 @@ class Session:
         scene: bool = False,
     ) -> None:
         self._parts = scenario if isinstance(scenario, Parts) else scenario.parts()
-        self.seat, self.desk = Seat(device=device), Desk(DeskState(watch_target=False))
+        self.seat, self.desk = ControlMailbox(device=device), OperatorState(OperatorSettings(watch_target=False))
         self._device, self._scene_wanted = device, scene
-        self._scene: Scene | None = None
+        self._scene: ViserScene | None = None
         self._fallback: str | None = None
         self.folder, self._paced, self._guided = folder, paced, guided
         self.flown: list[Path] = []
@@ -79,14 +79,14 @@ class Session:
         self._camera = LiveCamera(self._parts.scenario, self._parts.given.get("target")) if pictures else None
         self._live: LiveFlight | None = None
         self._pilot: AssistedPilot | None = None
-        self._gauges: Gauges | None = None
-        self._lookout: Lookout | None = None
-        self._instruments: Instruments | None = None
-        self._guide: LiveGuide | None = None
+        self._gauges: WakeReadout | None = None
+        self._lookout: SnapshotRecorder | None = None
+        self._instruments: StateEncoder | None = None
+        self._guide: LiveCoverage | None = None
         self._described: dict[str, Any] = {}
         self._preparing: str | None = "making the parts of the flight"
         self._edition = 0
-        self._notes: deque[Note] = deque(maxlen=_MOST_NOTES)
+        self._notes: deque[StatusMessage] = deque(maxlen=_MOST_NOTES)
         self._photos, self._pictures = 0, 0
         self._silt_shown: object = None
         self._shown_s = -np.inf
@@ -133,7 +133,7 @@ class Session:
         return self._live
 
     @property
-    def lookout(self) -> Lookout | None:
+    def lookout(self) -> SnapshotRecorder | None:
         """What that flight's thread takes down."""
         return self._lookout
 
@@ -178,7 +178,7 @@ class Session:
             },
         }
 
-    def notes(self) -> Sequence[Note]:
+    def notes(self) -> Sequence[StatusMessage]:
         """What has happened since the last call."""
         told = []
         while self._notes:
@@ -189,14 +189,14 @@ class Session:
         """Change settings of the desk; raises InputError where a value is out of range."""
         self.desk.set(**changes)
 
-    def picture(self) -> Picture | None:
+    def picture(self) -> CameraPicture | None:
         """What the camera sees now."""
         now = self._lookout.now if self._lookout is not None else None
         if now is None or self._camera is None:
             return None
         silt = now.silt if now.silt is not self._silt_shown else None
         try:
-            jpeg = self._camera.draw(View(X_WC=now.X_WC, silt=silt))
+            jpeg = self._camera.draw(CameraState(X_WC=now.X_WC, silt=silt))
         except StageError as fault:
             self._say(f"{fault}; the flight goes on without it", "error")
             self._camera = None
@@ -205,7 +205,7 @@ class Session:
             return None
         self._silt_shown = now.silt
         self._pictures += 1
-        return Picture(number=self._pictures, time_s=now.step.time_s, jpeg=jpeg)
+        return CameraPicture(number=self._pictures, time_s=now.step.time_s, jpeg=jpeg)
 
     def _tend(self) -> None:
         try:
@@ -243,14 +243,14 @@ class Session:
         parts = self._parts
         self.flights += 1
         if self._gauges is None:
-            self._gauges = Gauges.of(parts)
+            self._gauges = WakeReadout.of(parts)
             self._described = described(parts, self._gauges)
         self._say_preparing("making pilot and controllers")
         flown = assisted(parts, self.seat, self.desk)
         pilot = cast("AssistedPilot", flown.pilot)
         self._gauges.disturbances(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))  # kernels are read now
         self._gauges.predicted_m_s(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))
-        lookout = Lookout(
+        lookout = SnapshotRecorder(
             parts.vehicle,
             self._gauges.true_points_W_m,
             1.0 / parts.control.rate_hz,
@@ -260,17 +260,17 @@ class Session:
         self._photos = 0
         if self._guided:
             self._say_preparing("looking for views of the target")
-            self._guide = LiveGuide(parts)
+            self._guide = LiveCoverage(parts)
         live = LiveFlight(flown, folder=self._free_folder(), paced=self._paced, watch=lookout)
         self._pilot, self._lookout, self._live = pilot, lookout, live
-        self._instruments = Instruments(self._gauges, lookout)
+        self._instruments = StateEncoder(self._gauges, lookout)
         return live
 
     def _follow(self, live: LiveFlight) -> None:
         """Hand on what the pilot says, and photographs to the guide."""
         assert self._pilot is not None
         for note in self._pilot.notes():
-            self._notes.append(Note(text=note.text, level=note.level, time_s=note.time_s))
+            self._notes.append(StatusMessage(text=note.text, level=note.level, time_s=note.time_s))
         for level, text in getattr(self._device, "notes", tuple)():
             self._say(text, level)
         fallback = None if live.latest is None else live.latest.command.fallback
@@ -342,7 +342,7 @@ class Session:
 
     def _say(self, text: str, level: str = "info", time_s: float | None = None) -> None:
         at_s = self._live.time_s if time_s is None and self._live is not None else time_s
-        self._notes.append(Note(text=text, level=level, time_s=at_s or 0.0))
+        self._notes.append(StatusMessage(text=text, level=level, time_s=at_s or 0.0))
 
     def _say_preparing(self, what: str | None) -> None:
         if what != self._preparing:

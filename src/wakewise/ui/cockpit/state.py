@@ -16,14 +16,14 @@ from wakewise.core.arrays import Array
 from wakewise.core.geometry import euler_from_quat
 from wakewise.operation import Parts
 from wakewise.simulation.tank.water_truth import STILL_M_S
-from wakewise.ui.cockpit.flight_snapshot import SAMPLED_S, WINDOW_S, Lookout, Moment
-from wakewise.ui.cockpit.wake_readout import Gauges
+from wakewise.ui.cockpit.flight_snapshot import SAMPLED_S, WINDOW_S, FlightSnapshot, SnapshotRecorder
+from wakewise.ui.cockpit.wake_readout import WakeReadout
 
 POINTS_EVERY, GAUGES_EVERY = 5, 2
 """States between two looks at the water of every point, and at D: with a current these cost the most."""
 
 
-def described(parts: Parts, gauges: Gauges) -> dict[str, Any]:
+def described(parts: Parts, gauges: WakeReadout) -> dict[str, Any]:
     """Scenario, vehicle and target, as a client is told when it comes."""
     scenario, vehicle, target = parts.scenario, parts.vehicle, parts.found_target
     return {
@@ -62,23 +62,23 @@ def told_scenario(parts: Parts) -> dict[str, Any]:
     }
 
 
-class Instruments:
+class StateEncoder:
     """Makes a state of a moment; one for each flight. `predicted_m_s` is the wash at the gauges' points, as last read.
 
     Parameters
     ----------
-    gauges : Gauges
-    lookout : Lookout
+    gauges : WakeReadout
+    lookout : SnapshotRecorder
     """
 
-    def __init__(self, gauges: Gauges, lookout: Lookout) -> None:
+    def __init__(self, gauges: WakeReadout, lookout: SnapshotRecorder) -> None:
         self._gauges, self._lookout = gauges, lookout
         self._both: deque[tuple[float, float]] = deque(maxlen=round(WINDOW_S / SAMPLED_S / GAUGES_EVERY))
         self.predicted_m_s = np.zeros(len(gauges.points_W_m))
         self._now = (math.nan, math.nan)
         self._count = 0
 
-    def read(self, now: Moment) -> dict[str, Any]:
+    def read(self, now: FlightSnapshot) -> dict[str, Any]:
         """How the flight stands, but for what desk, helm, coverage and photographs add."""
         step, estimate = now.step, now.step.estimate
         if self._count % GAUGES_EVERY == 0:

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from wakewise.ui.cockpit.control_mailbox import Seat
+from wakewise.ui.cockpit.control_mailbox import ControlMailbox
 
 
 @dataclass(frozen=True, kw_only=True)
-class Picture:
+class CameraPicture:
     """What the camera sees: a JPEG, its number, and the time of the flight that it shows."""
 
     number: int
@@ -25,7 +25,7 @@ class Picture:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Note:
+class StatusMessage:
     """A line for everybody: what has just changed."""
 
     text: str
@@ -37,11 +37,11 @@ class Note:
         return as_json({"type": "note", "level": self.level, "text": self.text, "time_s": round(self.time_s, 2)})
 
 
-class Show(Protocol):
+class ViewModel(Protocol):
     """What is shown, and what may be changed; called from the server's thread, and never for long."""
 
     @property
-    def seat(self) -> Seat:
+    def seat(self) -> ControlMailbox:
         """The helm, and where the flight reads its sticks."""
         ...
 
@@ -58,7 +58,7 @@ class Show(Protocol):
         """What is so now; None before there is anything."""
         ...
 
-    def notes(self) -> Sequence[Note]:
+    def notes(self) -> Sequence[StatusMessage]:
         """What has happened since the last call."""
         ...
 
@@ -66,7 +66,7 @@ class Show(Protocol):
         """Change settings of the desk; raises InputError where a value is out of range."""
         ...
 
-    def picture(self) -> Picture | None:
+    def picture(self) -> CameraPicture | None:
         """What the camera sees now; called in another thread, where it may wait for the picture for a while."""
         ...
 

@@ -19,8 +19,8 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.interfaces import BodyState
 from wakewise.operation import Parts
 from wakewise.simulation.tank.probes import surface_points
-from wakewise.wake import WakeView, free_jet
-from wakewise.wake.advected_jets import Flow
+from wakewise.wake import InfluenceModel, free_jet
+from wakewise.wake.advected_jets import CrossFlow
 from wakewise.wake.disturbance import carried_velocity
 from wakewise.wake.jets import AxialJet
 
@@ -30,14 +30,14 @@ _LEAST_N = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Gauges:
+class WakeReadout:
     """A vehicle's thrusters, a target's region and the wake model between them.
 
     `points_W_m`, shape (n, 3), are places on the target where it is taken to be, evenly by area; `true_points_W_m` the
     same places where it is.
     """
 
-    view: WakeView
+    view: InfluenceModel
     watch: Watch
     points_W_m: Array
     true_points_W_m: Array
@@ -47,13 +47,13 @@ class Gauges:
         freeze(self, points_W_m=(n, 3), true_points_W_m=(n, 3))
 
     @classmethod
-    def of(cls, parts: Parts) -> Gauges:
+    def of(cls, parts: Parts) -> WakeReadout:
         """The gauges of a flight."""
         true = surface_points(parts.target, POINTS, np.random.default_rng(parts.scenario.seed))
         off_m = parts.found_target.centre_W_m - parts.target.centre_W_m
         made_of = (parts.vehicle, parts.region, parts.wake)
         return cls(
-            view=WakeView.of(*made_of, parts.control.superposition),
+            view=InfluenceModel.of(*made_of, parts.control.superposition),
             watch=watching(*made_of, parts.control),
             points_W_m=true + off_m,
             true_points_W_m=true,
@@ -80,7 +80,7 @@ class Gauges:
         place = (self.points_W_m, X_WB.apply(view.positions_B_m[on]), jets_W, view.areas_m2[on])
         flow = self.watch.flow(estimate, thrusts_N)
         if flow is not None and isinstance(free_jet(view.wake), AxialJet):
-            own = Flow(current_W_m_s=flow.current_W_m_s, unsure_m_s=flow.unsure_m_s, thrusts_N=thrusts_N[on])
+            own = CrossFlow(current_W_m_s=flow.current_W_m_s, unsure_m_s=flow.unsure_m_s, thrusts_N=thrusts_N[on])
             unit = carried_velocity(view.wake, *place, size_N, own)
         else:
             unit = view.wake.unit_velocity(*place)

@@ -73,8 +73,8 @@ Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Outside:
-    """A fixed view of a trial; make it with `Outside.build`."""
+class ExternalView:
+    """A fixed view of a trial; make it with `ExternalView.build`."""
 
     camera: PinholeCamera
     X_WC: Pose
@@ -89,7 +89,7 @@ class Outside:
     @classmethod
     def build(
         cls, scene: Scene, camera: PinholeCamera, X_WC: Pose, hull: Hull, lights: Lights, grains: SiltOptics
-    ) -> Outside:
+    ) -> ExternalView:
         """Render what does not move; lamps are left out, since they go with the vehicle."""
         unlit = replace(lights, lamp=0.0)
         still = render(scene, camera, X_WC, unlit, _SAMPLES)

@@ -39,7 +39,7 @@ _TIME: Box = (64, 626, 1260, 684)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Story:
+class FilmOverview:
     """What stays on every frame: names, and the whole flight's legs, speeds and photographs.
 
     `legs` are (name, start_s, end_s); `speed_m_s` (k,) at `time_s` (k,) is the mean excess speed at the target, NaN or
@@ -57,7 +57,7 @@ class Story:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Moment:
+class FilmFrame:
     """What one frame shows. Pictures are RGB; `shot` counts from 0 and is None before the first photograph."""
 
     time_s: float
@@ -71,10 +71,10 @@ class Moment:
     since_shot_s: float
 
 
-class Page:
+class FrameComposer:
     """Draws frames; what no frame changes is drawn once."""
 
-    def __init__(self, story: Story, view: View) -> None:
+    def __init__(self, story: FilmOverview, view: View) -> None:
         self.story, self.view = story, view
         self._top_mm_s = _nice(1e3 * float(np.nanmax(story.speed_m_s))) if np.isfinite(story.speed_m_s).any() else 0.0
         self._thrust_top_N = 1.0
@@ -86,12 +86,12 @@ class Page:
         left, top, right, bottom = _MAIN[self.view]
         return right - left, bottom - top
 
-    def scaled_to(self, largest_thrust_N: float) -> Page:
+    def scaled_to(self, largest_thrust_N: float) -> FrameComposer:
         """Set the thrust bars' full height."""
         self._thrust_top_N = max(1.0, float(np.ceil(largest_thrust_N)))
         return self
 
-    def frame(self, moment: Moment) -> NDArray[np.uint8]:
+    def frame(self, moment: FilmFrame) -> NDArray[np.uint8]:
         """One frame, shape (720, 1280, 3), RGB."""
         page = self._base.copy()
         draw = ImageDraw.Draw(page)
@@ -153,7 +153,7 @@ class Page:
         left, _, right, _ = _TIME
         return left + (right - left) * min(max(time_s / self.story.duration_s, 0.0), 1.0)
 
-    def _show_photo(self, page: Pictures.Image, draw: ImageDraw.ImageDraw, moment: Moment, box: Box) -> None:
+    def _show_photo(self, page: Pictures.Image, draw: ImageDraw.ImageDraw, moment: FilmFrame, box: Box) -> None:
         width, height = box[2] - box[0], box[3] - box[1]
         if moment.photo is None:
             draw.rounded_rectangle(box, 8, fill=CARD)
@@ -165,7 +165,7 @@ class Page:
             colour = tuple(round(p + fresh * (c - p)) for p, c in zip(PAPER, CORAL, strict=True))
             draw.rounded_rectangle((box[0] - 4, box[1] - 4, box[2] + 3, box[3] + 3), 11, outline=colour, width=4)
 
-    def _figures(self, draw: ImageDraw.ImageDraw, moment: Moment, y: int) -> None:
+    def _figures(self, draw: ImageDraw.ImageDraw, moment: FilmFrame, y: int) -> None:
         left, right = _PHOTO[0], _PHOTO[2]
         shots = self.story.shots
         if moment.shot is not None:
@@ -187,7 +187,7 @@ class Page:
         write(draw, (left + 204 + used, y + 28), "/m", 15, MUTED)
         self._thrusts(draw, moment, (left, y + 56, right, 584))
 
-    def _sharpness_strip(self, draw: ImageDraw.ImageDraw, moment: Moment, box: Box) -> None:
+    def _sharpness_strip(self, draw: ImageDraw.ImageDraw, moment: FilmFrame, box: Box) -> None:
         """One bar per photograph, as high as it is sharp; those to come are hollow."""
         shots = self.story.shots
         known = [sharp for _, sharp in shots if sharp is not None]
@@ -202,7 +202,7 @@ class Page:
             x = box[0] + k * step
             draw.rectangle((x, box[3] - max(height, 1.0), x + max(step - 2.0, 1.0), box[3]), fill=colour)
 
-    def _thrusts(self, draw: ImageDraw.ImageDraw, moment: Moment, box: Box) -> None:
+    def _thrusts(self, draw: ImageDraw.ImageDraw, moment: FilmFrame, box: Box) -> None:
         n = len(moment.thrusts_N)
         if not n:
             return
@@ -219,7 +219,7 @@ class Page:
             draw.rectangle((x, low, x + step - 6, max(high, low + 1)), fill=CORAL if thrust > 0 else TEAL)
         draw.line((box[0], middle, box[2] - 6, middle), fill=MUTED)
 
-    def _figures_over(self, page: Pictures.Image, moment: Moment, main: Box) -> None:
+    def _figures_over(self, page: Pictures.Image, moment: FilmFrame, main: Box) -> None:
         """The figures of the moment on a dark corner of the large picture."""
         box = (main[2] - 226, main[1] + 14, main[2] - 14, main[1] + 92)
         _shade(page, box)
@@ -239,12 +239,12 @@ class Page:
         write(draw, (left + 14, bottom - 28), "wash", 12, INK)
         write(draw, (left + 212, bottom - 28), f"0 to {100 * FASTEST_M_S:.0f} cm/s", 12, MUTED, anchor="rs")
 
-    def _clock(self, draw: ImageDraw.ImageDraw, moment: Moment) -> None:
+    def _clock(self, draw: ImageDraw.ImageDraw, moment: FilmFrame) -> None:
         write(draw, (1260, 37), f"× {self.story.pace:.1f}", 14, MUTED, anchor="rs")
         write(draw, (1200, 37), f"{moment.time_s:.1f} s", 21, bold=True, anchor="rs")
         write(draw, (1090, 37), moment.leg, 14, MUTED, anchor="rs")
 
-    def _playhead(self, draw: ImageDraw.ImageDraw, moment: Moment) -> None:
+    def _playhead(self, draw: ImageDraw.ImageDraw, moment: FilmFrame) -> None:
         x = self._x(moment.time_s)
         _, top, _, bottom = _TIME
         draw.line((x, top, x, bottom + 4), fill=INK, width=2)

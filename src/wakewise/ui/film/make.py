@@ -23,10 +23,10 @@ from wakewise.operation import Scenario, read_exposures, read_scenario
 from wakewise.operation.exposures import ExposureRecord
 from wakewise.scene.targets import stony_kinds
 from wakewise.ui.film.encode import check_film_name, film_writer
-from wakewise.ui.film.external_view import FOV_RAD, Outside
-from wakewise.ui.film.layout import HEIGHT, VIEWS, WIDTH, Moment, Page, Story, View
+from wakewise.ui.film.external_view import FOV_RAD, ExternalView
+from wakewise.ui.film.layout import HEIGHT, VIEWS, WIDTH, FilmFrame, FilmOverview, FrameComposer, View
 from wakewise.ui.film.viewpoint import vantage
-from wakewise.ui.film.wash import Motion, Tracers, wash_of
+from wakewise.ui.film.wash import RecordedMotion, Tracers, wash_of
 from wakewise.ui.reports import figures
 from wakewise.ui.reports.trial import Trial, read_trial
 from wakewise.ui.reports.vehicle.hull import hull_of
@@ -112,18 +112,20 @@ class _Film:
         if self.trial.steps is None:
             raise InputError(f"{folder / 'steps.parquet'}: cannot be read, a film needs a finished trial")
         self.steps: pl.DataFrame = self.trial.steps
-        self.motion = Motion.of(self.steps)
+        self.motion = RecordedMotion.of(self.steps)
         duration_s = float(self.motion.time_s[-1])
         self.times_s: Array = np.linspace(float(self.motion.time_s[0]), duration_s, count)
         self.story = story_of(self.trial, self.scenario, duration_s, duration_s / (count / fps))
-        self.page = Page(self.story, view).scaled_to(float(np.nanquantile(np.abs(self.motion.thrusts_N), 0.998)))
+        self.page = FrameComposer(self.story, view).scaled_to(
+            float(np.nanquantile(np.abs(self.motion.thrusts_N), 0.998))
+        )
         digest = hashlib.sha256((folder / "steps.parquet").read_bytes())
         digest.update((folder / "images.csv").read_bytes())
         digest.update(repr((LOOK, count, fps, view)).encode())
         self.key = digest.hexdigest()[:12]
         self._speed = self.trial.column("target_speed_mean_m_s")
         self._turbidity = self.trial.column("turbidity_per_m")
-        self._outside: Outside | None = None
+        self._outside: ExternalView | None = None
         self._tracers: list[Tracers] = []
         self._exposures: list[ExposureRecord] = []
         self._photo: tuple[int, NDArray[np.uint8] | None] = (-1, None)
@@ -143,7 +145,9 @@ class _Film:
         X_WC = vantage(camera, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m)))
         grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
         scene = parts.scene
-        self._outside = Outside.build(scene, camera, X_WC, hull_of(parts.vehicle), scenario.imaging.lights(), grains)
+        self._outside = ExternalView.build(
+            scene, camera, X_WC, hull_of(parts.vehicle), scenario.imaging.lights(), grains
+        )
         self._tracers = wash_of(scenario, self.folder / "steps.parquet", self.times_s, wash, progress)
 
     def frame(self, k: int) -> NDArray[np.uint8]:
@@ -155,7 +159,7 @@ class _Film:
         since_s = math.inf if last is None else time_s - self.trial.photographs[last].time_s
         leg = next((name for name, start, stop in self.story.legs if start <= time_s <= stop), "")
         return self.page.frame(
-            Moment(
+            FilmFrame(
                 time_s=time_s,
                 leg=leg,
                 speed_m_s=_at(self._speed, row),
@@ -171,7 +175,7 @@ class _Film:
         )
 
     def _seen_from_outside(
-        self, outside: Outside, k: int, row: int, last: int | None, since_s: float
+        self, outside: ExternalView, k: int, row: int, last: int | None, since_s: float
     ) -> NDArray[np.uint8]:
         pose = Pose(self.motion.p_W_m[row], self.motion.q_WB[row])
         picture, depth = outside.picture(pose, silt_at(self._exposures, float(self.times_s[k])), self._tracers[k])
@@ -190,14 +194,14 @@ class _Film:
         return self._photo[1]
 
 
-def story_of(trial: Trial, scenario: Scenario, duration_s: float, pace: float) -> Story:
+def story_of(trial: Trial, scenario: Scenario, duration_s: float, pace: float) -> FilmOverview:
     """What every frame of a trial's film says."""
     speed = trial.column("target_speed_mean_m_s")
     steps = trial.steps
     time_s = np.zeros(0) if speed is None or steps is None else steps["time_s"].to_numpy().astype(np.float64)
     kind = scenario.target.kind
     target = f"{kind} coral" if kind in stony_kinds() else Path(kind).stem
-    return Story(
+    return FilmOverview(
         title=scenario.method,
         subtitle=f"{target}, vehicle {Path(scenario.vehicle).stem}, seed {scenario.seed}",
         duration_s=duration_s,
@@ -236,7 +240,7 @@ def _at(column: Array | None, row: int) -> float | None:
     return None if column is None or not np.isfinite(column[row]) else float(column[row])
 
 
-def _track(picture: NDArray[np.uint8], outside: Outside, depth_m: NDArray[np.float32], path_W_m: Array) -> None:
+def _track(picture: NDArray[np.uint8], outside: ExternalView, depth_m: NDArray[np.float32], path_W_m: Array) -> None:
     """Draw where the vehicle came from, fading with time, dotted where something hides it."""
     if len(path_W_m) < 2:
         return
@@ -258,7 +262,7 @@ def _track(picture: NDArray[np.uint8], outside: Outside, depth_m: NDArray[np.flo
 
 
 def _view_cone(
-    picture: NDArray[np.uint8], outside: Outside, X_WC: Pose | None, scenario: Scenario, strength: float
+    picture: NDArray[np.uint8], outside: ExternalView, X_WC: Pose | None, scenario: Scenario, strength: float
 ) -> None:
     """Draw what the camera sees as a pyramid of light for the moment of the shutter."""
     if X_WC is None:

@@ -24,11 +24,11 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import no_progress
 from wakewise.operation import Scenario, read_exposures, read_scenario
 from wakewise.ui.film.drawing import INK, MUTED, PAPER, paste, write
-from wakewise.ui.film.external_view import FOV_RAD, Outside
+from wakewise.ui.film.external_view import FOV_RAD, ExternalView
 from wakewise.ui.film.layout import cover
 from wakewise.ui.film.make import silt_at
 from wakewise.ui.film.viewpoint import vantage
-from wakewise.ui.film.wash import Motion, wash_of
+from wakewise.ui.film.wash import RecordedMotion, wash_of
 from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Trial, read_trial
 from wakewise.ui.reports.vehicle.hull import hull_of
@@ -40,7 +40,7 @@ _GAP, _LEFT, _TOP, _NAME, _NOTE = 12, 20, 76, 46, 26
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Cell:
+class ComparisonTile:
     """One method at one time: RGB pictures by the camera and from outside, and a line of figures."""
 
     camera: NDArray[np.uint8]
@@ -101,13 +101,13 @@ def write_rows(
     return out
 
 
-def cells_of(folder: Path, times_s: Sequence[float]) -> list[Cell]:
+def cells_of(folder: Path, times_s: Sequence[float]) -> list[ComparisonTile]:
     """Pictures of one trial at times counted from its first photograph."""
     trial: Trial = read_trial(folder)
     scenario: Scenario = read_scenario(folder / "scenario.yaml")
     if trial.steps is None or not trial.photographs:
         raise InputError(f"{folder}: no flight with photographs, a finished trial is needed")
-    motion = Motion.of(trial.steps)
+    motion = RecordedMotion.of(trial.steps)
     first_s = min(shot.time_s for shot in trial.photographs)
     instants = np.array([first_s + t for t in times_s])
     if instants.max() > motion.time_s[-1]:
@@ -125,7 +125,7 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[Cell]:
     flown = motion.p_W_m[motion.row(first_s) : motion.row(float(instants.max()) + 5.0)]
     far = PinholeCamera(*CELL, FOV_RAD)
     X_WO = vantage(far, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m)))
-    outside = Outside.build(scene, far, X_WO, hull_of(parts.vehicle), scenario.imaging.lights(), grains)
+    outside = ExternalView.build(scene, far, X_WO, hull_of(parts.vehicle), scenario.imaging.lights(), grains)
     speed, turbidity = trial.column("target_speed_mean_m_s"), trial.column("turbidity_per_m")
     tilt_deg = trial.column("true_tilt_deg")  # none in trials that were flown before cameras had a joint
     out = []
@@ -139,11 +139,11 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[Cell]:
         facts += [] if turbidity is None else [f"silt {number(float(turbidity[row]), 2)} /m"]
         facts += [] if speed is None else [f"water {1e3 * float(speed[row]):.1f} mm/s"]
         seen, _ = outside.picture(X_WB, silt, wash[k])
-        out.append(Cell(camera=cover(photo.image, *CELL), outside=seen, note="   ".join(facts)))
+        out.append(ComparisonTile(camera=cover(photo.image, *CELL), outside=seen, note="   ".join(facts)))
     return out
 
 
-def rows_picture(cells: dict[str, list[Cell]], times_s: Sequence[float]) -> NDArray[np.uint8]:
+def rows_picture(cells: dict[str, list[ComparisonTile]], times_s: Sequence[float]) -> NDArray[np.uint8]:
     """All cells on one page, shape (h, w, 3), RGB: for each method a row by the camera and a row from outside."""
     width, height = CELL
     columns = len(times_s)

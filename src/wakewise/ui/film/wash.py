@@ -47,7 +47,7 @@ class Tracers:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
+class RecordedMotion:
     """True motion of a vehicle as recorded: times (k,), p_W_m (k, 3), q_WB (k, 4), thrusts_N (k, n)."""
 
     time_s: Array
@@ -56,7 +56,7 @@ class Motion:
     thrusts_N: Array
 
     @classmethod
-    def of(cls, steps: pl.DataFrame) -> Motion:
+    def of(cls, steps: pl.DataFrame) -> RecordedMotion:
         """Take the motion from steps.parquet.
 
         Raises
@@ -103,7 +103,7 @@ def wash_of(
     found = _read(kept, key)
     if found is not None:
         return found
-    motion = Motion.of(pl.read_parquet(steps_path))
+    motion = RecordedMotion.of(pl.read_parquet(steps_path))
     tank = tank_world(scenario.parts()).tank()
     mounts = tank.vehicle.thruster_positions_B_m, tank.vehicle.thruster_axes_B
     disks = np.sqrt(tank.vehicle.disk_areas_m2 / np.pi)
@@ -114,7 +114,7 @@ def wash_of(
 
 def replay(
     water: Water,
-    motion: Motion,
+    motion: RecordedMotion,
     mounts_B: tuple[Array, Array],
     disk_radii_m: Array,
     times_s: Array,

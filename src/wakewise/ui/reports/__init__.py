@@ -18,9 +18,9 @@ from wakewise.core.lazy_imports import lazy_door
 if TYPE_CHECKING:
     from wakewise.ui.reports.campaign import write_campaign
     from wakewise.ui.reports.compare import write_comparison
-    from wakewise.ui.reports.page_parts import Draft
+    from wakewise.ui.reports.page_parts import PageParts
     from wakewise.ui.reports.report import begin_report, write_report
 
-__all__ = ["Draft", "begin_report", "write_campaign", "write_comparison", "write_report"]
+__all__ = ["PageParts", "begin_report", "write_campaign", "write_comparison", "write_report"]
 
 lazy_door(__name__, "reports", "photos")

@@ -10,7 +10,7 @@ from typing import Any
 
 from wakewise.core.files import write_text
 from wakewise.experiments.campaigns.contrasts import comparable, contest, measures, places
-from wakewise.experiments.campaigns.summary import FEWEST, Glance, Measure, Place
+from wakewise.experiments.campaigns.summary import FEWEST, ComparisonMetric, MethodSummary, Place
 from wakewise.experiments.campaigns.table import Results, failures, group_table
 from wakewise.experiments.trials import UNITS
 from wakewise.ui.reports.methods_compared import methods_compared, price, profiles, won
@@ -65,7 +65,7 @@ def campaign_page(found: Results, folder: Path, compare: str = "") -> str:
     return whole_page(f"{found.plan.name} · Wakewise", body)
 
 
-def _head(found: Results, judged: Sequence[tuple[Measure, Glance]], compared: str) -> str:
+def _head(found: Results, judged: Sequence[tuple[ComparisonMetric, MethodSummary]], compared: str) -> str:
     done, failed, total = found.count("done"), found.count("failed"), len(found.made)
     took = duration(sum(one.took_s or 0.0 for one in found.made))
     eyebrow = (
@@ -87,7 +87,7 @@ def _head(found: Results, judged: Sequence[tuple[Measure, Glance]], compared: st
     return f"{eyebrow}<h1>{escape(_title(judged, compared))}</h1>{_why(judged)}{said}"
 
 
-def _title(judged: Sequence[tuple[Measure, Glance]], compared: str) -> str:
+def _title(judged: Sequence[tuple[ComparisonMetric, MethodSummary]], compared: str) -> str:
     """The leading measure in a sentence."""
     if not judged:
         return "No trials that can be compared have ended yet."
@@ -102,12 +102,12 @@ def _title(judged: Sequence[tuple[Measure, Glance]], compared: str) -> str:
     return f"{winner} is surely best in {count} of {len(leading)} settings ({what})."
 
 
-def _why(judged: Sequence[tuple[Measure, Glance]]) -> str:
+def _why(judged: Sequence[tuple[ComparisonMetric, MethodSummary]]) -> str:
     leading = [one for measure, one in judged if measure == judged[0][0]] if judged else []
     return f'<p class="why">{escape(price(leading[0]))}</p>' if len(leading) == 1 and price(leading[0]) else ""
 
 
-def _glance(judged: Sequence[tuple[Measure, Glance]], compared: str) -> str:
+def _glance(judged: Sequence[tuple[ComparisonMetric, MethodSummary]], compared: str) -> str:
     if not judged:
         why = f"no seed has ended with every {compared}"
         return section("glance", "At a glance", "", missing("who won", why))
@@ -129,7 +129,7 @@ def _glance(judged: Sequence[tuple[Measure, Glance]], compared: str) -> str:
     return section("glance", "At a glance", lead, f'<div class="wide">{table}</div>')
 
 
-def _chance(one: Glance) -> str:
+def _chance(one: MethodSummary) -> str:
     return "" if one.improvement is None or not one.is_sure else f"{number(100.0 * one.improvement)} %"
 
 

@@ -20,7 +20,7 @@ from wakewise.ui.reports.photos import embed
 from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, data_uri, error_colours
 from wakewise.ui.reports.text import grouped, number, shown, unit, verdict
 from wakewise.ui.reports.trial import Trial, read_trial
-from wakewise.ui.reports.views import SIDES, Frame, coverage_colours, draw_cloud, draw_surface
+from wakewise.ui.reports.views import SIDES, ViewBounds, coverage_colours, draw_cloud, draw_surface
 from wakewise.vision.image_decoding import read_picture
 
 VIEW_PIXELS = 300
@@ -310,7 +310,7 @@ def _models(trials: Mapping[str, Trial], errors: Mapping[str, ModelErrors | None
             accuracy.append(gap)
             coverage.append(gap)
             continue
-        frame = Frame.around(trial.truth.vertices_m[found.counts])
+        frame = ViewBounds.around(trial.truth.vertices_m[found.counts])
         if found.model is not None and found.model_accuracy_m is not None:
             drawn = draw_surface(found.model, error_colours(found.model_accuracy_m), SIDES, frame, VIEW_PIXELS)
         else:
@@ -337,7 +337,7 @@ def _in_colour(trials: Mapping[str, Trial]) -> str:
         found = coloured_model(trial)
         if found is not None:
             surface, colours = found
-            drawn = draw_surface(surface, colours, SIDES, Frame.around(surface.vertices_m), VIEW_PIXELS)
+            drawn = draw_surface(surface, colours, SIDES, ViewBounds.around(surface.vertices_m), VIEW_PIXELS)
             rows.append(
                 f'<p class="sheet-leg">{escape(name)}</p>' + pictures(drawn, SIDES, f"model of {name} in colour")
             )

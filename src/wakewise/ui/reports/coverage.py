@@ -14,10 +14,10 @@ from wakewise.operation.seeds import Seeds
 from wakewise.scene.missions import Coverage, missed
 from wakewise.scene.targets import Mesh, Target
 from wakewise.ui.reports.page import absence, chip, missing, panel, pictures
-from wakewise.ui.reports.page_parts import Draft
+from wakewise.ui.reports.page_parts import PageParts
 from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, rgb
-from wakewise.ui.reports.trial import Surface, Trial
-from wakewise.ui.reports.views import SIDES, Frame, draw_surface
+from wakewise.ui.reports.trial import Trial, TrialMesh
+from wakewise.ui.reports.views import SIDES, ViewBounds, draw_surface
 
 WELL_SEEN, IN_PART = "#3f9b6b", "#e3b341"
 PIXELS = 300
@@ -25,7 +25,7 @@ LITTLE = 0.15
 """Patches that have come less far than this are shown as not seen."""
 
 
-def coverage_html(trial: Trial, draft: Draft) -> str:
+def coverage_html(trial: Trial, draft: PageParts) -> str:
     """Share seen well, a map of it, and why the rest was not; a gap that says why where parts are missing."""
     return draft.once("coverage", lambda: _made(trial))
 
@@ -64,9 +64,9 @@ def _made(trial: Trial) -> str:
             (WELL_SEEN, "seen well"), (IN_PART, "by too few"), (NOT_COVERED, "not"), (NOT_COUNTED, "does not count"),
         )
     )  # fmt: skip
-    surface = Surface(vertices_m=target.mesh.vertices_m, faces=target.mesh.faces)
+    surface = TrialMesh(vertices_m=target.mesh.vertices_m, faces=target.mesh.faces)
     colours, counts = _painted(coverage, surface.vertices_m)
-    frame = Frame.around(surface.vertices_m[counts] if counts.any() else surface.vertices_m)
+    frame = ViewBounds.around(surface.vertices_m[counts] if counts.any() else surface.vertices_m)
     drawn = draw_surface(surface, colours, SIDES, frame, PIXELS)
     return panel("Coverage", text, f'<div class="chips">{legend}</div>', pictures(drawn, SIDES, "coverage"))
 
@@ -85,7 +85,7 @@ def _blurred(coverage: Coverage) -> str:
     return f"{coverage.blurred} of {coverage.photos} photographs were too blurred to count."
 
 
-def _found(truth: Surface, settings: Scenario, bed_z_m: float) -> Target:
+def _found(truth: TrialMesh, settings: Scenario, bed_z_m: float) -> Target:
     """The target where the crew took it to be; its shape is known."""
     mesh = Mesh(truth.vertices_m, truth.faces)
     middle = 0.5 * (truth.vertices_m.min(axis=0) + truth.vertices_m.max(axis=0))

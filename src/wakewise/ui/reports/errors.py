@@ -14,8 +14,8 @@ from scipy.spatial import KDTree
 from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError, StageError
 from wakewise.scene.targets import MeshDistance
-from wakewise.ui.reports.trial import Surface, Trial
-from wakewise.vision.evaluation import Crop, Refinement, refine_icp, sample_surface, thin
+from wakewise.ui.reports.trial import Trial, TrialMesh
+from wakewise.vision.evaluation import Crop, IcpRefinement, refine_icp, sample_surface, thin
 
 VOXEL_M = 0.0008
 """The cloud is thinned to one mean point per cell of this size, as the score does."""
@@ -37,7 +37,7 @@ class CloudErrors:
     coverage_m: Array
     counts: BoolArray
     samples_m: Array
-    refinement: Refinement | None
+    refinement: IcpRefinement | None
     box_m: tuple[Array, Array]
     to_truth: MeshDistance
 
@@ -58,7 +58,7 @@ class ModelErrors(CloudErrors):
     Both are None where there is no mesh.
     """
 
-    model: Surface | None
+    model: TrialMesh | None
     model_accuracy_m: Array | None
 
 
@@ -106,7 +106,7 @@ def model_errors(trial: Trial, cloud: CloudErrors | None = None) -> ModelErrors 
         moved = model.vertices_m if cloud.refinement is None else cloud.refinement.apply(model.vertices_m)
         inside = Crop(bed_z_m=trial.bed_z_m).keeps(moved, *cloud.box_m)
         faces = model.faces[inside[model.faces].all(axis=1)]
-        model = Surface(vertices_m=moved, faces=faces) if len(faces) else None
+        model = TrialMesh(vertices_m=moved, faces=faces) if len(faces) else None
     if model is not None:
         accuracy = cloud.to_truth(model.vertices_m)
     known = {field.name: getattr(cloud, field.name) for field in fields(CloudErrors)}

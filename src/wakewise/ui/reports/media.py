@@ -14,11 +14,11 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.ui.reports.page import panel
 from wakewise.ui.reports.svg_style import data_uri
 from wakewise.ui.reports.text import number
-from wakewise.ui.reports.trial import Photograph, Surface, Trial
+from wakewise.ui.reports.trial import Photograph, Trial, TrialMesh
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.imaging.sensor import srgb_encode
 from wakewise.vision.texturing.colour import WaterFit, balanced, fit_water, without_water
-from wakewise.vision.texturing.photo_colours import Depths
+from wakewise.vision.texturing.photo_colours import RangeMaps
 from wakewise.vision.texturing.textured import read_textured
 
 FILMS = {"film.mp4": "video/mp4", "film.webm": "video/webm", "film.webp": "image/webp"}
@@ -80,7 +80,7 @@ def colours_html(trial: Trial) -> str:
     )
 
 
-def coloured_model(trial: Trial) -> tuple[Surface, Array] | None:
+def coloured_model(trial: Trial) -> tuple[TrialMesh, Array] | None:
     """The model in the photographs' colours, world NED, and sRGB colours 0 to 1, shape (n, 3); None without one."""
     path = trial.folder / "mesh.glb"
     if not path.is_file():
@@ -91,7 +91,7 @@ def coloured_model(trial: Trial) -> tuple[Surface, Array] | None:
         return None
     # Back from x east, y up, z south.
     east, up, south = vertices.T
-    surface = Surface(vertices_m=np.column_stack([-south, east, trial.bed_z_m - up]), faces=faces)
+    surface = TrialMesh(vertices_m=np.column_stack([-south, east, trial.bed_z_m - up]), faces=faces)
     return surface, srgb_encode(colours)
 
 
@@ -103,7 +103,7 @@ def _water(folder: Path, shots: list[Photograph]) -> tuple[dict[str, NDArray[np.
     if not (folder / "sparse" / "images.bin").is_file():
         return {}, None
     try:
-        depths = Depths.read(folder)
+        depths = RangeMaps.read(folder)
         ranges: dict[str, NDArray[np.float32]] = {}
         pairs = []
         for shot in shots:

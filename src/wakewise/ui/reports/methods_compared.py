@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wakewise.experiments.campaigns.statistics import performance_profile, stratified_bootstrap
-from wakewise.experiments.campaigns.summary import Glance, Measure, Place
+from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place
 from wakewise.ui.reports.figures import NARROW_IN, WIDTH_IN
 from wakewise.ui.reports.svg_style import CORAL, INK, MUTED, SAND, SLATE, TEAL, VIOLET, dress, key, new_figure
 from wakewise.ui.reports.text import number, percent
@@ -45,7 +45,7 @@ def colours_of(methods: Sequence[str]) -> dict[str, str]:
     return {method: _OTHERS[k % len(_OTHERS)] for k, method in enumerate(methods)}
 
 
-def won(glance: Glance) -> str:
+def won(glance: MethodSummary) -> str:
     """Who won, by how much, how sure; nobody where the interval of the difference holds zero or pairs are few."""
     value = number(glance.means[glance.winner])
     if glance.rival is None:
@@ -64,11 +64,11 @@ def won(glance: Glance) -> str:
     return f"{said}; {glance.sure}."
 
 
-def _better(glance: Glance) -> str:
+def _better(glance: MethodSummary) -> str:
     return " ".join(part for part in percent(glance.less_pct, glance.interval_pct, more=True) if part)
 
 
-def price(glance: Glance) -> str:
+def price(glance: MethodSummary) -> str:
     """What the winner costs, and where trials failed."""
     said = []
     if glance.energy_ratio is not None:
@@ -86,7 +86,7 @@ def price(glance: Glance) -> str:
 
 
 def methods_compared(
-    measure: Measure, places: Sequence[Place], rows: Sequence[Row] = (), narrow: bool = False
+    measure: ComparisonMetric, places: Sequence[Place], rows: Sequence[Row] = (), narrow: bool = False
 ) -> Figure | None:
     """A panel per world: each trial a dot, the mean with its interval, the paper's figure a tick."""
     figure, words, scale, _ = measure
@@ -123,7 +123,7 @@ def methods_compared(
     return drawn
 
 
-def profiles(measure: Measure, places: Sequence[Place], narrow: bool = False) -> Figure | None:
+def profiles(measure: ComparisonMetric, places: Sequence[Place], narrow: bool = False) -> Figure | None:
     """Share of trials that are at least so good, by method, a panel per world; failed trials never are."""
     figure, words, scale, less = measure
     if not less:

@@ -7,17 +7,17 @@ from wakewise.ui.reports import figures
 from wakewise.ui.reports.errors import CloudErrors, ModelErrors, cloud_errors, model_errors
 from wakewise.ui.reports.media import coloured_model
 from wakewise.ui.reports.page import absence, chip, error_scale, missing, panel, pictures, plot, scene_box, section
-from wakewise.ui.reports.page_parts import Draft
+from wakewise.ui.reports.page_parts import PageParts
 from wakewise.ui.reports.scene3d import CAMERA_RGB, HULL_RGB, PATH_RGB, PLANNED_RGB, scene_html
 from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, error_colours
 from wakewise.ui.reports.text import number
-from wakewise.ui.reports.trial import Surface, Trial
-from wakewise.ui.reports.views import OUTLOOK, SIDES, Drawing, Frame, coverage_colours, draw_cloud, draw_surface
+from wakewise.ui.reports.trial import Trial, TrialMesh
+from wakewise.ui.reports.views import OUTLOOK, SIDES, Drawing, ViewBounds, coverage_colours, draw_cloud, draw_surface
 
 VIEW_PIXELS = 360
 
 
-def before_mesh(trial: Trial, draft: Draft) -> None:
+def before_mesh(trial: Trial, draft: PageParts) -> None:
     """Make what of the part shows neither mesh nor colours."""
     cloud = draft.once("cloud", lambda: cloud_errors(trial))
     if cloud is not None:
@@ -25,34 +25,34 @@ def before_mesh(trial: Trial, draft: Draft) -> None:
         _spread(cloud, draft)
 
 
-def before_colours(trial: Trial, draft: Draft) -> None:
+def before_colours(trial: Trial, draft: PageParts) -> None:
     """Make what of the part shows the mesh but not its colours."""
     errors = _errors(trial, draft)
     if errors is not None and trial.truth is not None:
         _accuracy(trial.truth, errors, draft)
 
 
-def _errors(trial: Trial, draft: Draft) -> ModelErrors | None:
+def _errors(trial: Trial, draft: PageParts) -> ModelErrors | None:
     cloud = draft.once("cloud", lambda: cloud_errors(trial))
     return draft.once("errors", lambda: None if cloud is None else model_errors(trial, cloud))
 
 
-def _covered(trial: Trial, cloud: CloudErrors, draft: Draft) -> list[str]:
+def _covered(trial: Trial, cloud: CloudErrors, draft: PageParts) -> list[str]:
     """The truth by its distance to the cloud, from all sides."""
 
     def make() -> list[str]:
         if trial.truth is None:
             return []
-        frame = Frame.around(trial.truth.vertices_m[cloud.counts])
+        frame = ViewBounds.around(trial.truth.vertices_m[cloud.counts])
         colours = coverage_colours(cloud.coverage_m, cloud.counts)
         return draw_surface(trial.truth, colours, SIDES, frame, VIEW_PIXELS)
 
     return draft.once("covered", make)
 
 
-def _accuracy(truth: Surface, errors: ModelErrors, draft: Draft) -> list[str]:
+def _accuracy(truth: TrialMesh, errors: ModelErrors, draft: PageParts) -> list[str]:
     """The mesh, or else the cloud, by its distance to the truth, from all sides."""
-    frame = Frame.around(truth.vertices_m[errors.counts])
+    frame = ViewBounds.around(truth.vertices_m[errors.counts])
 
     def make() -> list[str]:
         if errors.model is not None and errors.model_accuracy_m is not None:
@@ -62,7 +62,7 @@ def _accuracy(truth: Surface, errors: ModelErrors, draft: Draft) -> list[str]:
     return draft.once("accuracy", make)
 
 
-def _spread(errors: CloudErrors, draft: Draft) -> str:
+def _spread(errors: CloudErrors, draft: PageParts) -> str:
     return draft.once(
         "spread",
         lambda: plot(
@@ -75,7 +75,7 @@ def _spread(errors: CloudErrors, draft: Draft) -> str:
     )
 
 
-def model_section(trial: Trial, draft: Draft) -> str:
+def model_section(trial: Trial, draft: PageParts) -> str:
     """HTML of the part; what `draft` holds is taken from there."""
     errors = _errors(trial, draft)
     coloured = coloured_model(trial)
@@ -110,12 +110,12 @@ def model_section(trial: Trial, draft: Draft) -> str:
 
 
 def _poster(
-    trial: Trial, errors: ModelErrors | None, coloured: tuple[Surface, Array] | None, drawing: Drawing | None
+    trial: Trial, errors: ModelErrors | None, coloured: tuple[TrialMesh, Array] | None, drawing: Drawing | None
 ) -> str:
     """The model as the 3D scene opens on it, for as long as the scene loads; empty where there is none."""
     if trial.truth is None:
         return ""
-    frame = Frame.around(trial.truth.vertices_m)
+    frame = ViewBounds.around(trial.truth.vertices_m)
     if coloured is not None and drawing is not None:
         return drawing.pictures(coloured[1], (OUTLOOK,), frame, VIEW_PIXELS)[0]
     if errors is not None and errors.model is not None and errors.model_accuracy_m is not None:
@@ -123,11 +123,11 @@ def _poster(
     return ""
 
 
-def _in_colour(coloured: tuple[Surface, Array] | None, drawing: Drawing | None) -> str:
+def _in_colour(coloured: tuple[TrialMesh, Array] | None, drawing: Drawing | None) -> str:
     if coloured is None or drawing is None:
         return ""
     surface, colours = coloured
-    views = drawing.pictures(colours, SIDES, Frame.around(surface.vertices_m), VIEW_PIXELS)
+    views = drawing.pictures(colours, SIDES, ViewBounds.around(surface.vertices_m), VIEW_PIXELS)
     text = "The model in the colours of its photographs, as mesh.glb has it for other programs."
     return panel("Likeness", text, "", pictures(views, SIDES, "model in colour"))
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from wakewise.ui.reports.svg_style import ERROR_LIMIT_MM, ERROR_STOPS, OVER_LIMIT, css_gradient, inline_svg
 from wakewise.ui.reports.trial import Trial
-from wakewise.ui.reports.views import View
+from wakewise.ui.reports.views import Viewpoint
 
 _LIGHT, _DARK_WHERE_THE_PAGE_IS = "darkMode:false", "darkMode:matchMedia('(prefers-color-scheme: dark)').matches"
 _CODE = re.compile(r"`([^`]+)`")
@@ -89,7 +89,7 @@ def panel(title: str, text: str, aside: str, content: str) -> str:
     )
 
 
-def pictures(sources: Sequence[str], views: Sequence[View], what: str) -> str:
+def pictures(sources: Sequence[str], views: Sequence[Viewpoint], what: str) -> str:
     """Views of one thing side by side."""
     return '<div class="views">' + "".join(
         f'<figure><img alt="{escape(what)} {view.name}" src="{source}"><figcaption>{view.name}</figcaption></figure>'

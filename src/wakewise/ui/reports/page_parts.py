@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 
-class Draft:
+class PageParts:
     """Keeps each part of a page by name, so that it is made once: early if that can be, else with the page.
 
     A draft belongs to one page. Whoever asks for a part before the page is written must know that nothing which the

@@ -10,13 +10,13 @@ from wakewise.core.files import write_text
 from wakewise.ui.reports.page import fold, section, tile, whole_page
 from wakewise.ui.reports.svg_style import data_uri
 from wakewise.ui.reports.text import fixed, shown
-from wakewise.vision.reconstruction.photo_preview import Look, PhotoLook
+from wakewise.vision.reconstruction.photo_preview import PhotoPreview, PhotoQuality
 
 MOST_BAD = 0.1
 """Share of the photographs to look at again up to which a dive is fair, and not bad."""
 
 
-def write_look(look: Look, thumbs: Mapping[str, bytes], path: Path, title: str) -> None:
+def write_look(look: PhotoPreview, thumbs: Mapping[str, bytes], path: Path, title: str) -> None:
     """Write a look as one HTML file that opens with no network.
 
     Parameters
@@ -27,7 +27,7 @@ def write_look(look: Look, thumbs: Mapping[str, bytes], path: Path, title: str) 
     write_text(path, look_page(look, thumbs, title))
 
 
-def look_page(look: Look, thumbs: Mapping[str, bytes], title: str) -> str:
+def look_page(look: PhotoPreview, thumbs: Mapping[str, bytes], title: str) -> str:
     """HTML of a look."""
     bad = [photo for photo in look.photos if photo.faults]
     good = [photo for photo in look.photos if not photo.faults]
@@ -78,11 +78,11 @@ def look_page(look: Look, thumbs: Mapping[str, bytes], title: str) -> str:
     return whole_page(f"{title} · a look", body)
 
 
-def _sheet(photos: list[PhotoLook], thumbs: Mapping[str, bytes]) -> str:
+def _sheet(photos: list[PhotoQuality], thumbs: Mapping[str, bytes]) -> str:
     return f'<div class="sheet">{"".join(_photo(photo, thumbs[photo.name]) for photo in photos)}</div>'
 
 
-def _photo(photo: PhotoLook, thumb: bytes) -> str:
+def _photo(photo: PhotoQuality, thumb: bytes) -> str:
     source = data_uri(thumb, "image/jpeg")
     short = photo.faults[0].split(":")[0] if photo.faults else ""
     tag = f'<span class="tag worst">{escape(short)}</span>' if short else ""

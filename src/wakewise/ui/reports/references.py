@@ -27,7 +27,7 @@ SMALL = 0.25
 
 
 @dataclass(frozen=True)
-class Bar:
+class ReferenceBar:
     """One bar of a yardstick: what it is, its value in its neighbours' unit and as text; `own` is this trial's."""
 
     name: str
@@ -37,7 +37,7 @@ class Bar:
 
 
 @dataclass(frozen=True)
-class Yardstick:
+class ReferenceComparison:
     """One question, its answer in a few words, the sentence behind it, and bars to one scale.
 
     `good` is None where the answer is neither good nor bad.
@@ -47,10 +47,10 @@ class Yardstick:
     verdict: str
     good: bool | None
     sentence: str
-    bars: tuple[Bar, ...]
+    bars: tuple[ReferenceBar, ...]
 
 
-def yardsticks(trial: Trial) -> list[Yardstick]:
+def yardsticks(trial: Trial) -> list[ReferenceComparison]:
     """Those that the trial's figures allow, in the order of the page."""
     return [found for found in (against_water(trial), against_dp(trial), against_grains(trial)) if found is not None]
 
@@ -67,19 +67,19 @@ def yardstick_html(trial: Trial) -> str:
     return section("yardstick", "Is that calm?", lead, f'<div class="yardsticks">{cards}</div>')
 
 
-def against_water(trial: Trial) -> Yardstick | None:
+def against_water(trial: Trial) -> ReferenceComparison | None:
     """The wash against still water and against the water's own motion."""
     wash, own = trial.metrics.number("target_speed_mean_m_s"), trial.metrics.number("ambient_speed_m_s")
     if wash is None:
         return None
     said = f"{number(1e3 * wash)} mm/s"
     still = f"Without thrusters this would be 0: the {said} are what they add to the water's own motion."
-    bars: tuple[Bar, ...] = (Bar("this flight's wash", 1e3 * wash, said, own=True),)
+    bars: tuple[ReferenceBar, ...] = (ReferenceBar("this flight's wash", 1e3 * wash, said, own=True),)
     if own is None:
-        return Yardstick("Against still water", f"{said} of wash", None, still, bars)
+        return ReferenceComparison("Against still water", f"{said} of wash", None, still, bars)
     if own < 1e-4:
         words = f"{still} This water has no motion of its own, so all that moved at the target is wash."
-        return Yardstick("Against still water", f"{said} where nothing else moves", None, words, bars)
+        return ReferenceComparison("Against still water", f"{said} where nothing else moves", None, words, bars)
     share = wash / own
     verdict = (
         "small beside the water's own motion" if share < SMALL
@@ -87,11 +87,11 @@ def against_water(trial: Trial) -> Yardstick | None:
         else "faster than the water itself"
     )  # fmt: skip
     words = f"{still} That motion passes the target at {number(1e3 * own)} mm/s, so the wash is {_share(share)} of it."
-    bars += (Bar("the water's own speed", 1e3 * own, f"{number(1e3 * own)} mm/s"),)
-    return Yardstick("Against the water itself", verdict, share < 1.0, words, bars)
+    bars += (ReferenceBar("the water's own speed", 1e3 * own, f"{number(1e3 * own)} mm/s"),)
+    return ReferenceComparison("Against the water itself", verdict, share < 1.0, words, bars)
 
 
-def against_dp(trial: Trial) -> Yardstick | None:
+def against_dp(trial: Trial) -> ReferenceComparison | None:
     """The thrusts flown against the least thrusts for the same wrenches, and a flight of `dp` beside this one."""
     metrics = trial.metrics
     flown, least = metrics.number("disturbance_flown"), metrics.number("disturbance_least_thrusts")
@@ -100,18 +100,18 @@ def against_dp(trial: Trial) -> Yardstick | None:
     measured = None if trial.method == "dp" else _measured_dp_m_s(trial)
     if trial.method == "dp":
         words = "dp is the yardstick: it makes every force with the least thrusts, wherever their jets go."
-        return Yardstick("Against dp", "this flight is dp's", None, words, ())
+        return ReferenceComparison("Against dp", "this flight is dp's", None, words, ())
     if measured and wash is not None:
         words = "Flown by dp in the same water from the same seed, one draw against one draw."
         if flown and least:
             times = number(least / flown)
             words += f" By the wake model's estimate, dp's sharing of these forces would disturb {times} times as much."
         bars = (
-            Bar("this flight's wash", 1e3 * wash, f"{number(1e3 * wash)} mm/s", own=True),
-            Bar("dp's wash, measured", 1e3 * measured, f"{number(1e3 * measured)} mm/s"),
+            ReferenceBar("this flight's wash", 1e3 * wash, f"{number(1e3 * wash)} mm/s", own=True),
+            ReferenceBar("dp's wash, measured", 1e3 * measured, f"{number(1e3 * measured)} mm/s"),
         )
         ratio = wash / measured
-        return Yardstick(title, f"{_against(ratio)} wash", _good(ratio), words, bars)
+        return ReferenceComparison(title, f"{_against(ratio)} wash", _good(ratio), words, bars)
     if not flown or not least:
         return None
     words = (
@@ -121,10 +121,10 @@ def against_dp(trial: Trial) -> Yardstick | None:
         "squared jet speeds at the target."
     )
     bars = (
-        Bar("D as flown, estimated", flown, f"{number(flown)} m²/s²", own=True),
-        Bar("D of dp's sharing, estimated", least, f"{number(least)} m²/s²"),
+        ReferenceBar("D as flown, estimated", flown, f"{number(flown)} m²/s²", own=True),
+        ReferenceBar("D of dp's sharing, estimated", least, f"{number(least)} m²/s²"),
     )
-    return Yardstick(title, "not measured: dp has not flown in this water", None, words, bars)
+    return ReferenceComparison(title, "not measured: dp has not flown in this water", None, words, bars)
 
 
 def _measured_dp_m_s(trial: Trial) -> float | None:
@@ -141,7 +141,7 @@ def _measured_dp_m_s(trial: Trial) -> float | None:
     return float(found) if not same and other.method == "dp" and isinstance(found, int | float) else None
 
 
-def against_grains(trial: Trial) -> Yardstick | None:
+def against_grains(trial: Trial) -> ReferenceComparison | None:
     """The pull of the water on the bed against the pull from which its grains move."""
     metrics = trial.metrics
     pull, moves = metrics.number("bed_shear_p95_Pa"), metrics.number("grain_threshold_Pa")
@@ -161,11 +161,11 @@ def against_grains(trial: Trial) -> Yardstick | None:
     lifted = pull >= moves or bool(over)
     verdict = "grains move" if pull >= moves else "grains move now and then" if lifted else "the bed stays put"
     bars = (
-        Bar("pull on the bed", pull, f"{number(pull)} Pa", own=True),
-        Bar("grains move from", moves, f"{number(moves)} Pa"),
+        ReferenceBar("pull on the bed", pull, f"{number(pull)} Pa", own=True),
+        ReferenceBar("grains move from", moves, f"{number(moves)} Pa"),
     )
     seldom = pull < moves and over is not None and 0.0 < over <= SELDOM
-    return Yardstick("Against the bed's grains", verdict, None if seldom else not lifted, words, bars)
+    return ReferenceComparison("Against the bed's grains", verdict, None if seldom else not lifted, words, bars)
 
 
 def _share_over(trial: Trial, limit: float) -> float | None:
@@ -195,7 +195,7 @@ def _share(share: float) -> str:
     return f"{number(100.0 * share, 2)} %"
 
 
-def _card(found: Yardstick) -> str:
+def _card(found: ReferenceComparison) -> str:
     top = max((bar.value for bar in found.bars), default=0.0) or 1.0
     rows = "".join(
         f'<dt>{escape(bar.name)}</dt><dd><i class="{"own" if bar.own else ""}" '

@@ -13,7 +13,7 @@ from wakewise.ui.reports.limits import limits_section
 from wakewise.ui.reports.media import colours_html, film_html
 from wakewise.ui.reports.model import before_colours, before_mesh, model_section
 from wakewise.ui.reports.page import absence, fold, missing, plot, prose, section, tile, whole_page
-from wakewise.ui.reports.page_parts import Draft
+from wakewise.ui.reports.page_parts import PageParts
 from wakewise.ui.reports.photos import contact_sheet
 from wakewise.ui.reports.references import yardstick_html
 from wakewise.ui.reports.scene3d import vehicle_of
@@ -34,13 +34,13 @@ PARTS = (
 )
 
 
-def begin_report(trial: Path, draft: Draft, missing: str) -> None:
+def begin_report(trial: Path, draft: PageParts, missing: str) -> None:
     """Make the parts of a report that can be made before its folder is whole.
 
     Parameters
     ----------
     trial : Path
-    draft : Draft
+    draft : PageParts
         Takes them; give it to `write_report` then.
     missing : {"mesh", "colours"}
         What is still being made: the mesh and its colours, or the colours alone.
@@ -61,7 +61,7 @@ def begin_report(trial: Path, draft: Draft, missing: str) -> None:
         draft.once("seen", lambda: colours_html(read))
 
 
-def write_report(trial: Path, draft: Draft | None = None) -> Path:
+def write_report(trial: Path, draft: PageParts | None = None) -> Path:
     """Write report.html into a trial folder and give its path; `draft` holds the parts that are made already.
 
     The page is one file that opens with no network. A part of the folder that is missing leaves a gap that says why.
@@ -77,9 +77,9 @@ def write_report(trial: Path, draft: Draft | None = None) -> Path:
     return path
 
 
-def report_page(trial: Trial, draft: Draft | None = None) -> str:
+def report_page(trial: Trial, draft: PageParts | None = None) -> str:
     """HTML of the whole report; `draft` holds the parts that are made already."""
-    draft = draft or Draft()
+    draft = draft or PageParts()
     calm = yardstick_html(trial)
     parts = [part for part in PARTS if calm or part[0] != "yardstick"]
     links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in parts)
@@ -156,7 +156,7 @@ def _energy(trial: Trial) -> str:
     return "duration" if energy is None else f"{number(energy)} kJ in the thrusters"
 
 
-def _flown(trial: Trial, draft: Draft) -> str:
+def _flown(trial: Trial, draft: PageParts) -> str:
     return draft.once("flown", lambda: _flown_section(trial))
 
 
@@ -195,12 +195,12 @@ def _leg_of(trial: Trial, time_s: float) -> str:
     return next((name for name in names if name.startswith("orbit")), names[0] if names else "")
 
 
-def _seen_photographs(trial: Trial, draft: Draft) -> str:
+def _seen_photographs(trial: Trial, draft: PageParts) -> str:
     leg_of = {i: _leg_of(trial, shot.time_s) for i, shot in enumerate(trial.photographs)}
     return draft.once("photographs", lambda: contact_sheet(trial, leg_of))
 
 
-def _seen(trial: Trial, draft: Draft) -> str:
+def _seen(trial: Trial, draft: PageParts) -> str:
     if not trial.photographs:
         gap = missing("the photographs", absence(trial, "images.csv"))
         return section("seen", "What was seen", "No photographs are on record.", gap)
@@ -217,7 +217,7 @@ def _seen(trial: Trial, draft: Draft) -> str:
     )
 
 
-def _water(trial: Trial, draft: Draft) -> str:
+def _water(trial: Trial, draft: PageParts) -> str:
     return draft.once("water", lambda: _water_section(trial))
 
 

@@ -25,7 +25,7 @@ from wakewise.robot.vehicles import Vehicle
 from wakewise.ui.reports.errors import ModelErrors
 from wakewise.ui.reports.media import coloured_model
 from wakewise.ui.reports.svg_style import error_colours
-from wakewise.ui.reports.trial import Photograph, Surface, Trial
+from wakewise.ui.reports.trial import Photograph, Trial, TrialMesh
 from wakewise.ui.reports.vehicle.hull import hull_of
 from wakewise.ui.reports.views import OUTLOOK
 from wakewise.vision.image_decoding import read_picture
@@ -173,7 +173,7 @@ def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None)
         )
 
 
-def lightened(mesh: Surface, max_faces: int = MAX_FACES) -> tuple[Surface, IntArray]:
+def lightened(mesh: TrialMesh, max_faces: int = MAX_FACES) -> tuple[TrialMesh, IntArray]:
     """A mesh light enough for a page, and for each of its vertices the index of the one that it was.
 
     Vertices that share a cell of a grid become one; the cells grow until at most `max_faces` triangles are left.
@@ -193,7 +193,7 @@ def lightened(mesh: Surface, max_faces: int = MAX_FACES) -> tuple[Surface, IntAr
         corners = corners[(a != b) & (b != c) & (c != a)]
         chosen = keep[first]
         cell_m *= 1.25
-    return Surface(vertices_m=mesh.vertices_m[chosen], faces=corners), chosen
+    return TrialMesh(vertices_m=mesh.vertices_m[chosen], faces=corners), chosen
 
 
 def _cameras(server: viser.ViserServer, trial: Trial) -> None:

@@ -18,12 +18,12 @@ from matplotlib.figure import Figure
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file, write_bytes, write_text
-from wakewise.scene.targets import Delicacy, Region, Target
+from wakewise.scene.targets import Fragility, Region, Target
 from wakewise.scene.targets.fragility import DELICATE_FROM, SHARP_PER_M, THIN_M
 from wakewise.ui.reports.page import plot, tile, whole_page
 from wakewise.ui.reports.svg_style import INK, LINE, MUTED, SLATE, TEAL, dress, new_figure
-from wakewise.ui.reports.trial import Surface
-from wakewise.ui.reports.views import Frame, View, draw_surface
+from wakewise.ui.reports.trial import TrialMesh
+from wakewise.ui.reports.views import ViewBounds, Viewpoint, draw_surface
 
 SUFFIXES = (".html", ".svg", ".ply")
 VIEW_PIXELS = 560
@@ -31,14 +31,14 @@ VIEW_PIXELS = 560
 SCALE = LinearSegmentedColormap.from_list("delicate", ("#ece7da", "#a9cfb8", "#4fa6a3", "#2a6a92", "#3b2a77"))
 _NEAR_TO_FAR = LinearSegmentedColormap.from_list("far", colormaps["viridis"](np.linspace(0.0, 0.85, 64)))
 VIEWS = (
-    View(name="from the north", azimuth_deg=0, elevation_deg=18),
-    View(name="from the east", azimuth_deg=90, elevation_deg=18),
-    View(name="from above", azimuth_deg=180, elevation_deg=89.9),
+    Viewpoint(name="from the north", azimuth_deg=0, elevation_deg=18),
+    Viewpoint(name="from the east", azimuth_deg=90, elevation_deg=18),
+    Viewpoint(name="from above", azimuth_deg=180, elevation_deg=89.9),
 )
 _OVER_BED_M = 1e-4
 
 
-def write_target(path: Path, target: Target, delicacy: Delicacy, region: Region) -> None:
+def write_target(path: Path, target: Target, delicacy: Fragility, region: Region) -> None:
     """Write a target's delicate features as a page (.html), a picture (.svg) or a coloured mesh (.ply).
 
     Raises
@@ -58,7 +58,7 @@ def write_target(path: Path, target: Target, delicacy: Delicacy, region: Region)
         raise InputError(f"{path}: suffix '{path.suffix}', allowed: {', '.join(SUFFIXES)}")
 
 
-def write_coloured(path: Path, target: Target, delicacy: Delicacy) -> None:
+def write_coloured(path: Path, target: Target, delicacy: Fragility) -> None:
     """Write the mesh as binary PLY with a colour and the property `delicate` per vertex; z up, bed at z = 0, metres."""
     vertices = target.mesh.vertices_m * [1.0, -1.0, -1.0] + [0.0, 0.0, target.bed_z_m]
     colours = np.round(255 * colours_of(delicacy.score)).astype(np.uint8)
@@ -72,11 +72,11 @@ def colours_of(score: Array) -> Array:
     return np.asarray(SCALE(np.clip(score, 0.0, 1.0)), dtype=np.float64)[:, :3]
 
 
-def picture(target: Target, delicacy: Delicacy, page: bool = True) -> Figure:
+def picture(target: Target, delicacy: Fragility, page: bool = True) -> Figure:
     """Target from three sides, coloured by score; in the page's ink, or in black for a picture of its own."""
     ink, muted, line = (INK, MUTED, LINE) if page else ("#12252d", "#587079", "#d9e1e3")
-    surface = Surface(vertices_m=target.mesh.vertices_m, faces=_above(target))
-    frame = Frame.around(target.mesh.vertices_m[np.unique(surface.faces)])
+    surface = TrialMesh(vertices_m=target.mesh.vertices_m, faces=_above(target))
+    frame = ViewBounds.around(target.mesh.vertices_m[np.unique(surface.faces)])
     sources = draw_surface(surface, colours_of(delicacy.score), VIEWS, frame, VIEW_PIXELS)
     figure = new_figure(10.2, 4.1)
     grid = figure.subplots(1, 3)
@@ -96,7 +96,7 @@ def picture(target: Target, delicacy: Delicacy, page: bool = True) -> Figure:
     return figure
 
 
-def spread(target: Target, delicacy: Delicacy) -> Figure:
+def spread(target: Target, delicacy: Fragility) -> Figure:
     """How much of the surface is how thick and how curved, with the bounds between which a score rises."""
     faces = _above(target)
     corners = target.mesh.triangles_m[_kept(target)]
@@ -149,7 +149,7 @@ def region_points(target: Target, region: Region) -> Figure:
     return figure
 
 
-def target_page(target: Target, delicacy: Delicacy, region: Region) -> str:
+def target_page(target: Target, delicacy: Fragility, region: Region) -> str:
     """HTML of the whole page, which opens with no network."""
     mesh = target.mesh
     length, width, height = 1e3 * mesh.extent_m

@@ -40,7 +40,7 @@ OTHER = "Other figures"
 
 
 @dataclass(frozen=True)
-class Verdict:
+class TrialHeadline:
     """Headline of a trial: `good` is None where the trial could not be judged."""
 
     good: bool | None
@@ -48,7 +48,7 @@ class Verdict:
     reasons: tuple[str, ...]
 
 
-def verdict(trial: Trial, *, named: bool = False) -> Verdict:
+def verdict(trial: Trial, *, named: bool = False) -> TrialHeadline:
     """Say whether the scan succeeded and why, in words; `named` says in the headline which method flew."""
     who = f" with {trial.method}" if named else ""
     metrics = trial.metrics
@@ -60,14 +60,14 @@ def verdict(trial: Trial, *, named: bool = False) -> Verdict:
         why = metrics.why.get("rmse_mm") or metrics.why.get("completeness_pct")
         headline = "The model was not measured." if made else "There is no model."
         headline += f" Flown{who}." if named else ""
-        return Verdict(
+        return TrialHeadline(
             False if success is False else None,
             headline,
             ((_sentence(why.removeprefix("no model: ")),) if why else ()) + reasons,
         )
     figures = f"{number(rmse)} mm RMSE, {number(covered)} % of the surface covered"
     good = success if isinstance(success, bool) else rmse < SUCCESS_RMSE_MM and covered > SUCCESS_COMPLETENESS_PCT
-    return Verdict(good, f"{'Success' if good else 'Not good enough'}{who}: {figures}.", reasons)
+    return TrialHeadline(good, f"{'Success' if good else 'Not good enough'}{who}: {figures}.", reasons)
 
 
 def _reasons(trial: Trial, rmse: float | None, covered: float | None) -> list[str]:

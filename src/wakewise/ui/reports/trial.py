@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Surface:
+class TrialMesh:
     """A triangle mesh in the world: vertices_m, shape (n, 3), and faces, shape (m, 3)."""
 
     vertices_m: Array
@@ -75,8 +75,8 @@ class Trial:
     steps: pl.DataFrame | None
     photographs: tuple[Photograph, ...]
     planned: tuple[Pose, ...]
-    truth: Surface | None
-    model: Surface | None
+    truth: TrialMesh | None
+    model: TrialMesh | None
     cloud_m: Array | None
     missing: Mapping[str, str]
 
@@ -251,11 +251,11 @@ def _read_planned(path: Path) -> tuple[Pose, ...]:
     return tuple(pose for pose in poses if pose is not None)
 
 
-def _read_surface(path: Path) -> Surface:
+def _read_surface(path: Path) -> TrialMesh:
     mesh = trimesh.load(path, process=False)
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise ValueError("holds no triangles")
-    return Surface(vertices_m=np.asarray(mesh.vertices, np.float64), faces=np.asarray(mesh.faces, np.int64))
+    return TrialMesh(vertices_m=np.asarray(mesh.vertices, np.float64), faces=np.asarray(mesh.faces, np.int64))
 
 
 def _read_cloud(path: Path) -> Array:

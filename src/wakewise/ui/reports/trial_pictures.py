@@ -15,11 +15,11 @@ from matplotlib.figure import Figure
 
 from wakewise.core.arrays import Array
 from wakewise.experiments.campaigns.pictures import MODEL, photographs_of
-from wakewise.experiments.campaigns.summary import Measure, Place, worst_trials
+from wakewise.experiments.campaigns.summary import ComparisonMetric, Place, worst_trials
 from wakewise.ui.reports.page import error_scale, panel
 from wakewise.ui.reports.svg_style import data_uri, error_colours
 from wakewise.ui.reports.text import number
-from wakewise.ui.reports.views import SIDES, Frame, draw_cloud
+from wakewise.ui.reports.views import SIDES, ViewBounds, draw_cloud
 from wakewise.vision.image_decoding import read_picture
 
 PIXELS = 260
@@ -28,7 +28,7 @@ _SHEET = ("north", "east", "above")
 _ROW_IN, _WIDE_IN, _DPI, _QUALITY = 1.75, 9.0, 100, 82
 
 
-def worst_panels(measure: Measure, places: Sequence[Place], store: Path) -> str:
+def worst_panels(measure: ComparisonMetric, places: Sequence[Place], store: Path) -> str:
     """The worst trial of each method in each world: what its camera saw, and its model; empty where none was kept."""
     parts = []
     for world in dict.fromkeys(place["world"] for place in places):
@@ -124,7 +124,7 @@ def _views(path: Path) -> list[str] | None:
         return None
     with np.load(path) as kept:
         points, errors = kept["points_m"].astype(np.float64), kept["error_mm"].astype(np.float64)
-    return draw_cloud(points, error_colours(1e-3 * errors), SIDES, Frame.around(points), PIXELS)
+    return draw_cloud(points, error_colours(1e-3 * errors), SIDES, ViewBounds.around(points), PIXELS)
 
 
 def _on_white(source: str) -> Array:

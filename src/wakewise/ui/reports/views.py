@@ -11,7 +11,7 @@ from embreex.mesh_construction import TriangleMesh
 
 from wakewise.core.arrays import Array, BoolArray
 from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, data_uri, error_colours, rgb
-from wakewise.ui.reports.trial import Surface
+from wakewise.ui.reports.trial import TrialMesh
 
 SAMPLES_PER_PIXEL = 4
 # Light over the viewer's left shoulder: right, up, toward the viewer.
@@ -19,7 +19,7 @@ _LIGHT = np.array([-0.45, 0.65, 0.62])
 
 
 @dataclass(frozen=True, kw_only=True)
-class View:
+class Viewpoint:
     """Where the viewer stands: `azimuth_deg` from north over east, `elevation_deg` above the horizon."""
 
     name: str
@@ -36,25 +36,25 @@ class View:
 
 
 SIDES = (
-    View(name="from the north", azimuth_deg=0, elevation_deg=20),
-    View(name="from the east", azimuth_deg=90, elevation_deg=20),
-    View(name="from the south", azimuth_deg=180, elevation_deg=20),
-    View(name="from the west", azimuth_deg=270, elevation_deg=20),
-    View(name="from above", azimuth_deg=180, elevation_deg=89.9),
+    Viewpoint(name="from the north", azimuth_deg=0, elevation_deg=20),
+    Viewpoint(name="from the east", azimuth_deg=90, elevation_deg=20),
+    Viewpoint(name="from the south", azimuth_deg=180, elevation_deg=20),
+    Viewpoint(name="from the west", azimuth_deg=270, elevation_deg=20),
+    Viewpoint(name="from above", azimuth_deg=180, elevation_deg=89.9),
 )
-OUTLOOK = View(name="from the south-east", azimuth_deg=138, elevation_deg=23)
+OUTLOOK = Viewpoint(name="from the south-east", azimuth_deg=138, elevation_deg=23)
 """From where the 3D scene is seen at first."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Frame:
+class ViewBounds:
     """What all views show, so that they can be laid side by side: `centre_m` in the middle, `radius_m` to the edge."""
 
     centre_m: Array
     radius_m: float
 
     @classmethod
-    def around(cls, points_m: Array) -> Frame:
+    def around(cls, points_m: Array) -> ViewBounds:
         """Frame that holds points, shape (n, 3), from every side."""
         centre = 0.5 * (points_m.min(axis=0) + points_m.max(axis=0))
         return cls(centre_m=centre, radius_m=1.04 * float(np.linalg.norm(points_m - centre, axis=1).max()))
@@ -70,12 +70,12 @@ def coverage_colours(coverage_m: Array, counts: BoolArray) -> Array:
 class Drawing:
     """A mesh that is drawn from many sides, in one or more colourings."""
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(self, surface: TrialMesh) -> None:
         self._faces, self._normals = surface.faces, _vertex_normals(surface)
         self._scene = rtcore_scene.EmbreeScene()
         TriangleMesh(self._scene, surface.vertices_m.astype(np.float32), surface.faces.astype(np.int32))
 
-    def pictures(self, colours: Array, views: tuple[View, ...], frame: Frame, pixels: int) -> list[str]:
+    def pictures(self, colours: Array, views: tuple[Viewpoint, ...], frame: ViewBounds, pixels: int) -> list[str]:
         """PNG data URIs of the mesh, lit, with a colour per vertex, shape (n, 3); orthographic, clear background."""
         side = pixels * int(np.sqrt(SAMPLES_PER_PIXEL))
         step = (np.arange(side) + 0.5) / side * 2.0 - 1.0
@@ -97,12 +97,16 @@ class Drawing:
         return pictures
 
 
-def draw_surface(surface: Surface, colours: Array, views: tuple[View, ...], frame: Frame, pixels: int) -> list[str]:
+def draw_surface(
+    surface: TrialMesh, colours: Array, views: tuple[Viewpoint, ...], frame: ViewBounds, pixels: int
+) -> list[str]:
     """PNG data URIs of a lit mesh with a colour per vertex, shape (n, 3); orthographic, clear background."""
     return Drawing(surface).pictures(colours, views, frame, pixels)
 
 
-def draw_cloud(points_m: Array, colours: Array, views: tuple[View, ...], frame: Frame, pixels: int) -> list[str]:
+def draw_cloud(
+    points_m: Array, colours: Array, views: tuple[Viewpoint, ...], frame: ViewBounds, pixels: int
+) -> list[str]:
     """PNG data URIs of a cloud with a colour per point, shape (n, 3): nearest dot on top; orthographic."""
     side = pixels * int(np.sqrt(SAMPLES_PER_PIXEL))
     offset = (points_m - frame.centre_m) / frame.radius_m
@@ -124,7 +128,7 @@ def draw_cloud(points_m: Array, colours: Array, views: tuple[View, ...], frame: 
     return pictures
 
 
-def _vertex_normals(surface: Surface) -> Array:
+def _vertex_normals(surface: TrialMesh) -> Array:
     corners = surface.vertices_m[surface.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     total = np.stack(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
-from wakewise.ui.web.files import File
+from wakewise.ui.web.files import StaticFile
 
 EXTRAS_PATH, SERVICE_PATH = "/cockpit_extras.json", "/register_service"
 WIDGET_PATH, ICON_PATH = "/?widget=1", "/page/icon.svg"
@@ -20,7 +20,7 @@ API_VERSION = "1.0.0"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Offer:
+class ServiceDescription:
     """A page as ground stations list it: what the service is called and does, and what its widget is called."""
 
     name: str
@@ -55,7 +55,7 @@ class Offer:
             "extras": {"cockpit": EXTRAS_PATH},
         }
 
-    def files(self) -> dict[str, Callable[[], File]]:
+    def files(self) -> dict[str, Callable[[], StaticFile]]:
         """Both, by address, for `Files.more`."""
         return {
             EXTRAS_PATH: lambda: as_json(self.cockpit_extras(), shared=True),
@@ -63,6 +63,6 @@ class Offer:
         }
 
 
-def as_json(told: dict[str, Any], *, shared: bool = False) -> File:
+def as_json(told: dict[str, Any], *, shared: bool = False) -> StaticFile:
     """A file of JSON; `shared` lets a page of another site read it, as Cockpit's does."""
-    return File(body=json.dumps(told, indent=1).encode(), kind="application/json", shared=shared)
+    return StaticFile(body=json.dumps(told, indent=1).encode(), kind="application/json", shared=shared)

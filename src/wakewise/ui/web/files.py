@@ -20,7 +20,7 @@ _TYPES = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class File:
+class StaticFile:
     """What is answered at one address; `shared`: pages of other sites may read it, too."""
 
     body: bytes
@@ -29,16 +29,16 @@ class File:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Files:
+class StaticFiles:
     """What lies in the page's folder and in the one that all pages share, and `more`, by address, made when asked for.
 
     Only names that a folder itself lists are read, so that no address leads out of it.
     """
 
     folder: Path
-    more: Mapping[str, Callable[[], File]] = field(default_factory=dict)
+    more: Mapping[str, Callable[[], StaticFile]] = field(default_factory=dict)
 
-    def at(self, address: str) -> File | None:
+    def at(self, address: str) -> StaticFile | None:
         """The file at an address such as /page/cockpit.js; None where there is none."""
         path = address.partition("?")[0]
         if path in self.more:
@@ -47,5 +47,5 @@ class Files:
         for folder in (self.folder, SHARED):
             for found in folder.iterdir() if folder.is_dir() else ():
                 if found.name == name and found.suffix in _TYPES and found.is_file():
-                    return File(body=found.read_bytes(), kind=_TYPES[found.suffix])
+                    return StaticFile(body=found.read_bytes(), kind=_TYPES[found.suffix])
         return None

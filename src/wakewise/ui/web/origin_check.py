@@ -24,7 +24,7 @@ _NAME = re.compile(r"([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\])(:\d+)?\Z")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Caller:
+class RequestOrigin:
     """Who asks: address of the other end, and the headers Host and Origin, None where they are not sent."""
 
     address: str
@@ -33,7 +33,7 @@ class Caller:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gate:
+class OriginCheck:
     """Rules of one server: its port, its token, and whether it listens beyond this computer (`open_to_net`).
 
     `origins` are those of a proxy before it, as a browser writes them ("http://192.168.2.2"). Behind a proxy everybody
@@ -45,7 +45,7 @@ class Gate:
     open_to_net: bool = False
     origins: tuple[str, ...] = ()
 
-    def refusal(self, caller: Caller) -> str | None:
+    def refusal(self, caller: RequestOrigin) -> str | None:
         """Why a request is refused; None where it is let in."""
         if caller.host is None:
             return "no Host header"
@@ -57,7 +57,7 @@ class Gate:
             return f"Origin {_short(caller.origin)}: pages of other sites may not ask"
         return None
 
-    def needs_token(self, caller: Caller) -> bool:
+    def needs_token(self, caller: RequestOrigin) -> bool:
         """Whether a caller who was let in must show the token."""
         return bool(self.origins) or not (
             is_loopback(caller.address) and caller.host is not None and self._local(caller.host)

@@ -16,7 +16,7 @@ PER_ADDRESS, IN_ALL = 128, 384
 """A page asks for its thirty files over at most six connections at a time; several pages may share an address."""
 
 
-class Pending:
+class PendingConnections:
     """Connections without a name, oldest first; safe to use from any thread.
 
     Parameters

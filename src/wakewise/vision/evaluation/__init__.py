@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
-    from wakewise.vision.evaluation.alignment import Refinement, Similarity, refine_icp, robust_similarity, umeyama
+    from wakewise.vision.evaluation.alignment import IcpRefinement, Similarity, refine_icp, robust_similarity, umeyama
     from wakewise.vision.evaluation.cloud_to_cloud import CLOUD_DEFINITIONS, CloudComparison, compare_clouds, extent_m
     from wakewise.vision.evaluation.cloud_to_surface import (
-        Comparison,
         Crop,
-        Surface,
+        SurfaceComparison,
+        SurfaceSamples,
         SurfaceScore,
         compare_surface,
         count_views,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     )
     from wakewise.vision.evaluation.flight import SWAY_FIGURES, attitude_rmse_deg, flight_figures
     from wakewise.vision.evaluation.soundness import MeshFaults, mesh_faults
-    from wakewise.vision.evaluation.thresholds import Share, read_thresholds, shares
+    from wakewise.vision.evaluation.thresholds import ThresholdScore, read_thresholds, shares
 
 __all__ = [
     "CLOUD_DEFINITIONS",
@@ -47,16 +47,16 @@ __all__ = [
     "SURFACE_DEFINITIONS",
     "SWAY_FIGURES",
     "CloudComparison",
-    "Comparison",
     "Crop",
     "DepthScore",
     "DepthView",
+    "IcpRefinement",
     "MeshFaults",
-    "Refinement",
-    "Share",
     "Similarity",
-    "Surface",
+    "SurfaceComparison",
+    "SurfaceSamples",
     "SurfaceScore",
+    "ThresholdScore",
     "attitude_rmse_deg",
     "compare_clouds",
     "compare_depths",

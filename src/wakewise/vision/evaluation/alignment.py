@@ -119,7 +119,7 @@ def _near(similarity: Similarity, points_B: Array, points_A: Array) -> BoolArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Refinement:
+class IcpRefinement:
     """What ICP did. `displacement_mm` is the mean way that the points moved: a large one means a bad first guess.
 
     `accepted` is False, and nothing moved, where the cloud fitted no better after than before. `matched_pct` is the
@@ -150,7 +150,7 @@ def refine_icp(
     voxel_m: float = 0.002,
     limit_m: float = 0.02,
     least_matched_pct: float = 50.0,
-) -> Refinement:
+) -> IcpRefinement:
     """Rigid point-to-plane ICP of a cloud onto samples of the true surface, coarse to fine.
 
     Y. Chen and G. Medioni, Object modelling by registration of multiple range images, Image and Vision Computing
@@ -226,7 +226,7 @@ def refine_icp(
             f"ICP: {matched_pct:.0f} % of the model lies within {distances_m[-1] * 1e3:g} mm of the true surface, "
             f"at least {least_matched_pct:g} % must for the two to be the same thing"
         )
-    return Refinement(
+    return IcpRefinement(
         R=T[:3, :3],
         t_m=T[:3, 3],
         displacement_mm=1e3 * displacement,

@@ -9,10 +9,10 @@ from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError, StageError
-from wakewise.vision.evaluation.alignment import Refinement, refine_icp
+from wakewise.vision.evaluation.alignment import IcpRefinement, refine_icp
 from wakewise.vision.evaluation.cloud_to_surface import Crop, suspicious_extent, thin
 from wakewise.vision.evaluation.definitions import DTU, TANKS_AND_TEMPLES
-from wakewise.vision.evaluation.thresholds import Share, shares
+from wakewise.vision.evaluation.thresholds import ThresholdScore, shares
 
 LEAST_POINTS = 100
 ICP_SHARES, ICP_LIMIT, ICP_CELL = (0.04, 0.02), 0.1, 0.005
@@ -70,7 +70,7 @@ class CloudComparison:
     """A score, shares at thresholds, and the aligned, thinned model, shape (n, 3), with its errors, shape (n,)."""
 
     score: CloudScore
-    shares: tuple[Share, ...]
+    shares: tuple[ThresholdScore, ...]
     points_W_m: Array
     error_mm: Array
 
@@ -154,7 +154,7 @@ def compare_clouds(
     return CloudComparison(score=score, shares=found, points_W_m=even, error_mm=to_truth)
 
 
-def _refined(kept: Array, truth: Array, whole_m: float) -> Refinement:
+def _refined(kept: Array, truth: Array, whole_m: float) -> IcpRefinement:
     """ICP with reaches that suit the reference's size, onto planes through the neighbours of its points."""
     import small_gicp
 

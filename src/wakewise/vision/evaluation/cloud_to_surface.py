@@ -19,8 +19,8 @@ from wakewise.core.checks import truth
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.optional_dependencies import need
 from wakewise.scene.targets import MeshDistance
-from wakewise.vision.evaluation.alignment import Refinement, refine_icp
-from wakewise.vision.evaluation.thresholds import Share, shares
+from wakewise.vision.evaluation.alignment import IcpRefinement, refine_icp
+from wakewise.vision.evaluation.thresholds import ThresholdScore, shares
 
 SAMPLES = 60_000
 """Samples of the true surface. A share p of them is off by at most sqrt(p (1 - p) / 60,000), one standard deviation:
@@ -31,7 +31,7 @@ SUCCESS_COMPLETENESS_PCT = 85.0
 MAX_SCALE_RATIO = 20.0
 
 
-class Mesh(Protocol):
+class MeshArrays(Protocol):
     """Triangles: vertices, shape (n, 3), in m, and faces, shape (m, 3)."""
 
     @property
@@ -109,14 +109,14 @@ class SurfaceScore:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Surface:
+class SurfaceSamples:
     """Evenly spread samples of the true surface that counts: points and unit outward normals, shape (n, 3)."""
 
     points_m: Array
     normals: Array
 
 
-def sample_surface(mesh: Mesh, crop: Crop, rng: np.random.Generator, samples: int = SAMPLES) -> Surface:
+def sample_surface(mesh: MeshArrays, crop: Crop, rng: np.random.Generator, samples: int = SAMPLES) -> SurfaceSamples:
     """Sample the truth evenly by area, then drop what does not count.
 
     Raises
@@ -140,11 +140,11 @@ def sample_surface(mesh: Mesh, crop: Crop, rng: np.random.Generator, samples: in
     if not keep.any():
         raise InputError(f"reference mesh: nothing of it is {crop.clearance_m:g} m or more above the bed")
     normals = cross[face] / np.maximum(twice_area[face], 1e-300)[:, None]
-    return Surface(points_m=points[keep], normals=normals[keep])
+    return SurfaceSamples(points_m=points[keep], normals=normals[keep])
 
 
 def count_views(
-    surface: Surface, mesh: Mesh, centres_W_m: Array, min_cosine: float = 0.2, enough: int | None = None
+    surface: SurfaceSamples, mesh: MeshArrays, centres_W_m: Array, min_cosine: float = 0.2, enough: int | None = None
 ) -> IntArray:
     """How many cameras saw each sample: nothing of the mesh in between, and not at a grazing angle.
 
@@ -193,7 +193,7 @@ def thin(points_m: Array, voxel_m: float) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Comparison:
+class SurfaceComparison:
     """A score with what it was computed from: the aligned, thinned cloud, shape (n, 3), and its errors, shape (n,).
 
     shares: at the thresholds that were asked for, of the cloud thinned to half the smallest where that is finer.
@@ -202,20 +202,20 @@ class Comparison:
     score: SurfaceScore
     points_W_m: Array
     error_mm: Array
-    shares: tuple[Share, ...] = ()
+    shares: tuple[ThresholdScore, ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, points_W_m=(None, 3), error_mm=(None,))
 
 
-def evaluate_surface(cloud_W_m: Array, mesh: Mesh, **options: Any) -> SurfaceScore:
+def evaluate_surface(cloud_W_m: Array, mesh: MeshArrays, **options: Any) -> SurfaceScore:
     """Score a cloud against a true mesh; takes what `compare_surface` takes."""
     return compare_surface(cloud_W_m, mesh, **options).score
 
 
 def compare_surface(
     cloud_W_m: Array,
-    mesh: Mesh,
+    mesh: MeshArrays,
     *,
     crop: Crop | None = None,
     camera_centres_W_m: Array | None = None,
@@ -227,7 +227,7 @@ def compare_surface(
     samples: int = SAMPLES,
     thresholds_mm: tuple[float, ...] = (),
     distance: MeshDistance | None = None,
-) -> Comparison:
+) -> SurfaceComparison:
     """Score a cloud against a true mesh; `SurfaceScore` defines every figure.
 
     Parameters
@@ -271,7 +271,7 @@ def compare_surface(
     kept = cloud[crop.keeps(cloud, low, high)]
     if len(kept) < 100:
         raise StageError(f"model: {len(kept)} of its {len(cloud)} points lie about the truth, needs at least 100")
-    refinement: Refinement | None = None
+    refinement: IcpRefinement | None = None
     if icp:
         refinement = refine_icp(kept, surface.points_m, surface.normals)
         moved = refinement.apply(cloud)
@@ -311,17 +311,17 @@ def compare_surface(
         cloud_points=len(even),
         truth_samples=len(surface.points_m),
     )
-    found: tuple[Share, ...] = ()
+    found: tuple[ThresholdScore, ...] = ()
     if thresholds_mm:
         fine, near = to_truth_mm, to_cloud_mm
         if 0.5e-3 * min(thresholds_mm) < voxel_m:
             finer = thin(kept, 0.5e-3 * min(thresholds_mm))
             fine, near = 1e3 * distance(finer), 1e3 * np.asarray(KDTree(finer).query(surface.points_m, workers=-1)[0])
         found = shares(fine, near, thresholds_mm)
-    return Comparison(score=score, points_W_m=even, error_mm=to_truth_mm, shares=found)
+    return SurfaceComparison(score=score, points_W_m=even, error_mm=to_truth_mm, shares=found)
 
 
-def suspicious_scale(cloud_m: Array, mesh: Mesh) -> str | None:
+def suspicious_scale(cloud_m: Array, mesh: MeshArrays) -> str | None:
     """A sentence if cloud and mesh differ so much in extent that one of them is hardly in metres; else None.
 
     A cloud may hold more than the truth or a part of it only, so that a factor of ten either way proves nothing.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.vision.evaluation.cloud_to_surface import Crop, Mesh
+from wakewise.vision.evaluation.cloud_to_surface import Crop, MeshArrays
 
 
-def area_and_volume(mesh: Mesh, crop: Crop) -> tuple[float, float]:
+def area_and_volume(mesh: MeshArrays, crop: Crop) -> tuple[float, float]:
     """Area in m2 and volume in m3 of the part of a mesh that counts; zeros where none does.
 
     The volume is the flux of (0, 0, z - z0) through the surface, z0 the height at which it is cut: of that field the
@@ -16,7 +16,7 @@ def area_and_volume(mesh: Mesh, crop: Crop) -> tuple[float, float]:
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : MeshArrays
         In the world, z down.
     crop : Crop
         Its bed says what counts; its box does not cut.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.vision.evaluation.cloud_to_surface import Mesh
+from wakewise.vision.evaluation.cloud_to_surface import MeshArrays
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ class MeshFaults:
         return out
 
 
-def mesh_faults(mesh: Mesh) -> MeshFaults:
+def mesh_faults(mesh: MeshArrays) -> MeshFaults:
     """Count the faults of a mesh."""
     _, number = np.unique(np.asarray(mesh.vertices_m), axis=0, return_inverse=True)
     faces = np.sort(number.reshape(-1)[np.asarray(mesh.faces)], axis=1)

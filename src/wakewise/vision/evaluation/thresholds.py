@@ -14,7 +14,7 @@ TELLING_PCT = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Share:
+class ThresholdScore:
     """Precision and recall at one threshold.
 
     accuracy_pct: share of the model nearer to the truth than the threshold; completeness_pct: of the truth nearer to
@@ -27,7 +27,7 @@ class Share:
     f_score: float
 
 
-def shares(to_truth_mm: Array, to_model_mm: Array, thresholds_mm: tuple[float, ...]) -> tuple[Share, ...]:
+def shares(to_truth_mm: Array, to_model_mm: Array, thresholds_mm: tuple[float, ...]) -> tuple[ThresholdScore, ...]:
     """Shares at each threshold, of distances, shape (n,) and (m,)."""
     out = []
     for threshold in thresholds_mm:
@@ -35,7 +35,7 @@ def shares(to_truth_mm: Array, to_model_mm: Array, thresholds_mm: tuple[float, .
         recall = 100.0 * float((to_model_mm < threshold).mean())
         both = precision + recall
         out.append(
-            Share(
+            ThresholdScore(
                 threshold_mm=threshold,
                 accuracy_pct=precision,
                 completeness_pct=recall,

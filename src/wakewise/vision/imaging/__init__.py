@@ -18,7 +18,7 @@ from wakewise.core.lazy_imports import lazy_door
 if TYPE_CHECKING:
     from wakewise.vision.imaging.blur import Shutter, motion_blur, motion_px, pose_at
     from wakewise.vision.imaging.camera import Camera, FlatPort, LensCamera, PinholeCamera
-    from wakewise.vision.imaging.camera_model import Calibration, calibrate
+    from wakewise.vision.imaging.camera_model import OpenCVCamera, calibrate
     from wakewise.vision.imaging.optics import (
         SiltOptics,
         WaterOptics,
@@ -27,23 +27,23 @@ if TYPE_CHECKING:
         water_optics,
         water_types,
     )
-    from wakewise.vision.imaging.panels import Panels
-    from wakewise.vision.imaging.photograph import Photo, photograph, photograph_of, sharpness
+    from wakewise.vision.imaging.panels import LedPanels
+    from wakewise.vision.imaging.photograph import RenderedPhoto, photograph, photograph_of, sharpness
     from wakewise.vision.imaging.renderer import Lights, Render, render
     from wakewise.vision.imaging.scene import Scene
     from wakewise.vision.imaging.settings import ImagingSettings
 
 __all__ = [
-    "Calibration",
     "Camera",
     "FlatPort",
     "ImagingSettings",
+    "LedPanels",
     "LensCamera",
     "Lights",
-    "Panels",
-    "Photo",
+    "OpenCVCamera",
     "PinholeCamera",
     "Render",
+    "RenderedPhoto",
     "Scene",
     "Shutter",
     "SiltOptics",

@@ -38,7 +38,7 @@ SHORTEST_S, MOST_AMPLIFIED = 1e-5, 8.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chosen:
+class ExposureSetting:
     """How long the shutter is open, the signal of a white card in unit light, and the amplification in it."""
 
     exposure_s: float
@@ -76,7 +76,7 @@ def settled(seen: Sequence[float]) -> float:
     return math.exp(log_gain)
 
 
-def divided(gain: float, settings: ImagingSettings) -> Chosen:
+def divided(gain: float, settings: ImagingSettings) -> ExposureSetting:
     """A gain made of exposure first, then of amplification, as far as they go.
 
     `settings.gain` at `settings.exposure_s` is the sensor unamplified.
@@ -84,7 +84,7 @@ def divided(gain: float, settings: ImagingSettings) -> Chosen:
     wished_s = settings.exposure_s * gain / settings.gain
     exposure_s = min(max(wished_s, SHORTEST_S), LONGEST_S)
     amplification = min(max(wished_s / exposure_s, 1.0), MOST_AMPLIFIED)
-    return Chosen(
+    return ExposureSetting(
         exposure_s=exposure_s,
         gain=settings.gain * amplification * exposure_s / settings.exposure_s,
         amplification=amplification,
@@ -98,7 +98,7 @@ def automatic(
     settings: ImagingSettings,
     grains: SiltOptics,
     balance: Array,
-) -> Chosen:
+) -> ExposureSetting:
     """What automatic exposure has come to after these views, oldest first, at least one; see `brightness`.
 
     The silt is that of the photograph: what hangs in the water does not change in a second.

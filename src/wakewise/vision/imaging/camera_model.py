@@ -26,7 +26,7 @@ PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Calibration:
+class OpenCVCamera:
     """COLMAP's OPENCV camera that stands for a camera in water.
 
     `params` (8,) are fx, fy, cx, cy in pixels, k1, k2, p1, p2; pixel centres at +0.5. `ahead_m` is how far before the
@@ -86,21 +86,21 @@ class Calibration:
         )
 
 
-def calibrate(camera: Camera, depths_m: tuple[float, ...] = FIT_DEPTHS_M) -> Calibration:
+def calibrate(camera: Camera, depths_m: tuple[float, ...] = FIT_DEPTHS_M) -> OpenCVCamera:
     """COLMAP's OPENCV model of a camera: its own numbers without a port, the least-squares fit behind one."""
     w, h = camera.width, camera.height
     distortion = camera.distortion if isinstance(camera, LensCamera) else (0.0, 0.0, 0.0, 0.0)
     start = np.array([camera.focal_px, camera.focal_px, 0.5 * w, 0.5 * h, *distortion, 0.0])
     if not (isinstance(camera, LensCamera) and camera.port is not None):
-        return Calibration(
+        return OpenCVCamera(
             width=w, height=h, params=start[:8], ahead_m=0.0, rms_px=0.0, max_px=0.0, depths_m=np.array(depths_m)
         )
     grid = np.stack(np.meshgrid(np.linspace(0.0, w, 21), np.linspace(0.0, h, 16)), axis=-1).reshape(-1, 2)
     points = np.concatenate([camera.unproject(grid, np.full(len(grid), d)) for d in depths_m])
     pixels = np.tile(grid, (len(depths_m), 1))
 
-    def model(x: Array) -> Calibration:
-        return Calibration(
+    def model(x: Array) -> OpenCVCamera:
+        return OpenCVCamera(
             width=w, height=h, params=x[:8], ahead_m=float(x[8]), rms_px=0.0, max_px=0.0, depths_m=np.array(depths_m)
         )
 
@@ -110,7 +110,7 @@ def calibrate(camera: Camera, depths_m: tuple[float, ...] = FIT_DEPTHS_M) -> Cal
     scale = np.array([w, w, w, w, 1.0, 1.0, 0.1, 0.1, 0.1])
     fit = least_squares(residual, start, x_scale=scale, max_nfev=60)
     error = np.linalg.norm(model(fit.x).project(points) - pixels, axis=1)
-    return Calibration(
+    return OpenCVCamera(
         width=w,
         height=h,
         params=fit.x[:8],

@@ -16,7 +16,7 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.vision.imaging.panels import Panels
+from wakewise.vision.imaging.panels import LedPanels
 
 SNELL_SIN = 0.75
 """Sine of the half angle of Snell's window."""
@@ -41,7 +41,7 @@ def sky_radiance(up: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def bake_light(
-    parts: Sequence[tuple[Array, IntArray]], normals: Sequence[Array], near_m: float, panels: Panels, foot_W_m: Array
+    parts: Sequence[tuple[Array, IntArray]], normals: Sequence[Array], near_m: float, panels: LedPanels, foot_W_m: Array
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Irradiance by sky and by panels on both sides of each vertex of target, bed and stones, shape (n, 2) each.
 
@@ -54,7 +54,7 @@ def bake_light(
     normals : their unit vertex normals
     near_m : float
         Bed vertices farther than this from the foot are taken as unshaded.
-    panels : Panels
+    panels : LedPanels
     foot_W_m : ndarray, shape (3,)
         Origin of the scene's frame in the world.
     """

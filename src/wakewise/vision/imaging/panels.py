@@ -24,7 +24,7 @@ SPOTS = 8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Panels:
+class LedPanels:
     """Rectangular panels that face straight down: middles in the world, shape (k, 3), and size along x and y."""
 
     centres_W_m: Array
@@ -36,7 +36,7 @@ class Panels:
             raise InputError(f"panels: size {self.size_m} m, both must be above 0")
 
     @classmethod
-    def over_tank(cls, length_m: float, width_m: float) -> Panels:
+    def over_tank(cls, length_m: float, width_m: float) -> LedPanels:
         """Four panels at the surface, z = 0, each over the middle of a quarter of the tank; its middle is x = y = 0."""
         x, y = 0.25 * length_m, 0.25 * width_m
         return cls(centres_W_m=np.array([[x, y, 0.0], [x, -y, 0.0], [-x, -y, 0.0], [-x, y, 0.0]]))

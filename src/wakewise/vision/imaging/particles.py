@@ -70,7 +70,7 @@ def flake_positions(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Seen:
+class VisibleFlakes:
     """Flakes before a camera: places in its frame and velocities in the world, (n, 3), size and shade, (n,)."""
 
     p_C_m: Array
@@ -87,7 +87,7 @@ def flakes_before(
     per_kg: float,
     rng: np.random.Generator,
     drifting: FlakeCloud | None = None,
-) -> Seen:
+) -> VisibleFlakes:
     """Flakes at the density per_m3 + per_kg C: those that drift, as many as there should be, and new ones beyond.
 
     New ones move as the nearest of those that drift does.
@@ -95,7 +95,7 @@ def flakes_before(
     new = flake_positions(camera, X_WC, silt, per_m3, per_kg, rng)
     size, shade = rng.standard_normal(len(new)), rng.random(len(new))
     if drifting is None or not len(drifting.p_W_m):
-        return Seen(p_C_m=new, v_W_m_s=np.zeros_like(new), size=size, shade=shade)
+        return VisibleFlakes(p_C_m=new, v_W_m_s=np.zeros_like(new), size=size, shade=shade)
     places = X_WC.apply(new)
     wanted = per_m3 + per_kg * concentration(silt, places)
     spare = rng.random(len(new)) * wanted < wanted - drifting.per_m3
@@ -105,7 +105,7 @@ def flakes_before(
     p_C = X_WC.inverse().apply(drifting.p_W_m)
     old = (rank < per_m3 + per_kg * concentration(silt, drifting.p_W_m)) & (p_C[:, 2] > NEAREST_M)
     old &= p_C[:, 2] < FARTHEST_M
-    return Seen(
+    return VisibleFlakes(
         p_C_m=np.concatenate([p_C[old], new[more]]),
         v_W_m_s=np.concatenate([drifting.v_W_m_s[old], velocity]),
         size=np.concatenate([drifting.looks[old, 1], size[more]]),
@@ -125,7 +125,7 @@ def draw_flakes(
     depth_m: Image,
     camera: Camera,
     poses: Sequence[Pose],
-    flakes: Seen,
+    flakes: VisibleFlakes,
     exposure_s: float,
     water: WaterOptics,
     lights: Lights,

@@ -13,7 +13,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import FlakeCloud, ScalarGrid
-from wakewise.vision.imaging.auto_exposure import Chosen, automatic
+from wakewise.vision.imaging.auto_exposure import ExposureSetting, automatic
 from wakewise.vision.imaging.blur import motion_blur, pose_at
 from wakewise.vision.imaging.camera import Camera
 from wakewise.vision.imaging.optics import SiltOptics, haze_between, through_water
@@ -28,7 +28,7 @@ BALANCE_M = 0.25
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Photo:
+class RenderedPhoto:
     """A photograph and what is known about it.
 
     `image` (h, w, 3) uint8 RGB; `sharpness` see `sharpness`, None if the target is not in view; `turbidity_per_m` mean
@@ -53,7 +53,7 @@ def photograph(
     grains: SiltOptics | None = None,
     before: Sequence[Pose] = (),
     drifting: FlakeCloud | None = None,
-) -> Photo:
+) -> RenderedPhoto:
     """Take one photograph.
 
     Parameters
@@ -107,14 +107,14 @@ def photograph_of(
     settings: ImagingSettings,
     rng: np.random.Generator,
     grains: SiltOptics | None = None,
-    chosen: Chosen | None = None,
+    chosen: ExposureSetting | None = None,
     drifting: FlakeCloud | None = None,
-) -> Photo:
+) -> RenderedPhoto:
     """As `photograph`, from a render of the middle of the exposure that is there already.
 
     Exposure and gain are those `chosen`, or those of the settings.
     """
-    taken = chosen or Chosen(exposure_s=settings.exposure_s, gain=settings.gain, amplification=1.0)
+    taken = chosen or ExposureSetting(exposure_s=settings.exposure_s, gain=settings.gain, amplification=1.0)
     shutter = settings.shutter(taken.exposure_s)
     if silt is not None and silt.values.size and float(silt.values.min()) < 0.0:
         raise InputError(f"silt: concentration {float(silt.values.min()):g} kg/m3, must not be negative")
@@ -130,7 +130,7 @@ def photograph_of(
     well_e = ELECTRONS_PER_S * settings.exposure_s / taken.amplification
     image = expose(radiance, taken.gain * white_balance(settings), well_e, READ_NOISE_E, rng)
     on_target = view.target_fraction >= 0.5
-    return Photo(
+    return RenderedPhoto(
         image=image,
         sharpness=sharpness(image, view.target_fraction),
         turbidity_per_m=float(np.mean(silt_per_m[on_target] if on_target.any() else silt_per_m)),

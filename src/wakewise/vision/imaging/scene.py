@@ -22,9 +22,9 @@ from wakewise.core.errors import InputError
 from wakewise.scene.targets import Mesh, Target
 from wakewise.vision.imaging.daylight import bake_light
 from wakewise.vision.imaging.height_field import HeightField, grid_faces, height_field
-from wakewise.vision.imaging.panels import Panels
+from wakewise.vision.imaging.panels import LedPanels
 from wakewise.vision.imaging.texture import BED_MAP_LEVELS, BED_MAP_SIZE, BED_TEXEL_M, Maps, bake_bed, bed_heights
-from wakewise.vision.imaging.tile_culling import Pieces
+from wakewise.vision.imaging.tile_culling import BoundingSpheres
 
 TARGET, BED, STONE = 0, 1, 2
 """Numbers of the three kinds of surface, as ray casting returns them."""
@@ -105,13 +105,13 @@ class Scene:
     def _stone_spheres(self) -> Array:
         vertices, faces = self._stones
         places = vertices.astype(np.float64)
-        return Pieces.of(places, faces.astype(np.int64)).spheres(places)
+        return BoundingSpheres.of(places, faces.astype(np.int64)).spheres(places)
 
     @cached_property
-    def _pieces(self) -> Pieces:
+    def _pieces(self) -> BoundingSpheres:
         """Of the target, cut as it stands here: pieces that it is moved in are no larger for it."""
         vertices, faces = self.vertices_F_m[: self.first_bed_vertex], self.faces[: self.first_face[1]]
-        return Pieces.of(vertices.astype(np.float64), faces.astype(np.int64))
+        return BoundingSpheres.of(vertices.astype(np.float64), faces.astype(np.int64))
 
     @property
     def target_normals(self) -> NDArray[np.float32]:
@@ -126,7 +126,7 @@ class Scene:
         *,
         bed_half_m: float = 1.5,
         stones: int = 200,
-        panels: Panels | None = None,
+        panels: LedPanels | None = None,
     ) -> Scene:
         """Lay the bed, scatter the stones, light everything and make it ready for rays.
 
@@ -163,7 +163,7 @@ class Scene:
         stone_vertices, stone_faces = _stones(stones, clear_m + 0.03, bed_half_m, noise_seed)
         parts = [(vertices, faces), (bed_vertices, bed_faces), (stone_vertices, stone_faces)]
         normals = [vertex_normals(v, f) for v, f in parts]
-        panels = panels or Panels.over_tank(6.0, 5.0)
+        panels = panels or LedPanels.over_tank(6.0, 5.0)
         daylight, panel_light = bake_light(parts, normals, clear_m + 0.4, panels, foot_W)
 
         offsets = np.cumsum([0] + [len(v) for v, _ in parts])
@@ -181,7 +181,7 @@ class Scene:
             seed=noise_seed,
             bed=height_field(lines, bed_z),
             first_bed_vertex=len(vertices),
-            spheres_F_m=np.concatenate([Pieces.of(v, f).spheres(v) for v, f in (parts[0], parts[2])]),
+            spheres_F_m=np.concatenate([BoundingSpheres.of(v, f).spheres(v) for v, f in (parts[0], parts[2])]),
             solids=_embree([parts[0], parts[2]]),
         )
 

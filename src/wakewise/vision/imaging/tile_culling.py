@@ -25,8 +25,8 @@ SLACK = 1.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pieces:
-    """A surface cut into pieces, for spheres round them however it is moved; make it with `Pieces.of`.
+class BoundingSpheres:
+    """A surface cut into pieces, for spheres round them however it is moved; make it with `BoundingSpheres.of`.
 
     `faces` (m, 3) are vertex indices, those of a piece one after the other; `firsts` (k + 1,) says where each begins.
     """
@@ -35,7 +35,7 @@ class Pieces:
     firsts: IntArray
 
     @classmethod
-    def of(cls, vertices: Array, faces: IntArray) -> Pieces:
+    def of(cls, vertices: Array, faces: IntArray) -> BoundingSpheres:
         """Cut a surface into cells of `PIECE_M`."""
         if not len(faces):
             return cls(faces=np.zeros((0, 3), np.int64), firsts=np.zeros(1, np.int64))

@@ -22,28 +22,28 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
-    from wakewise.vision.reconstruction.calibration import Board, Calibration, calibrate
-    from wakewise.vision.reconstruction.clouds import Cloud, read_cloud, write_cloud, write_mesh
+    from wakewise.vision.reconstruction.calibration import CalibrationBoard, CameraCalibration, calibrate
+    from wakewise.vision.reconstruction.clouds import OrientedPointCloud, read_cloud, write_cloud, write_mesh
     from wakewise.vision.reconstruction.known_cameras import KnownCameras, read_known_cameras
     from wakewise.vision.reconstruction.lenses import Lens, read_lens
     from wakewise.vision.reconstruction.meshing import mesh_model
     from wakewise.vision.reconstruction.photos import Photo, read_photos
     from wakewise.vision.reconstruction.pipeline import Model, reconstruct
     from wakewise.vision.reconstruction.references import match_references, read_reference_cameras
-    from wakewise.vision.reconstruction.request import Box, Wishes
+    from wakewise.vision.reconstruction.request import CropBox, ReconstructionRequest
     from wakewise.vision.reconstruction.settings import ReconstructionSettings
 
 __all__ = [
-    "Board",
-    "Box",
-    "Calibration",
-    "Cloud",
+    "CalibrationBoard",
+    "CameraCalibration",
+    "CropBox",
     "KnownCameras",
     "Lens",
     "Model",
+    "OrientedPointCloud",
     "Photo",
+    "ReconstructionRequest",
     "ReconstructionSettings",
-    "Wishes",
     "calibrate",
     "match_references",
     "mesh_model",

@@ -37,7 +37,7 @@ MIN_CORNERS, MIN_PHOTOS = 8, 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Board:
+class CalibrationBoard:
     """Squares across and down, and the sides of a square and of a marker in m."""
 
     columns: int
@@ -56,7 +56,7 @@ class Board:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Calibration:
+class CameraCalibration:
     """What the photographs say of the camera.
 
     residual_px: root mean square distance of board corners in the photographs from where the model puts them;
@@ -89,7 +89,7 @@ class Calibration:
         return {**asdict(self), "distortion": list(self.distortion)}
 
 
-def calibrate(folder: Path, board: Board, model: str = "radial") -> Calibration:
+def calibrate(folder: Path, board: CalibrationBoard, model: str = "radial") -> CameraCalibration:
     """Calibrate the camera that took a folder of photographs of one board.
 
     Parameters
@@ -130,7 +130,7 @@ def calibrate(folder: Path, board: Board, model: str = "radial") -> Calibration:
         fits[each] = _fit(found, (width, height), flags, next(reversed(fits.values()), None))
     K, distortion, errors = fits[model]
     every = np.concatenate(list(errors.values()))
-    return Calibration(
+    return CameraCalibration(
         model=model,
         residual_px=_rms(every),
         residual_median_px=float(np.median(every)),
@@ -152,7 +152,7 @@ def calibrate(folder: Path, board: Board, model: str = "radial") -> Calibration:
     )
 
 
-def cameras_txt(found: Calibration) -> str:
+def cameras_txt(found: CameraCalibration) -> str:
     """The camera as COLMAP's cameras.txt."""
     camera = found.colmap
     numbers = " ".join(repr(value) for value in camera["params"])
@@ -175,7 +175,7 @@ def _colmaps(fit: Fit, width: int, height: int) -> dict[str, Any]:
     }
 
 
-def seen(photos: dict[str, NDArray[np.uint8]], board: Board, name: str) -> str:
+def seen(photos: dict[str, NDArray[np.uint8]], board: CalibrationBoard, name: str) -> str:
     """What is seen of a board that is not found, in words."""
     plain = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name)))
     found = [ids for grey in photos.values() if (ids := plain.detectMarkers(grey)[1]) is not None]
@@ -209,7 +209,7 @@ def _read(folder: Path) -> dict[str, NDArray[np.uint8]]:
     return out
 
 
-def board_detector(photos: list[NDArray[np.uint8]], board: Board) -> tuple[str, Any]:
+def board_detector(photos: list[NDArray[np.uint8]], board: CalibrationBoard) -> tuple[str, Any]:
     """The dictionary and the pattern of squares (white or black at the origin) that most corners are found with.
 
     Where none are found, the dictionary of which most markers are seen.

@@ -16,7 +16,7 @@ from wakewise.core.size_limits import broken_ply
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Cloud:
+class OrientedPointCloud:
     """Points in m with unit normals and colours (red, green, blue, 0 to 1), each of shape (n, 3)."""
 
     points_m: Array
@@ -26,15 +26,15 @@ class Cloud:
     def __post_init__(self) -> None:
         freeze(self, points_m=(None, 3), normals=(None, 3), colours=(None, 3))
 
-    def only(self, kept: BoolArray) -> Cloud:
+    def only(self, kept: BoolArray) -> OrientedPointCloud:
         """The points that a mask of shape (n,) keeps."""
-        return Cloud(points_m=self.points_m[kept], normals=self.normals[kept], colours=self.colours[kept])
+        return OrientedPointCloud(points_m=self.points_m[kept], normals=self.normals[kept], colours=self.colours[kept])
 
 
 _FIELDS = [(k, "<f4") for k in ("x", "y", "z", "nx", "ny", "nz")] + [(k, "u1") for k in ("red", "green", "blue")]
 
 
-def write_cloud(path: Path, cloud: Cloud) -> None:
+def write_cloud(path: Path, cloud: OrientedPointCloud) -> None:
     """Write a binary PLY file, whole or not at all."""
     rows = np.empty(len(cloud.points_m), dtype=_FIELDS)
     for k, name in enumerate(("x", "y", "z")):
@@ -49,7 +49,7 @@ def write_cloud(path: Path, cloud: Cloud) -> None:
         temporary.write_bytes(header.encode("ascii") + rows.tobytes())
 
 
-def read_cloud(path: Path) -> Cloud:
+def read_cloud(path: Path) -> OrientedPointCloud:
     """Read points from a PLY file or any other that holds points or a mesh; grey and without normals where none are.
 
     Raises
@@ -70,7 +70,9 @@ def read_cloud(path: Path) -> Cloud:
     points = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64).reshape(-1, 3)
     if len(points) == 0 or not np.all(np.isfinite(points)):
         raise InputError(f"{path}: holds {len(points)} points, needs at least one and all finite")
-    return Cloud(points_m=points, normals=_normals(loaded, len(points)), colours=_colours(loaded, len(points)))
+    return OrientedPointCloud(
+        points_m=points, normals=_normals(loaded, len(points)), colours=_colours(loaded, len(points))
+    )
 
 
 def _raw(loaded: object, names: tuple[str, ...], count: int) -> Array | None:

@@ -18,12 +18,17 @@ from wakewise.core.errors import StageError
 from wakewise.core.interfaces import Progress
 from wakewise.core.run_lock import half_done
 from wakewise.vision.reconstruction.cells import CellMeans
-from wakewise.vision.reconstruction.clouds import Cloud, write_cloud
+from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud
 from wakewise.vision.reconstruction.depth_store import DepthStore
 from wakewise.vision.reconstruction.fusion import facing_normals, fuse, lonely
 from wakewise.vision.reconstruction.masks import masked
 from wakewise.vision.reconstruction.photos import Image, PhotoStore
-from wakewise.vision.reconstruction.registered_photos import Ball, View, rank_partners, read_views
+from wakewise.vision.reconstruction.registered_photos import (
+    RegionOfInterest,
+    RegisteredPhoto,
+    rank_partners,
+    read_views,
+)
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.stereo import DepthMap, pair_depth, rectifiable
 
@@ -41,7 +46,7 @@ def densify(
     out: Path,
     settings: ReconstructionSettings,
     *,
-    region: Ball | None,
+    region: RegionOfInterest | None,
     progress: Progress,
     store: PhotoStore | None = None,
 ) -> dict[str, Any]:
@@ -73,16 +78,16 @@ def densify(
     if len(cloud) < 100:
         raise StageError(f"dense: {len(cloud)} points survive from {len(maps)} depth maps, at least 100 must")
     normals = facing_normals(cloud[:, :3], cloud[:, 6:9], settings.threads)
-    write_cloud(out, Cloud(points_m=cloud[:, :3], normals=normals, colours=cloud[:, 3:6]))
+    write_cloud(out, OrientedPointCloud(points_m=cloud[:, :3], normals=normals, colours=cloud[:, 3:6]))
     return {"dense_points": len(cloud), "depth_maps": len(maps), "point_spacing_mm": 1e3 * spacing}
 
 
 def _all_depths(
     maps: DepthStore,
     store: PhotoStore,
-    views: tuple[View, ...],
+    views: tuple[RegisteredPhoto, ...],
     partners: list[list[int]],
-    region: Ball | None,
+    region: RegionOfInterest | None,
     settings: ReconstructionSettings,
     scale: float,
     progress: Progress,
@@ -126,7 +131,7 @@ def _load(store: PhotoStore, name: str, shrink: int) -> Image:
     return np.asarray(small, dtype=np.uint8)
 
 
-def _shrunk(view: View, shrink: int) -> View:
+def _shrunk(view: RegisteredPhoto, shrink: int) -> RegisteredPhoto:
     """The view with pixels `shrink` times as large; COLMAP's pixel positions scale about the photo's corner."""
     if shrink == 1:
         return view
@@ -139,7 +144,9 @@ def _shrunk(view: View, shrink: int) -> View:
     )
 
 
-def _scale(views: tuple[View, ...], region: Ball | None, settings: ReconstructionSettings) -> float:
+def _scale(
+    views: tuple[RegisteredPhoto, ...], region: RegionOfInterest | None, settings: ReconstructionSettings
+) -> float:
     """Rectified pixels per photo pixel: a region is enlarged, whole frames are not; both are bounded in size."""
     if region is None:
         return min(1.0, settings.dense_px / max(max(view.width, view.height) for view in views))

@@ -13,7 +13,7 @@ ROUNDS, FAR = 12, 2.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Level:
+class GroundPlane:
     """A plane in the model's frame: a place in it, and axes as rows: across, along, up (towards the cameras)."""
 
     origin: Array
@@ -31,7 +31,7 @@ class Level:
         return np.asarray(np.asarray(told) @ self.axes + self.origin)
 
 
-def level_of(points: Array, eyes: Array) -> Level:
+def level_of(points: Array, eyes: Array) -> GroundPlane:
     """Plane of least squares of points, less those far above or below it, which are the subject's relief.
 
     Parameters
@@ -56,7 +56,7 @@ def level_of(points: Array, eyes: Array) -> Level:
         kept = points[np.abs(height - np.median(height)) <= max(far, 1e-9)]
     up = axes[2] * (1.0 if float((eyes.mean(axis=0) - middle) @ axes[2]) >= 0.0 else -1.0)
     across = axes[0] * (1.0 if axes[0][np.argmax(np.abs(axes[0]))] > 0.0 else -1.0)
-    return Level(origin=middle, axes=np.stack([across, np.cross(up, across), up]))
+    return GroundPlane(origin=middle, axes=np.stack([across, np.cross(up, across), up]))
 
 
 def heights(told: Array, cell: float) -> tuple[Array, Array]:

@@ -45,7 +45,7 @@ Poses = dict[str, tuple[Array, Array]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Spots:
+class PhotoFeatures:
     """Features of a photo: `xy` (n, 2) on the plane at unit depth, distortion undone; `descriptors` (n, 128)."""
 
     xy: Array
@@ -127,13 +127,13 @@ def match_by_poses(
     return [pair for pair, result in zip(pairs, found, strict=True) if result is None]
 
 
-def _spots(link: pycolmap.Database, image: pycolmap.Image, camera: pycolmap.Camera) -> Spots | None:
+def _spots(link: pycolmap.Database, image: pycolmap.Image, camera: pycolmap.Camera) -> PhotoFeatures | None:
     """Features of a photo as rays; None where the lens has no ray for one of them."""
     places = np.asarray(link.read_keypoints(image.image_id), dtype=np.float64)[:, :2].reshape(-1, 2)
     xy = np.asarray(camera.cam_from_img(places)).reshape(-1, 2)
     if not np.isfinite(xy).all():
         return None
-    return Spots(
+    return PhotoFeatures(
         xy=xy,
         descriptors=np.asarray(link.read_descriptors(image.image_id).data, dtype=np.uint8).reshape(-1, 128),
     )
@@ -149,7 +149,7 @@ def _write(link: pycolmap.Database, one: int, two: int, matches: IntArray, pose:
     link.write_two_view_geometry(one, two, geometry)
 
 
-def match_pair(first: Spots, second: Spots, pose: RelativePose) -> IntArray:
+def match_pair(first: PhotoFeatures, second: PhotoFeatures, pose: RelativePose) -> IntArray:
     """Rows of features that are each other's nearest along the epipolar lines, clearly so; shape (k, 2)."""
     E = pose.essential
     if len(first.xy) == 0 or len(second.xy) == 0:

@@ -29,7 +29,7 @@ LOOK_ALIKES = 20
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Looks:
+class ImageDescriptors:
     """Names, and a unit vector of each photograph, shape (n, 128 WORDS); zeros for one without features."""
 
     names: tuple[str, ...]
@@ -45,7 +45,7 @@ class Looks:
         return found
 
 
-def read_looks(database: Path) -> Looks:
+def read_looks(database: Path) -> ImageDescriptors:
     """Looks of every photograph in COLMAP's database."""
     link = pycolmap.Database.open(database)
     try:
@@ -58,10 +58,10 @@ def read_looks(database: Path) -> Looks:
         link.close()
     words = learn_words(np.concatenate(described), np.random.default_rng(RANDOM_SEED))
     vectors = np.array([describe(one, words) for one in described])
-    return Looks(names=tuple(image.name for image in images), vectors=vectors)
+    return ImageDescriptors(names=tuple(image.name for image in images), vectors=vectors)
 
 
-def like_pairs(looks: Looks, most: int = LOOK_ALIKES) -> Pairs:
+def like_pairs(looks: ImageDescriptors, most: int = LOOK_ALIKES) -> Pairs:
     """Each photograph with those that look most like it."""
     likeness = looks.likeness()
     found = set()

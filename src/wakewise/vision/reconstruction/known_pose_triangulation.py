@@ -17,7 +17,7 @@ from wakewise.core.errors import StageError
 from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.colmap import be_quiet, pycolmap
 from wakewise.vision.reconstruction.guided import Poses
-from wakewise.vision.reconstruction.registered_photos import MIN_SHARED, Ball
+from wakewise.vision.reconstruction.registered_photos import MIN_SHARED, RegionOfInterest
 from wakewise.vision.reconstruction.settings import RANDOM_SEED
 
 FILTER_PX, MIN_ANGLE_DEG = 4.0, 1.5
@@ -29,14 +29,14 @@ LEAST_POINTS, SPREAD_PCT, MARGIN = 50, 95.0, 1.2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fixed:
+class FixedPoseModel:
     """A model at given poses; kept_pct: share of the matched features that stand in it, None where none matched."""
 
     model: pycolmap.Reconstruction
     kept_pct: float | None
 
 
-def map_at_poses(database: Path, poses: Poses, photos: int, progress: Progress) -> Fixed:
+def map_at_poses(database: Path, poses: Poses, photos: int, progress: Progress) -> FixedPoseModel:
     """Model of the photos at these poses with what points their matches give.
 
     Parameters
@@ -79,10 +79,10 @@ def map_at_poses(database: Path, poses: Poses, photos: int, progress: Progress) 
     graph = cache.correspondence_graph
     matched = sum(graph.num_observations_for_image(number) for number in placed if graph.exists_image(number))
     mapper.end_reconstruction(False)
-    return Fixed(model=model, kept_pct=100.0 * model.compute_num_observations() / matched if matched else None)
+    return FixedPoseModel(model=model, kept_pct=100.0 * model.compute_num_observations() / matched if matched else None)
 
 
-def common_sight(model: pycolmap.Reconstruction) -> Ball | None:
+def common_sight(model: pycolmap.Reconstruction) -> RegionOfInterest | None:
     """What all cameras look at, where most see too few sparse points to tell; None where they do, or look about.
 
     Raises
@@ -108,7 +108,7 @@ def common_sight(model: pycolmap.Reconstruction) -> Ball | None:
     points = np.array([point.xyz for point in model.points3D.values()]).reshape(-1, 3)
     if len(points) >= LEAST_POINTS:
         radius = min(radius, MARGIN * float(np.percentile(np.linalg.norm(points - middle, axis=1), SPREAD_PCT)))
-    return Ball(centre_W_m=middle, radius_m=radius)
+    return RegionOfInterest(centre_W_m=middle, radius_m=radius)
 
 
 def nearest_to_lines(centres: Array, axes: Array) -> Array:

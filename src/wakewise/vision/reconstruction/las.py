@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.files import whole_file
-from wakewise.vision.reconstruction.clouds import Cloud
+from wakewise.vision.reconstruction.clouds import OrientedPointCloud
 
 HEADER_BYTES, FORMAT, RECORD_BYTES = 227, 2, 26
 _RECORD = np.dtype(
@@ -23,7 +23,7 @@ _ONE_RETURN = 0b00001001  # the first of one
 _NEVER_CLASSIFIED = 0
 
 
-def write_las(path: Path, cloud: Cloud, day: date | None = None) -> None:
+def write_las(path: Path, cloud: OrientedPointCloud, day: date | None = None) -> None:
     """Write points, whole or not at all; steps are a ten-thousandth of the spread, rounded to a power of ten or finer.
 
     Parameters

@@ -21,9 +21,15 @@ from wakewise.vision.reconstruction.colmap import call, no_stderr, pycolmap, set
 from wakewise.vision.reconstruction.guided import Poses
 from wakewise.vision.reconstruction.known_pose_triangulation import map_at_poses
 from wakewise.vision.reconstruction.model_quality import doubts, evidence, few_doubts, known_doubts
-from wakewise.vision.reconstruction.per_photo_intrinsics import LEAST_POINTS, OwnLenses, heaps, own_lenses, set_cameras
+from wakewise.vision.reconstruction.per_photo_intrinsics import (
+    LEAST_POINTS,
+    PerPhotoIntrinsics,
+    heaps,
+    own_lenses,
+    set_cameras,
+)
 from wakewise.vision.reconstruction.photos import PhotoStore
-from wakewise.vision.reconstruction.prior_pose_mapping import Seeded, map_from_poses
+from wakewise.vision.reconstruction.prior_pose_mapping import SeededModel, map_from_poses
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 from wakewise.vision.reconstruction.solving import BUNDLE_ITERATIONS, NEVER, solve, solve_again
 
@@ -99,7 +105,7 @@ def map_photos(
         copy = Path(shutil.copyfile(database, room / "database.db"))
         if settings.position_priors and references is not None:
             _write_priors(copy, references, settings.prior_sigma_m)
-        seeded, given = Seeded(model=None, refusal=None), None
+        seeded, given = SeededModel(model=None, refusal=None), None
         if fixed is not None:
             given = map_at_poses(copy, fixed, photos, progress)
         elif poses is not None:
@@ -182,7 +188,7 @@ def map_photos(
     return figures
 
 
-def _by_own_lens(database: Path, own: OwnLenses) -> list[tuple[tuple[str, ...], pycolmap.Camera]] | None:
+def _by_own_lens(database: Path, own: PerPhotoIntrinsics) -> list[tuple[tuple[str, ...], pycolmap.Camera]] | None:
     """Photos by lens where those that share one turn out to have several; None where they do not.
 
     Of a lens that was split, a photo that has no focal length of its own is of none of the parts: it gets its own.
@@ -203,7 +209,7 @@ def _by_own_lens(database: Path, own: OwnLenses) -> list[tuple[tuple[str, ...], 
     return out or None
 
 
-def _second_opinion_pct(model: pycolmap.Reconstruction, own: OwnLenses) -> float | None:
+def _second_opinion_pct(model: pycolmap.Reconstruction, own: PerPhotoIntrinsics) -> float | None:
     """How far cameras are from where they are with a lens for each photo, rms, in percent of their spread."""
     mine = {image.name: image.projection_center() for image in model.images.values() if image.has_pose}
     both = sorted(mine.keys() & own.centres.keys())
@@ -218,7 +224,7 @@ def _second_opinion_pct(model: pycolmap.Reconstruction, own: OwnLenses) -> float
     return 100.0 * float(np.sqrt((error**2).mean()) / np.sqrt(((b - b.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 
-def lens_doubts(model: pycolmap.Reconstruction, own: OwnLenses | None, opinion_pct: float | None) -> list[str]:
+def lens_doubts(model: pycolmap.Reconstruction, own: PerPhotoIntrinsics | None, opinion_pct: float | None) -> list[str]:
     """Reasons not to trust a model that come from mapping with a lens for each photo."""
     if own is None:
         return []

@@ -18,7 +18,7 @@ from wakewise.core.arrays import BoolArray
 from wakewise.core.errors import InputError
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction.photos import PNG, Image, Photo
-from wakewise.vision.reconstruction.registered_photos import View
+from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
 from wakewise.vision.reconstruction.stereo import DepthMap, resample
 
 NAMES = ("{name}.png", "{stem}.png", "{stem}_mask.png", "{stem}.tif", "{stem}.jpg", "{stem}.jpeg", "{stem}.bmp")
@@ -96,7 +96,7 @@ def write_for_colmap(masks: Masks, names: list[str], folder: Path) -> None:
             path.write_bytes(cv2.imencode(".png", np.where(mask, 255, 0).astype(np.uint8))[1].tobytes())
 
 
-def masked(depth_map: DepthMap, view: View, mask: BoolArray | None) -> DepthMap:
+def masked(depth_map: DepthMap, view: RegisteredPhoto, mask: BoolArray | None) -> DepthMap:
     """A depth map without what the mask of its photo hides: no depth there, neither to become points nor to vote."""
     if mask is None:
         return depth_map

@@ -30,7 +30,7 @@ LEAST_KEPT_PCT, LEAST_REGISTERED = 40.0, 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evidence:
+class ModelEvidence:
     """What the photographs say of a model.
 
     observations_per_photo: median number of sparse points that a registered photo sees. coverage_pct: median share of
@@ -58,12 +58,12 @@ class _Observations:
     centres_W: Array
 
 
-def evidence(model: pycolmap.Reconstruction, database: Path) -> Evidence:
+def evidence(model: pycolmap.Reconstruction, database: Path) -> ModelEvidence:
     """Hold a model against the photographs' features and the verified matches in the database."""
     images = sorted((image for image in model.images.values() if image.has_pose), key=lambda one: one.name)
     seen = _observations(model, images)
     count = np.bincount(seen.photo, minlength=len(images))
-    return Evidence(
+    return ModelEvidence(
         observations_per_photo=float(np.median(count)) if len(count) else 0.0,
         coverage_pct=_coverage_pct(images),
         angle_deg=_angle_deg(seen),
@@ -72,7 +72,7 @@ def evidence(model: pycolmap.Reconstruction, database: Path) -> Evidence:
     )
 
 
-def doubts(found: Evidence, *, uncut_px: float, cut_pct: float) -> list[str]:
+def doubts(found: ModelEvidence, *, uncut_px: float, cut_pct: float) -> list[str]:
     """Each reason not to trust a model, in words with its figure; none if it may be trusted."""
     out = []
     if found.observations_per_photo < LEAST_OBSERVATIONS:
@@ -113,7 +113,7 @@ def few_doubts(registered: int, photos: int) -> list[str]:
     ]
 
 
-def known_doubts(found: Evidence, *, error_px: float, kept_pct: float | None) -> list[str]:
+def known_doubts(found: ModelEvidence, *, error_px: float, kept_pct: float | None) -> list[str]:
     """Reasons not to trust cameras that were given and kept: what the photographs' features say of them."""
     if kept_pct is None or (found.agreeing_pairs_pct is None and kept_pct < LEAST_KEPT_PCT):
         return ["nothing in the photos confirms the cameras that were given: hardly any features match between them"]

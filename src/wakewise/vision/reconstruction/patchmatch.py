@@ -15,7 +15,7 @@ from wakewise.core.interfaces import Progress
 from wakewise.core.run_lock import half_done
 from wakewise.vision.reconstruction.clouds import read_cloud, write_cloud
 from wakewise.vision.reconstruction.colmap import call, pycolmap
-from wakewise.vision.reconstruction.registered_photos import Ball
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 from wakewise.vision.reconstruction.stages import need_room
 
@@ -40,7 +40,7 @@ def patch_match(
     out: Path,
     settings: ReconstructionSettings,
     *,
-    region: Ball | None,
+    region: RegionOfInterest | None,
     progress: Progress,
 ) -> dict[str, Any]:
     """Patch-match stereo and fusion; what lies outside the region is left out.

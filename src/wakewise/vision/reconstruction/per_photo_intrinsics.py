@@ -30,7 +30,7 @@ MOST_LENSES = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class OwnLens:
+class PhotoIntrinsics:
     """Focal length in pixels that a photo has by itself, and on how many sparse points it rests."""
 
     focal_px: float
@@ -38,16 +38,16 @@ class OwnLens:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class OwnLenses:
+class PerPhotoIntrinsics:
     """Lenses by photo name, and camera centres, shape (3,), of the largest model that they came from."""
 
-    lenses: dict[str, OwnLens]
+    lenses: dict[str, PhotoIntrinsics]
     centres: dict[str, Array]
 
 
 def own_lenses(
     folder: Path, database: Path, scratch: Path, settings: ReconstructionSettings, photos: int, progress: Progress
-) -> OwnLenses:
+) -> PerPhotoIntrinsics:
     """Map with a lens for each photo.
 
     Raises
@@ -64,7 +64,7 @@ def own_lenses(
         link.close()
     set_cameras(copy, [((name,), cameras[number]) for name, number in images.items()])
     free = settings.model_copy(update={"refine_camera": True, "mapper": "incremental", "position_priors": False})
-    found: dict[str, OwnLens] = {}
+    found: dict[str, PhotoIntrinsics] = {}
     centres: dict[str, Array] = {}
     for k, model in enumerate(solve(folder, copy, scratch, free, photos, progress)):
         for image in model.images.values():
@@ -74,8 +74,8 @@ def own_lenses(
                 centres[image.name] = np.asarray(image.projection_center())
             focal_px = float(model.cameras[image.camera_id].mean_focal_length())
             if image.name not in found and focal_px > 0.0:  # photographs that tell nothing of it drive it anywhere
-                found[image.name] = OwnLens(focal_px=focal_px, points=image.num_points3D)
-    return OwnLenses(lenses=found, centres=centres)
+                found[image.name] = PhotoIntrinsics(focal_px=focal_px, points=image.num_points3D)
+    return PerPhotoIntrinsics(lenses=found, centres=centres)
 
 
 def set_cameras(database: Path, groups: list[tuple[tuple[str, ...], pycolmap.Camera]]) -> None:
@@ -112,7 +112,7 @@ def _like(camera: pycolmap.Camera) -> pycolmap.Camera:
     return new
 
 
-def heaps(own: dict[str, OwnLens]) -> list[tuple[str, ...]]:
+def heaps(own: dict[str, PhotoIntrinsics]) -> list[tuple[str, ...]]:
     """Photos by lens: one group where focal lengths scatter, several where they lie in heaps well apart.
 
     A photo that rests on few points goes where its focal length is nearest. The best cut of the sorted logarithms in

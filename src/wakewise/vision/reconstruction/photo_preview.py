@@ -44,7 +44,7 @@ _RATIO, _GEOMETRY_PX = 0.8, 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class PhotoLook:
+class PhotoQuality:
     """One photo. sharpness_pct: of the median of all; mean: grey 0 to 255; dark_pct, bright_pct: of its pixels;
     partners: photos that overlap it, best first, and their matches; covered_pct: share of its parts that two or more
     partners show too; faults: words, empty where nothing is wrong.
@@ -65,10 +65,10 @@ class PhotoLook:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Look:
+class PhotoPreview:
     """All photos, in order; groups: how many hang together, largest set first; advice: what to shoot again."""
 
-    photos: tuple[PhotoLook, ...]
+    photos: tuple[PhotoQuality, ...]
     groups: tuple[int, ...]
     pairs: int
     advice: tuple[str, ...]
@@ -93,7 +93,7 @@ class _Seen:
     size: tuple[int, int]
 
 
-def look_at(folder: Path, threads: int = 2, progress: Progress = no_progress) -> tuple[Look, dict[str, bytes]]:
+def look_at(folder: Path, threads: int = 2, progress: Progress = no_progress) -> tuple[PhotoPreview, dict[str, bytes]]:
     """Look at a folder of photographs; also small JPEG copies of them, by name.
 
     Raises
@@ -208,7 +208,7 @@ def _judged(
     matched: dict[tuple[int, int], IntArray],
     pairs: int,
     others: dict[str, int],
-) -> Look:
+) -> PhotoPreview:
     count = len(names)
     usual = float(np.median([one.sharpness for one in seen]))
     ends = np.array(list(matched), dtype=np.int64).reshape(-1, 2)
@@ -221,7 +221,7 @@ def _judged(
         mine = [(len(rows), a + b - i, rows[:, 0 if a == i else 1]) for (a, b), rows in matched.items() if i in (a, b)]
         mine.sort(key=lambda entry: -entry[0])
         covered = _covered(one, [rows for _, _, rows in mine])
-        photo = PhotoLook(
+        photo = PhotoQuality(
             name=names[i],
             width=sizes[i][0],
             height=sizes[i][1],
@@ -237,7 +237,9 @@ def _judged(
         )
         photos.append(_with_faults(photo))
     groups = tuple(int(n) for n in np.bincount(group))
-    return Look(photos=tuple(photos), groups=groups, pairs=pairs, advice=_advice(photos, groups), passed_over=others)
+    return PhotoPreview(
+        photos=tuple(photos), groups=groups, pairs=pairs, advice=_advice(photos, groups), passed_over=others
+    )
 
 
 def _covered(one: _Seen, partners: list[IntArray]) -> float:
@@ -253,7 +255,7 @@ def _covered(one: _Seen, partners: list[IntArray]) -> float:
     return 100.0 * float((counts >= LEAST_PARTNERS).mean())
 
 
-def _with_faults(photo: PhotoLook) -> PhotoLook:
+def _with_faults(photo: PhotoQuality) -> PhotoQuality:
     faults = []
     if photo.sharpness_pct < 100.0 * BLURRED_SHARE:
         faults.append(f"blurred: {photo.sharpness_pct:.0f} % of the usual sharpness")
@@ -267,10 +269,10 @@ def _with_faults(photo: PhotoLook) -> PhotoLook:
         faults.append(f"one partner: overlaps {photo.partners[0][0]} only")
     elif photo.covered_pct < LEAST_COVERED_PCT:
         faults.append(f"little shared: two other photos show {photo.covered_pct:.0f} % of it")
-    return PhotoLook(**{**{k: getattr(photo, k) for k in photo.__dataclass_fields__}, "faults": tuple(faults)})
+    return PhotoQuality(**{**{k: getattr(photo, k) for k in photo.__dataclass_fields__}, "faults": tuple(faults)})
 
 
-def _advice(photos: Sequence[PhotoLook], groups: tuple[int, ...]) -> tuple[str, ...]:
+def _advice(photos: Sequence[PhotoQuality], groups: tuple[int, ...]) -> tuple[str, ...]:
     """What to shoot again or between, most important first."""
     out = []
     parts = [number for number, count in enumerate(groups) if count > 1]

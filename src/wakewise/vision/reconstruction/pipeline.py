@@ -28,8 +28,8 @@ from wakewise.vision.reconstruction.pairs import BAND_NEIGHBOURS, POSE_NEIGHBOUR
 from wakewise.vision.reconstruction.patchmatch import require_cuda
 from wakewise.vision.reconstruction.photos import Photo, PhotoStore, passed_over, read_photos, without_duplicates
 from wakewise.vision.reconstruction.references import match_references
-from wakewise.vision.reconstruction.registered_photos import Ball
-from wakewise.vision.reconstruction.request import Wishes
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
+from wakewise.vision.reconstruction.request import ReconstructionRequest
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.stage_keys import stage_key
 from wakewise.vision.reconstruction.stages import StageResult, make_folder, run_stage, withdraw
@@ -147,7 +147,7 @@ def reconstruct(
     reference_rotations: dict[str, Array] | None = None,
     region: tuple[Array, float] | None = None,
     known: KnownCameras | None = None,
-    wishes: Wishes | None = None,
+    wishes: ReconstructionRequest | None = None,
     progress: Progress = no_progress,
 ) -> Model:
     """Photos to a model in `out`: database.db, sparse/, dense.ply, mesh.ply, reconstruction.json.
@@ -197,7 +197,7 @@ def reconstruct(
     settings = settings or ReconstructionSettings()
     if settings.dense == "patch-match":
         require_cuda()
-    wishes, store = wishes or Wishes(), PhotoStore(photos)
+    wishes, store = wishes or ReconstructionRequest(), PhotoStore(photos)
     found, duplicates = without_duplicates(read_photos(photos, store, settings.threads))
     strangers: tuple[Photo, ...] = ()
     fixed = known is not None and settings.known_cameras == "fixed"
@@ -334,7 +334,7 @@ def _poses(
     return {name: (np.asarray(rotations[name]), p) for name, p in positions.items() if name in rotations}
 
 
-def _ball(region: tuple[Array, float] | None, references: dict[str, Array] | None) -> Ball | None:
+def _ball(region: tuple[Array, float] | None, references: dict[str, Array] | None) -> RegionOfInterest | None:
     if region is None:
         return None
     if references is None:
@@ -342,4 +342,4 @@ def _ball(region: tuple[Array, float] | None, references: dict[str, Array] | Non
     centre, radius = region
     if not (np.isfinite(radius) and radius > 0):
         raise InputError(f"region of interest: radius {radius:g} m, must be above 0")
-    return Ball(centre_W_m=np.asarray(centre, dtype=np.float64), radius_m=float(radius))
+    return RegionOfInterest(centre_W_m=np.asarray(centre, dtype=np.float64), radius_m=float(radius))

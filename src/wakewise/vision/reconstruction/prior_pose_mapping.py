@@ -34,7 +34,7 @@ MOST_ERROR_PX, LEAST_TRACK, LEAST_KEPT = 0.7, 2.5, 0.4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seeded:
+class SeededModel:
     """A model, or why there is none."""
 
     model: pycolmap.Reconstruction | None
@@ -43,7 +43,7 @@ class Seeded:
 
 def map_from_poses(
     database: Path, poses: Poses, settings: ReconstructionSettings, photos: int, progress: Progress
-) -> Seeded:
+) -> SeededModel:
     """Model from verified matches and rough poses.
 
     Parameters
@@ -72,7 +72,7 @@ def map_from_poses(
     matched = {number: graph.num_observations_for_image(number) for number in cache.images}
     strangers = [image.name for n, image in cache.images.items() if matched[n] and image.name not in poses]
     if strangers:
-        return Seeded(model=None, refusal=f"{len(strangers)} photos have no known pose, such as {strangers[0]}")
+        return SeededModel(model=None, refusal=f"{len(strangers)} photos have no known pose, such as {strangers[0]}")
     mapper, model = pycolmap.IncrementalMapper(cache), pycolmap.Reconstruction()
     mapper.begin_reconstruction(model)
     manager = mapper.observation_manager
@@ -105,7 +105,7 @@ def map_from_poses(
             manager.deregister_frame(model.images[number].frame_id)
     mapper.end_reconstruction(False)
     refusal = _refusal(model, matched)
-    return Seeded(model=model if refusal is None else None, refusal=refusal)
+    return SeededModel(model=model if refusal is None else None, refusal=refusal)
 
 
 def _refusal(model: pycolmap.Reconstruction, matched: dict[int, int]) -> str | None:

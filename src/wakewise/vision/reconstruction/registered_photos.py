@@ -21,7 +21,7 @@ MIN_SHARED = 20
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ball:
+class RegionOfInterest:
     """A region of interest in the model's frame."""
 
     centre_W_m: Array
@@ -32,7 +32,7 @@ class Ball:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class View:
+class RegisteredPhoto:
     """One registered photo. R_CW and p_WC_m place the camera; depth limits in m hold for what it should see.
 
     Of OpenCV's lens, `focal_px` is fx and `stretch` fy / fx; `radial` is k1 and `bend` the rest: k2, p1, p2, or of a
@@ -87,7 +87,7 @@ def camera_centres(sparse: Path) -> dict[str, Array]:
     return {one.name: np.asarray(one.projection_center()) for one in images if one.has_pose}
 
 
-def read_views(sparse: Path, region: Ball | None) -> tuple[tuple[View, ...], Array]:
+def read_views(sparse: Path, region: RegionOfInterest | None) -> tuple[tuple[RegisteredPhoto, ...], Array]:
     """Registered photos of a sparse model, in order of name, and the sparse points, shape (n, 3).
 
     Depth limits come from the region, or from the 1st and 99th percentile of what each photo sees of the sparse points,
@@ -121,7 +121,7 @@ def read_views(sparse: Path, region: Ball | None) -> tuple[tuple[View, ...], Arr
         lens = lens_of(image.camera)
         fx, fy, cx, cy, k1, *bend = lens.params
         views.append(
-            View(
+            RegisteredPhoto(
                 name=image.name,
                 width=lens.width,
                 height=lens.height,
@@ -144,7 +144,9 @@ def read_views(sparse: Path, region: Ball | None) -> tuple[tuple[View, ...], Arr
     return tuple(views), points
 
 
-def rank_partners(views: tuple[View, ...], points: Array, region: Ball | None, most: int) -> list[list[int]]:
+def rank_partners(
+    views: tuple[RegisteredPhoto, ...], points: Array, region: RegionOfInterest | None, most: int
+) -> list[list[int]]:
     """For each view the best others for stereo, best first, at most `most`.
 
     Weight: how many sparse points both see (alike for all when the region is given: nearly all points lie around it),

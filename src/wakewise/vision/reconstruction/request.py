@@ -11,14 +11,14 @@ import numpy as np
 from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.errors import InputError, StageError
 from wakewise.vision.reconstruction.clouds import read_cloud, write_cloud
-from wakewise.vision.reconstruction.scale.bars import Bars
-from wakewise.vision.reconstruction.scale.position_fixes import Fixes
+from wakewise.vision.reconstruction.scale.bars import ScaleBars
+from wakewise.vision.reconstruction.scale.position_fixes import PositionFixes
 
 LEAST_POINTS = 100
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Box:
+class CropBox:
     """What is kept of a model: from one corner to the other along its axes, in its units (m where it has a scale)."""
 
     low: Array
@@ -42,19 +42,19 @@ class Box:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wishes:
+class ReconstructionRequest:
     """bars: lengths that give scale; fixes: weak knowledge of places, which gives it without bars; masks: a folder of
     them; crop: what dense points and mesh are kept of; until: the last stage.
     """
 
-    bars: Bars | None = None
-    fixes: Fixes | None = None
+    bars: ScaleBars | None = None
+    fixes: PositionFixes | None = None
     masks: Path | None = None
-    crop: Box | None = None
+    crop: CropBox | None = None
     until: Literal["sparse", "dense", "mesh"] = "mesh"
 
 
-def cut_cloud(path: Path, box: Box) -> int:
+def cut_cloud(path: Path, box: CropBox) -> int:
     """Keep of a cloud on disk what lies in a box; how many points that is.
 
     Raises

@@ -18,7 +18,7 @@ from wakewise.core.arrays import Array, IntArray
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import write_json
 from wakewise.vision.reconstruction.clouds import read_cloud
-from wakewise.vision.reconstruction.ground_plane import Level, level_of
+from wakewise.vision.reconstruction.ground_plane import GroundPlane, level_of
 from wakewise.vision.reconstruction.registered_photos import camera_centres
 
 FIGURES = ("area", "plan_area", "rugosity", "volume")
@@ -28,7 +28,7 @@ LEAST_PHOTOS = 12
 
 
 @dataclass(frozen=True, kw_only=True)
-class Extent:
+class SurfaceExtent:
     """Area of the surface and of what it covers of its plane, their ratio, and volume above the plane.
 
     The ratio is the surface index of A. L. Dahl, Ecology 54(2), 1973, doi 10.2307/1934335, which divers call rugosity.
@@ -54,13 +54,15 @@ def surface_of(path: Path) -> tuple[Array, IntArray]:
     return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
 
 
-def cells_of(vertices: Array, faces: IntArray, level: Level, cell: float) -> set[tuple[int, int]]:
+def cells_of(vertices: Array, faces: IntArray, level: GroundPlane, cell: float) -> set[tuple[int, int]]:
     """Cells of the plane that middles of triangles lie over."""
     place = np.floor(level.told(vertices[faces].mean(axis=1))[:, :2] / cell).astype(np.int64)
     return {(int(i), int(j)) for i, j in np.unique(place, axis=0)}
 
 
-def extent_over(vertices: Array, faces: IntArray, level: Level, cell: float, wanted: set[tuple[int, int]]) -> Extent:
+def extent_over(
+    vertices: Array, faces: IntArray, level: GroundPlane, cell: float, wanted: set[tuple[int, int]]
+) -> SurfaceExtent:
     """Extent of the part of a surface over these cells.
 
     Volume is the flux of (0, 0, height) through what looks up or down of it: what lies above the plane less what lies
@@ -74,7 +76,7 @@ def extent_over(vertices: Array, faces: IntArray, level: Level, cell: float, wan
     area = float(np.linalg.norm(normal, axis=1).sum())
     plan = len(wanted) * cell**2
     volume = float((corners[:, :, 2].mean(axis=1) * normal[:, 2]).sum())
-    return Extent(area=area, plan_area=plan, rugosity=area / plan, volume=volume)
+    return SurfaceExtent(area=area, plan_area=plan, rugosity=area / plan, volume=volume)
 
 
 def measure_halves(

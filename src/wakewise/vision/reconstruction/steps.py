@@ -17,8 +17,8 @@ from wakewise.vision.reconstruction.mapping import map_photos
 from wakewise.vision.reconstruction.pairs import Pairs
 from wakewise.vision.reconstruction.patchmatch import patch_match
 from wakewise.vision.reconstruction.photos import Photo, PhotoStore
-from wakewise.vision.reconstruction.registered_photos import Ball
-from wakewise.vision.reconstruction.request import Box, Wishes, cut_cloud
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
+from wakewise.vision.reconstruction.request import CropBox, ReconstructionRequest, cut_cloud
 from wakewise.vision.reconstruction.scale.stage import place_model, scale_model
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.stages import need_room
@@ -84,7 +84,7 @@ def map_step(
 
 
 def scale_step(
-    store: PhotoStore, sparse: Path, wishes: Wishes, threads: int, referred: bool, progress: Progress
+    store: PhotoStore, sparse: Path, wishes: ReconstructionRequest, threads: int, referred: bool, progress: Progress
 ) -> dict[str, Any]:
     """sparse/ in metres; see `scale.stage`. The surest gives the scale: references (`referred`), then bars, then fixes;
     the others check it.
@@ -102,9 +102,9 @@ def dense_step(
     sparse: Path,
     dense: Path,
     settings: ReconstructionSettings,
-    region: Ball | None,
+    region: RegionOfInterest | None,
     fixed: bool,
-    crop: Box | None,
+    crop: CropBox | None,
     progress: Progress,
 ) -> dict[str, Any]:
     """sparse/ to dense.ply, cut to a box; see `dense.densify`. `fixed`: the poses are known and stay."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.jit.njit import njit
 from wakewise.vision.reconstruction.photos import Image
-from wakewise.vision.reconstruction.registered_photos import Ball, View
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest, RegisteredPhoto
 
 DepthImage = NDArray[np.float32]
 BLOCK = 5
@@ -51,7 +51,7 @@ class DepthMap:
         freeze(self, centre_px=(2,), R_CW=(3, 3), p_WC_m=(3,))
 
 
-def rectify_axes(first: View, second: View, focus_W_m: Array) -> Array:
+def rectify_axes(first: RegisteredPhoto, second: RegisteredPhoto, focus_W_m: Array) -> Array:
     """Rotation R_CW, shape (3, 3), that both views are turned to: x along the baseline, z at the focus."""
     x = second.p_WC_m - first.p_WC_m
     x = x / np.linalg.norm(x)
@@ -61,7 +61,7 @@ def rectify_axes(first: View, second: View, focus_W_m: Array) -> Array:
     return np.stack([x, np.cross(z, x), z])
 
 
-def rectifiable(first: View, second: View) -> bool:
+def rectifiable(first: RegisteredPhoto, second: RegisteredPhoto) -> bool:
     """Whether neither view has to be turned far from where it looks, which would stretch it: motion forward does."""
     baseline = second.p_WC_m - first.p_WC_m
     sight = first.focus_W_m - 0.5 * (first.p_WC_m + second.p_WC_m)
@@ -73,7 +73,13 @@ def rectifiable(first: View, second: View) -> bool:
 
 
 def pair_depth(
-    views: tuple[View, ...], photos: list[Image], i: int, j: int, region: Ball | None, scale: float, paths: int = 8
+    views: tuple[RegisteredPhoto, ...],
+    photos: list[Image],
+    i: int,
+    j: int,
+    region: RegionOfInterest | None,
+    scale: float,
+    paths: int = 8,
 ) -> DepthMap | None:
     """Depth map of view i from the pair (i, j), which must be rectifiable; None if too little of it can be seen.
 
@@ -149,7 +155,9 @@ def pair_depth(
     )
 
 
-def _inside(depth_m: DepthImage, focal: float, centre_px: Array, middle_C_m: Array, region: Ball | None) -> BoolArray:
+def _inside(
+    depth_m: DepthImage, focal: float, centre_px: Array, middle_C_m: Array, region: RegionOfInterest | None
+) -> BoolArray:
     """Which pixels have a depth, and where a region is given, one inside its ball about `middle_C_m`."""
     if region is None:
         return np.asarray(depth_m > 0)
@@ -171,19 +179,21 @@ def _in_ball(depth_m: DepthImage, focal: float, centre_px: Array, middle_C_m: Ar
     return inside
 
 
-def _turn_deg(view: View, R_CW: Array) -> float:
+def _turn_deg(view: RegisteredPhoto, R_CW: Array) -> float:
     """Angle between the view's optical axis and the rectified one."""
     return float(np.degrees(np.arccos(np.clip(view.R_CW[2] @ R_CW[2], -1.0, 1.0))))
 
 
-def _depth_limits(view: View, middle_m: float, region: Ball | None) -> tuple[float, float]:
+def _depth_limits(view: RegisteredPhoto, middle_m: float, region: RegionOfInterest | None) -> tuple[float, float]:
     """Nearest and farthest depth in the rectified frame that counts."""
     if region is None:
         return view.near_m, view.far_m
     return max(middle_m - 1.1 * region.radius_m, 0.3 * middle_m), middle_m + 1.1 * region.radius_m
 
 
-def _window(view: View, R_CW: Array, focal: float, region: Ball | None) -> tuple[int, int, int, int]:
+def _window(
+    view: RegisteredPhoto, R_CW: Array, focal: float, region: RegionOfInterest | None
+) -> tuple[int, int, int, int]:
     """Left, top, width and height in rectified pixels (principal point at 0) of what is worth matching."""
     corners = view.rays(np.array([[0.0, 0.0], [view.width, 0.0], [0.0, view.height], [view.width, view.height]]))
     rays = corners @ view.R_CW @ R_CW.T
@@ -200,7 +210,9 @@ def _window(view: View, R_CW: Array, focal: float, region: Ball | None) -> tuple
     return left, top, width, height
 
 
-def resample(photo: Image, view: View, R_CW: Array, focal: float, centre_px: Array, size: tuple[int, int]) -> Image:
+def resample(
+    photo: Image, view: RegisteredPhoto, R_CW: Array, focal: float, centre_px: Array, size: tuple[int, int]
+) -> Image:
     """The photo as a pinhole camera of the same centre turned to R_CW would have taken it."""
     # COLMAP has pixel centres at +0.5, OpenCV at 0.
     K = np.array(

@@ -42,7 +42,7 @@ _POINTS, _LEAST_POINTS, _QUALITY = 300, 20, 96
 
 
 @dataclass(frozen=True, kw_only=True)
-class FilmFrames:
+class VideoFrames:
     """What was taken of a film. blurred: frames looked at that are; blurred_taken: of those taken, as a stretch had no
     better; moved_widths: how far the picture went in all, in widths; motion_px_s: how fast where frames were taken,
     median; skew_px: what a rolling shutter of READOUT_S makes of that.
@@ -79,7 +79,7 @@ def is_film(path: Path) -> bool:
     return path.is_file() and path.suffix.lower() in SUFFIXES
 
 
-def take_frames(film: Path, out: Path, progress: Progress = no_progress) -> tuple[Path, FilmFrames]:
+def take_frames(film: Path, out: Path, progress: Progress = no_progress) -> tuple[Path, VideoFrames]:
     """Folder of the frames of a film, `out/frames`, made unless it is there, and what was taken.
 
     Raises
@@ -96,7 +96,7 @@ def take_frames(film: Path, out: Path, progress: Progress = no_progress) -> tupl
     key = fingerprint(VERSION, digest.hexdigest(), STEP_SHARE, MOST_FRAMES)
     with alone(out):
         done = run_stage(out, "frames", key, (folder,), lambda: {"film": asdict(_take(film, folder, progress))})
-    return folder, FilmFrames(**done.figures["film"])
+    return folder, VideoFrames(**done.figures["film"])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,7 +108,7 @@ class _Looked:
     way: Array
 
 
-def _take(film: Path, folder: Path, progress: Progress) -> FilmFrames:
+def _take(film: Path, folder: Path, progress: Progress) -> VideoFrames:
     with _opened(film) as reader:
         facts = {
             "width": int(reader.get(cv2.CAP_PROP_FRAME_WIDTH)),
@@ -134,7 +134,7 @@ def _take(film: Path, folder: Path, progress: Progress) -> FilmFrames:
         _write(film, temporary, {int(n) for n in numbers}, progress, frames)
     pace = np.gradient(looked.way, looked.numbers / rate) if len(looked.way) > 1 else np.zeros(1)
     motion = float(np.median(pace[chosen])) * max(facts.values())
-    return FilmFrames(
+    return VideoFrames(
         film=film.name,
         **facts,
         frames_per_s=rate,

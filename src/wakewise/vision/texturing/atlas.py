@@ -23,7 +23,7 @@ from wakewise.core.errors import StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.vision.image_decoding import read_picture
-from wakewise.vision.reconstruction.registered_photos import View, read_views
+from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto, read_views
 from wakewise.vision.texturing.photo_colours import project
 
 SIDES_PX = (512, 1024, 2048, 4096, 8192)
@@ -39,7 +39,7 @@ _CHUNK = 2_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Layout:
+class AtlasLayout:
     """Where triangles lie in the picture: its side and that of a square in px, corners in px, shape (m, 3, 2)."""
 
     side: int
@@ -50,7 +50,7 @@ class Layout:
         freeze(self, corners_px=(None, 3, 2))
 
 
-def lay_out(faces: int) -> Layout:
+def lay_out(faces: int) -> AtlasLayout:
     """Squares in rows, two triangles in each; the smallest picture in which squares have their least side.
 
     Raises
@@ -70,11 +70,11 @@ def lay_out(faces: int) -> Layout:
     number = np.arange(faces)
     square = number // 2
     corner = np.stack([square % per_row, square // per_row], axis=1)[:, None, :] * float(cell)
-    return Layout(side=side, cell=cell, corners_px=corner + _corners(cell)[number % 2])
+    return AtlasLayout(side=side, cell=cell, corners_px=corner + _corners(cell)[number % 2])
 
 
 def best_views(
-    vertices: Array, faces: IntArray, views: tuple[View, ...], progress: Progress = no_progress
+    vertices: Array, faces: IntArray, views: tuple[RegisteredPhoto, ...], progress: Progress = no_progress
 ) -> tuple[IntArray, Array]:
     """The views that see each triangle best, shape (m, BEST), -1 where there are fewer, and their weights.
 
@@ -113,10 +113,10 @@ def best_views(
 
 
 def paint(
-    layout: Layout,
+    layout: AtlasLayout,
     vertices: Array,
     faces: IntArray,
-    views: tuple[View, ...],
+    views: tuple[RegisteredPhoto, ...],
     photos: Path,
     progress: Progress = no_progress,
 ) -> tuple[NDArray[np.uint8], float]:
@@ -156,7 +156,7 @@ def paint(
     return out, float(seen.mean())
 
 
-def _pattern(layout: Layout, half: int) -> tuple[IntArray, Array]:
+def _pattern(layout: AtlasLayout, half: int) -> tuple[IntArray, Array]:
     """Pixels of a square that one of its two triangles owns, as steps from the square's first, and their places in it.
 
     A triangle owns its half of the square, border and all: its colours go on beyond its edges, so that a viewer's
@@ -172,7 +172,7 @@ def _pattern(layout: Layout, half: int) -> tuple[IntArray, Array]:
     return np.asarray(row[own] * layout.side + column[own], dtype=np.int64), bary
 
 
-def _texels(layout: Layout, faces: IntArray, inside: IntArray) -> IntArray:
+def _texels(layout: AtlasLayout, faces: IntArray, inside: IntArray) -> IntArray:
     """Pixels of the picture, counted row by row, that triangles own, shape (m, n)."""
     per_row = layout.side // layout.cell
     square = faces // 2

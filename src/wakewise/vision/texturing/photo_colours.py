@@ -25,7 +25,7 @@ from wakewise.core.interfaces import no_progress
 from wakewise.core.size_limits import picture_depth
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import read_photos
-from wakewise.vision.reconstruction.registered_photos import View, read_views
+from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto, read_views
 from wakewise.vision.texturing.colour import WaterFit, balanced, fit_water, without_water
 
 FIT_PHOTOS = 16
@@ -36,7 +36,7 @@ _QUALITY = 93
 
 
 @dataclass(frozen=True, kw_only=True)
-class Corrected:
+class CorrectionResult:
     """What was done: photographs with the water undone by physics, others balanced, and the water, in 1/m.
 
     deep, clear: photographs of more than 8 bits and with transparency, which the copies have not; renamed: copies that
@@ -92,7 +92,7 @@ class Corrected:
 
 def correct_photos(
     photos: Path, out: Path, *, model: Path | None = None, progress: Callable[..., None] = no_progress
-) -> Corrected:
+) -> CorrectionResult:
     """Write colour-corrected copies of the photographs of a folder, JPEG, each whole; those that are there stay.
 
     Parameters
@@ -148,7 +148,7 @@ def correct_photos(
             jpeg = cv2.imencode(".jpg", np.ascontiguousarray(shown[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
             temporary.write_bytes(jpeg[1].tobytes())
     progress(len(names), len(names), "")
-    return Corrected(
+    return CorrectionResult(
         physical=physical,
         balanced=len(names) - physical,
         water=fit,
@@ -173,16 +173,16 @@ def copy_names(names: Sequence[str]) -> dict[str, str]:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Depths:
+class RangeMaps:
     """Ranges of a reconstruction as its photographs see them: its mesh, and between its sparse points elsewhere."""
 
-    views: dict[str, View]
+    views: dict[str, RegisteredPhoto]
     points_m: Array
     mesh: Any | None
     corners_m: Array
 
     @classmethod
-    def read(cls, model: Path) -> Depths:
+    def read(cls, model: Path) -> RangeMaps:
         """Read sparse/ and mesh.ply of a model."""
         views, points = read_views(model / "sparse", None)
         mesh, corners = None, np.zeros((0, 3))
@@ -232,12 +232,12 @@ class Depths:
         return np.asarray(depth * length, np.float32)
 
 
-def project(view: View, points_W_m: Array) -> tuple[Array, Array]:
+def project(view: RegisteredPhoto, points_W_m: Array) -> tuple[Array, Array]:
     """Pixels, shape (n, 2), and depths, shape (n,), of points before a view, through its lens."""
     return view.project(points_W_m)
 
 
-def rays(view: View, pixels: Array) -> Array:
+def rays(view: RegisteredPhoto, pixels: Array) -> Array:
     """Directions with unit z in the camera frame, shape (n, 3), of pixels, shape (n, 2), distortion undone."""
     return view.rays(pixels)
 
@@ -276,13 +276,13 @@ def _between(pixels: Array, inverse: Array, grid: Array) -> Array:
     return np.asarray(out)
 
 
-def _depths(model: Path | None, names: list[str]) -> tuple[Depths | None, str | None]:
+def _depths(model: Path | None, names: list[str]) -> tuple[RangeMaps | None, str | None]:
     if model is None:
         return None, "no model was given"
     if not (model / "sparse" / "images.bin").is_file():
         return None, f"{model} holds no reconstruction"
     try:
-        depths = Depths.read(model)
+        depths = RangeMaps.read(model)
     except StageError as fault:
         return None, str(fault)
     if not set(names) & set(depths.views):

@@ -22,7 +22,7 @@ from wakewise.core.errors import StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import no_progress
 from wakewise.vision.image_decoding import read_picture
-from wakewise.vision.reconstruction.registered_photos import View, read_views
+from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto, read_views
 from wakewise.vision.texturing.colour import srgb_decode
 from wakewise.vision.texturing.photo_colours import project
 
@@ -121,7 +121,7 @@ def standing(vertices_m: Array, bed_z_m: float | None) -> Array:
 def vertex_colours(
     vertices_m: Array,
     faces: IntArray,
-    views: tuple[View, ...],
+    views: tuple[RegisteredPhoto, ...],
     photos: Path,
     progress: Callable[..., None] = no_progress,
 ) -> tuple[Array, NDArray[np.bool_]]:

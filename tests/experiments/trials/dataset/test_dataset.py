@@ -18,14 +18,14 @@ from made_trials import POSE, make_trial, target_mesh
 from wakewise.core.errors import InputError
 from wakewise.experiments.exports.frames import ros_body
 from wakewise.experiments.trials.dataset import build_dataset, check_dataset, read_words
-from wakewise.experiments.trials.dataset.statement import Words
+from wakewise.experiments.trials.dataset.statement import DatasetStatement
 from wakewise.ui.cli.main import run
 
 Capsys = pytest.CaptureFixture[str]
 WORDS = ["--license", "CC-BY-4.0", "--creator", "Reef Lab", "--date", "2026-11-23"]
 
 
-def words(**more: Any) -> Words:
+def words(**more: Any) -> DatasetStatement:
     return read_words(
         **{"name": "reef", "licence": "cc by 4.0", "creators": ["Reef Lab"], "published": "2026-11-23"} | more
     )

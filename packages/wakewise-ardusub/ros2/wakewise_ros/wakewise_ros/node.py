@@ -25,9 +25,9 @@ from wakewise.core.geometry import Pose
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
 from wakewise_ardusub.ros import (
-    Answer,
-    Field,
-    Target,
+    NodeAllocation,
+    PointField,
+    ProtectedPoints,
     ThrustAllocator,
     body_points,
     cloud_points,
@@ -97,7 +97,9 @@ class AllocatorNode(Node):
         # How long ago a message came is asked of a clock that no simulation stops: thrusts must not outlive it.
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         # Compiled before a vehicle waits for it.
-        self._allocate(np.ones(6), Target(points_m=np.array([[2.0, 0.0, 0.0]]), weights=np.ones(1), on_body=True))
+        self._allocate(
+            np.ones(6), ProtectedPoints(points_m=np.array([[2.0, 0.0, 0.0]]), weights=np.ones(1), on_body=True)
+        )
         self._wire(told["controllers"], bool(told["stamped"]), bool(told["target_latched"]))
 
     def _wire(self, controllers: list[str], stamped: bool, latched: bool) -> None:
@@ -139,7 +141,7 @@ class AllocatorNode(Node):
         fresh = self._now_ns() - self._pose_ns <= self._pose_timeout_s * 1e9
         return self._pose if fresh and self._target_frame in ("", self._pose_frame) else None
 
-    def _send(self, answer: Answer) -> None:
+    def _send(self, answer: NodeAllocation) -> None:
         self._thrusts_N = answer.thrusts_N
         if answer.way != self._way:
             self._way = answer.way
@@ -196,7 +198,7 @@ class AllocatorNode(Node):
             )
             return
         try:
-            fields = [Field(name=f.name, offset=f.offset, datatype=f.datatype) for f in message.fields]
+            fields = [PointField(name=f.name, offset=f.offset, datatype=f.datatype) for f in message.fields]
             sizes = (message.point_step, message.row_step, message.width, message.height, message.is_bigendian)
             xyz, weights = cloud_points(fields, *sizes, bytes(message.data))
             self._target, self._target_frame = self._placed(xyz, weights, on_body), frame
@@ -225,16 +227,16 @@ class AllocatorNode(Node):
                 return SetParametersResult(successful=False, reason=str(fault))
         return SetParametersResult(successful=True)
 
-    def _target_of(self, flat: list[float], on_body: bool) -> Target:
+    def _target_of(self, flat: list[float], on_body: bool) -> ProtectedPoints:
         """Target of the parameter: x, y, z, x, y, z, ... in the node's frame."""
         numbers = np.array([x for x in flat if not math.isnan(x)], dtype=np.float64)
         if len(numbers) % 3:
             raise ValueError(f"target_points: {len(numbers)} numbers, must be x, y, z of each point")
         return self._placed(numbers.reshape(-1, 3), np.ones(len(numbers) // 3), on_body)
 
-    def _placed(self, xyz: np.ndarray, weights: np.ndarray, on_body: bool) -> Target:
+    def _placed(self, xyz: np.ndarray, weights: np.ndarray, on_body: bool) -> ProtectedPoints:
         turn = body_points if on_body else world_points
-        return Target(points_m=turn(xyz, self._frame), weights=weights, on_body=on_body)
+        return ProtectedPoints(points_m=turn(xyz, self._frame), weights=weights, on_body=on_body)
 
 
 def _array(label: str, values) -> Float64MultiArray:

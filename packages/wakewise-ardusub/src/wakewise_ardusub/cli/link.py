@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import Bars, print_json, shown, write_page
+from wakewise.ui.cli.console import ProgressBars, print_json, shown, write_page
 from wakewise.ui.cli.options import Json
 from wakewise_ardusub.cli import link_ardusub, link_script, link_share, link_sitl
 from wakewise_ardusub.cli.link_points import Ahead, Points, WakeModelName, region_ahead, region_words
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from wakewise.robot.vehicles import Vehicle
     from wakewise.scene.targets import Region
     from wakewise_ardusub.logs.channels import VehicleLog
-    from wakewise_ardusub.logs.replay_allocation import Hindsight
+    from wakewise_ardusub.logs.replay_allocation import ReplayedAllocation
     from wakewise_ardusub.logs.table import LogTable
 
 app = typer.Typer(help="Real vehicles and what they recorded.", rich_markup_mode=None)
@@ -89,7 +89,7 @@ def log(
     folder = out or Path("runs") / f"log-{file.stem}"
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {folder}: a file is there, a folder is needed")
-    bars = Bars()
+    bars = ProgressBars()
     with bars.stage("reading"):
         found = read_log(file, any_vehicle=any_vehicle)
         table = tabulate(found)
@@ -116,7 +116,7 @@ def log(
 
 def _hindsight(
     found: VehicleLog, table: LogTable, vehicle: Vehicle, region: Region, wake_model: str, *, named: bool
-) -> tuple[Hindsight | None, str | None]:
+) -> tuple[ReplayedAllocation | None, str | None]:
     """Flown thrusts against others, or why there is none; a vehicle that was named must fit, the default may not."""
     from wakewise import wake
     from wakewise.core.errors import InputError

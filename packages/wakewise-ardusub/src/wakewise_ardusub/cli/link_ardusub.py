@@ -29,8 +29,8 @@ from wakewise_ardusub.cli.link_ardusub_check import (
 
 if TYPE_CHECKING:
     from wakewise_ardusub.link.connection import Endpoint
-    from wakewise_ardusub.session.protected_region import WhatToSpare
-    from wakewise_ardusub.session.session import SeaSession
+    from wakewise_ardusub.session.protected_region import ProtectedRegion
+    from wakewise_ardusub.session.session import VehicleSession
 
 DEFAULT_VEHICLE = "bluerov2-heavy"
 LINE_S = 0.2
@@ -170,18 +170,18 @@ def ardusub(
 
     from wakewise.operation import load_scenario, parse_overrides
     from wakewise_ardusub.link.connection import parse_connection
-    from wakewise_ardusub.link.engagement_fsm import Limits
-    from wakewise_ardusub.link.mavlink_codec import Post
+    from wakewise_ardusub.link.engagement_fsm import EngagementLimits
+    from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
     from wakewise_ardusub.session.cameras import parse_camera
     from wakewise_ardusub.session.link_join import SEA
-    from wakewise_ardusub.session.session import SeaSession
+    from wakewise_ardusub.session.session import VehicleSession
 
     vehicle_at = parse_connection(connection)
     ground_at = None if relay is None else parse_connection(relay, "--relay")
     changes = {**SEA, **parse_overrides(sets or []), "vehicle": vehicle, "method": method, "name": "sea"}
     scenario = load_scenario(None, None, changes)
     low, high = _numbers(depths, "--depths", "LEAST,MOST", 2)
-    limits = Limits(depth_m=(low, high), distance_m=fence, battery_V=battery)
+    limits = EngagementLimits(depth_m=(low, high), distance_m=fence, battery_V=battery)
     wardens: dict[str, Any] = {
         "limits": limits,
         "buttons": meant,
@@ -196,8 +196,8 @@ def ardusub(
         raise InputError(f"--out {folder}: a file is there, a folder is needed")
     with ExitStack() as stack:
         carrier, finish = _carried(stack, vehicle_at, ground_at)
-        post = Post(carrier, system)
-        session = SeaSession(
+        post = MavlinkCodec(carrier, system)
+        session = VehicleSession(
             scenario=scenario,
             receiving=post,
             send=post.send,
@@ -240,8 +240,8 @@ def _uninterrupted() -> Iterator[None]:
 def _carried(stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None) -> tuple[Any, Any]:
     """What carries the bytes, and what is to be done once the session is there."""
     from wakewise.core.errors import InputError
-    from wakewise_ardusub.link.mavlink_codec import Tap
-    from wakewise_ardusub.link.mavlink_relay import Mediator
+    from wakewise_ardusub.link.mavlink_codec import RelayTransport
+    from wakewise_ardusub.link.mavlink_relay import MavlinkRelay
     from wakewise_ardusub.link.transports import carrier_of, open_udp
 
     if ground_at is None:
@@ -251,13 +251,13 @@ def _carried(stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None)
     for option, end in (("--connection", vehicle_at), ("--relay", ground_at)):
         if end.way not in ("udpin", "udpout"):
             raise InputError(f"{option} {end.words}: the relay forwards udpin:HOST:PORT and udpout:HOST:PORT only")
-    tap = Tap()
+    tap = RelayTransport()
     sockets = [stack.enter_context(open_udp(end)) for end in (vehicle_at, ground_at)]
     known = [None if end.way == "udpin" else (end.host, end.port) for end in (vehicle_at, ground_at)]
 
-    def begin(session: SeaSession) -> None:
+    def begin(session: VehicleSession) -> None:
         warden = session.warden
-        relay = Mediator(
+        relay = MavlinkRelay(
             *sockets,
             driving=lambda: warden.entry is not None,
             heard=tap.put,
@@ -271,7 +271,7 @@ def _carried(stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None)
     return tap, begin
 
 
-def _watch(session: SeaSession, where: str) -> None:
+def _watch(session: VehicleSession, where: str) -> None:
     """Show how it stands and hand key presses over, until the session is over."""
     import select
 
@@ -298,7 +298,7 @@ def _watch(session: SeaSession, where: str) -> None:
             _say(line)
 
 
-def _spare(vehicle: str, target: str | None, ahead: float, points: Path | None) -> WhatToSpare:
+def _spare(vehicle: str, target: str | None, ahead: float, points: Path | None) -> ProtectedRegion:
     import numpy as np
 
     from wakewise.core.errors import InputError
@@ -306,20 +306,20 @@ def _spare(vehicle: str, target: str | None, ahead: float, points: Path | None) 
     from wakewise.robot.importers import any_vehicle
     from wakewise.scene.targets import Region
     from wakewise_ardusub.logs.replay_allocation import bow_points
-    from wakewise_ardusub.session.protected_region import WhatToSpare
+    from wakewise_ardusub.session.protected_region import ProtectedRegion
 
     if target is not None and points is not None:
         raise InputError("--target, --points: both say what to spare, give one")
     if target is not None:
-        return WhatToSpare(place_W_m=np.array(_numbers(target, "--target", "N,E,D", 3)))
+        return ProtectedRegion(place_W_m=np.array(_numbers(target, "--target", "N,E,D", 3)))
     chosen = any_vehicle(vehicle)
     if points is None:
         bow_points(chosen, ahead)  # refuses what is too near or too far
-        return WhatToSpare(ahead_m=ahead)
+        return ProtectedRegion(ahead_m=ahead)
     from wakewise.ui.cli.points import read_points
 
     places, weights = read_points(points, chosen, Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])))
-    return WhatToSpare(points=Region(points_W_m=places, weights=weights, distance_m=np.zeros(len(places))))
+    return ProtectedRegion(points=Region(points_W_m=places, weights=weights, distance_m=np.zeros(len(places))))
 
 
 def _numbers(text: str, option: str, form: str, count: int) -> tuple[float, ...]:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import Bars, plain, print_json, print_table
+from wakewise.ui.cli.console import ProgressBars, plain, print_json, print_table
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.link.checks import Facts, Row
+    from wakewise_ardusub.link.checks import CheckInputs, CheckResult
     from wakewise_ardusub.link.connection import Connection
     from wakewise_ardusub.link.motor_results import Answer, MotorResults
-    from wakewise_ardusub.link.motor_test import MotorTurn
+    from wakewise_ardusub.link.motor_test import MotorTestStep
 
 Check = Annotated[
     bool,
@@ -69,7 +69,7 @@ def check_vehicle(
 ) -> None:
     """Print every row and the verdict; end with 1 unless it is go, with 2 where motors were not seen to turn."""
     from wakewise.robot.importers import any_vehicle
-    from wakewise_ardusub.link.checks import Facts, check, verdict
+    from wakewise_ardusub.link.checks import CheckInputs, check, verdict
     from wakewise_ardusub.link.motor_results import read_results
     from wakewise_ardusub.link.parameters import SYSTEM_NAMES, first_of, read_parameter_file
     from wakewise_ardusub.link.vehicle_survey import survey
@@ -80,9 +80,9 @@ def check_vehicle(
         parameters = read_parameter_file(params)
         own = first_of(parameters, SYSTEM_NAMES)
         named = round(own[1]) if own else system
-        facts = Facts(vehicle=chosen, parameters=parameters, system=named, results=results, buttons=buttons)
+        facts = CheckInputs(vehicle=chosen, parameters=parameters, system=named, results=results, buttons=buttons)
     else:
-        with _connected(connection, system, "--check") as link, Bars().stage("asking") as advance:
+        with _connected(connection, system, "--check") as link, ProgressBars().stage("asking") as advance:
             facts = survey(link, chosen, results=results, buttons=buttons, progress=advance)
     rows = check(facts)
     said = verdict(rows, motors_seen=not untested)
@@ -110,7 +110,7 @@ def test_vehicle_motors(
     before = read_results(motor_results) if motor_results.exists() else None
     with _connected(connection, system, "--motor-test") as link:
         await_autopilot(link)
-        with Bars().stage("parameters") as advance:
+        with ProgressBars().stage("parameters") as advance:
             turns = planned_turns(chosen, read_parameters(link, progress=advance), numbers)
         _say(
             f"{len(turns)} motors of {chosen.title} turn one by one for 1.5 s. Put it in water or hold it fast, with "
@@ -136,14 +136,14 @@ def test_vehicle_motors(
 class _Person:
     """Who sits at the terminal; implements `wakewise_ardusub.link.motor_test.Operator`."""
 
-    def consents(self, turn: MotorTurn) -> bool:
+    def consents(self, turn: MotorTestStep) -> bool:
         _say(
             f"\nmotor {turn.motor} ({turn.name}), {turn.pulse_us} us: pushes the vehicle {turn.expected}; its water "
             "goes the other way"
         )
         return typer.confirm("turn it now?", default=False, err=True)
 
-    def saw(self, turn: MotorTurn) -> Answer:
+    def saw(self, turn: MotorTestStep) -> Answer:
         from wakewise_ardusub.link.motor_results import ANSWERS
 
         letters: dict[str, Answer] = dict(zip("yonx", ANSWERS, strict=False))
@@ -189,7 +189,7 @@ def _motor_numbers(motors: str | None) -> list[int] | None:
     return [int(part) for part in parts]
 
 
-def _show(rows: tuple[Row, ...], said: str, facts: Facts) -> None:
+def _show(rows: tuple[CheckResult, ...], said: str, facts: CheckInputs) -> None:
     from rich.table import Table
 
     table = Table(title=f"{facts.vehicle.title}: may it be driven motor by motor?", title_justify="left")
@@ -212,7 +212,7 @@ def _show(rows: tuple[Row, ...], said: str, facts: Facts) -> None:
         typer.echo(f"no-go: {wrong} wrong, {open_rows} not known")
 
 
-def _unseen(rows: tuple[Row, ...]) -> str:
+def _unseen(rows: tuple[CheckResult, ...]) -> str:
     numbers = [row.what.removeprefix("motor ").removesuffix(" seen") for row in rows if row.unseen]
     return "the motors" if numbers == ["motors"] else f"motor {', '.join(numbers)}"
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wakewise.ui.cli.console import Bars, print_json
+from wakewise.ui.cli.console import ProgressBars, print_json
 from wakewise.ui.cli.options import Json
 
 Folder = Annotated[
@@ -104,7 +104,7 @@ def _uploaded(connection: str, system: int, *, start: bool) -> str:
         raise InputError(f"--upload {connection}: a log is no vehicle; --out writes the script into a folder")
     with Connection(endpoint, system) as link:
         await_autopilot(link)
-        with Bars().stage("upload") as advance:
+        with ProgressBars().stage("upload") as advance:
             path = upload_script(link, script_text().encode("utf-8"), progress=advance)
         if start:
             start_script(link)

@@ -13,7 +13,7 @@ from wakewise.ui.cli.console import print_json, shown
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.sensors.sensor_polling import Source
+    from wakewise_ardusub.sensors.sensor_polling import PolledSensor
 
 Depth = Annotated[
     Path | None, typer.Option("--depth", metavar="BUS", help="I2C bus of an MS5837, /dev/i2c-1.", show_default=False)
@@ -103,12 +103,12 @@ def _sources(
     poses: str | None,
     density: float,
     zero: bool,
-) -> list[Source]:
+) -> list[PolledSensor]:
     from wakewise.core.errors import InputError
     from wakewise_ardusub.sensors import DepthSensor, InertialUnit, LinePoses, LinuxI2C, SerialPort, UdpSocket, mounting
     from wakewise_ardusub.sensors.sensor_polling import DepthSource, InertialSource, PoseSource
 
-    sources: list[Source] = []
+    sources: list[PolledSensor] = []
     if zero and depth is None:
         raise InputError("--zero: goes with --depth")
     if depth is not None:

@@ -40,10 +40,10 @@ def share(connection: Connection = VEHICLE, out: Out = None, seconds: Seconds = 
     What comes from one goes to all others as it is. On a vehicle, BlueOS's MAVLink Endpoints do this.
     """
     from wakewise_ardusub.link.connection import parse_connection
-    from wakewise_ardusub.link.mavlink_router import Share
+    from wakewise_ardusub.link.mavlink_router import MavlinkRouter
 
     places = [parse_connection(connection), *(parse_connection(each, "--out") for each in out or OUTS)]
-    shared = Share(places)
+    shared = MavlinkRouter(places)
     typer.echo(f"shares {places[0].words} with {', '.join(place.words for place in places[1:])}", err=True)
     end_s = None if seconds is None else time.monotonic() + seconds
     next_s = time.monotonic() + LINE_S

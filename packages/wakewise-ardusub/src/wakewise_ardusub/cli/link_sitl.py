@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import Bars, print_json, shown, status_line
+from wakewise.ui.cli.console import ProgressBars, print_json, shown, status_line
 from wakewise.ui.cli.options import Json, Preset, ScenarioFile, Sets, Vehicle, World, overrides
 
 if TYPE_CHECKING:
     from wakewise.robot.vehicles import Vehicle as AnyVehicle
     from wakewise_ardusub.physics import PhysicsFigures
-    from wakewise_ardusub.physics.depth_monitor import DepthWatch
-    from wakewise_ardusub.sitl.simulated_autopilot import StandIn
-    from wakewise_ardusub.sitl.udp_endpoints import Behind
+    from wakewise_ardusub.physics.depth_monitor import DepthMonitor
+    from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+    from wakewise_ardusub.sitl.udp_endpoints import PhysicsBackend
 
 DEFAULT_VEHICLE = "bluerov2-heavy"
 _STATION, _COMPANION, _WATCH = "127.0.0.1:14550", "127.0.0.1:14560", "127.0.0.1:14570"
@@ -121,22 +121,22 @@ def sitl(
     the firmware does: at the surface, and then let down to where the scenario starts it.
     """
     from wakewise.operation import load_scenario
-    from wakewise_ardusub.physics import Physics, PulseTable
+    from wakewise_ardusub.physics import PhysicsServer, PulseTable
     from wakewise_ardusub.physics.udp import open_socket, serve
     from wakewise_ardusub.sitl.own_parameters import read_params
-    from wakewise_ardusub.sitl_plant import BehindFirmware
+    from wakewise_ardusub.sitl_plant import SitlPlant
 
     if scenario is None and vehicle is None:
         vehicle = DEFAULT_VEHICLE
     chosen = overrides(sets, seed=None, vehicle=vehicle, target=None, target_size=None, world=world)
     flown = load_scenario(preset, scenario, chosen).parts()
     table = PulseTable.of(flown.vehicle, None if params is None else read_params(params))
-    behind = BehindFirmware(parts=flown, held_s=held)
-    physics = Physics(behind.begin, table.thrusts, rate_hz=rate, own_clock=own_clock)
+    behind = SitlPlant(parts=flown, held_s=held)
+    physics = PhysicsServer(behind.begin, table.thrusts, rate_hz=rate, own_clock=own_clock)
     with ExitStack() as stack:
         listening = stack.enter_context(open_socket(host, port))
         depths = _depth_watch(stack, watch)
-        with Bars().stage("water") as progress:
+        with ProgressBars().stage("water") as progress:
             warning = behind.ready(progress)
         if warning:
             typer.echo(warning, err=True)
@@ -186,9 +186,9 @@ def stand_in(
     need("wakewise link stand-in", "links", only=("pymavlink", "lupa"))
     from wakewise.robot.importers import any_vehicle
     from wakewise_ardusub.sitl.own_parameters import own_parameters, read_params
-    from wakewise_ardusub.sitl.scripted_ground_station import Ashore, carry_to
-    from wakewise_ardusub.sitl.simulated_autopilot import StandIn
-    from wakewise_ardusub.sitl.udp_endpoints import Link, OverUdp, run
+    from wakewise_ardusub.sitl.scripted_ground_station import ScriptedGroundStation, carry_to
+    from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+    from wakewise_ardusub.sitl.udp_endpoints import UdpEndpoint, UdpPhysics, run
 
     if script is not None and no_script:
         raise InputError("--script and --no-script: one or the other")
@@ -197,17 +197,17 @@ def stand_in(
     scripts = {} if no_script else _scripts(script)
     # Water of its own has no surface to start at: there it was carried down, switched on, to where it is.
     zero_m = 0.0 if physics is None else None
-    made = StandIn(values | {"SCHED_LOOP_RATE": loop}, loop_hz=loop, scripts=scripts, zero_depth_m=zero_m)
-    behind = _embedded(chosen, values) if physics is None else OverUdp(*_address("--physics", physics))
+    made = SimulatedAutopilot(values | {"SCHED_LOOP_RATE": loop}, loop_hz=loop, scripts=scripts, zero_depth_m=zero_m)
+    behind = _embedded(chosen, values) if physics is None else UdpPhysics(*_address("--physics", physics))
     outs = out or [_STATION, _COMPANION, _WATCH]
-    links = [Link(*_address("--out", each), out=True) for each in outs]
+    links = [UdpEndpoint(*_address("--out", each), out=True) for each in outs]
     typer.echo(f"stand-in for ArduSub, system {made.system}: MAVLink to {', '.join(outs)}", err=True)
     with ExitStack() as held:
         held.enter_context(suppress(KeyboardInterrupt))
         held.callback(behind.close)
         for link in links:
             held.callback(link.close)
-        turn = Ashore(made, carry_to(made, links)).turn if pilot else None
+        turn = ScriptedGroundStation(made, carry_to(made, links)).turn if pilot else None
         run(made, behind, links, _until(seconds), turn=turn, said=lambda: status_line(_stand_in_line(made)))
     if json:
         print_json(_stand_in_facts(made))
@@ -228,11 +228,11 @@ def _scripts(file: Path | None) -> dict[str, str]:
         raise InputError(f"--script {file}: {fault.strerror}") from None
 
 
-def _embedded(vehicle: AnyVehicle, values: dict[str, float]) -> Behind:
+def _embedded(vehicle: AnyVehicle, values: dict[str, float]) -> PhysicsBackend:
     from wakewise_ardusub.physics import FreeWater, PulseTable
-    from wakewise_ardusub.sitl.udp_endpoints import Embedded
+    from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics
 
-    return Embedded(body=FreeWater(vehicle), table=PulseTable.of(vehicle, values))
+    return InProcessPhysics(body=FreeWater(vehicle), table=PulseTable.of(vehicle, values))
 
 
 def _address(option: str, text: str) -> tuple[str, int]:
@@ -249,12 +249,12 @@ def _until(seconds: float | None) -> Callable[[], bool]:
     return lambda: end_s is None or time.monotonic() < end_s
 
 
-def _depth_watch(stack: ExitStack, where: str) -> DepthWatch | None:
+def _depth_watch(stack: ExitStack, where: str) -> DepthMonitor | None:
     """What holds the autopilot's depth against the truth; None, and a line, where nothing can be overheard."""
     from wakewise.core.errors import EnvironmentFailure
     from wakewise.core.optional_dependencies import has
     from wakewise_ardusub.link.connection import parse_connection
-    from wakewise_ardusub.physics.depth_monitor import DepthWatch
+    from wakewise_ardusub.physics.depth_monitor import DepthMonitor
 
     if where == "none":
         return None
@@ -262,7 +262,7 @@ def _depth_watch(stack: ExitStack, where: str) -> DepthWatch | None:
     if not has("links"):
         typer.echo("the autopilot's depth is not compared: the extra `links` is not installed", err=True)
         return None
-    from wakewise_ardusub.link.mavlink_codec import Post
+    from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
     from wakewise_ardusub.link.protocol import DEFAULT_SYSTEM
     from wakewise_ardusub.link.transports import carrier_of
 
@@ -274,10 +274,10 @@ def _depth_watch(stack: ExitStack, where: str) -> DepthWatch | None:
         typer.echo(f"the autopilot's depth is not compared: {fault} (--watch HOST:PORT takes another)", err=True)
         return None
     stack.callback(carrier.close)
-    return DepthWatch(Post(carrier, DEFAULT_SYSTEM))
+    return DepthMonitor(MavlinkCodec(carrier, DEFAULT_SYSTEM))
 
 
-def _physics_line(figures: PhysicsFigures, depths: DepthWatch | None) -> str:
+def _physics_line(figures: PhysicsFigures, depths: DepthMonitor | None) -> str:
     if not figures.frames:
         return f"no firmware yet; {figures.refused} datagrams refused"
     pulses = " ".join(str(pulse) for pulse in figures.pulses_us[:8])
@@ -288,7 +288,7 @@ def _physics_line(figures: PhysicsFigures, depths: DepthWatch | None) -> str:
     )
 
 
-def _stand_in_line(made: StandIn) -> str:
+def _stand_in_line(made: SimulatedAutopilot) -> str:
     from wakewise_ardusub.sitl.modes import MODES
 
     pulses = " ".join(str(pulse) for pulse in made.pulses_us[:8])
@@ -298,7 +298,7 @@ def _stand_in_line(made: StandIn) -> str:
     return f"t {made.now_s:.1f} s, {state}, depth {depth_m:.2f} m; pulses {pulses}{said}"
 
 
-def _stand_in_facts(made: StandIn) -> dict[str, Any]:
+def _stand_in_facts(made: SimulatedAutopilot) -> dict[str, Any]:
     return {
         "time_s": made.now_s,
         "armed": made.armed,

@@ -12,8 +12,8 @@ from wakewise.ui.cli.options import Json
 from wakewise_ardusub.cli.link_points import Ahead, Points, WakeModelName, region_ahead, region_words
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.vehicle_summary import Craft
-    from wakewise_ardusub.wash_meter.run import Work
+    from wakewise_ardusub.vehicle_summary import VehicleSummary
+    from wakewise_ardusub.wash_meter.run import MeterLoop
 
 Connection = Annotated[
     str | None,
@@ -108,11 +108,11 @@ def meter(
     from wakewise.core.optional_dependencies import need
     from wakewise.robot.vehicles import load_vehicle
     from wakewise_ardusub.link.parameters import read_parameter_file
-    from wakewise_ardusub.vehicle_summary import Craft
+    from wakewise_ardusub.vehicle_summary import VehicleSummary
     from wakewise_ardusub.wash_meter.settings import MeterSettings
 
     chosen = load_vehicle(vehicle)
-    craft = Craft.of(chosen, wake.wake_model(wake_model))
+    craft = VehicleSummary.of(chosen, wake.wake_model(wake_model))
     if write is not None:
         _write(write, craft)
         return
@@ -130,19 +130,19 @@ def meter(
         out=out,
     )
     from wakewise.core.jit.precompile import is_warm
-    from wakewise_ardusub.wash_meter.run import Work
+    from wakewise_ardusub.wash_meter.run import MeterLoop
 
     region = region_ahead(chosen, ahead, points)
     known = {} if params is None else read_parameter_file(params)
     if not is_warm(("fly",)):
         _say("kernels are compiled first, this time only: some seconds")
-    work = Work(settings, craft, region.points_W_m, region.weights, region_words(ahead, points), known, _say)
+    work = MeterLoop(settings, craft, region.points_W_m, region.weights, region_words(ahead, points), known, _say)
     state = _run(work)
     if json:
         print_json(state)
 
 
-def _run(work: Work) -> dict[str, Any]:
+def _run(work: MeterLoop) -> dict[str, Any]:
     """Work until Ctrl-C, which ends it as it should end."""
     import signal
 
@@ -156,14 +156,14 @@ def _run(work: Work) -> dict[str, Any]:
             signal.signal(number, handler)
 
 
-def _write(path: Path, craft: Craft) -> None:
+def _write(path: Path, craft: VehicleSummary) -> None:
     from wakewise.core.errors import InputError
     from wakewise.core.files import write_text
     from wakewise_ardusub.vehicle_summary import craft_json
-    from wakewise_ardusub.wash_savings import Sparing
+    from wakewise_ardusub.wash_savings import WashSavingsCalculator
 
     text = craft_json(craft)
-    if not Sparing.is_small(craft):
+    if not WashSavingsCalculator.is_small(craft):
         raise InputError(
             f"--write {path}: vehicle {craft.name} has spare thrusters that cannot be looked at one by one; its meter "
             "needs a 64-bit computer, which reads the vehicle file itself"

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from wakewise.core.arrays import Array
-from wakewise.core.interfaces import Measurement, Witness
-from wakewise_ardusub.link.output_gate import Warden
+from wakewise.core.interfaces import Measurement, TruthProvider
+from wakewise_ardusub.link.output_gate import OutputGate
 
 EARLY = 0.1
 """Share of a step by which measurements are handed over before its end: 10 ms at 10 Hz, where a filter takes 4."""
@@ -28,12 +28,12 @@ class FlightClock(Protocol):
 
 
 @dataclass(kw_only=True, eq=False)
-class SeaPlant:
+class ArduSubPlant:
     """The vehicle of a warden; implements `wakewise.core.interfaces.Plant`.
 
     Parameters
     ----------
-    warden : Warden
+    warden : OutputGate
     clock : FlightClock
     wait : callable
         Waits so many seconds, or less where there is nothing to wait for any more.
@@ -41,7 +41,7 @@ class SeaPlant:
         In which engagement the controller decided what it hands over; None: in none, and nothing is sent.
     """
 
-    warden: Warden
+    warden: OutputGate
     clock: FlightClock
     wait: Callable[[float], object]
     entry: Callable[[], int | None]
@@ -61,17 +61,17 @@ class SeaPlant:
 
 
 @dataclass(kw_only=True, eq=False)
-class Sea:
+class ArduSubWorld:
     """Where a real vehicle flies; implements `wakewise.core.interfaces.World`. It does not wait, and nobody knows its
     truth.
 
     `plant` is what makes the plant when a flight begins.
     """
 
-    plant: Callable[[], SeaPlant]
+    plant: Callable[[], ArduSubPlant]
     name: str = "sea"
     waits: bool = field(default=False, init=False)
 
-    def begin(self) -> tuple[SeaPlant, Witness | None]:
+    def begin(self) -> tuple[ArduSubPlant, TruthProvider | None]:
         """The vehicle, and no witness."""
         return self.plant(), None

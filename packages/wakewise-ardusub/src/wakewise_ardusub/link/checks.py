@@ -11,7 +11,7 @@ from typing import Literal
 
 from wakewise.robot.vehicles import Vehicle
 from wakewise_ardusub.link.buttons import conflict, free_buttons, free_words, parameters_of
-from wakewise_ardusub.link.engagement_fsm import Limits
+from wakewise_ardusub.link.engagement_fsm import EngagementLimits
 from wakewise_ardusub.link.frames import FRAMES, match_motors
 from wakewise_ardusub.link.motor_results import MotorResults
 from wakewise_ardusub.link.parameters import GROUND_NAMES, SYSTEM_NAMES, first_of
@@ -31,12 +31,12 @@ from wakewise_ardusub.motors import channels_of_motors
 Verdict = Literal["go", "no-go", "unknown"]
 Whole = Literal["go", "no-go", "unknown", "unseen"]
 """Of all rows; `unseen` is go but for motors that nobody has seen turn."""
-GAP_S = Limits().pose_s
+GAP_S = EngagementLimits().pose_s
 """Longer than this nothing that a session needs may stay away."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Heard:
+class ReceivedTelemetry:
     """What came over a connection in `seconds`: all of it is unknown without one.
 
     Parameters
@@ -69,7 +69,7 @@ class Heard:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Facts:
+class CheckInputs:
     """All that is looked at; `heard` is None without a connection, `results` where no motor was tested.
 
     `buttons` are those of the pilot's sticks that are to mean something here, as of `Warden`.
@@ -78,13 +78,13 @@ class Facts:
     vehicle: Vehicle
     parameters: Mapping[str, float]
     system: int
-    heard: Heard | None = None
+    heard: ReceivedTelemetry | None = None
     results: MotorResults | None = None
     buttons: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class CheckResult:
     """One thing: what was asked for, what was found, and what to do; `needed` rows must not be unknown.
 
     `unseen` rows are motors that nobody has seen turn.
@@ -99,12 +99,12 @@ class Row:
     unseen: bool = False
 
 
-def check(facts: Facts) -> tuple[Row, ...]:
+def check(facts: CheckInputs) -> tuple[CheckResult, ...]:
     """All rows, in the order in which they are mended."""
     return tuple(row for part in _PARTS for row in part(facts))
 
 
-def verdict(rows: tuple[Row, ...], *, motors_seen: bool = True) -> Whole:
+def verdict(rows: tuple[CheckResult, ...], *, motors_seen: bool = True) -> Whole:
     """Go if nothing says no-go, nothing that is needed is unknown and, if asked for, every motor was seen to turn."""
     if any(row.verdict == "no-go" for row in rows):
         return "no-go"
@@ -113,14 +113,14 @@ def verdict(rows: tuple[Row, ...], *, motors_seen: bool = True) -> Whole:
     return "unseen" if motors_seen and any(row.unseen for row in rows) else "go"
 
 
-def _vehicle(facts: Facts) -> Iterator[Row]:
+def _vehicle(facts: CheckInputs) -> Iterator[CheckResult]:
     if facts.heard is None:
         return
     asked = "ArduSub"
     yield _row("autopilot", asked, facts.heard.kind, facts.heard.kind == asked, "connect to the vehicle's autopilot")
 
 
-def _firmware(facts: Facts) -> Iterator[Row]:
+def _firmware(facts: CheckInputs) -> Iterator[CheckResult]:
     least = ".".join(map(str, LEAST_FIRMWARE))
     tried = " and ".join(".".join(map(str, version)) for version in TRIED_FIRMWARE)
     asked = f"ArduSub {least} or later"
@@ -130,12 +130,12 @@ def _firmware(facts: Facts) -> Iterator[Row]:
     found = ".".join(map(str, facts.heard.firmware))
     if facts.heard.firmware >= LEAST_FIRMWARE:
         also = "" if facts.heard.firmware[:2] in TRIED_FIRMWARE else f"tried on {tried} only: run --motor-test"
-        yield Row(what="firmware", asked=asked, found=found, verdict="go", do=also)
+        yield CheckResult(what="firmware", asked=asked, found=found, verdict="go", do=also)
     else:
         yield _row("firmware", asked, found, False, f"update ArduSub to {least} or later: its Lua lacks what is called")
 
 
-def _system(facts: Facts) -> Iterator[Row]:
+def _system(facts: CheckInputs) -> Iterator[CheckResult]:
     found = first_of(facts.parameters, SYSTEM_NAMES)
     if found is None:
         yield _unknown("system id", f"{facts.system}", facts, f"neither {' nor '.join(SYSTEM_NAMES)} is known")
@@ -143,7 +143,7 @@ def _system(facts: Facts) -> Iterator[Row]:
         yield _is(f"system id ({found[0]})", found[1], facts.system, f"say --system {found[1]:g}")
 
 
-def _script(facts: Facts) -> Iterator[Row]:
+def _script(facts: CheckInputs) -> Iterator[CheckResult]:
     yield _parameter(facts, "SCR_ENABLE", {1.0}, "set SCR_ENABLE to 1 and reboot the autopilot")
     asked = f"version {SCRIPT_VERSION}, heard"
     if facts.heard is None:
@@ -163,15 +163,15 @@ def _script(facts: Facts) -> Iterator[Row]:
         do = do or ("" if allowed else f"set {MODES_PARAMETER} to {DEFAULT_MODES}")
         asked = " or ".join(MODES[mode] for mode in sorted(ALLOWED_MODES, reverse=True))
         good: Verdict = "go" if allowed else "no-go"
-        yield Row(what=f"modes ({MODES_PARAMETER})", asked=asked, found=names, verdict=good, do=do)
+        yield CheckResult(what=f"modes ({MODES_PARAMETER})", asked=asked, found=names, verdict=good, do=do)
     switch = facts.parameters.get(ENABLE_PARAMETER)
     if switch is not None:
         do = "" if switch == 1.0 else f"set {ENABLE_PARAMETER} to 1 when the companion is to drive; off after a reboot"
         found = "on" if switch == 1.0 else "off"
-        yield Row(what=f"switch ({ENABLE_PARAMETER})", asked="on or off", found=found, verdict="go", do=do)
+        yield CheckResult(what=f"switch ({ENABLE_PARAMETER})", asked="on or off", found=found, verdict="go", do=do)
 
 
-def _motors(facts: Facts) -> Iterator[Row]:
+def _motors(facts: CheckInputs) -> Iterator[CheckResult]:
     count = len(facts.vehicle.thrusters)
     asked = f"motors 1 to {count}, each on one channel"
     if count > SLOTS:
@@ -205,7 +205,7 @@ def _motors(facts: Facts) -> Iterator[Row]:
         yield _row("pulses (MOT_PWM_TYPE)", "0", f"{pwm:g}", pwm == 0.0, do)
 
 
-def _mixing(facts: Facts) -> Iterator[Row]:
+def _mixing(facts: CheckInputs) -> Iterator[CheckResult]:
     value = facts.parameters.get("FRAME_CONFIG")
     count = len(facts.vehicle.thrusters)
     asked = f"a frame with {count} motors"
@@ -214,7 +214,7 @@ def _mixing(facts: Facts) -> Iterator[Row]:
         return
     if int(value) not in FRAMES:
         do = "its matrix is built into the firmware: check every motor with --motor-test"
-        yield Row(
+        yield CheckResult(
             what="frame (FRAME_CONFIG)", asked=asked, found=f"{value:g}, custom", verdict="unknown", do=do, needed=True
         )
         return
@@ -228,12 +228,14 @@ def _mixing(facts: Facts) -> Iterator[Row]:
             yield _row(what, f"mixer: {match.by_mixer}", f"vehicle file: {match.by_vehicle}", match.agree, match.advice)
 
 
-def _tested(facts: Facts) -> Iterator[Row]:
+def _tested(facts: CheckInputs) -> Iterator[CheckResult]:
     look = "wakewise link ardusub --motor-test has somebody look at each"
     if facts.results is None or facts.results.vehicle != facts.vehicle.name:
         found = "none was tested" if facts.results is None else f"tested were those of {facts.results.vehicle}"
         asked = "each pushes as expected"
-        row = Row(what="motors seen", asked=asked, found=found, verdict="unknown", do=look, needed=False, unseen=True)
+        row = CheckResult(
+            what="motors seen", asked=asked, found=found, verdict="unknown", do=look, needed=False, unseen=True
+        )
         yield row
         return
     for motor in range(1, min(len(facts.vehicle.thrusters), SLOTS) + 1):
@@ -242,7 +244,9 @@ def _tested(facts: Facts) -> Iterator[Row]:
         direction = facts.parameters.get(f"MOT_{motor}_DIRECTION")
         if seen is None or direction is None:
             found = "not tested"
-            yield Row(what=what, asked=asked, found=found, verdict="unknown", do=look, needed=False, unseen=True)
+            yield CheckResult(
+                what=what, asked=asked, found=found, verdict="unknown", do=look, needed=False, unseen=True
+            )
         elif seen.right_direction is None:
             do = f"find what turns: SERVOn_FUNCTION {32 + motor}, the cable of motor {motor}, its speed controller"
             yield _row(what, asked, seen.answer, False, do)
@@ -252,12 +256,14 @@ def _tested(facts: Facts) -> Iterator[Row]:
             yield _row(what, asked, found, direction == right, f"set MOT_{motor}_DIRECTION to {right:g}")
 
 
-def _buttons(facts: Facts) -> Iterator[Row]:
+def _buttons(facts: CheckInputs) -> Iterator[CheckResult]:
     free = free_buttons(facts.parameters)
     if not facts.buttons:
         if free:
             found = ", ".join(map(str, free))
-            yield Row(what="buttons without a function", asked="any of them for --buttons", found=found, verdict="go")
+            yield CheckResult(
+                what="buttons without a function", asked="any of them for --buttons", found=found, verdict="go"
+            )
         return
     for what, button in facts.buttons.items():
         row, asked = f"button {button} ({what})", "no function of the autopilot"
@@ -269,7 +275,7 @@ def _buttons(facts: Facts) -> Iterator[Row]:
         yield _row(row, asked, words or "none", not words, free_words(facts.parameters, facts.buttons))
 
 
-def _failsafes(facts: Facts) -> Iterator[Row]:
+def _failsafes(facts: CheckInputs) -> Iterator[CheckResult]:
     yield _parameter(
         facts, "FS_GCS_ENABLE", {2.0, 3.0, 4.0}, "set FS_GCS_ENABLE to 2: a lost ground station disarms, and ends it"
     )
@@ -286,7 +292,7 @@ def _failsafes(facts: Facts) -> Iterator[Row]:
         yield _row("arming checks (ARMING_CHECK)", "not 0", f"{checks:g}", checks != 0.0, "set ARMING_CHECK to 1: all")
 
 
-def _hearing(facts: Facts) -> Iterator[Row]:
+def _hearing(facts: CheckInputs) -> Iterator[CheckResult]:
     heard = facts.heard
     ground = first_of(facts.parameters, GROUND_NAMES)
     asked = f"MANUAL_CONTROL of system {ground[1]:g}" if ground else "MANUAL_CONTROL of the ground station"
@@ -307,7 +313,7 @@ def _hearing(facts: Facts) -> Iterator[Row]:
     for what, gap_s in heard.gaps_s.items():
         even = gap_s <= GAP_S
         do = f"a session lets go after {1e3 * GAP_S:.0f} ms without: look for what pauses it (Wi-Fi, a busy computer)"
-        yield Row(
+        yield CheckResult(
             what=f"longest pause of the {what}",
             asked=f"at most {1e3 * GAP_S:.0f} ms, better half of it",
             found=f"{1e3 * gap_s:.0f} ms in {heard.seconds:g} s",
@@ -319,7 +325,7 @@ def _hearing(facts: Facts) -> Iterator[Row]:
     yield _row("MAVLink", "version 2", "version 2" if heard.mavlink_2 else "version 1", heard.mavlink_2, do)
 
 
-_PARTS: tuple[Callable[[Facts], Iterator[Row]], ...] = (
+_PARTS: tuple[Callable[[CheckInputs], Iterator[CheckResult]], ...] = (
     _vehicle,
     _firmware,
     _system,
@@ -333,15 +339,15 @@ _PARTS: tuple[Callable[[Facts], Iterator[Row]], ...] = (
 )
 
 
-def _row(what: str, asked: str, found: str, good: bool, do: str) -> Row:
-    return Row(what=what, asked=asked, found=found, verdict="go" if good else "no-go", do="" if good else do)
+def _row(what: str, asked: str, found: str, good: bool, do: str) -> CheckResult:
+    return CheckResult(what=what, asked=asked, found=found, verdict="go" if good else "no-go", do="" if good else do)
 
 
-def _is(what: str, found: float, asked: float, do: str) -> Row:
+def _is(what: str, found: float, asked: float, do: str) -> CheckResult:
     return _row(what, f"{asked:g}", f"{found:g}", found == asked, do)
 
 
-def _parameter(facts: Facts, name: str, allowed: set[float], do: str) -> Row:
+def _parameter(facts: CheckInputs, name: str, allowed: set[float], do: str) -> CheckResult:
     asked = " or ".join(f"{value:g}" for value in sorted(allowed))
     if name not in facts.parameters:
         return _unknown(name, asked, facts, "not known", needed=True)
@@ -349,10 +355,10 @@ def _parameter(facts: Facts, name: str, allowed: set[float], do: str) -> Row:
     return _row(name, asked, f"{found:g}", found in allowed, do)
 
 
-def _unknown(what: str, asked: str, facts: Facts, found: str = "", *, needed: bool | None = None) -> Row:
+def _unknown(what: str, asked: str, facts: CheckInputs, found: str = "", *, needed: bool | None = None) -> CheckResult:
     """Without a connection nothing can be heard, and only parameters must be known."""
     offline = facts.heard is None
-    return Row(
+    return CheckResult(
         what=what,
         asked=asked,
         found=found or "needs a connection",

@@ -93,7 +93,7 @@ def parse_connection(words: str, option: str = "--connection") -> Endpoint:
     return Endpoint(way=way, host=place, port=value)
 
 
-class Talk(Protocol):
+class MavlinkSession(Protocol):
     """What conversations with an autopilot need of a connection."""
 
     system: int
@@ -166,7 +166,7 @@ class Connection:
             raise EnvironmentFailure(f"{self.endpoint.words}: {fault.strerror or fault}") from None
 
 
-def heard_of(talk: Talk, kinds: Collection[str], timeout_s: float) -> Any:
+def heard_of(talk: MavlinkSession, kinds: Collection[str], timeout_s: float) -> Any:
     """The next message of these kinds from the autopilot of a connection's vehicle, None if none came in time."""
     until = time.monotonic() + timeout_s
     while True:
@@ -178,7 +178,7 @@ def heard_of(talk: Talk, kinds: Collection[str], timeout_s: float) -> Any:
             return message
 
 
-def send_command(talk: Talk, number: int, *params: float) -> None:
+def send_command(talk: MavlinkSession, number: int, *params: float) -> None:
     """Send a COMMAND_LONG; parameters that are left out are 0."""
     filled = (*params, *[0.0] * (7 - len(params)))
     talk.send(

@@ -1,8 +1,8 @@
 """Whether the companion's thrusts may act: a state machine without a clock, a wire or a memory of its own.
 
-`Engagement` judges `Facts`, what is known at one instant, against `Limits`. Thrusts may go out while it is engaged and
-nothing is amiss, and only then. The way there is the operator's: consent is asked for once all is well, and any fault
-takes it away for good; nothing engages by itself.
+`EngagementState` judges `EngagementInputs`, what is known at one instant, against `EngagementLimits`. Thrusts may go
+out while it is engaged and nothing is amiss, and only then. The way there is the operator's: consent is asked for once
+all is well, and any fault takes it away for good; nothing engages by itself.
 
     off -> listening <-> ready -> engaged -> refused -> listening
 
@@ -37,7 +37,7 @@ ACTS_WITHIN_S = 1.2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limits:
+class EngagementLimits:
     """Bounds within which the companion drives; ages in s, lengths in m, angles in rad.
 
     What is fresh: a pose and an attitude of 0.2 s leave 0.1 s of the 0.3 s, within which thrusts must be gone after any
@@ -62,7 +62,7 @@ class Limits:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Facts:
+class EngagementInputs:
     """What is known at one instant; ages are infinite and figures NaN where nothing was ever heard.
 
     Parameters
@@ -121,7 +121,7 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Fault:
+class EngagementFault:
     """What is amiss, and in words."""
 
     kind: Kind
@@ -139,7 +139,7 @@ class Transition:
     kind: str = ""
 
 
-def faults(facts: Facts, limits: Limits, *, engaged: bool) -> tuple[Fault, ...]:
+def faults(facts: EngagementInputs, limits: EngagementLimits, *, engaged: bool) -> tuple[EngagementFault, ...]:
     """All that is amiss, the gravest first; some can only be while engaged."""
     f, m, found = facts, limits, dict[Kind, str]()
     told: tuple[tuple[Kind, str], ...] = (
@@ -192,11 +192,11 @@ def faults(facts: Facts, limits: Limits, *, engaged: bool) -> tuple[Fault, ...]:
     )
     # What is not a number fits nothing.
     found |= {kind: text.replace("nan", "unknown") for kind, fits, text in figures if not fits}
-    return tuple(Fault(kind, found[kind]) for kind in FAULTS if kind in found)
+    return tuple(EngagementFault(kind, found[kind]) for kind in FAULTS if kind in found)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Engagement:
+class EngagementState:
     """Where it stands: the state, since when, and why in words; `entries` counts engagements."""
 
     state: State = "off"
@@ -206,15 +206,15 @@ class Engagement:
     told: tuple[Transition, ...] = field(default=(), compare=False)
     """Changes made by the last move."""
 
-    def begun(self, now_s: float) -> Engagement:
+    def begun(self, now_s: float) -> EngagementState:
         """Start to listen."""
         return self._to("listening", now_s, "begun")
 
-    def ended(self, now_s: float, why: str) -> Engagement:
+    def ended(self, now_s: float, why: str) -> EngagementState:
         """End for good."""
         return replace(self, told=()) if self.state == "off" else self._to("off", now_s, why)
 
-    def judged(self, facts: Facts, limits: Limits) -> Engagement:
+    def judged(self, facts: EngagementInputs, limits: EngagementLimits) -> EngagementState:
         """What the facts make of it."""
         found, now_s = faults(facts, limits, engaged=self.state == "engaged"), facts.now_s
         first = found[0] if found else None
@@ -231,7 +231,7 @@ class Engagement:
                 return replace(self, why=first.text, told=())
         return replace(self, told=())
 
-    def consented(self, facts: Facts, limits: Limits) -> Engagement:
+    def consented(self, facts: EngagementInputs, limits: EngagementLimits) -> EngagementState:
         """The operator consents; it counts where all is well now."""
         now = self.judged(facts, limits)
         found = faults(facts, limits, engaged=False)
@@ -240,10 +240,10 @@ class Engagement:
         after = now._to("engaged", facts.now_s, "the operator consents")
         return replace(after, entries=now.entries + 1, told=(*now.told, *after.told))
 
-    def released(self, now_s: float, why: str = "the operator takes the sticks") -> Engagement:
+    def released(self, now_s: float, why: str = "the operator takes the sticks") -> EngagementState:
         """The operator, or who ends the session, takes consent back."""
         return self._to("listening", now_s, why) if self.state == "engaged" else replace(self, told=())
 
-    def _to(self, state: State, now_s: float, why: str, kind: str = "") -> Engagement:
+    def _to(self, state: State, now_s: float, why: str, kind: str = "") -> EngagementState:
         told = (Transition(now_s, self.state, state, why, kind),)
         return replace(self, state=state, since_s=now_s, why=why, told=told)

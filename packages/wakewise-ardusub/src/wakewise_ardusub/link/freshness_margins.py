@@ -7,7 +7,7 @@ from collections import Counter, deque
 
 import numpy as np
 
-from wakewise_ardusub.link.engagement_fsm import Facts, Limits, Transition
+from wakewise_ardusub.link.engagement_fsm import EngagementInputs, EngagementLimits, Transition
 
 SPAN_S = 60.0
 SHARE = 0.99
@@ -15,7 +15,7 @@ _MOST = round(SPAN_S / 0.02)
 WHAT = ("pose", "sticks", "attitude")
 
 
-class Margins:
+class FreshnessMargins:
     """Ages of the last minute, looked at as often as the watch ticks, and trips.
 
     A trip is a fault that ended an engagement, or took back that all was well.
@@ -30,7 +30,7 @@ class Margins:
         self.trips: Counter[str] = Counter()
         self._ages: deque[tuple[float, float, float]] = deque(maxlen=_MOST)
 
-    def looked(self, facts: Facts) -> None:
+    def looked(self, facts: EngagementInputs) -> None:
         """What is known at a tick."""
         ages = (facts.pose_s, facts.operator_s, facts.telemetry_s)
         if all(map(math.isfinite, ages)):
@@ -47,7 +47,7 @@ class Margins:
             return dict.fromkeys(WHAT, math.nan)
         return dict(zip(WHAT, np.quantile(np.array(self._ages), SHARE, axis=0).tolist(), strict=True))
 
-    def words(self, limits: Limits) -> str:
+    def words(self, limits: EngagementLimits) -> str:
         """For the status line: ages in ms against their limits, and trips."""
         most = dict(zip(WHAT, (limits.pose_s, limits.operator_s, limits.telemetry_s), strict=True))
         ages = [

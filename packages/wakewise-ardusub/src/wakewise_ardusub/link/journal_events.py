@@ -6,17 +6,17 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from wakewise_ardusub.link.message_state import Known
-from wakewise_ardusub.link.session_log import Journal
+from wakewise_ardusub.link.message_state import LinkState
+from wakewise_ardusub.link.session_log import SessionLog
 
 TOLD_EVERY_S = 0.5
 """News of one kind are written down no more often, but for changes of state."""
 
 
-class News:
+class EventLogger:
     """Writes into a journal, if there is one."""
 
-    def __init__(self, journal: Journal | None, clock: Callable[[], float]) -> None:
+    def __init__(self, journal: SessionLog | None, clock: Callable[[], float]) -> None:
         self._journal, self._clock = journal, clock
         self._due: dict[str, tuple[float, int]] = {}
         self._jump = ""
@@ -33,7 +33,7 @@ class News:
         self._due[event] = (now_s + TOLD_EVERY_S, 0)
         self._journal.write(event, **told, **({"left_out": left_out} if left_out else {}))
 
-    def changed(self, before: Known, after: Known, jump: str) -> None:
+    def changed(self, before: LinkState, after: LinkState, jump: str) -> None:
         """What a message changed; `jump` is what was last said of a clock."""
         if (before.armed, before.mode) != (after.armed, after.mode):
             self.tell("vehicle", armed=after.armed, mode=after.mode_name)

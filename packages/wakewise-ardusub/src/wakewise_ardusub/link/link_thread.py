@@ -6,17 +6,17 @@ import threading
 from collections.abc import Iterable
 from typing import Protocol
 
-from wakewise_ardusub.link.message_state import Said
-from wakewise_ardusub.link.output_gate import RELEASES, TICK_S, Warden
+from wakewise_ardusub.link.message_state import MavlinkMessage
+from wakewise_ardusub.link.output_gate import RELEASES, TICK_S, OutputGate
 
 MOST_AT_ONCE = 50
 """Messages taken between two looks at the clock, however many wait."""
 
 
-class Receiving(Protocol):
+class MessageReceiver(Protocol):
     """Where messages come in."""
 
-    def receive(self, timeout_s: float) -> tuple[Iterable[Said], int]:
+    def receive(self, timeout_s: float) -> tuple[Iterable[MavlinkMessage], int]:
         """Messages that came, and bytes that are none; waits for the first at most so long."""
         ...
 
@@ -24,7 +24,7 @@ class Receiving(Protocol):
 class LinkThread:
     """Runs until it is stopped; what breaks it is kept in `fault`, after the warden has let go."""
 
-    def __init__(self, connection: Receiving, warden: Warden) -> None:
+    def __init__(self, connection: MessageReceiver, warden: OutputGate) -> None:
         self._connection, self._warden = connection, warden
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from threading import Condition
 from typing import Any, Protocol
 
-from wakewise_ardusub.link.message_state import Said
-from wakewise_ardusub.link.packets import Packet, dialect, packets
+from wakewise_ardusub.link.message_state import MavlinkMessage
+from wakewise_ardusub.link.packets import MavlinkPacket, dialect, packets
 from wakewise_ardusub.link.protocol import COMPANION_COMPONENT
 
 
-class Carrier(Protocol):
+class Transport(Protocol):
     """Carries bytes to a vehicle and from it."""
 
     def receive(self, timeout_s: float) -> bytes:
@@ -24,31 +24,31 @@ class Carrier(Protocol):
         ...
 
 
-class Post:
+class MavlinkCodec:
     """Speaks as the companion of a vehicle.
 
     Parameters
     ----------
-    carrier : Carrier
+    carrier : Transport
     system : int
         The vehicle's id, which its companion shares.
     """
 
-    def __init__(self, carrier: Carrier, system: int) -> None:
+    def __init__(self, carrier: Transport, system: int) -> None:
         self._carrier = carrier
         self._out = dialect().MAVLink(None, srcSystem=system, srcComponent=COMPANION_COMPONENT)
         self._in = dialect().MAVLink(None)
 
-    def receive(self, timeout_s: float) -> tuple[list[Said], int]:
+    def receive(self, timeout_s: float) -> tuple[list[MavlinkMessage], int]:
         """Messages that came, and how many stretches of bytes were none; waits at most so long for the first."""
         data = self._carrier.receive(timeout_s)
-        said: list[Said] = []
+        said: list[MavlinkMessage] = []
         noise = 0
         for part in packets(data):
             try:
-                if not isinstance(part, Packet):
+                if not isinstance(part, MavlinkPacket):
                     raise TypeError
-                said.append(Said.of(self._in.decode(bytearray(data[part.start : part.end]))))
+                said.append(MavlinkMessage.of(self._in.decode(bytearray(data[part.start : part.end]))))
             except Exception:  # pymavlink raises what the fields made it raise
                 noise += 1
         return said, noise
@@ -61,8 +61,8 @@ class Post:
         self._carrier.send(bytes(data))
 
 
-class Tap:
-    """A `Carrier` beside a relay: what it forwards is put in here, and what is to be sent goes out through it."""
+class RelayTransport:
+    """A `Transport` beside a relay: what it forwards is put in here, and what is to be sent goes out through it."""
 
     def __init__(self, most: int = 4096) -> None:
         self._waiting: deque[bytes] = deque(maxlen=most)

@@ -19,7 +19,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wakewise_ardusub.link.packets import Packet, checksum, dialect, is_signed, packets
+from wakewise_ardusub.link.packets import MavlinkPacket, checksum, dialect, is_signed, packets
 from wakewise_ardusub.link.protocol import STICKS_MESSAGE, STICKS_MIDDLE
 
 Address = tuple[str, int]
@@ -42,7 +42,7 @@ def stilled(data: bytes) -> bytes:
     """
     out = bytearray()
     for part in packets(data):
-        if not isinstance(part, Packet):
+        if not isinstance(part, MavlinkPacket):
             out += data[slice(*part)]
         elif part.number != STICKS_MESSAGE:
             out += data[part.start : part.end]
@@ -51,7 +51,7 @@ def stilled(data: bytes) -> bytes:
     return bytes(out)
 
 
-def _let_go(data: bytes, packet: Packet) -> bytes:
+def _let_go(data: bytes, packet: MavlinkPacket) -> bytes:
     """MANUAL_CONTROL with its sticks in the middle."""
     head = bytearray(data[packet.start : packet.payload])
     second = head[0] == _MARK_2
@@ -69,7 +69,7 @@ def _let_go(data: bytes, packet: Packet) -> bytes:
     return bytes(head[:1]) + body + checksum(body, extra).to_bytes(2, "little")
 
 
-class Mediator:
+class MavlinkRelay:
     """Forwards datagrams in a thread of its own.
 
     Parameters

@@ -10,14 +10,14 @@ from collections.abc import Callable, Sequence
 
 from wakewise.core.errors import InputError
 from wakewise_ardusub.link.connection import Endpoint
-from wakewise_ardusub.link.transports import Udp
+from wakewise_ardusub.link.transports import UdpTransport
 
 WAIT_S = 0.1
 """How soon `going` is asked again while nobody speaks."""
 _UDP = ("udpin", "udpout")
 
 
-class Share:
+class MavlinkRouter:
     """Sockets of an autopilot and of those who share it, in the order given: the autopilot first.
 
     Attributes
@@ -39,9 +39,9 @@ class Share:
         for place in places:
             if place.way not in _UDP:
                 raise InputError(f"{place.words}: only udpin:HOST:PORT and udpout:HOST:PORT can be shared")
-        self._ends: list[Udp] = []
+        self._ends: list[UdpTransport] = []
         try:
-            self._ends += map(Udp, places)
+            self._ends += map(UdpTransport, places)
         except BaseException:
             self.close()
             raise
@@ -69,7 +69,7 @@ class Share:
         for end in self._ends:
             end.close()
 
-    def _hand(self, end: Udp, data: bytes) -> None:
+    def _hand(self, end: UdpTransport, data: bytes) -> None:
         try:
             end.send(data)
         except OSError:  # nobody there yet

@@ -1,8 +1,8 @@
 """What is known of a vehicle from the MAVLink messages that were heard: a record that each message leaves anew.
 
-`Known` is frozen and `heard` is pure, so that any sequence of messages can be played to it. Only what the vehicle's own
-autopilot says counts as its state; sticks count from whoever sends them to this vehicle, ground stations are told apart
-by their system id. A message that says nonsense changes nothing and is counted.
+`LinkState` is frozen and `heard` is pure, so that any sequence of messages can be played to it. Only what the vehicle's
+own autopilot says counts as its state; sticks count from whoever sends them to this vehicle, ground stations are told
+apart by their system id. A message that says nonsense changes nothing and is counted.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _ANSWERS = {1: "temporarily rejected", 2: "denied", 3: "unsupported", 4: "failed
 
 
 @dataclass(frozen=True)
-class Said:
+class MavlinkMessage:
     """A message: who said it, what it is called and its fields."""
 
     system: int
@@ -52,7 +52,7 @@ class Said:
     fields: Mapping[str, Any]
 
     @classmethod
-    def of(cls, message: Any) -> Said:
+    def of(cls, message: Any) -> MavlinkMessage:
         """Of a message as pymavlink decodes it."""
         name = message.get_type()
         fields = {key: getattr(message, key) for key in message.get_fieldnames()} if name in WANTED else {}
@@ -60,7 +60,7 @@ class Said:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sticks:
+class PilotInput:
     """The pilot's sticks: axes as in `wakewise.operation.teleop.input.Controls`, shape (5,), buttons as bits, who moves
     them, when.
     """
@@ -72,7 +72,7 @@ class Sticks:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Known:
+class LinkState:
     """All that was heard, with the time of this computer's clock at which it came.
 
     Parameters
@@ -121,7 +121,7 @@ class Known:
     battery_V: float = math.nan
     servo_us: tuple[int, ...] = ()
     servo_s: float = -math.inf
-    sticks: Sticks | None = None
+    sticks: PilotInput | None = None
     named: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
     parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     ground: Mapping[int, float] = field(default_factory=lambda: MappingProxyType({}))
@@ -150,11 +150,11 @@ class Known:
         value, came_s = self.named.get(name, (math.nan, -math.inf))
         return value, now_s - came_s
 
-    def sent(self, time_us: int) -> Known:
+    def sent(self, time_us: int) -> LinkState:
         """Thrusts of this time went out."""
         return replace(self, sent_us=(*self.sent_us[-63:], time_us))
 
-    def noise(self, count: int = 1) -> Known:
+    def noise(self, count: int = 1) -> LinkState:
         """Bytes came that are no message."""
         return replace(self, garbage=self.garbage + count)
 
@@ -168,7 +168,7 @@ WANTED = frozenset({
 """Messages that are looked into, here or in `measuring.py`."""
 
 
-def heard(known: Known, said: Said, now_s: float) -> Known:
+def heard(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
     """What is known after a message."""
     known = replace(known, messages=known.messages + 1)
     if said.name not in WANTED:
@@ -180,7 +180,7 @@ def heard(known: Known, said: Said, now_s: float) -> Known:
         return replace(known, garbage=known.garbage + 1, odd=odd)
 
 
-def _taken(known: Known, said: Said, now_s: float) -> Known:
+def _taken(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
     ours = said.system == known.system
     if ours and said.name in ("COMMAND_ACK", "CAMERA_IMAGE_CAPTURED"):
         return _photographed(known, said, now_s)
@@ -199,7 +199,7 @@ def _taken(known: Known, said: Said, now_s: float) -> Known:
     return _from_ground(known, said, now_s)
 
 
-def _photographed(known: Known, said: Said, now_s: float) -> Known:
+def _photographed(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
     """What a camera, or the autopilot for one, answers to a request for a photograph, or tells of one."""
     get, who = said.fields, f"component {said.component}"
     if said.name == "CAMERA_IMAGE_CAPTURED":
@@ -217,7 +217,7 @@ def _photographed(known: Known, said: Said, now_s: float) -> Known:
     return replace(known, camera=words, camera_s=now_s)
 
 
-def _from_companion(known: Known, said: Said, now_s: float) -> Known:
+def _from_companion(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
     """A message under this program's own ids: its echo, or a rival."""
     if said.name == "SET_ACTUATOR_CONTROL_TARGET":
         rival = int(said.fields["time_usec"]) not in known.sent_us
@@ -232,7 +232,7 @@ def _from_companion(known: Known, said: Said, now_s: float) -> Known:
     return replace(known, duplicate=words, duplicate_s=now_s) if rival else known
 
 
-def _from_autopilot(known: Known, said: Said, now_s: float) -> Known:
+def _from_autopilot(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
     name, get = said.name, said.fields
     if name == "HEARTBEAT":
         armed = bool(int(get["base_mode"]) & _ARMED)
@@ -275,12 +275,12 @@ def _from_autopilot(known: Known, said: Said, now_s: float) -> Known:
     return known
 
 
-def _from_ground(known: Known, said: Said, now_s: float) -> Known:
+def _from_ground(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
     """Sticks and orders of whoever stands ashore."""
     name, get = said.name, said.fields
     if name == "MANUAL_CONTROL" and int(get["target"]) == known.system:
         before = known.sticks
-        sticks = Sticks(axes=stick_axes(get), buttons=int(get["buttons"]), system=said.system, came_s=now_s)
+        sticks = PilotInput(axes=stick_axes(get), buttons=int(get["buttons"]), system=said.system, came_s=now_s)
         known = replace(known, sticks=sticks)
         if before is not None and before.system != said.system and now_s - before.came_s < REMEMBERED_S:
             return _overtaken(known, f"sticks from two ground stations, {before.system} and {said.system}", now_s)
@@ -298,11 +298,11 @@ def _from_ground(known: Known, said: Said, now_s: float) -> Known:
     return known
 
 
-def _overtaken(known: Known, words: str, now_s: float) -> Known:
+def _overtaken(known: LinkState, words: str, now_s: float) -> LinkState:
     return replace(known, takeover=words, takeover_s=now_s)
 
 
-def _placed(known: Known, said: Said, now_s: float) -> Known:
+def _placed(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
     """A position: of the autopilot's own estimate, or of a sensor that others feed it with."""
     place = np.array(_floats(said.fields, "x", "y", "z"))
     if np.abs(place).max() > 1e5:
@@ -332,13 +332,13 @@ def stick_axes(fields: Mapping[str, Any]) -> Array:
     return shaped(axes)
 
 
-def tilt_of(known: Known) -> float:
+def tilt_of(known: LinkState) -> float:
     """Angle between the body's down and the world's, NaN where no attitude was heard."""
     roll, pitch, _ = known.attitude
     return math.acos(min(max(math.cos(roll) * math.cos(pitch), -1.0), 1.0)) if math.isfinite(roll + pitch) else math.nan
 
 
-def attitude_of(known: Known) -> Array:
+def attitude_of(known: LinkState) -> Array:
     """The attitude as a quaternion w, x, y, z of body in world, shape (4,)."""
     return quat_from_euler(*known.attitude)
 

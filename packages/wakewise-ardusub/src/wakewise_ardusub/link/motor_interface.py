@@ -16,7 +16,7 @@ from wakewise_ardusub.link.protocol import SLOTS
 from wakewise_ardusub.motors import OUTPUTS, channels_of_motors
 
 
-class Drive(Protocol):
+class MotorInterface(Protocol):
     """What thrusts are to the script, by what the autopilot is set to."""
 
     @property
@@ -34,8 +34,8 @@ class Drive(Protocol):
 
 
 @dataclass(eq=False)
-class VehicleDrive:
-    """The motors of a vehicle; implements `Drive`.
+class VehicleMotors:
+    """The motors of a vehicle; implements `MotorInterface`.
 
     Raises
     ------

@@ -18,7 +18,7 @@ _KIND = "wakewise motor test 1"
 
 
 @dataclass(frozen=True, kw_only=True)
-class MotorSeen:
+class MotorObservation:
     """One motor, from 1: at a pulse above 1500 us, with MOT_n_DIRECTION as it was, what somebody saw.
 
     `expected` is the direction in words that was said before.
@@ -44,9 +44,9 @@ class MotorResults:
 
     vehicle: str
     time: str
-    seen: Mapping[int, MotorSeen]
+    seen: Mapping[int, MotorObservation]
 
-    def of(self, motor: int) -> MotorSeen | None:
+    def of(self, motor: int) -> MotorObservation | None:
         """What was seen of a motor; None if it was not asked."""
         found = self.seen.get(motor)
         return found if found is not None and found.answer != "not asked" else None
@@ -83,13 +83,13 @@ def read_results(path: Path) -> MotorResults:
         raise InputError(f"{path}: {fault!r} is missing or wrong; test the motors again") from None
 
 
-def _seen(entry: Any) -> MotorSeen:
+def _seen(entry: Any) -> MotorObservation:
     answer, direction, motor = entry["answer"], float(entry["direction"]), int(entry["motor"])
     if answer not in ANSWERS:
         raise ValueError(f"answer {answer!r}")
     if direction not in {1.0, -1.0}:
         raise ValueError(f"direction {direction:g}")
-    return MotorSeen(
+    return MotorObservation(
         motor=motor,
         pulse_us=int(entry["pulse_us"]),
         direction=direction,

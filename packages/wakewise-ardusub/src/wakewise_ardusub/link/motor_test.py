@@ -17,9 +17,9 @@ import numpy as np
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.robot.vehicles import Vehicle
-from wakewise_ardusub.link.connection import Talk, send_command
+from wakewise_ardusub.link.connection import MavlinkSession, send_command
 from wakewise_ardusub.link.frames import force_words
-from wakewise_ardusub.link.motor_results import Answer, MotorResults, MotorSeen
+from wakewise_ardusub.link.motor_results import Answer, MotorObservation, MotorResults
 from wakewise_ardusub.link.output import motor_output
 from wakewise_ardusub.link.protocol import MIDDLE_US
 from wakewise_ardusub.link.vehicle_survey import say_hello
@@ -40,7 +40,7 @@ _REFUSALS = {1: "temporarily rejected", 2: "denied", 3: "unsupported", 4: "faile
 
 
 @dataclass(frozen=True, kw_only=True)
-class MotorTurn:
+class MotorTestStep:
     """One motor's turn, from 1: the pulse above 1500 us that it gets, and which way the vehicle should be pushed."""
 
     motor: int
@@ -53,11 +53,11 @@ class MotorTurn:
 class Operator(Protocol):
     """Who looks: consents to each motor before it turns, and says afterwards what was seen."""
 
-    def consents(self, turn: MotorTurn) -> bool:
+    def consents(self, turn: MotorTestStep) -> bool:
         """Whether this motor may turn now."""
         ...
 
-    def saw(self, turn: MotorTurn) -> Answer:
+    def saw(self, turn: MotorTestStep) -> Answer:
         """What this motor did."""
         ...
 
@@ -68,7 +68,7 @@ class Operator(Protocol):
 
 def planned_turns(
     vehicle: Vehicle, parameters: Mapping[str, float], motors: Sequence[int] | None = None
-) -> list[MotorTurn]:
+) -> list[MotorTestStep]:
     """What each motor will be told, and which way it should push the vehicle.
 
     Raises
@@ -89,7 +89,7 @@ def planned_turns(
     for motor in chosen:
         thruster, direction = vehicle.thrusters[motor - 1], float(output.directions[motor - 1])
         turns.append(
-            MotorTurn(
+            MotorTestStep(
                 motor=motor,
                 name=thruster.name,
                 pulse_us=min(int(own[motor - 1]), MIDDLE_US + MOST_US),
@@ -101,9 +101,9 @@ def planned_turns(
 
 
 def run_motor_test(
-    talk: Talk,
+    talk: MavlinkSession,
     vehicle: Vehicle,
-    turns: Sequence[MotorTurn],
+    turns: Sequence[MotorTestStep],
     operator: Operator,
     *,
     keep: Callable[[MotorResults], None] = lambda _: None,
@@ -117,7 +117,7 @@ def run_motor_test(
     EnvironmentFailure
         If the autopilot refuses a test, with its own words.
     """
-    seen: dict[int, MotorSeen] = {}
+    seen: dict[int, MotorObservation] = {}
     results = MotorResults(vehicle=vehicle.name, time="", seen=seen)
     ended_s = -COOL_S
     for turn in turns:
@@ -130,7 +130,7 @@ def run_motor_test(
             _turn(talk, turn, clock, sleep)
             ended_s = clock()
             answer = operator.saw(turn)
-        seen[turn.motor] = MotorSeen(
+        seen[turn.motor] = MotorObservation(
             motor=turn.motor,
             pulse_us=turn.pulse_us,
             direction=turn.direction,
@@ -143,13 +143,13 @@ def run_motor_test(
     return results
 
 
-def _until_armed(talk: Talk, operator: Operator) -> None:
+def _until_armed(talk: MavlinkSession, operator: Operator) -> None:
     say_hello(talk)
     while not _armed(talk):
         operator.arms("ArduSub turns motors only while it is armed, and disarms by itself after each")
 
 
-def _armed(talk: Talk) -> bool:
+def _armed(talk: MavlinkSession) -> bool:
     """What the next heartbeat says; one that was waiting may be old, so the last of them counts."""
     armed = False
     beat: Any = talk.hear({"HEARTBEAT"}, 2.5)
@@ -161,7 +161,9 @@ def _armed(talk: Talk) -> bool:
     return armed
 
 
-def _turn(talk: Talk, turn: MotorTurn, clock: Callable[[], float], sleep: Callable[[float], None]) -> None:
+def _turn(
+    talk: MavlinkSession, turn: MotorTestStep, clock: Callable[[], float], sleep: Callable[[float], None]
+) -> None:
     """One motor's pulse, renewed, then rest; whatever happens, rest is sent."""
     try:
         _renew(talk, turn.motor, turn.pulse_us, TURN_S, clock, sleep)
@@ -170,7 +172,7 @@ def _turn(talk: Talk, turn: MotorTurn, clock: Callable[[], float], sleep: Callab
 
 
 def _renew(
-    talk: Talk,
+    talk: MavlinkSession,
     motor: int,
     pulse_us: int,
     seconds: float,

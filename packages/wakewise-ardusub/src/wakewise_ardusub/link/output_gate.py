@@ -3,7 +3,7 @@
 Thrusts are sent only while engaged, by facts of that very moment, and only those that a controller decided in this
 engagement. When it ends, `RELEASES` messages tell the script to let go, which gives the pilot the sticks at once; were
 all of them lost, the script would let go `HOLD_MS` after the last thrusts. The watch also sends the last thrusts again,
-so that lost messages do no harm, for no longer than `Limits.thrusts_s`.
+so that lost messages do no harm, for no longer than `EngagementLimits.thrusts_s`.
 
 Any thread may call it. It waits for nothing but its own lock, which is held for no longer than a message takes.
 """
@@ -23,11 +23,11 @@ from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Measurement
 from wakewise_ardusub.link import protocol
 from wakewise_ardusub.link.buttons import BUTTON_PARAMETERS, buttons_amiss
-from wakewise_ardusub.link.engagement_fsm import Engagement, Facts, Limits, faults
-from wakewise_ardusub.link.freshness_margins import Margins
-from wakewise_ardusub.link.journal_events import News
-from wakewise_ardusub.link.message_state import REMEMBERED_S, Known, Said, heard, tilt_of
-from wakewise_ardusub.link.motor_interface import Drive
+from wakewise_ardusub.link.engagement_fsm import EngagementInputs, EngagementLimits, EngagementState, faults
+from wakewise_ardusub.link.freshness_margins import FreshnessMargins
+from wakewise_ardusub.link.journal_events import EventLogger
+from wakewise_ardusub.link.message_state import REMEMBERED_S, LinkState, MavlinkMessage, heard, tilt_of
+from wakewise_ardusub.link.motor_interface import MotorInterface
 from wakewise_ardusub.link.requests import (
     AGAIN_S,
     MOST_PARAMETERS,
@@ -35,8 +35,8 @@ from wakewise_ardusub.link.requests import (
     interval_requests,
     parameter_request,
 )
-from wakewise_ardusub.link.session_log import Journal
-from wakewise_ardusub.link.telemetry_adapter import Telemetry, measured
+from wakewise_ardusub.link.session_log import SessionLog
+from wakewise_ardusub.link.telemetry_adapter import TelemetryAdapter, measured
 
 Send = Callable[[str, Mapping[str, Any]], None]
 """Sends a message: its name as pymavlink's encoders have it, and its fields."""
@@ -50,14 +50,14 @@ _KEPT = 4096
 _ONBOARD_CONTROLLER, _NO_AUTOPILOT, _ACTIVE = 18, 8, 4
 
 
-class Warden:
+class OutputGate:
     """Keeps what is known of the vehicle and lets thrusts through, or not.
 
     Parameters
     ----------
     send : callable
-    drive : Drive
-    limits : Limits
+    drive : MotorInterface
+    limits : EngagementLimits
     journal : Journal or None
     system : int
         The vehicle's id.
@@ -77,21 +77,25 @@ class Warden:
         self,
         *,
         send: Send,
-        drive: Drive,
-        limits: Limits | None = None,
-        journal: Journal | None = None,
+        drive: MotorInterface,
+        limits: EngagementLimits | None = None,
+        journal: SessionLog | None = None,
         system: int = protocol.DEFAULT_SYSTEM,
         session: int = 0,
         buttons: Mapping[str, int] | None = None,
         listen_only: bool = False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.limits, self.journal, self.clock = limits or Limits(), journal, clock
+        self.limits, self.journal, self.clock = limits or EngagementLimits(), journal, clock
         self._send, self._drive, self._listen_only = send, drive, listen_only
         self._buttons = dict(buttons or {})
         self._needs = (*drive.needs, *(BUTTON_PARAMETERS if self._buttons else ()))
         self._lock = threading.RLock()
-        self.known, self._telemetry, self.engagement = Known(system=system, session=session), Telemetry(), Engagement()
+        self.known, self._telemetry, self.engagement = (
+            LinkState(system=system, session=session),
+            TelemetryAdapter(),
+            EngagementState(),
+        )
         self.target_W_m: Array | None = None
         self.figures: dict[str, float] = {}
         self._estimate: BodyState | None = None
@@ -101,10 +105,10 @@ class Warden:
         self._ticked_s, self._standstill_s, self._last_us = -math.inf, 0.0, 0
         self._pressed: deque[str] = deque(maxlen=64)
         self._measurements: deque[Measurement] = deque(maxlen=_KEPT)
-        self._news = News(journal, clock)
+        self._news = EventLogger(journal, clock)
         self._judged_for: Mapping[str, float] | None = None
         self._amiss, self._engaged_with, self._engaged_mode = "", dict[str, float](), ""
-        self._releases_left, self.margins = 0, Margins()
+        self._releases_left, self.margins = 0, FreshnessMargins()
         self.thrusts_sent = self.releases_sent = self.unsent = 0
 
     def begin(self) -> None:
@@ -131,7 +135,7 @@ class Warden:
         engagement = self.engagement
         return engagement.entries if engagement.state == "engaged" else None
 
-    def facts(self) -> Facts:
+    def facts(self) -> EngagementInputs:
         """What is known now, as it is judged."""
         with self._lock:
             known, now_s, held = self.known, self.clock(), self._telemetry
@@ -146,7 +150,7 @@ class Warden:
             away = math.nan if place is None or self.target_W_m is None else math.dist(place, self.target_W_m)
             engaged = self.engagement.state == "engaged"
             since_s = self.engagement.since_s if engaged else now_s
-            return Facts(
+            return EngagementInputs(
                 now_s=now_s,
                 armed=known.armed,
                 mode=known.mode,
@@ -186,7 +190,7 @@ class Warden:
         changed = [name for name, value in self._engaged_with.items() if parameters.get(name) != value]
         return self._amiss or (f"{changed[0]} was changed" if changed else "")
 
-    def take(self, said: Said) -> None:
+    def take(self, said: MavlinkMessage) -> None:
         """A message came."""
         with self._lock:
             now_s, before = self.clock(), self.known
@@ -321,7 +325,7 @@ class Warden:
         if self.engagement.state != "off":
             self._told(self.engagement.judged(self.facts(), self.limits))
 
-    def _told(self, after: Engagement) -> None:
+    def _told(self, after: EngagementState) -> None:
         """Take a move over: what ends an engagement stills the thrusters first and is written down then."""
         before, self.engagement = self.engagement, after
         if before.state == "engaged" and after.state != "engaged":

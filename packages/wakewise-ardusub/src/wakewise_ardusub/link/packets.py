@@ -12,7 +12,7 @@ _HEAD_1, _HEAD_2, _CHECKSUM, _SIGNATURE = 6, 10, 2, 13
 
 
 @dataclass(frozen=True)
-class Packet:
+class MavlinkPacket:
     """A packet of a datagram: where it begins and ends, where its payload begins, and its message's number."""
 
     start: int
@@ -29,7 +29,7 @@ def dialect() -> Any:
     return ardupilotmega
 
 
-def packets(data: bytes) -> Iterator[Packet | tuple[int, int]]:
+def packets(data: bytes) -> Iterator[MavlinkPacket | tuple[int, int]]:
     """Packets in their order, and between them the stretches of bytes that are none, as (start, end).
 
     Of a message that is unknown the checksum cannot be told, so it counts as a stretch that is none.
@@ -48,7 +48,7 @@ def packets(data: bytes) -> Iterator[Packet | tuple[int, int]]:
         yield noise, len(data)
 
 
-def packet_at(data: bytes, at: int) -> Packet | None:
+def packet_at(data: bytes, at: int) -> MavlinkPacket | None:
     """The whole packet at an offset; None where there is none."""
     size, mark = len(data), data[at]
     if mark == _MARK_2 and at + _HEAD_2 + _CHECKSUM <= size:
@@ -64,14 +64,14 @@ def packet_at(data: bytes, at: int) -> Packet | None:
     if end > size or message is None:
         return None
     told = int.from_bytes(data[last : last + _CHECKSUM], "little")
-    return Packet(at, end, payload, number) if checksum(data[at + 1 : last], message.crc_extra) == told else None
+    return MavlinkPacket(at, end, payload, number) if checksum(data[at + 1 : last], message.crc_extra) == told else None
 
 
 def begun_at(data: bytes) -> int:
     """Where a packet begins whose end has not come yet, by what its head promises; the end where there is none."""
     at = 0
     for part in packets(data):
-        if isinstance(part, Packet):
+        if isinstance(part, MavlinkPacket):
             at = part.end
     while (at := _next_mark(data, at)) < len(data):
         if len(data) - at < _HEAD_2 or at + _HEAD_2 + data[at + 1] + _CHECKSUM + _SIGNATURE > len(data):
@@ -80,7 +80,7 @@ def begun_at(data: bytes) -> int:
     return len(data)
 
 
-def is_signed(data: bytes, packet: Packet) -> bool:
+def is_signed(data: bytes, packet: MavlinkPacket) -> bool:
     """Whether a packet bears a signature, so that nobody may change it."""
     return data[packet.start] == _MARK_2 and bool(data[packet.start + 2] & _SIGNED)
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise_ardusub.link.buttons import BUTTON_PARAMETERS
-from wakewise_ardusub.link.connection import Talk
+from wakewise_ardusub.link.connection import MavlinkSession
 from wakewise_ardusub.link.protocol import AUTOPILOT_COMPONENT
 
 SYSTEM_NAMES = ("MAV_SYSID", "SYSID_THISMAV")
@@ -44,7 +44,7 @@ def first_of(parameters: Mapping[str, float], names: Iterable[str]) -> tuple[str
 
 
 def read_parameters(
-    talk: Talk, names: Iterable[str] = WANTED, *, progress: Progress | None = None, quiet_s: float = QUIET_S
+    talk: MavlinkSession, names: Iterable[str] = WANTED, *, progress: Progress | None = None, quiet_s: float = QUIET_S
 ) -> dict[str, float]:
     """Ask for parameters by name; those that the firmware does not know are left out.
 
@@ -77,7 +77,7 @@ def read_parameters(
 
 
 def read_all_parameters(
-    talk: Talk, *, progress: Progress | None = None, quiet_s: float = 2.0 * QUIET_S
+    talk: MavlinkSession, *, progress: Progress | None = None, quiet_s: float = 2.0 * QUIET_S
 ) -> dict[str, float]:
     """All parameters of the autopilot: its list, then those that were lost on the way by their index.
 
@@ -114,7 +114,7 @@ def read_all_parameters(
     raise EnvironmentFailure(f"{count - len(indices)} of {count} parameters never came: the link loses too much")
 
 
-def set_parameter(talk: Talk, name: str, value: float, *, quiet_s: float = QUIET_S) -> None:
+def set_parameter(talk: MavlinkSession, name: str, value: float, *, quiet_s: float = QUIET_S) -> None:
     """Set a parameter and read it back: nothing else says that it was taken.
 
     Raises
@@ -178,7 +178,7 @@ def read_parameter_file(path: Path) -> dict[str, float]:
     return found
 
 
-def _ask(talk: Talk, name: str) -> None:
+def _ask(talk: MavlinkSession, name: str) -> None:
     talk.send(
         "param_request_read",
         target_system=talk.system,
@@ -188,7 +188,7 @@ def _ask(talk: Talk, name: str) -> None:
     )
 
 
-def _collect(talk: Talk, found: dict[str, float], quiet_s: float, wanted: list[str]) -> None:
+def _collect(talk: MavlinkSession, found: dict[str, float], quiet_s: float, wanted: list[str]) -> None:
     """Take answers until all are there or none comes for a while; never for longer than ten such whiles."""
     until = time.monotonic() + 10.0 * quiet_s
     while time.monotonic() < until and not all(name in found for name in wanted):

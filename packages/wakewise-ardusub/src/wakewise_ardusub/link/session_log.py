@@ -21,7 +21,7 @@ from wakewise.core.errors import EnvironmentFailure, InputError
 JOURNAL_FILE = "journal.jsonl"
 
 
-class Journal:
+class SessionLog:
     """Appends to a file that nobody else writes; any thread may.
 
     Parameters

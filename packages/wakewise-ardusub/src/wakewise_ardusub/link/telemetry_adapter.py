@@ -23,7 +23,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.geometry import Pose, quat_from_euler, quat_integrate, quat_multiply
 from wakewise.core.interfaces import Measurement
-from wakewise_ardusub.link.message_state import Said
+from wakewise_ardusub.link.message_state import MavlinkMessage
 from wakewise_ardusub.link.protocol import AUTOPILOT_COMPONENT
 
 AHEAD_S, BEHIND_S = 1.0, 1.0
@@ -76,7 +76,7 @@ class SenderClock:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Attitude:
+class AttitudeSample:
     """The autopilot's attitude and rates at an instant of our clock."""
 
     time_s: float
@@ -89,18 +89,20 @@ class Attitude:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Telemetry:
+class TelemetryAdapter:
     """What turning messages into measurements remembers: clocks by sender, the last attitude, the last jump."""
 
     clocks: Mapping[tuple[int, int, bool], SenderClock] = field(default_factory=lambda: MappingProxyType({}))
-    attitude: Attitude | None = None
+    attitude: AttitudeSample | None = None
     sensed_s: float = -math.inf
     """When a sensor's own pose came last; then the autopilot's estimate, which is made of it, is left aside."""
     jump: str = ""
     jump_s: float = -math.inf
 
 
-def measured(known: Telemetry, said: Said, came_s: float, system: int) -> tuple[Telemetry, tuple[Measurement, ...]]:
+def measured(
+    known: TelemetryAdapter, said: MavlinkMessage, came_s: float, system: int
+) -> tuple[TelemetryAdapter, tuple[Measurement, ...]]:
     """The memory after a message, and what it measured; times are on the clock of `came_s`.
 
     Messages of other vehicles, and such that say nonsense, measure nothing.
@@ -111,7 +113,9 @@ def measured(known: Telemetry, said: Said, came_s: float, system: int) -> tuple[
         return known, ()
 
 
-def _measured(known: Telemetry, said: Said, came_s: float, system: int) -> tuple[Telemetry, tuple[Measurement, ...]]:
+def _measured(
+    known: TelemetryAdapter, said: MavlinkMessage, came_s: float, system: int
+) -> tuple[TelemetryAdapter, tuple[Measurement, ...]]:
     name, get = said.name, said.fields
     autopilot = said.system == system and said.component == AUTOPILOT_COMPONENT
     if name in ("VISION_POSITION_ESTIMATE", "ODOMETRY"):
@@ -134,7 +138,7 @@ def _measured(known: Telemetry, said: Said, came_s: float, system: int) -> tuple
     if name == "ATTITUDE":
         q, omega = quat_from_euler(*_finite(get, "roll", "pitch", "yaw")), _rates(get)
         return (
-            replace(known, attitude=Attitude(time_s=time_s, q_WB=q, omega_B_rad_s=omega)),
+            replace(known, attitude=AttitudeSample(time_s=time_s, q_WB=q, omega_B_rad_s=omega)),
             (Measurement(time_s=time_s, omega_B_rad_s=omega),),
         )
     if name == "RAW_IMU":

@@ -22,7 +22,7 @@ _PATIENCE_S = 5.0
 _TAKEN = 98
 
 
-def carrier_of(endpoint: Endpoint) -> Udp | Stream:
+def carrier_of(endpoint: Endpoint) -> UdpTransport | StreamTransport:
     """The carrier to an endpoint.
 
     Raises
@@ -38,7 +38,7 @@ def carrier_of(endpoint: Endpoint) -> Udp | Stream:
         return _tcp(endpoint)
     if endpoint.way == "serial":
         return _serial(endpoint)
-    return Udp(endpoint)
+    return UdpTransport(endpoint)
 
 
 def open_udp(endpoint: Endpoint) -> socket.socket:
@@ -59,7 +59,7 @@ def open_udp(endpoint: Endpoint) -> socket.socket:
     return made
 
 
-class Udp:
+class UdpTransport:
     """A `Carrier` over a UDP socket. It answers whoever spoke last, or the place that it was told to speak to."""
 
     def __init__(self, endpoint: Endpoint) -> None:
@@ -87,7 +87,7 @@ class Udp:
         self.socket.close()
 
 
-class Stream:
+class StreamTransport:
     """A `Carrier` over bytes without borders: what may be the begin of a packet is kept until the rest has come."""
 
     def __init__(
@@ -122,21 +122,21 @@ class Stream:
         self._close()
 
 
-def _tcp(endpoint: Endpoint) -> Stream:
+def _tcp(endpoint: Endpoint) -> StreamTransport:
     try:
         made = socket.create_connection(_address(endpoint), timeout=_PATIENCE_S)
     except OSError as fault:
         raise _refused(endpoint, fault) from None
     made.settimeout(_PATIENCE_S)
     made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    return Stream(made, made.recv, made.sendall, made.close)
+    return StreamTransport(made, made.recv, made.sendall, made.close)
 
 
-def _serial(endpoint: Endpoint) -> Stream:
+def _serial(endpoint: Endpoint) -> StreamTransport:
     made = open_serial(endpoint)
     if isinstance(made, SerialPort):
-        return Stream(made, lambda _: made.read(), made.write, made.close)
-    return Stream(made, made.read, made.write, made.close)
+        return StreamTransport(made, lambda _: made.read(), made.write, made.close)
+    return StreamTransport(made, made.read, made.write, made.close)
 
 
 def _address(endpoint: Endpoint) -> tuple[str, int]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wakewise.core.errors import EnvironmentFailure
-from wakewise_ardusub.link.connection import Talk, send_command
+from wakewise_ardusub.link.connection import MavlinkSession, send_command
 from wakewise_ardusub.link.parameters import set_parameter
 from wakewise_ardusub.link.protocol import AUTOPILOT_COMPONENT
 from wakewise_ardusub.link.script import SCRIPT_FOLDERS, SCRIPT_NAME
@@ -59,7 +59,7 @@ class _Answer:
 class _Client:
     """Requests one at a time, each until it is answered; the server answers a repeated one as it did before."""
 
-    def __init__(self, talk: Talk) -> None:
+    def __init__(self, talk: MavlinkSession) -> None:
         self._talk, self._number, self.session = talk, 0, 0
 
     def ask(self, operation: int, data: bytes = b"", *, offset: int = 0, size: int | None = None) -> _Answer:
@@ -102,7 +102,7 @@ class _Client:
                 return _Answer(code == _ACK, session, data)
 
 
-def upload_script(talk: Talk, script: bytes, *, progress: Progress | None = None) -> str:
+def upload_script(talk: MavlinkSession, script: bytes, *, progress: Progress | None = None) -> str:
     """Put the script where the autopilot looks for scripts, and say where that was.
 
     Raises
@@ -124,7 +124,7 @@ def upload_script(talk: Talk, script: bytes, *, progress: Progress | None = None
     return path
 
 
-def start_script(talk: Talk) -> None:
+def start_script(talk: MavlinkSession) -> None:
     """Have the autopilot load its scripts: SCR_ENABLE to 1, read back, and a reboot. It must be disarmed.
 
     Raises

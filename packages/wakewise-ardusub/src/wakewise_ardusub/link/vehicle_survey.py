@@ -9,8 +9,8 @@ from typing import Any
 
 from wakewise.core.errors import EnvironmentFailure
 from wakewise.robot.vehicles import Vehicle
-from wakewise_ardusub.link.checks import Facts, Heard
-from wakewise_ardusub.link.connection import Talk, send_command
+from wakewise_ardusub.link.checks import CheckInputs, ReceivedTelemetry
+from wakewise_ardusub.link.connection import MavlinkSession, send_command
 from wakewise_ardusub.link.motor_results import MotorResults
 from wakewise_ardusub.link.parameters import read_parameters
 from wakewise_ardusub.link.protocol import AUTOPILOT_COMPONENT, HEARTBEAT_PERIOD_S, VERSION_NAME
@@ -32,14 +32,14 @@ Progress = Callable[[float, float], None]
 
 
 def survey(
-    talk: Talk,
+    talk: MavlinkSession,
     vehicle: Vehicle,
     *,
     results: MotorResults | None = None,
     buttons: Mapping[str, int] | None = None,
     seconds: float = LISTEN_S,
     progress: Progress | None = None,
-) -> Facts:
+) -> CheckInputs:
     """All facts about the vehicle at the other end of a connection.
 
     Raises
@@ -51,7 +51,7 @@ def survey(
     kind = "ArduSub" if (beat.autopilot, beat.type) == (_ARDUPILOT, _SUBMARINE) else _kind(beat)
     heard = _listened(talk, seconds, kind, mavlink_2=bytes(beat.get_msgbuf()[:1]) == b"\xfd")
     parameters = read_parameters(talk, progress=progress)
-    return Facts(
+    return CheckInputs(
         vehicle=vehicle,
         parameters=parameters,
         system=talk.system,
@@ -61,7 +61,7 @@ def survey(
     )
 
 
-def await_autopilot(talk: Talk, patience_s: float | None = None) -> Any:
+def await_autopilot(talk: MavlinkSession, patience_s: float | None = None) -> Any:
     """A heartbeat of the vehicle's autopilot; our own goes out meanwhile, since routers send to those they know.
 
     Raises
@@ -88,12 +88,12 @@ def await_autopilot(talk: Talk, patience_s: float | None = None) -> Any:
     raise EnvironmentFailure(f"no heartbeat of system {talk.system} in {patience_s:g} s{instead}")
 
 
-def say_hello(talk: Talk) -> None:
+def say_hello(talk: MavlinkSession) -> None:
     """The companion's heartbeat: an onboard controller, never a ground station."""
     talk.send("heartbeat", type=18, autopilot=8, base_mode=0, custom_mode=0, system_status=4)
 
 
-def _listened(talk: Talk, seconds: float, kind: str, *, mavlink_2: bool) -> Heard:
+def _listened(talk: MavlinkSession, seconds: float, kind: str, *, mavlink_2: bool) -> ReceivedTelemetry:
     """Everything that is said for a while, at the rates that a session asks for; the version is asked for until it is.
 
     Pauses count from the second message of a kind after `SETTLE_S`.
@@ -142,7 +142,7 @@ def _listened(talk: Talk, seconds: float, kind: str, *, mavlink_2: bool) -> Hear
                 came("pose")
         elif name == "ATTITUDE":
             came("attitude")
-    return Heard(
+    return ReceivedTelemetry(
         seconds=seconds,
         kind=kind,
         firmware=firmware,

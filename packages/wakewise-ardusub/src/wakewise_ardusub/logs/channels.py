@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise_ardusub.logs.clock import Clock, ClockJump
-from wakewise_ardusub.logs.identity import Identity, firmware_of_parameters
+from wakewise_ardusub.logs.clock import ClockJump, LogClock
+from wakewise_ardusub.logs.identity import VehicleIdentity, firmware_of_parameters
 
 SERVOS = 16
 WIDTHS = {"sticks": 4, "servo": SERVOS, "attitude": 3, "position": 3}
@@ -44,7 +44,7 @@ MODES = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Series:
+class ChannelSeries:
     """Samples of one channel: times, shape (n,), on the mended clock, and values, shape (n, k), NaN where damaged."""
 
     time_s: Array
@@ -76,14 +76,14 @@ class VehicleLog:
         How many whole records of a wanted kind had other fields than are known, by kind.
     cut_short : bool
         Whether the file ends within a record.
-    series : dict of Series
+    series : dict of ChannelSeries
         By channel; see the module.
     parameters : dict
         The vehicle's, as last said.
     jumps : tuple of ClockJump
     started_s : float or None
         Stamp of the first record in seconds: since 1970 for tlog and mcap, since boot for dataflash.
-    identity : Identity
+    identity : VehicleIdentity
         What the vehicle says it is.
     """
 
@@ -93,13 +93,13 @@ class VehicleLog:
     bad: dict[str, int]
     bad_bytes: int
     cut_short: bool
-    series: dict[str, Series]
+    series: dict[str, ChannelSeries]
     parameters: dict[str, float]
     jumps: tuple[ClockJump, ...] = ()
     started_s: float | None = None
     system: int | None = None
     others: tuple[int, ...] = ()
-    identity: Identity = field(default_factory=Identity)
+    identity: VehicleIdentity = field(default_factory=VehicleIdentity)
     unread: dict[str, int] = field(default_factory=dict)
 
     @property
@@ -125,7 +125,7 @@ def is_parameter(name: str, value: float) -> bool:
 
 
 @dataclass
-class Vessel:
+class SystemRecords:
     """Samples and parameters of one system while a log is read."""
 
     rows: dict[str, list[tuple[float, ...]]] = field(default_factory=dict)
@@ -148,12 +148,12 @@ class Vessel:
         self.beats[mav_type, autopilot] += 1
 
     @property
-    def identity(self) -> Identity:
+    def identity(self) -> VehicleIdentity:
         """By most heartbeats; without any by the firmware's name, or by parameters that only one firmware has."""
         if self.beats:
             ((mav_type, autopilot), _) = self.beats.most_common(1)[0]
-            return Identity(mav_type=mav_type, autopilot=autopilot, firmware=self.firmware)
-        return Identity(firmware=self.firmware or firmware_of_parameters(self.parameters))
+            return VehicleIdentity(mav_type=mav_type, autopilot=autopilot, firmware=self.firmware)
+        return VehicleIdentity(firmware=self.firmware or firmware_of_parameters(self.parameters))
 
     @property
     def samples(self) -> int:
@@ -161,21 +161,21 @@ class Vessel:
         return sum(map(len, self.rows.values()))
 
 
-class Gather:
+class LogCollector:
     """Collects what a reader finds; `done` makes the record of it."""
 
     def __init__(self) -> None:
-        self.clock = Clock()
+        self.clock = LogClock()
         self.records = 0
         self.bad: Counter[str] = Counter()
         self.bad_bytes = 0
         self.unread: Counter[str] = Counter()
         self.cut_short = False
-        self.vessels: dict[int | None, Vessel] = {}
+        self.vessels: dict[int | None, SystemRecords] = {}
 
-    def vessel(self, system: int | None = None) -> Vessel:
+    def vessel(self, system: int | None = None) -> SystemRecords:
         """Where samples of a system go."""
-        return self.vessels.setdefault(system, Vessel())
+        return self.vessels.setdefault(system, SystemRecords())
 
     def spoiled(self, reason: str, size: int) -> None:
         """Count a bad record of some bytes."""
@@ -187,11 +187,11 @@ class Gather:
         self.clock.close()
         held = {s: (vessel.identity.is_ardusub, vessel.samples) for s, vessel in self.vessels.items() if vessel.samples}
         system = max(held, key=lambda s: held[s], default=None)
-        vessel = self.vessels.get(system, Vessel())
+        vessel = self.vessels.get(system, SystemRecords())
         series = {}
         for channel, rows in vessel.rows.items():
             table = np.array(rows, dtype=np.float64)
-            series[channel] = Series(time_s=table[:, 0].copy(), values=table[:, 1:].copy())
+            series[channel] = ChannelSeries(time_s=table[:, 0].copy(), values=table[:, 1:].copy())
         return VehicleLog(
             path=path,
             kind=kind,

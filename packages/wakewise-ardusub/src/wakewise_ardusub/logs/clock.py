@@ -20,7 +20,7 @@ class ClockJump:
     step_s: float
 
 
-class Clock:
+class LogClock:
     """Turns the stamps of records, in the order of the file, into seconds from the first one that never run back.
 
     A step back, or ahead by more than `AHEAD_S`, is a jump or a pause. The vehicle's time since boot tells which: after

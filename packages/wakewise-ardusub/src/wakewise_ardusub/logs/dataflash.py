@@ -13,7 +13,7 @@ import struct
 from dataclasses import dataclass
 from typing import Any
 
-from wakewise_ardusub.logs.channels import SERVOS, Gather, Vessel
+from wakewise_ardusub.logs.channels import SERVOS, LogCollector, SystemRecords
 from wakewise_ardusub.logs.identity import firmware_of
 
 HEAD = b"\xa3\x95"
@@ -34,7 +34,7 @@ _MIDDLE_US, _HALF_US = 1500.0, 400.0
 
 
 @dataclass(frozen=True)
-class Format:
+class RecordFormat:
     """One kind of record: its name, its length with the head, how it is packed, and its fields."""
 
     name: str
@@ -52,11 +52,11 @@ class Format:
         }
 
 
-def read_dataflash(data: Any) -> Gather:
+def read_dataflash(data: Any) -> LogCollector:
     """Read all records of a log of the autopilot, damaged or not."""
-    gather = Gather()
+    gather = LogCollector()
     vessel = gather.vessel()
-    formats: dict[int, Format] = {}
+    formats: dict[int, RecordFormat] = {}
     at, size = 0, len(data)
     lost = False
     while at + 3 <= size:
@@ -96,14 +96,14 @@ def read_dataflash(data: Any) -> Gather:
     return gather
 
 
-def _format(body: bytes) -> tuple[int, Format]:
+def _format(body: bytes) -> tuple[int, RecordFormat]:
     number, length, name, codes, labels = _FMT.unpack(body)
     text = codes.rstrip(b"\0").decode("ascii")
     parts = [_CODES[code] for code in text]
     packed = struct.Struct("<" + "".join(part for part, _ in parts))
     if packed.size + 3 != length:
         raise ValueError
-    return number, Format(
+    return number, RecordFormat(
         name=name.rstrip(b"\0").decode("ascii"),
         length=length,
         packed=packed,
@@ -112,7 +112,7 @@ def _format(body: bytes) -> tuple[int, Format]:
     )
 
 
-def _take(gather: Gather, vessel: Vessel, form: Format, body: bytes) -> None:
+def _take(gather: LogCollector, vessel: SystemRecords, form: RecordFormat, body: bytes) -> None:
     if form.name not in _WANTED:
         return
     fields = form.read(body)
@@ -127,7 +127,7 @@ def _take(gather: Gather, vessel: Vessel, form: Format, body: bytes) -> None:
         gather.unread[form.name] += 1
 
 
-def _keep(vessel: Vessel, name: str, time_s: float, fields: dict[str, Any]) -> None:
+def _keep(vessel: SystemRecords, name: str, time_s: float, fields: dict[str, Any]) -> None:
     """Keep what a record says; KeyError if it lacks a field that is needed."""
     match name:
         case "ATT":

@@ -9,13 +9,15 @@ import polars as pl
 
 from wakewise.core.files import whole_file, write_json, write_text
 from wakewise_ardusub.logs.channels import VehicleLog
-from wakewise_ardusub.logs.replay_allocation import Hindsight
+from wakewise_ardusub.logs.replay_allocation import ReplayedAllocation
 from wakewise_ardusub.logs.table import LogTable
 
 STEPS, FACTS, PARAMETERS, PAGE = "steps.parquet", "log.json", "parameters.csv", "report.html"
 
 
-def log_facts(log: VehicleLog, table: LogTable, hindsight: Hindsight | None, why_not: str | None) -> dict[str, Any]:
+def log_facts(
+    log: VehicleLog, table: LogTable, hindsight: ReplayedAllocation | None, why_not: str | None
+) -> dict[str, Any]:
     """What a log held and what it would have saved, as figures; `why_not` says why there is no hindsight."""
     rows = table.rows
     lowest = cast("float | None", rows["depth_m"].min())
@@ -66,7 +68,7 @@ def log_facts(log: VehicleLog, table: LogTable, hindsight: Hindsight | None, why
 
 
 def write_folder(
-    folder: Path, log: VehicleLog, table: LogTable, hindsight: Hindsight | None, facts: dict[str, Any]
+    folder: Path, log: VehicleLog, table: LogTable, hindsight: ReplayedAllocation | None, facts: dict[str, Any]
 ) -> None:
     """Write the table, the figures and the parameters."""
     rows = table.rows if hindsight is None else pl.concat([table.rows, hindsight.columns()], how="horizontal")

@@ -23,7 +23,7 @@ _ONLY_ARDUSUB = re.compile(r"MOT_\d+_DIRECTION\Z|JS_GAIN_DEFAULT\Z")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Identity:
+class VehicleIdentity:
     """MAV_TYPE and MAV_AUTOPILOT of the heartbeats, or the firmware's name; None where nothing says it."""
 
     mav_type: int | None = None

@@ -21,7 +21,7 @@ _NO_VOLTAGE = 65535
 _PASCAL_PER_MBAR = 100.0
 
 
-class Stamped(Protocol):
+class ClockModel(Protocol):
     """What makes one clock of stamps."""
 
     def at(self, stamp_s: float, boot_s: float | None = None) -> float:
@@ -29,7 +29,7 @@ class Stamped(Protocol):
         ...
 
 
-class Told(Protocol):
+class SampleSink(Protocol):
     """Where the samples and parameters of one system go."""
 
     def put(self, channel: str, time_s: float, values: Iterable[float]) -> None:
@@ -45,20 +45,22 @@ class Told(Protocol):
         ...
 
 
-class Listener(Protocol):
+class MessageListener(Protocol):
     """Who keeps what messages say: a log's reader, or the meter beside a vehicle."""
 
     @property
-    def clock(self) -> Stamped:
+    def clock(self) -> ClockModel:
         """Its clock."""
         ...
 
-    def vessel(self, system: int) -> Told:
+    def vessel(self, system: int) -> SampleSink:
         """Where a system's go."""
         ...
 
 
-def take(gather: Listener, stamp_s: float, system: int, component: int, name: str, fields: Mapping[str, Any]) -> None:
+def take(
+    gather: MessageListener, stamp_s: float, system: int, component: int, name: str, fields: Mapping[str, Any]
+) -> None:
     """Keep what a message says; those that are not `WANTED` only set the clock.
 
     Raises

@@ -14,7 +14,7 @@ import struct
 from io import BytesIO
 from typing import Any
 
-from wakewise_ardusub.logs.channels import Gather
+from wakewise_ardusub.logs.channels import LogCollector
 from wakewise_ardusub.logs.mavlink import take
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -26,9 +26,9 @@ _BARE_KEY = re.compile(r"([{,]\s*)([A-Za-z_]\w*)\s*:")
 MOST_CHUNK_BYTES = 1 << 28
 
 
-def read_mcap(data: Any) -> Gather:
+def read_mcap(data: Any) -> LogCollector:
     """Read the MAVLink messages of an MCAP file, damaged or not."""
-    gather = Gather()
+    gather = LogCollector()
     _walk(gather, data, len(MAGIC), {}, inside=False)
     return gather
 
@@ -42,7 +42,7 @@ def is_ros_bag(data: Any) -> bool:
     return bytes(data[start + 4 : start + 4 + min(length, 4)]) in (b"ros1", b"ros2")
 
 
-def _walk(gather: Gather, data: Any, at: int, topics: dict[int, tuple[int, int, str]], *, inside: bool) -> None:
+def _walk(gather: LogCollector, data: Any, at: int, topics: dict[int, tuple[int, int, str]], *, inside: bool) -> None:
     """Go through the records of a file, or of an unpacked chunk."""
     size = len(data)
     while at + _HEAD.size <= size:
@@ -91,7 +91,7 @@ def _channel(body: bytes, topics: dict[int, tuple[int, int, str]]) -> None:
         topics[channel.id] = int(named[1]), int(named[2]), named[3]
 
 
-def _message(gather: Gather, body: bytes, topics: dict[int, tuple[int, int, str]]) -> bool:
+def _message(gather: LogCollector, body: bytes, topics: dict[int, tuple[int, int, str]]) -> bool:
     """Keep what a message says; whether it was one of MAVLink."""
     number, _, at_ns, _ = _MESSAGE_HEAD.unpack(body[: _MESSAGE_HEAD.size])
     if number not in topics:

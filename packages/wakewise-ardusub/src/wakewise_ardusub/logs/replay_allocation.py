@@ -17,12 +17,12 @@ from wakewise.core.interfaces import WakeModel
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
 from wakewise_ardusub.motors import directions_of_motors, motor_channels
-from wakewise_ardusub.vehicle_summary import Craft
+from wakewise_ardusub.vehicle_summary import VehicleSummary
 from wakewise_ardusub.wash_savings import (
     SHARES,
     STILL_M_S,
     Shares,
-    Sparing,
+    WashSavingsCalculator,
     bow_ball,
     look,
     saved_pct,
@@ -30,7 +30,7 @@ from wakewise_ardusub.wash_savings import (
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Hindsight:
+class ReplayedAllocation:
     """Flown thrusts against others for n rows of a log and a vehicle's m thrusters; NaN where pulses are not known.
 
     Parameters
@@ -93,7 +93,7 @@ def bow_points(vehicle: Vehicle, ahead_m: float) -> Region:
 
 def hindsight(
     rows: pl.DataFrame, parameters: dict[str, float], vehicle: Vehicle, region: Region, wake: WakeModel
-) -> Hindsight:
+) -> ReplayedAllocation:
     """Hold the flown thrusts of a log's table against least and gentle ones.
 
     Parameters
@@ -112,9 +112,9 @@ def hindsight(
     InputError
         As `motor_channels`.
     """
-    craft = Craft.of(vehicle, wake)
+    craft = VehicleSummary.of(vehicle, wake)
     motors, directions = motor_channels(craft, parameters), directions_of_motors(parameters, craft.count)
-    sparing = Sparing(craft, directions)
+    sparing = WashSavingsCalculator(craft, directions)
     pulses = rows.select(f"servo_{channel}_us" for channel in motors).to_numpy().astype(np.float64)
     voltages = np.array([sparing.supply_V(volts) for volts in rows["voltage_V"]])
     known = np.isfinite(pulses).all(axis=1)
@@ -133,7 +133,7 @@ def hindsight(
     for share in SHARES:
         every[share][known] = thrusts[share][back]
         disturbances[share][known] = found[share][back]
-    return Hindsight(
+    return ReplayedAllocation(
         thrusts_N=every,
         disturbance=disturbances,
         wrench_B=every["flown"] @ vehicle.allocation_matrix.T,

@@ -14,7 +14,7 @@ import polars as pl
 from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.geometry import quat_from_euler
-from wakewise_ardusub.logs.channels import HELD_S, MODES, SERVOS, Series, VehicleLog
+from wakewise_ardusub.logs.channels import HELD_S, MODES, SERVOS, ChannelSeries, VehicleLog
 
 RATE_HZ = 10.0
 MOST_ROWS = 500_000
@@ -58,7 +58,7 @@ def tabulate(log: VehicleLog, rate_hz: float = RATE_HZ) -> LogTable:
     if attitude is not None:
         known = np.isfinite(attitude.values).all(axis=1)
         unwound = np.unwrap(attitude.values[known], axis=0)
-        attitude = Series(time_s=attitude.time_s[known].copy(), values=unwound)
+        attitude = ChannelSeries(time_s=attitude.time_s[known].copy(), values=unwound)
     turned = _straight(attitude, time_s, 3)
     for i, name in enumerate(("roll", "pitch", "heading")):
         angle = turned[:, i]
@@ -73,7 +73,7 @@ def tabulate(log: VehicleLog, rate_hz: float = RATE_HZ) -> LogTable:
     return LogTable(rows=rows.with_columns(pl.col("armed") > 0.5), rate_hz=rate, depth_from=source)
 
 
-def _pose(log: VehicleLog, depth: Series | None, turned: Array, time_s: Array) -> dict[str, Array]:
+def _pose(log: VehicleLog, depth: ChannelSeries | None, turned: Array, time_s: Array) -> dict[str, Array]:
     """Where the vehicle believed to be, as a trial has it; a place that nobody knew is unknown but for its depth."""
     place = _straight(log.series.get("position"), time_s, 3)
     if np.isnan(place).all():
@@ -98,7 +98,7 @@ def _held(log: VehicleLog, channel: str, time_s: Array, width: int) -> Array:
     return result
 
 
-def _straight(series: Series | None, time_s: Array, width: int) -> Array:
+def _straight(series: ChannelSeries | None, time_s: Array, width: int) -> Array:
     """Values on the lines between samples, NaN outside and across long gaps; shape (n, width)."""
     result = np.full((len(time_s), width), np.nan)
     if series is None:
@@ -120,9 +120,9 @@ def _wound(angle: Array) -> Array:
     return np.asarray(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi)
 
 
-def _depth(log: VehicleLog) -> tuple[Series | None, str | None]:
+def _depth(log: VehicleLog) -> tuple[ChannelSeries | None, str | None]:
     """Depth of the first source that ever changes, else of the first there is."""
-    found: list[tuple[str, Series]] = [
+    found: list[tuple[str, ChannelSeries]] = [
         (name.removeprefix("depth "), log.series[name]) for name in _STATED if name in log.series
     ]
     # The second pressure sensor is the one outside the hull.
@@ -138,7 +138,7 @@ def _depth(log: VehicleLog) -> tuple[Series | None, str | None]:
     return (found[0][1], found[0][0]) if found else (None, None)
 
 
-def _of_pressure(log: VehicleLog, number: int) -> Series:
+def _of_pressure(log: VehicleLog, number: int) -> ChannelSeries:
     """Depth by hydrostatics from the pressure at the surface: the autopilot's, or the least of the log."""
     series = log.series[f"pressure {number}"]
     at_surface = log.parameters.get(f"BARO{number}_GND_PRESS", 0.0)
@@ -147,4 +147,4 @@ def _of_pressure(log: VehicleLog, number: int) -> Series:
         at_surface = float(known.min()) if known.size else np.nan
     gravity = log.parameters.get("BARO_SPEC_GRAV", 1.0)
     density = _FRESH_KG_M3 * (gravity if 0.9 <= gravity <= 1.1 else 1.0)
-    return Series(time_s=series.time_s, values=(series.values - at_surface) / (density * GRAVITY_M_S2))
+    return ChannelSeries(time_s=series.time_s, values=(series.values - at_surface) / (density * GRAVITY_M_S2))

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from wakewise_ardusub.logs.channels import Gather
+from wakewise_ardusub.logs.channels import LogCollector
 from wakewise_ardusub.logs.mavlink import WANTED, take
 
 Buffer = Any
@@ -25,7 +25,7 @@ _LIKELY = re.compile(rb"(?=\x00.{7}[\xfd\xfe])", re.DOTALL)
 
 
 @dataclass(frozen=True)
-class Packet:
+class TlogPacket:
     """Where a packet lies and what its head says; `end` is where the next record begins."""
 
     stamp_s: float
@@ -36,7 +36,7 @@ class Packet:
     component: int
 
 
-def packet_at(data: Buffer, at: int) -> Packet | None:
+def packet_at(data: Buffer, at: int) -> TlogPacket | None:
     """The record at an offset by its head alone; None where there is none or the file ends within it."""
     start, size = at + 8, len(data)
     if start + 8 > size or data[at] != 0:
@@ -55,16 +55,16 @@ def packet_at(data: Buffer, at: int) -> Packet | None:
     if end > size:
         return None
     stamp_s = 1e-6 * _STAMP.unpack(data[at:start])[0]
-    return Packet(stamp_s=stamp_s, start=start, end=end, number=number, system=system, component=component)
+    return TlogPacket(stamp_s=stamp_s, start=start, end=end, number=number, system=system, component=component)
 
 
-def read_tlog(data: Buffer) -> Gather:
+def read_tlog(data: Buffer) -> LogCollector:
     """Read all records of a telemetry log, damaged or not."""
     from pymavlink.dialects.v20 import ardupilotmega
 
     known = ardupilotmega.mavlink_map
     decoder = ardupilotmega.MAVLink(None)
-    gather = Gather()
+    gather = LogCollector()
     for packet, size in _records(data, gather, ardupilotmega):
         if packet is None:
             gather.spoiled("no record", size)
@@ -99,7 +99,7 @@ def holds_packets(data: Buffer) -> bool:
     return _next(data, 0, ardupilotmega) is not None
 
 
-def _records(data: Buffer, gather: Gather, dialect: Any) -> Iterator[tuple[Packet | None, int]]:
+def _records(data: Buffer, gather: LogCollector, dialect: Any) -> Iterator[tuple[TlogPacket | None, int]]:
     """Records in their order with their sizes; None is a stretch that is none."""
     at, size = 0, len(data)
     while at < size:
@@ -136,7 +136,7 @@ def _next(data: Buffer, at: int, dialect: Any) -> int | None:
     return None
 
 
-def _is_whole(data: Buffer, packet: Packet, dialect: Any) -> bool:
+def _is_whole(data: Buffer, packet: TlogPacket, dialect: Any) -> bool:
     """Whether a packet's checksum is right; that of an unknown message cannot be told and counts as wrong."""
     message = dialect.mavlink_map.get(packet.number)
     if message is None:

@@ -6,19 +6,26 @@ and `lowered_start.py` where the water ends and how a vehicle comes under it, `d
 knows its depth, `udp.py` the socket. A tank is put behind it in `wakewise_ardusub.sitl_plant`.
 """
 
-from wakewise_ardusub.physics.datagrams import Motion, Request, read_reply, read_request, write_reply, write_request
+from wakewise_ardusub.physics.datagrams import (
+    PhysicsState,
+    ServoFrame,
+    read_reply,
+    read_request,
+    write_reply,
+    write_request,
+)
 from wakewise_ardusub.physics.free_water import FreeWater
-from wakewise_ardusub.physics.physics import Body, Physics, PhysicsFigures
+from wakewise_ardusub.physics.physics import PhysicsFigures, PhysicsServer, SimulatedBody
 from wakewise_ardusub.physics.pulses import PulseTable
 
 __all__ = [
-    "Body",
     "FreeWater",
-    "Motion",
-    "Physics",
     "PhysicsFigures",
+    "PhysicsServer",
+    "PhysicsState",
     "PulseTable",
-    "Request",
+    "ServoFrame",
+    "SimulatedBody",
     "read_reply",
     "read_request",
     "write_reply",

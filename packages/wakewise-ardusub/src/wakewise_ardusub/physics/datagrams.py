@@ -31,7 +31,7 @@ _QUATERNION_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class ServoFrame:
     """One frame of the firmware: the rate in Hz at which it wants to be answered, its count, pulses per channel."""
 
     rate_hz: int
@@ -40,7 +40,7 @@ class Request:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
+class PhysicsState:
     """What physics tells the firmware: truth at one instant.
 
     Parameters
@@ -68,7 +68,7 @@ class Motion:
         freeze(self, omega_B_rad_s=(3,), force_B_m_s2=(3,), p_WB_m=(3,), q_WB=(4,), v_W_m_s=(3,))
 
 
-def write_request(request: Request) -> bytes:
+def write_request(request: ServoFrame) -> bytes:
     """The datagram of a frame; 16 or 32 channels.
 
     Raises
@@ -86,7 +86,7 @@ def write_request(request: Request) -> bytes:
         raise InputError(f"physics link: {request}: {fault}") from None
 
 
-def read_request(datagram: bytes) -> Request:
+def read_request(datagram: bytes) -> ServoFrame:
     """The frame in a datagram.
 
     Raises
@@ -104,10 +104,10 @@ def read_request(datagram: bytes) -> Request:
         raise InputError(f"physics link: {len(datagram)} bytes, {count} channels need {_HEAD.size + 2 * count}")
     if rate_hz == 0:
         raise InputError("physics link: a rate of 0 Hz, must be at least 1")
-    return Request(rate_hz=rate_hz, frame=frame, pulses_us=struct.unpack_from(f"<{count}H", datagram, _HEAD.size))
+    return ServoFrame(rate_hz=rate_hz, frame=frame, pulses_us=struct.unpack_from(f"<{count}H", datagram, _HEAD.size))
 
 
-def write_reply(motion: Motion, *, own_clock: bool = False) -> bytes:
+def write_reply(motion: PhysicsState, *, own_clock: bool = False) -> bytes:
     """The line that answers a frame.
 
     `own_clock` asks the firmware not to hold itself to the clock on the wall, so that it runs as fast as both can.
@@ -124,7 +124,7 @@ def write_reply(motion: Motion, *, own_clock: bool = False) -> bytes:
     return f"\n{json.dumps(said, separators=(',', ':'), allow_nan=False)}\n".encode()
 
 
-def read_reply(datagram: bytes) -> Motion:
+def read_reply(datagram: bytes) -> PhysicsState:
     """The motion in a reply.
 
     Raises
@@ -134,7 +134,7 @@ def read_reply(datagram: bytes) -> Motion:
     """
     try:
         said = json.loads(datagram.decode("ascii"))
-        motion = Motion(
+        motion = PhysicsState(
             time_s=float(said["timestamp"]),
             omega_B_rad_s=_array(said["imu"]["gyro"], 3),
             force_B_m_s2=_array(said["imu"]["accel_body"], 3),

@@ -6,7 +6,7 @@ import math
 import time
 from typing import Protocol
 
-from wakewise_ardusub.link.message_state import Known, Said, heard
+from wakewise_ardusub.link.message_state import LinkState, MavlinkMessage, heard
 from wakewise_ardusub.link.protocol import DEFAULT_SYSTEM
 
 APART_M = 0.3
@@ -15,15 +15,15 @@ FRESH_S = 1.0
 _MOST = 1000
 
 
-class Receiving(Protocol):
+class MessageSource(Protocol):
     """Where messages come from."""
 
-    def receive(self, timeout_s: float) -> tuple[list[Said], int]:
+    def receive(self, timeout_s: float) -> tuple[list[MavlinkMessage], int]:
         """Messages that came, and how many stretches of bytes were none."""
         ...
 
 
-class DepthWatch:
+class DepthMonitor:
     """Compares now and then what the autopilot last said with the truth.
 
     Attributes
@@ -34,8 +34,8 @@ class DepthWatch:
         What the autopilot says less the truth, as last seen, and the largest without its sign; NaN before.
     """
 
-    def __init__(self, receiving: Receiving, system: int = DEFAULT_SYSTEM) -> None:
-        self._receiving, self._known = receiving, Known(system=system)
+    def __init__(self, receiving: MessageSource, system: int = DEFAULT_SYSTEM) -> None:
+        self._receiving, self._known = receiving, LinkState(system=system)
         self.looks = self.apart = 0
         self.off_m = self.most_m = math.nan
 

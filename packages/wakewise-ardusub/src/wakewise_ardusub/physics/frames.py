@@ -14,7 +14,7 @@ Verdict = Literal["begin", "step", "repeat", "late", "other"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Frames:
+class FrameCounter:
     """What has come so far.
 
     Parameters
@@ -40,7 +40,7 @@ class Frames:
     starts: int = 0
     strangers: int = 0
 
-    def take(self, frame: int, sender: tuple[str, int], now_s: float) -> tuple[Frames, Verdict]:
+    def take(self, frame: int, sender: tuple[str, int], now_s: float) -> tuple[FrameCounter, Verdict]:
         """What a frame is, and the count after it.
 
         "begin" asks for the vehicle at its start and one step, "step" for a step, "repeat" for the last answer again;
@@ -62,5 +62,5 @@ class Frames:
             return replace(self, late=self.late + 1, heard_s=now_s), "late"
         return self._begun(frame, sender, now_s), "begin"
 
-    def _begun(self, frame: int, sender: tuple[str, int], now_s: float) -> Frames:
+    def _begun(self, frame: int, sender: tuple[str, int], now_s: float) -> FrameCounter:
         return replace(self, last=frame, sender=sender, heard_s=now_s, stepped=self.stepped + 1, starts=self.starts + 1)

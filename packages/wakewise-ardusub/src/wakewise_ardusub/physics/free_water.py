@@ -13,7 +13,7 @@ from wakewise.core.geometry import Pose, matrix_from_quat, quat_multiply
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.thrusters import saturate, thruster_lag
 from wakewise.robot.vehicles import Vehicle, fossen
-from wakewise_ardusub.physics.datagrams import Motion
+from wakewise_ardusub.physics.datagrams import PhysicsState
 
 _GRAVITY_W_M_S2 = np.array([0.0, 0.0, GRAVITY_M_S2])
 
@@ -42,7 +42,7 @@ class FreeWater:
         """What the thrusters give now, shape (n,)."""
         return self._motors_N.copy()
 
-    def step(self, thrusts_N: Array, dt_s: float) -> Motion:
+    def step(self, thrusts_N: Array, dt_s: float) -> PhysicsState:
         """Hold commanded thrusts, shape (n,), for `dt_s`."""
         vehicle = self._vehicle
         wanted = saturate(thrusts_N, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
@@ -65,7 +65,7 @@ class FreeWater:
             self._p[2], v_W[2] = 0.0, max(float(v_W[2]), 0.0)
             self._nu[:3] = R_WB.T @ v_W
         self._time_s += dt_s
-        return Motion(
+        return PhysicsState(
             time_s=self._time_s,
             omega_B_rad_s=self._nu[3:],
             force_B_m_s2=R_WB.T @ ((v_W - v_before_W) / dt_s - _GRAVITY_W_M_S2),

@@ -14,22 +14,22 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.interfaces import BodyState
-from wakewise_ardusub.physics.datagrams import Motion
-from wakewise_ardusub.physics.physics import Body
+from wakewise_ardusub.physics.datagrams import PhysicsState
+from wakewise_ardusub.physics.physics import SimulatedBody
 
 LOWERED_M_S = 0.3
 """Fastest that it is let down."""
 _GRAVITY_W_M_S2 = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
-class Lowered:
-    """Implements `Body`: at rest at a depth of 0, then down without a jerk, then the body of its own.
+class LoweringBody:
+    """Implements `SimulatedBody`: at rest at a depth of 0, then down without a jerk, then the body of its own.
 
     Thrusts move nothing before that, and the body's own time begins then.
 
     Parameters
     ----------
-    body : Body
+    body : SimulatedBody
         At its start.
     start : BodyState
         Where that is.
@@ -37,7 +37,7 @@ class Lowered:
         How long it is held.
     """
 
-    def __init__(self, body: Body, start: BodyState, held_s: float) -> None:
+    def __init__(self, body: SimulatedBody, start: BodyState, held_s: float) -> None:
         self._body, self._start, self._held_s = body, start, held_s
         self._down_s = 2.0 * max(float(start.X_WB.p_m[2]), 0.0) / LOWERED_M_S
         self._time_s = 0.0
@@ -52,14 +52,14 @@ class Lowered:
             return f"held at the surface for {math.ceil(left_s)} s more"
         return f"let down, {math.ceil(left_s + self._down_s)} s more"
 
-    def step(self, thrusts_N: Array, dt_s: float) -> Motion:
+    def step(self, thrusts_N: Array, dt_s: float) -> PhysicsState:
         """Hold commanded thrusts, shape (n,), for `dt_s`; before it is free they move nothing."""
         self._time_s += dt_s
         if self._time_s > self._held_s + self._down_s:
             return replace(self._body.step(thrusts_N, dt_s), time_s=self._time_s)
         depth_m, down_m_s, down_m_s2 = self._way()
         p, R = self._start.X_WB.p_m, self._start.X_WB.R
-        return Motion(
+        return PhysicsState(
             time_s=self._time_s,
             omega_B_rad_s=np.zeros(3),
             force_B_m_s2=(np.array([0.0, 0.0, down_m_s2]) - _GRAVITY_W_M_S2) @ R,

@@ -15,25 +15,25 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-from wakewise_ardusub.physics.datagrams import LARGEST_B, Motion, read_request, write_reply
-from wakewise_ardusub.physics.frames import Frames
+from wakewise_ardusub.physics.datagrams import LARGEST_B, PhysicsState, read_request, write_reply
+from wakewise_ardusub.physics.frames import FrameCounter
 
 RATES_HZ = (20, 2000)
 """Steps a second that are taken; a firmware that asks for others is refused."""
 _RATE_OVER = 400
 
 
-class Body(Protocol):
+class SimulatedBody(Protocol):
     """A vehicle in its water."""
 
-    def step(self, thrusts_N: Array, dt_s: float) -> Motion:
+    def step(self, thrusts_N: Array, dt_s: float) -> PhysicsState:
         """Hold commanded thrusts, shape (n,), for `dt_s` and tell how it moves then."""
         ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class PhysicsFigures:
-    """How the link went: counts as in `Frames`, datagrams refused, frames a second, and how the vehicle is now.
+    """How the link went: counts as in `FrameCounter`, datagrams refused, frames a second, and how the vehicle is now.
 
     `stage` is what is done with it before it is free, see `Lowered`.
     """
@@ -53,7 +53,7 @@ class PhysicsFigures:
     stage: str = ""
 
 
-class Physics:
+class PhysicsServer:
     """A vehicle behind a firmware.
 
     Parameters
@@ -75,7 +75,7 @@ class Physics:
 
     def __init__(
         self,
-        begin: Callable[[], Body],
+        begin: Callable[[], SimulatedBody],
         thrusts: Callable[[tuple[int, ...]], Array],
         *,
         rate_hz: int | None = None,
@@ -85,14 +85,14 @@ class Physics:
             raise InputError(f"--rate {rate_hz}: {RATES_HZ[0]} to {RATES_HZ[1]} Hz are allowed")
         self._begin, self._thrusts = begin, thrusts
         self._rate_hz, self._own_clock = rate_hz, own_clock
-        self._body: Body | None = None
-        self._frames = Frames()
+        self._body: SimulatedBody | None = None
+        self._frames = FrameCounter()
         self._refused = 0
         self.why_refused = ""
         """Why the last datagram was refused that was."""
         self._times_s: deque[float] = deque(maxlen=_RATE_OVER + 1)
         self._last_reply = b""
-        self.motion: Motion | None = None
+        self.motion: PhysicsState | None = None
         """What was last told."""
         self._pulses: tuple[int, ...] = ()
         self._now_N: Array = np.zeros(0)

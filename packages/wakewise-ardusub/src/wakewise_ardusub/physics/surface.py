@@ -18,7 +18,7 @@ from wakewise.robot.vehicles import Vehicle
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Surface:
+class WaterSurface:
     """The surface at z = 0 for one vehicle of n thrusters.
 
     Parameters
@@ -43,7 +43,7 @@ class Surface:
         freeze(self, half_m=(3,), p_BB_m=(3,), disks_B_m=(len(self.radii_m), 3), radii_m=(len(self.radii_m),))
 
     @classmethod
-    def of(cls, vehicle: Vehicle, density_kg_m3: float = TRIM_WATER_KG_M3) -> Surface:
+    def of(cls, vehicle: Vehicle, density_kg_m3: float = TRIM_WATER_KG_M3) -> WaterSurface:
         """Of a vehicle in water of a density."""
         return cls(
             half_m=0.5 * np.asarray(vehicle.size_m),

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from wakewise.core.errors import InputError
 from wakewise_ardusub.physics.datagrams import LARGEST_B
-from wakewise_ardusub.physics.physics import Physics
+from wakewise_ardusub.physics.physics import PhysicsServer
 
 LOOPBACK = "127.0.0.1"
 _LISTEN_S = 0.2
@@ -37,7 +37,7 @@ def open_socket(host: str, port: int) -> socket.socket:
 
 
 def serve(
-    physics: Physics,
+    physics: PhysicsServer,
     listening: socket.socket,
     going: Callable[[], bool],
     *,

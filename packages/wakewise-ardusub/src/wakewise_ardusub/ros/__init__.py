@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.ros.allocator import Answer, Target, ThrustAllocator, failed_thrusters
-    from wakewise_ardusub.ros.cloud import Field, cloud_points
+    from wakewise_ardusub.ros.allocator import NodeAllocation, ProtectedPoints, ThrustAllocator, failed_thrusters
+    from wakewise_ardusub.ros.cloud import PointField, cloud_points
     from wakewise_ardusub.ros.mapping import body_points, pose_of, read_frame, world_points, wrench_for, wrench_of
 
 __all__ = [
-    "Answer",
-    "Field",
-    "Target",
+    "NodeAllocation",
+    "PointField",
+    "ProtectedPoints",
     "ThrustAllocator",
     "body_points",
     "cloud_points",

@@ -20,14 +20,14 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import WakeModel
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake import WakeView
+from wakewise.wake import InfluenceModel
 
 MOST_POINTS = 400
 """Points of a target that are reckoned with; of more, every n-th is taken with n times its weight."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Target:
+class ProtectedPoints:
     """Points to spare, shape (n, 3), and their weights, shape (n,): in NED, or in FRD of the body they are fixed to."""
 
     points_m: Array
@@ -48,11 +48,11 @@ class Target:
         return not np.sum(self.weights) > 0.0
 
 
-NO_TARGET = Target(points_m=np.zeros((0, 3)), weights=np.zeros(0))
+NO_TARGET = ProtectedPoints(points_m=np.zeros((0, 3)), weights=np.zeros(0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Answer:
+class NodeAllocation:
     """Thrusts (n,) for a wrench, what they make (6,) in FRD, and what they do.
 
     `disturbance` and `least_disturbance` are D of these and of the least thrusts in (m/s)^2, None where there is no
@@ -121,8 +121,12 @@ class ThrustAllocator:
         return compile_layout(self.vehicle.allocation_matrix, lower, upper)
 
     def __call__(
-        self, wrench_B: Array, target: Target = NO_TARGET, X_WB: Pose | None = None, previous_N: Array | None = None
-    ) -> Answer:
+        self,
+        wrench_B: Array,
+        target: ProtectedPoints = NO_TARGET,
+        X_WB: Pose | None = None,
+        previous_N: Array | None = None,
+    ) -> NodeAllocation:
         """Thrusts for a wrench, shape (6,), in FRD."""
         gram, total_weight, way = self._gram(target, X_WB)
         least = least_thrusts(self.layout, wrench_B, gram, self.priority)
@@ -130,7 +134,7 @@ class ThrustAllocator:
         if gram is not None:
             weights = replace(self.weights, disturbance=self.weights.disturbance / total_weight)
             chosen = gentle_allocation(self.layout, wrench_B, gram, weights, previous_N, self.priority, self.budget)
-        return Answer(
+        return NodeAllocation(
             thrusts_N=chosen.thrusts_N,
             wrench_B=chosen.wrench_B,
             requested_B=wrench_B,
@@ -140,7 +144,7 @@ class ThrustAllocator:
             way=way,
         )
 
-    def _gram(self, target: Target, X_WB: Pose | None) -> tuple[Array | None, float, str]:
+    def _gram(self, target: ProtectedPoints, X_WB: Pose | None) -> tuple[Array | None, float, str]:
         if target.is_empty:
             return None, 1.0, "least thrusts: no target"
         if X_WB is None and not target.on_body:
@@ -153,7 +157,7 @@ class ThrustAllocator:
         if not np.sum(weights) > 0.0:
             return None, 1.0, "least thrusts: all points of the target lie within the vehicle"
         region = Region(points_W_m=points, weights=weights, distance_m=np.zeros(len(points)))
-        view = WakeView.of(self.vehicle, region, self.wake)
+        view = InfluenceModel.of(self.vehicle, region, self.wake)
         return view.gram(placed), view.total_weight, "gentle"
 
 

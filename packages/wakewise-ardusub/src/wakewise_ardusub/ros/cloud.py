@@ -23,7 +23,7 @@ _LARGEST = 4096
 
 
 @dataclass(frozen=True, kw_only=True)
-class Field:
+class PointField:
     """A number of each point, as sensor_msgs/PointField has it."""
 
     name: str
@@ -32,7 +32,7 @@ class Field:
 
 
 def cloud_points(
-    fields: Sequence[Field], point_step: int, row_step: int, width: int, height: int, big_endian: bool, data: bytes
+    fields: Sequence[PointField], point_step: int, row_step: int, width: int, height: int, big_endian: bool, data: bytes
 ) -> tuple[Array, Array]:
     """Places, shape (n, 3), in the cloud's own frame, and weights, shape (n,).
 
@@ -64,7 +64,7 @@ def cloud_points(
     return places[seen], weights[seen]
 
 
-def _column(points: NDArray[np.uint8], field: Field, order: str) -> Array:
+def _column(points: NDArray[np.uint8], field: PointField, order: str) -> Array:
     if field.datatype not in NUMBERS:
         raise InputError(f"cloud: field {field.name} is of type {field.datatype}, known are {min(NUMBERS)} to 8")
     kind = np.dtype(order + NUMBERS[field.datatype])

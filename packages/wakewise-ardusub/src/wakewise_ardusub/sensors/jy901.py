@@ -39,7 +39,7 @@ _PAIRED_S = 0.1
 
 
 @dataclass(frozen=True)
-class Frame:
+class SerialFrame:
     """Kind and the four numbers of a frame."""
 
     kind: int
@@ -54,7 +54,7 @@ class FrameReader:
         self.frames = 0
         self.bad_bytes = 0
 
-    def feed(self, data: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> list[SerialFrame]:
         """Frames that are complete now; a frame that was cut short waits for the rest."""
         held, found = self._held, []
         held += data
@@ -62,7 +62,7 @@ class FrameReader:
         while len(held) - at >= LENGTH:
             # A sum that happens to fit is one in 256; the kind makes it one in 6,000 bytes of noise.
             if held[at] == HEAD and held[at + 1] in KINDS and sum(held[at : at + 10]) & 0xFF == held[at + 10]:
-                found.append(Frame(held[at + 1], struct.unpack_from("<4h", held, at + 2)))
+                found.append(SerialFrame(held[at + 1], struct.unpack_from("<4h", held, at + 2)))
                 at += LENGTH
                 continue
             nearest = held.find(HEAD, at + 1)

@@ -46,7 +46,7 @@ class I2C(Protocol):
 
 
 @dataclass(frozen=True)
-class Reading:
+class PressureReading:
     """Pressure and temperature of one instant."""
 
     pressure_Pa: float
@@ -64,12 +64,12 @@ def crc4(words: Sequence[int]) -> int:
     return (remainder >> 12) & 0xF
 
 
-def compensated(model: Model, words: Sequence[int], d1: int, d2: int, second_order: bool = True) -> Reading:
+def compensated(model: Model, words: Sequence[int], d1: int, d2: int, second_order: bool = True) -> PressureReading:
     """Pressure and temperature of the raw values D1 and D2, by the calibration words W0 to W6."""
     temp, off, sens, dt = _first_order(model, words, d2)
     off_less, sens_less, temp_less = _second_order(model, temp, dt) if second_order else (0, 0, 0)
     pressure = _pressure(model, d1, off - off_less, sens - sens_less)
-    return Reading(pressure, (temp - temp_less) / 100.0)
+    return PressureReading(pressure, (temp - temp_less) / 100.0)
 
 
 def _first_order(model: Model, words: Sequence[int], d2: int) -> tuple[int, int, int, int]:
@@ -165,7 +165,7 @@ class DepthSensor:
         if product is not None and product != self.model:
             raise InputError(f"MS5837 at 0x{address:02x}: says that it is a {product}, was told to be a {self.model}")
 
-    def read(self) -> Reading:
+    def read(self) -> PressureReading:
         """Convert and read once, waiting; takes two conversions, 36 ms at the finest.
 
         Raises
@@ -178,10 +178,10 @@ class DepthSensor:
             try:
                 self._sleep(next(steps))
             except StopIteration as done:
-                reading: Reading = done.value
+                reading: PressureReading = done.value
                 return reading
 
-    def reading(self) -> Generator[float, None, Reading]:
+    def reading(self) -> Generator[float, None, PressureReading]:
         """The same for who has other things to do meanwhile: yields how long to wait, s, before it goes on."""
         raw = []
         for command in (CONVERT_PRESSURE, CONVERT_TEMPERATURE):
@@ -199,7 +199,7 @@ class DepthSensor:
             )
         return reading
 
-    def measured(self, reading: Reading, time_s: float) -> Measurement:
+    def measured(self, reading: PressureReading, time_s: float) -> Measurement:
         """A reading as depth, stamped `time_s`."""
         return Measurement(time_s=time_s, depth_m=depth_m(reading.pressure_Pa, self.surface_Pa, self.density))
 

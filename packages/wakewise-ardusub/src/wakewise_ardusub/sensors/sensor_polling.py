@@ -16,7 +16,7 @@ from wakewise.core.interfaces import Measurement
 from wakewise_ardusub.sensors.devices import SerialPort, UdpSocket
 from wakewise_ardusub.sensors.jy901 import InertialUnit
 from wakewise_ardusub.sensors.line_poses import LinePoses
-from wakewise_ardusub.sensors.ms5837 import DepthSensor, Reading
+from wakewise_ardusub.sensors.ms5837 import DepthSensor, PressureReading
 from wakewise_ardusub.sensors.samples import PoseSample
 
 DEPTH_PERIOD_S = 0.1
@@ -25,11 +25,11 @@ _RATE_OVER_S = 3.0
 _POLL_S = 0.01
 
 
-class Source(Protocol):
+class PolledSensor(Protocol):
     """A sensor that is read."""
 
     @property
-    def tally(self) -> Tally:
+    def tally(self) -> RateCounter:
         """How many samples came, and what went wrong."""
         ...
 
@@ -42,7 +42,7 @@ class Source(Protocol):
         ...
 
 
-class Tally:
+class RateCounter:
     """Counts samples of one source and says at what rate they come."""
 
     def __init__(self, name: str, device: str) -> None:
@@ -72,9 +72,9 @@ class DepthSource:
     """
 
     def __init__(self, sensor: DepthSensor, device: str) -> None:
-        self.tally = Tally("depth", device)
+        self.tally = RateCounter("depth", device)
         self._sensor = sensor
-        self._steps: Generator[float, None, Reading] | None = None
+        self._steps: Generator[float, None, PressureReading] | None = None
         self._began_s = self._due_s = self._next_s = -math.inf
         self._last: dict[str, Any] = {}
 
@@ -91,7 +91,7 @@ class DepthSource:
             self._next_s = now_s + next(self._steps)
             return []
         except StopIteration as done:
-            reading: Reading = done.value
+            reading: PressureReading = done.value
         except EnvironmentFailure as fault:
             self.tally.bad += 1
             self.tally.complaint = str(fault)
@@ -121,7 +121,7 @@ class InertialSource:
     """An inertial unit on a serial line."""
 
     def __init__(self, unit: InertialUnit, port: SerialPort, device: str) -> None:
-        self.tally = Tally("imu", device)
+        self.tally = RateCounter("imu", device)
         self._unit, self._port = unit, port
         self._last: dict[str, Any] = {}
 
@@ -151,7 +151,7 @@ class PoseSource:
     """Poses by lines of text on a socket."""
 
     def __init__(self, poses: LinePoses, port: UdpSocket, device: str) -> None:
-        self.tally = Tally("poses", device)
+        self.tally = RateCounter("poses", device)
         self._poses, self._port = poses, port
         self._last: dict[str, Any] = {}
 
@@ -176,7 +176,7 @@ class PoseSource:
         return self._last
 
 
-def facts(source: Source, now_s: float) -> dict[str, Any]:
+def facts(source: PolledSensor, now_s: float) -> dict[str, Any]:
     """A source in figures."""
     tally = source.tally
     return {
@@ -191,7 +191,7 @@ def facts(source: Source, now_s: float) -> dict[str, Any]:
 
 
 def watch(
-    sources: Sequence[Source],
+    sources: Sequence[PolledSensor],
     seconds: float,
     every_s: float,
     passed: Callable[[Measurement | PoseSample], None] | None = None,

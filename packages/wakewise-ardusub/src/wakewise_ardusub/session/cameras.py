@@ -25,8 +25,8 @@ from typing import Protocol
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise_ardusub.link.message_state import DIGICAM_CONTROL, IMAGE_START_CAPTURE
-from wakewise_ardusub.link.output_gate import Warden
-from wakewise_ardusub.link.session_log import Journal
+from wakewise_ardusub.link.output_gate import OutputGate
+from wakewise_ardusub.link.session_log import SessionLog
 
 PHOTOGRAPHS = "photographs"
 CAMERAS_FILE = "cameras.csv"
@@ -37,7 +37,7 @@ _ALL_COMPONENTS = 0
 RIGHT = "mavlink, digicam, or run:PROGRAM with {file} where the photograph goes"
 
 
-class Camera(Protocol):
+class CameraDriver(Protocol):
     """Takes photographs."""
 
     def take(self, number: int) -> None:
@@ -49,7 +49,7 @@ class Camera(Protocol):
         ...
 
 
-MakeCamera = Callable[[Warden, Path, Journal], Camera]
+MakeCamera = Callable[[OutputGate, Path, SessionLog], CameraDriver]
 """Makes the camera of a session: its warden, its folder and its journal."""
 
 
@@ -86,7 +86,7 @@ def parse_camera(words: str) -> MakeCamera:
 class MavlinkCamera:
     """A camera of the vehicle that takes MAVLink's commands; what it answers is the warden's to hear."""
 
-    warden: Warden
+    warden: OutputGate
     digicam: bool = False
 
     def take(self, number: int) -> None:
@@ -111,11 +111,11 @@ class ProgramCamera:
         Its words; {file} becomes the photograph's path and {number} its number.
     folder : Path
         Where photographs go; made with the first.
-    journal : Journal
+    journal : SessionLog
         Is told how each went.
     """
 
-    def __init__(self, program: list[str], folder: Path, journal: Journal) -> None:
+    def __init__(self, program: list[str], folder: Path, journal: SessionLog) -> None:
         self._program, self._folder, self._journal = program, folder, journal
         self._beside = ThreadPoolExecutor(1, thread_name_prefix="camera")
 

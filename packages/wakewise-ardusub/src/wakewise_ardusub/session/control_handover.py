@@ -12,11 +12,11 @@ from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Command, Controller, Estimator, Goal, Measurement
 from wakewise.operation.teleop.assisted import AssistedPilot
 from wakewise.operation.teleop.input.controls import CENTRED, Controls
-from wakewise_ardusub.link.output_gate import Warden
+from wakewise_ardusub.link.output_gate import OutputGate
 
 
 @dataclass(kw_only=True, eq=False)
-class Turn:
+class FlightOwnership:
     """In which engagement the present step is flown, None in none, and when in the flight that began."""
 
     entry: int | None = None
@@ -24,10 +24,10 @@ class Turn:
 
 
 @dataclass(kw_only=True, eq=False)
-class PilotsSticks:
+class GroundStationInput:
     """A `ControlSource`: the sticks that the pilot moves at the ground station, and the buttons that mean something."""
 
-    warden: Warden
+    warden: OutputGate
     stale_s: float = 0.3
 
     def read(self, time_s: float) -> Controls | None:  # noqa: ARG002  (as they are now)
@@ -39,12 +39,12 @@ class PilotsSticks:
 
 
 @dataclass(kw_only=True, eq=False)
-class BesidePilot:
+class EngagedPilot:
     """A `Pilot`: the assisted one while engaged, on its own clock; else the vehicle is wished to be where it is."""
 
     inner: AssistedPilot
-    warden: Warden
-    turn: Turn
+    warden: OutputGate
+    turn: FlightOwnership
     photographed: Callable[[], None]
     _notes_told: int = 0
 
@@ -78,7 +78,7 @@ class BesidePilot:
 
 
 @dataclass(frozen=True, eq=False)
-class Engaged:
+class EngagedControllerState:
     """State of a controller that rests while it is not engaged."""
 
     entry: int | None
@@ -86,11 +86,11 @@ class Engaged:
 
 
 @dataclass(kw_only=True, eq=False)
-class WhileEngaged:
+class EngagedController:
     """A `Controller` that begins afresh at each engagement and asks for nothing between them."""
 
     inner: Controller[Any]
-    turn: Turn
+    turn: FlightOwnership
     thrusters: int
 
     @property
@@ -98,26 +98,28 @@ class WhileEngaged:
         """Name of the method."""
         return self.inner.name
 
-    def init(self) -> Engaged:
+    def init(self) -> EngagedControllerState:
         """At rest."""
-        return Engaged(None, None)
+        return EngagedControllerState(None, None)
 
-    def step(self, state: Engaged, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[Engaged, Command]:
+    def step(
+        self, state: EngagedControllerState, dt_s: float, estimate: BodyState, goal: Goal
+    ) -> tuple[EngagedControllerState, Command]:
         """The method's thrusts while engaged, else none."""
         entry = self.turn.entry
         if entry is None:
-            return Engaged(None, None), Command(thrusts_N=np.zeros(self.thrusters), wrench_B=np.zeros(6))
+            return EngagedControllerState(None, None), Command(thrusts_N=np.zeros(self.thrusters), wrench_B=np.zeros(6))
         inner = state.inner if entry == state.entry else self.inner.init()
         inner, command = self.inner.step(inner, dt_s, estimate, goal)
-        return Engaged(entry, inner), command
+        return EngagedControllerState(entry, inner), command
 
 
 @dataclass(kw_only=True, eq=False)
-class TheServos:
+class ServoEstimator:
     """An `Estimator` that is told what the servos do while the pilot flies."""
 
     inner: Estimator[Any]
-    turn: Turn
+    turn: FlightOwnership
     flown_N: Callable[[], Array]
 
     def init(self, start: BodyState) -> Any:

@@ -13,14 +13,14 @@ from wakewise.allocation import disturbance_of, least_thrusts
 from wakewise.control import vehicle_layout
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import Witness
+from wakewise.core.interfaces import TruthProvider
 from wakewise.operation.loop import Step
 from wakewise.operation.parts import Parts
 from wakewise.scene.missions import Coverage, patches_of
-from wakewise.wake import WakeView
-from wakewise_ardusub.link.output_gate import Warden
+from wakewise.wake import InfluenceModel
+from wakewise_ardusub.link.output_gate import OutputGate
 from wakewise_ardusub.link.protocol import COVERAGE_NAME, DISTURBANCE_NAME, SAVED_NAME
-from wakewise_ardusub.session.control_handover import Turn
+from wakewise_ardusub.session.control_handover import FlightOwnership
 
 FIGURES_S = 0.5
 STILL_M_S = 1e-4
@@ -28,22 +28,22 @@ STILL_M_S = 1e-4
 
 
 @dataclass(kw_only=True, eq=False)
-class Figures:
+class WashFigures:
     """D of the thrusts that act and what they save against the least ones, for ground stations; twice a second.
 
     `speeds_m_s` is the root mean square speed at the target's points of both, for people; None before any.
     """
 
     parts: Parts
-    warden: Warden
-    turn: Turn
+    warden: OutputGate
+    turn: FlightOwnership
     flown_N: Callable[[], Array]
     speeds_m_s: tuple[float, float] | None = None
     _due_s: float = -math.inf
     _covered_pct: float | None = None
     _coverage: Coverage | None = None
 
-    def __call__(self, step: Step, witness: Witness | None = None) -> None:  # noqa: ARG002  (as flights call it)
+    def __call__(self, step: Step, witness: TruthProvider | None = None) -> None:  # noqa: ARG002  (as flights call it)
         """Reckon them anew, if it is time."""
         if step.time_s < self._due_s:
             return
@@ -80,6 +80,6 @@ class Figures:
         self.warden.figures = {}
 
     def __post_init__(self) -> None:
-        self._view = WakeView.of(self.parts.vehicle, self.parts.region, self.parts.wake)
+        self._view = InfluenceModel.of(self.parts.vehicle, self.parts.region, self.parts.wake)
         self._layout = vehicle_layout(self.parts.vehicle)
         self._beside = ThreadPoolExecutor(1, thread_name_prefix="coverage")

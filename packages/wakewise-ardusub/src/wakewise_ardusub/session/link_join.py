@@ -14,13 +14,19 @@ from wakewise.core.interfaces import BodyState
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.teleop.assisted import AssistedPilot, assisted
-from wakewise.operation.teleop.operator_state import Desk, DeskState
+from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
 from wakewise.planning import Surroundings, check_start, state_of
 from wakewise.scene.targets import Region, Target
-from wakewise_ardusub.link.ardusub_plant import FlightClock, Sea, SeaPlant
-from wakewise_ardusub.link.output_gate import Warden
-from wakewise_ardusub.session.control_handover import BesidePilot, PilotsSticks, TheServos, Turn, WhileEngaged
-from wakewise_ardusub.session.figures import Figures
+from wakewise_ardusub.link.ardusub_plant import ArduSubPlant, ArduSubWorld, FlightClock
+from wakewise_ardusub.link.output_gate import OutputGate
+from wakewise_ardusub.session.control_handover import (
+    EngagedController,
+    EngagedPilot,
+    FlightOwnership,
+    GroundStationInput,
+    ServoEstimator,
+)
+from wakewise_ardusub.session.figures import WashFigures
 
 RATE_HZ = 10.0
 """Control steps a second; the autopilot's own loop goes on beneath."""
@@ -36,19 +42,19 @@ SEA = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class AtSea:
+class VehicleFlight:
     """What flies at sea: the parts, what reckons the figures, the desk, and the parts without their warden."""
 
     parts: Parts
     bare: Parts
-    figures: Figures
-    desk: Desk
-    turn: Turn = field(default_factory=Turn)
+    figures: WashFigures
+    desk: OperatorState
+    turn: FlightOwnership = field(default_factory=FlightOwnership)
 
 
 def at_sea(
     scenario: Scenario,
-    warden: Warden,
+    warden: OutputGate,
     *,
     start: BodyState,
     target: Target,
@@ -57,14 +63,14 @@ def at_sea(
     wait: Callable[[float], object],
     flown_N: Callable[[], Array],
     photographed: Callable[[], None],
-) -> AtSea:
+) -> VehicleFlight:
     """Join a scenario's parts to the vehicle of a warden.
 
     Parameters
     ----------
     scenario : Scenario
         Vehicle, method and settings; its tank and world are not flown in.
-    warden : Warden
+    warden : OutputGate
     start : BodyState
         Where the vehicle is now.
     target : Target
@@ -74,7 +80,7 @@ def at_sea(
     clock : callable
         Gives the flight's clock once the flight begins.
     wait : callable
-        See `SeaPlant`.
+        See `ArduSubPlant`.
     flown_N : callable
         What the thrusters give by the servos' pulses, shape (n,).
     photographed : callable
@@ -85,7 +91,7 @@ def at_sea(
     InputError
         If the vehicle stands where no plan can be good, such as with the target inside its hull.
     """
-    turn, known = Turn(), warden.known
+    turn, known = FlightOwnership(), warden.known
     place_z = float(start.X_WB.p_m[2])
     surface = np.array([[0.0, 0.0, 1.0, place_z - known.depth_m]]) if math.isfinite(known.depth_m) else np.zeros((0, 4))
     around = Surroundings(
@@ -94,28 +100,28 @@ def at_sea(
         names=(*("the water surface",) * len(surface), "the target"),
     )
 
-    def plant() -> SeaPlant:
-        return SeaPlant(warden=warden, clock=clock(), wait=wait, entry=lambda: turn.entry)
+    def plant() -> ArduSubPlant:
+        return ArduSubPlant(warden=warden, clock=clock(), wait=wait, entry=lambda: turn.entry)
 
     parts = Parts(scenario).replace(
-        target=target, region=region, surroundings=around, start=start, world=Sea(plant=plant)
+        target=target, region=region, surroundings=around, start=start, world=ArduSubWorld(plant=plant)
     )
     check_start(parts.vehicle, region, state_of(start), around, what="here")
     if warden.target_W_m is None:
         warden.target_W_m = target.centre_W_m
-    desk = Desk(DeskState(mode="operator"))
-    flown = assisted(parts, PilotsSticks(warden=warden), desk, DeskState(mode="operator"))
+    desk = OperatorState(OperatorSettings(mode="operator"))
+    flown = assisted(parts, GroundStationInput(warden=warden), desk, OperatorSettings(mode="operator"))
     inner = flown.pilot
     if not isinstance(inner, AssistedPilot):
         raise InputError("pilot: only hands fly at sea")
-    beside = BesidePilot(inner=inner, warden=warden, turn=turn, photographed=photographed)
-    rests = WhileEngaged(inner=flown.controller, turn=turn, thrusters=len(parts.vehicle.thrusters))
-    told = TheServos(inner=flown.estimator, turn=turn, flown_N=flown_N)
+    beside = EngagedPilot(inner=inner, warden=warden, turn=turn, photographed=photographed)
+    rests = EngagedController(inner=flown.controller, turn=turn, thrusters=len(parts.vehicle.thrusters))
+    told = ServoEstimator(inner=flown.estimator, turn=turn, flown_N=flown_N)
     whole = flown.replace(pilot=beside, controller=rests, estimator=told)
-    return AtSea(
+    return VehicleFlight(
         parts=whole,
         bare=parts,
-        figures=Figures(parts=parts, warden=warden, turn=turn, flown_N=flown_N),
+        figures=WashFigures(parts=parts, warden=warden, turn=turn, flown_N=flown_N),
         desk=desk,
         turn=turn,
     )

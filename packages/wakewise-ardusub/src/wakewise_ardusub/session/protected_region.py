@@ -48,7 +48,7 @@ def ball_points(middle_W_m: Array, radius_m: float) -> Region:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class WhatToSpare:
+class ProtectedRegion:
     """Where the target is: a place in the autopilot's frame, or so far ahead of the bow as the session begins.
 
     Parameters

@@ -25,14 +25,14 @@ from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.teleop.live import LiveFlight
 from wakewise.robot.importers import any_vehicle
-from wakewise_ardusub.link.link_thread import LinkThread, Receiving
+from wakewise_ardusub.link.link_thread import LinkThread, MessageReceiver
 from wakewise_ardusub.link.message_state import attitude_of
-from wakewise_ardusub.link.motor_interface import VehicleDrive
-from wakewise_ardusub.link.output_gate import Send, Warden
-from wakewise_ardusub.link.session_log import JOURNAL_FILE, Journal
+from wakewise_ardusub.link.motor_interface import VehicleMotors
+from wakewise_ardusub.link.output_gate import OutputGate, Send
+from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
 from wakewise_ardusub.session.cameras import MakeCamera, note_view
-from wakewise_ardusub.session.link_join import AtSea, at_sea
-from wakewise_ardusub.session.protected_region import WhatToSpare, ball
+from wakewise_ardusub.session.link_join import VehicleFlight, at_sea
+from wakewise_ardusub.session.protected_region import ProtectedRegion, ball
 from wakewise_ardusub.session.warm_up import rehearse
 
 LOOK_S = 0.05
@@ -41,17 +41,17 @@ LEFT_S = 2.0
 
 
 @dataclass(kw_only=True, eq=False)
-class SeaSession:
+class VehicleSession:
     """One session with one vehicle.
 
     Parameters
     ----------
     scenario : Scenario
-    receiving : Receiving
+    receiving : MessageReceiver
     send : callable
     folder : Path
         Becomes a trial folder with a journal.
-    spare : WhatToSpare
+    spare : ProtectedRegion
     session : int
         Number of this program's heartbeats.
     wardens : mapping
@@ -61,10 +61,10 @@ class SeaSession:
     """
 
     scenario: Scenario
-    receiving: Receiving
+    receiving: MessageReceiver
     send: Send
     folder: Path
-    spare: WhatToSpare
+    spare: ProtectedRegion
     session: int
     wardens: dict[str, Any] = field(default_factory=dict)
     camera: MakeCamera | None = None
@@ -72,15 +72,15 @@ class SeaSession:
     preparing: str = "not begun"
     live: LiveFlight | None = None
     photographs: int = 0
-    sea: AtSea | None = None
+    sea: VehicleFlight | None = None
 
     def __post_init__(self) -> None:
         if (self.folder / "steps.parquet").exists():
             raise InputError(f"--out {self.folder}: holds a flight already, give another folder")
         self.vehicle = any_vehicle(self.scenario.vehicle)
-        self.drive = VehicleDrive(self.vehicle)
-        self.journal = Journal(self.folder / JOURNAL_FILE)
-        self.warden = Warden(
+        self.drive = VehicleMotors(self.vehicle)
+        self.journal = SessionLog(self.folder / JOURNAL_FILE)
+        self.warden = OutputGate(
             send=self.send, drive=self.drive, journal=self.journal, session=self.session, **self.wardens
         )
         self._camera = None if self.camera is None else self.camera(self.warden, self.folder, self.journal)
@@ -172,7 +172,7 @@ class SeaSession:
     def _warming(self, done: float, total: float, note: str = "") -> None:
         self.preparing = f"compiles, {done:g} of {total:g} done: {note}" if total else note
 
-    def _prepared(self) -> AtSea | None:
+    def _prepared(self) -> VehicleFlight | None:
         """Wait for the vehicle, and join the parts to it; None where the session ended before."""
         warden = self.warden
         warm(FLIGHT_JOBS, self._warming)

@@ -14,9 +14,9 @@ from wakewise.core.interfaces import Goal, Measurement
 from wakewise.operation.loop import Step
 from wakewise.operation.teleop.assisted import assisted
 from wakewise.operation.teleop.input.controls import Controls
-from wakewise.operation.teleop.operator_state import Desk, DeskState
-from wakewise_ardusub.session.control_handover import WhileEngaged
-from wakewise_ardusub.session.link_join import AtSea
+from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
+from wakewise_ardusub.session.control_handover import EngagedController
+from wakewise_ardusub.session.link_join import VehicleFlight
 
 
 class _Patience:
@@ -35,7 +35,7 @@ class _Waving:
         return Controls(axes=np.array([0.0, 0.1, 0.1, 0.1, 0.0]))
 
 
-def rehearse(sea: AtSea, steps: int = 12) -> float:
+def rehearse(sea: VehicleFlight, steps: int = 12) -> float:
     """Let the whole chain decide a few times for nobody, so that its kernels are there when thrusts count.
 
     Returns
@@ -45,9 +45,9 @@ def rehearse(sea: AtSea, steps: int = 12) -> float:
     """
     parts, start = sea.parts, sea.parts.start
     dt_s, layout = 1.0 / parts.control.rate_hz, vehicle_layout(parts.vehicle)
-    chain = assisted(sea.bare.replace(world=_Patience()), _Waving(), Desk(), DeskState(mode="operator"))
+    chain = assisted(sea.bare.replace(world=_Patience()), _Waving(), OperatorState(), OperatorSettings(mode="operator"))
     resting = sea.parts.controller
-    assert isinstance(resting, WhileEngaged)  # see `join.at_sea`
+    assert isinstance(resting, EngagedController)  # see `join.at_sea`
     flying, filtering, method = chain.flying, chain.estimator, resting.inner
     state, own, known, estimate, took_s = flying.init(), method.init(), filtering.init(start), start, 0.0
     for k in range(steps):

@@ -18,14 +18,21 @@ from wakewise.core.errors import WakewiseError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import Vehicle
-from wakewise_ardusub.link.engagement_fsm import Limits
-from wakewise_ardusub.link.mavlink_codec import Post
+from wakewise_ardusub.link.engagement_fsm import EngagementLimits
+from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
 from wakewise_ardusub.link.message_state import attitude_of
-from wakewise_ardusub.link.motor_interface import VehicleDrive
-from wakewise_ardusub.link.output_gate import TICK_S, Warden
+from wakewise_ardusub.link.motor_interface import VehicleMotors
+from wakewise_ardusub.link.output_gate import TICK_S, OutputGate
 from wakewise_ardusub.link.protocol import ALT_HOLD, COMPANION_COMPONENT, ENABLE_PARAMETER
-from wakewise_ardusub.link.session_log import Journal
-from wakewise_ardusub.sitl.inprocess_session import STATION_COMPONENT, Outcome, Rehearsal, Speaker, noise, outcome
+from wakewise_ardusub.link.session_log import SessionLog
+from wakewise_ardusub.sitl.inprocess_session import (
+    STATION_COMPONENT,
+    FaultOutcome,
+    InProcessSession,
+    MavlinkSender,
+    noise,
+    outcome,
+)
 
 DECIDES_S = 0.1
 SESSION = 1
@@ -33,32 +40,32 @@ SECOND_STATION = 254
 _OFFSET_S = 1000.0
 
 
-class Aboard:
-    """A warden on a rehearsal's links; implements `wakewise_ardusub.link.mavlink_codec.Carrier`.
+class CompanionHarness:
+    """A warden on a rehearsal's links; implements `wakewise_ardusub.link.mavlink_codec.Transport`.
 
     Parameters
     ----------
-    flight : Rehearsal
+    flight : InProcessSession
     limits : Limits, optional
     journal : Journal, optional
     buttons : mapping, optional
-        As of `Warden`.
+        As of `OutputGate`.
     thrusts_N : ndarray, shape (n,), optional
         What the plain controller asks for; 5 N of each thruster if not given.
     """
 
     def __init__(
         self,
-        flight: Rehearsal,
+        flight: InProcessSession,
         *,
-        limits: Limits | None = None,
-        journal: Journal | None = None,
+        limits: EngagementLimits | None = None,
+        journal: SessionLog | None = None,
         buttons: Mapping[str, int] | None = None,
         thrusts_N: Array | None = None,
     ) -> None:
         self.flight = flight
         self.thrusts_N = np.full(len(flight.vehicle.thrusters), 5.0) if thrusts_N is None else thrusts_N
-        self.drive = VehicleDrive(flight.vehicle)
+        self.drive = VehicleMotors(flight.vehicle)
         self.withheld: set[str] = set()
         """Names of messages that do not reach it."""
         self.deaf = self.mute = self.stuck = False
@@ -67,8 +74,8 @@ class Aboard:
         """Whether the plain controller decides."""
         self._waiting: deque[bytes] = deque(maxlen=4096)
         self._ticked_s = self._decided_s = -1.0
-        self._post = Post(self, flight.stand_in.system)
-        self.warden = Warden(
+        self._post = MavlinkCodec(self, flight.stand_in.system)
+        self.warden = OutputGate(
             send=self._post.send,
             drive=self.drive,
             limits=limits,
@@ -116,7 +123,7 @@ class Aboard:
             self._decided_s = now_s
             self._decide()
 
-    def engaged(self) -> Aboard:
+    def engaged(self) -> CompanionHarness:
         """Armed, switched on and consented to, with all that this takes; acting for a second.
 
         Raises
@@ -158,93 +165,93 @@ class Aboard:
             warden.command(self.thrusts_N, entry)
 
 
-def _no_sticks(aboard: Aboard) -> None:
+def _no_sticks(aboard: CompanionHarness) -> None:
     aboard.flight.sticks = None
 
 
-def _no_station(aboard: Aboard) -> None:
+def _no_station(aboard: CompanionHarness) -> None:
     aboard.flight.sticks, aboard.flight.beats = None, False
 
 
-def _withheld(*names: str) -> Callable[[Aboard], None]:
-    def fault(aboard: Aboard) -> None:
+def _withheld(*names: str) -> Callable[[CompanionHarness], None]:
+    def fault(aboard: CompanionHarness) -> None:
         aboard.withheld |= set(names)
 
     return fault
 
 
-def _cut(aboard: Aboard) -> None:
+def _cut(aboard: CompanionHarness) -> None:
     aboard.deaf = aboard.mute = True
 
 
-def _deaf(aboard: Aboard) -> None:
+def _deaf(aboard: CompanionHarness) -> None:
     aboard.deaf = True
 
 
-def _mute(aboard: Aboard) -> None:
+def _mute(aboard: CompanionHarness) -> None:
     aboard.mute = True
 
 
-def _stuck(aboard: Aboard) -> None:
+def _stuck(aboard: CompanionHarness) -> None:
     aboard.stuck = True
 
 
-def _controller_stuck(aboard: Aboard) -> None:
+def _controller_stuck(aboard: CompanionHarness) -> None:
     aboard.decides = False
 
 
-def _disarm(aboard: Aboard) -> None:
+def _disarm(aboard: CompanionHarness) -> None:
     aboard.flight.arm(False)
 
 
-def _mode(aboard: Aboard) -> None:
+def _mode(aboard: CompanionHarness) -> None:
     aboard.flight.set_mode(ALT_HOLD)
 
 
-def _switch_off(aboard: Aboard) -> None:
+def _switch_off(aboard: CompanionHarness) -> None:
     aboard.flight.set(ENABLE_PARAMETER, 0.0)
 
 
-def _second_station(aboard: Aboard) -> None:
-    other = Speaker(aboard.flight.carry, SECOND_STATION, STATION_COMPONENT, "second station")
+def _second_station(aboard: CompanionHarness) -> None:
+    other = MavlinkSender(aboard.flight.carry, SECOND_STATION, STATION_COMPONENT, "second station")
     other.say(mavlink.MAVLink_manual_control_message(aboard.flight.stand_in.system, 900, 0, 500, 0, 0))
 
 
-def _channel(aboard: Aboard) -> None:
+def _channel(aboard: CompanionHarness) -> None:
     aboard.flight.set("SERVO2_FUNCTION", 0.0)
 
 
-def _direction(aboard: Aboard) -> None:
+def _direction(aboard: CompanionHarness) -> None:
     aboard.flight.set("MOT_3_DIRECTION", -aboard.warden.known.parameters["MOT_3_DIRECTION"])
 
 
-def _second_companion(aboard: Aboard) -> None:
+def _second_companion(aboard: CompanionHarness) -> None:
     """One that sends for less than a second: after that the script takes a sender that is left alone for its own."""
-    rival = Speaker(aboard.flight.carry, aboard.flight.stand_in.system, COMPANION_COMPONENT, "rival")
+    rival = MavlinkSender(aboard.flight.carry, aboard.flight.stand_in.system, COMPANION_COMPONENT, "rival")
     until_s = aboard.flight.now_s + 0.9
 
-    def speak(flight: Rehearsal) -> None:
+    def speak(flight: InProcessSession) -> None:
         if flight.now_s < until_s:
             flight.send_thrusts((0.3,) * 8, who=rival, ahead_s=60.0)
 
     aboard.flight.each = speak
 
 
-def _noise(aboard: Aboard) -> None:
+def _noise(aboard: CompanionHarness) -> None:
     pieces = iter(noise(20_000, 5))
     aboard.flight.each = lambda flight: flight.carry(next(pieces, b""), "noise")
     aboard.flight.sticks = None
 
 
-def _operator(aboard: Aboard) -> None:
+def _operator(aboard: CompanionHarness) -> None:
     aboard.warden.press()
 
 
-def _end(aboard: Aboard) -> None:
+def _end(aboard: CompanionHarness) -> None:
     aboard.warden.end("Ctrl-C")
 
 
-FAULTS_ABOARD: dict[str, Callable[[Aboard], None]] = {
+FAULTS_ABOARD: dict[str, Callable[[CompanionHarness], None]] = {
     "the operator takes the sticks": _operator,
     "the session ends": _end,
     "the sticks stop": _no_sticks,
@@ -271,9 +278,9 @@ FAULTS_ABOARD: dict[str, Callable[[Aboard], None]] = {
 """What may happen around a companion that drives, and after which the outputs must be the autopilot's again."""
 
 
-def suffer_aboard(vehicle: Vehicle, fault: Callable[[Aboard], None], seconds: float = 1.5) -> Outcome:
+def suffer_aboard(vehicle: Vehicle, fault: Callable[[CompanionHarness], None], seconds: float = 1.5) -> FaultOutcome:
     """Drive as the companion does, let something go wrong, and look at the outputs."""
-    aboard = Aboard(Rehearsal(vehicle)).engaged()
+    aboard = CompanionHarness(InProcessSession(vehicle)).engaged()
     began_s = aboard.flight.now_s
     fault(aboard)
     return outcome(aboard.flight.run(seconds), began_s)

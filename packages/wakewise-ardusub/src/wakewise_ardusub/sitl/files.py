@@ -26,7 +26,7 @@ _FAIL, _INVALID_SIZE, _INVALID_SESSION, _NO_SESSIONS, _EOF, _UNKNOWN, _EXISTS, _
 
 
 @dataclass
-class Files:
+class MavftpServer:
     """Files by name and the one session that is open."""
 
     content: dict[str, bytearray] = field(default_factory=dict)

@@ -29,8 +29,8 @@ from wakewise_ardusub.link.script import script_text
 from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
 from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.simulated_autopilot import StandIn
-from wakewise_ardusub.sitl.udp_endpoints import Embedded
+from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics
 
 STATION, STATION_COMPONENT = 255, 190
 THRUSTS = (0.2, -0.2, 0.15, -0.15, 0.1, 0.1, -0.1, -0.1)
@@ -42,7 +42,7 @@ def shipped_script() -> dict[str, str]:
     return {"wakewise.lua": script_text()}
 
 
-class Speaker:
+class MavlinkSender:
     """Somebody on a link, who packs messages under ids of their own."""
 
     def __init__(self, hear: Callable[[bytes, str], None], system: int, component: int, link: str) -> None:
@@ -56,7 +56,7 @@ class Speaker:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Moment:
+class LoopRecord:
     """One loop: its time, whether armed, whether a script drove an output, and the pulses."""
 
     time_s: float
@@ -71,7 +71,7 @@ class Moment:
 
 
 @dataclass
-class Rehearsal:
+class InProcessSession:
     """Stand-in, body, pilot and companion; what they do is in the fields, which a fault changes.
 
     Parameters
@@ -94,23 +94,23 @@ class Rehearsal:
     buttons: int = 0
     streams: bool = False
     thrusts: tuple[float, ...] = THRUSTS
-    moments: list[Moment] = field(default_factory=list)
+    moments: list[LoopRecord] = field(default_factory=list)
     said: list[Any] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         values = own_parameters(len(self.vehicle.thrusters)) | dict(self.values)
         scripts = shipped_script() if self.scripts is None else self.scripts
-        self.stand_in = StandIn(values, loop_hz=self.loop_hz, scripts=scripts)
-        self._behind = Embedded(body=FreeWater(self.vehicle), table=PulseTable.of(self.vehicle, values))
-        self.station = Speaker(self.carry, STATION, STATION_COMPONENT, "station")
-        self.companion = Speaker(self.carry, self.stand_in.system, COMPANION_COMPONENT, "companion")
+        self.stand_in = SimulatedAutopilot(values, loop_hz=self.loop_hz, scripts=scripts)
+        self._behind = InProcessPhysics(body=FreeWater(self.vehicle), table=PulseTable.of(self.vehicle, values))
+        self.station = MavlinkSender(self.carry, STATION, STATION_COMPONENT, "station")
+        self.companion = MavlinkSender(self.carry, self.stand_in.system, COMPANION_COMPONENT, "companion")
         self.listeners: dict[str, Callable[[bytes], None]] = {}
         """Others on the vehicle's links, by name: each hears what the autopilot and all others say."""
         self.turns: list[Callable[[], None]] = []
         """Called after each loop."""
         self._ears = mavlink.MAVLink(None)
         self._due = {"beat": 0.0, "sticks": 0.0, "stream": 0.0}
-        self.each: Callable[[Rehearsal], None] | None = None
+        self.each: Callable[[InProcessSession], None] | None = None
         """Called before every loop, if given."""
 
     @property
@@ -125,7 +125,7 @@ class Rehearsal:
             if name != link:
                 hear(data)
 
-    def run(self, seconds: float) -> Rehearsal:
+    def run(self, seconds: float) -> InProcessSession:
         """Let time pass."""
         end_s = self.now_s + seconds
         while self.now_s < end_s - 0.5 / self.loop_hz:
@@ -136,7 +136,7 @@ class Rehearsal:
             if motion is not None:
                 pulses = self.stand_in.step(motion)
                 self.moments.append(
-                    Moment(
+                    LoopRecord(
                         time_s=self.now_s,
                         armed=self.stand_in.armed,
                         overridden=self.stand_in.overridden,
@@ -151,7 +151,7 @@ class Rehearsal:
                 turn()
         return self
 
-    def engaged(self) -> Rehearsal:
+    def engaged(self) -> InProcessSession:
         """Armed, enabled and acting for a second."""
         self.run(0.2)
         self.arm(True)
@@ -179,7 +179,9 @@ class Rehearsal:
         """Ask for a mode."""
         self.station.say(mavlink.MAVLink_set_mode_message(self.stand_in.system, 1, mode))
 
-    def send_thrusts(self, values: tuple[float, ...], *, who: Speaker | None = None, ahead_s: float = 0.0) -> None:
+    def send_thrusts(
+        self, values: tuple[float, ...], *, who: MavlinkSender | None = None, ahead_s: float = 0.0
+    ) -> None:
         """One message of thrusts, its clock ahead of this one by so much."""
         stamp_us = max(0, round(1e6 * (self.now_s + ahead_s)))
         (who or self.companion).say(
@@ -219,35 +221,35 @@ class Rehearsal:
         return True
 
 
-def _stop_stream(flight: Rehearsal) -> None:
+def _stop_stream(flight: InProcessSession) -> None:
     flight.streams = False
 
 
-def _disarm(flight: Rehearsal) -> None:
+def _disarm(flight: InProcessSession) -> None:
     flight.arm(False)
 
 
-def _switch_off(flight: Rehearsal) -> None:
+def _switch_off(flight: InProcessSession) -> None:
     flight.set(ENABLE_PARAMETER, 0.0)
 
 
-def _change_mode(flight: Rehearsal) -> None:
+def _change_mode(flight: InProcessSession) -> None:
     flight.set_mode(ALT_HOLD)
 
 
-def _second_sender(flight: Rehearsal) -> None:
+def _second_sender(flight: InProcessSession) -> None:
     flight.each = lambda now: now.send_thrusts((0.3,) * 8, ahead_s=60.0)
 
 
-def _not_a_number(flight: Rehearsal) -> None:
+def _not_a_number(flight: InProcessSession) -> None:
     flight.thrusts = (float("nan"),) * 8
 
 
-def _script_restart(flight: Rehearsal) -> None:
+def _script_restart(flight: InProcessSession) -> None:
     flight.station.say(mavlink.MAVLink_command_long_message(flight.stand_in.system, 1, 42701, 0, 3.0, 0, 0, 0, 0, 0, 0))
 
 
-FAULTS: dict[str, Callable[[Rehearsal], None]] = {
+FAULTS: dict[str, Callable[[InProcessSession], None]] = {
     "the stream stops": _stop_stream,
     "disarmed while streaming": _disarm,
     "switched off while streaming": _switch_off,
@@ -260,7 +262,7 @@ FAULTS: dict[str, Callable[[Rehearsal], None]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class FaultOutcome:
     """What the outputs did after a fault.
 
     Parameters
@@ -278,7 +280,7 @@ class Outcome:
     disarmed_thrusts: int
 
 
-def outcome(flight: Rehearsal, began_s: float) -> Outcome:
+def outcome(flight: InProcessSession, began_s: float) -> FaultOutcome:
     """Of a flight in which something went wrong at a time."""
     last_s = flight.last_override_s()
     ended_s, after_ms, thrusts, was_armed = 0.0, 0.0, 0, False
@@ -289,16 +291,16 @@ def outcome(flight: Rehearsal, began_s: float) -> Outcome:
         if moment.thrusting and not moment.armed:
             after_ms = max(after_ms, 1e3 * (moment.time_s - ended_s) + 1e3 / flight.loop_hz)
             thrusts += moment.time_s > ended_s + 2e-3 * LOOP_MS
-    return Outcome(
+    return FaultOutcome(
         neutral_ms=0.0 if last_s is None else max(0.0, 1e3 * (last_s - began_s)),
         after_disarm_ms=after_ms,
         disarmed_thrusts=thrusts,
     )
 
 
-def suffer(vehicle: Vehicle, fault: Callable[[Rehearsal], None], seconds: float = 1.5) -> Outcome:
+def suffer(vehicle: Vehicle, fault: Callable[[InProcessSession], None], seconds: float = 1.5) -> FaultOutcome:
     """Drive by a mere stream of thrusts, let something go wrong, and look at the outputs."""
-    flight = Rehearsal(vehicle).engaged()
+    flight = InProcessSession(vehicle).engaged()
     began_s = flight.now_s
     fault(flight)
     return outcome(flight.run(seconds), began_s)

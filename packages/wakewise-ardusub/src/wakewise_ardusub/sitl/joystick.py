@@ -20,16 +20,16 @@ from wakewise_ardusub.link.buttons import (
 from wakewise_ardusub.sitl.parameters import ParameterTable
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+    from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 
 
-class Joystick:
+class ButtonHandler:
     """Remembers which buttons are down: one acts as it goes down."""
 
     def __init__(self) -> None:
         self._before = 0
 
-    def take(self, board: StandIn, buttons: int) -> None:
+    def take(self, board: SimulatedAutopilot, buttons: int) -> None:
         """Buttons as bits, as the last sticks have them."""
         pressed, self._before = buttons & ~self._before, buttons
         if not pressed:
@@ -51,7 +51,7 @@ def _function(parameters: ParameterTable, button: int, *, shifted: bool = False)
     return round(parameters.value(parameters_of(button)[shifted], otherwise=NONE))
 
 
-def _act(board: StandIn, function: int) -> None:
+def _act(board: SimulatedAutopilot, function: int) -> None:
     if function == ARM or (function == ARM_TOGGLE and not board.armed):
         board.arm()
     elif function in (DISARM, ARM_TOGGLE):

@@ -12,7 +12,7 @@ from wakewise_ardusub.sitl.mavlink_out import BUILDERS, parameter
 from wakewise_ardusub.sitl.sticks import demands_of
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+    from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 
 FORCED = 21196.0
 """Second number of the command to arm that arms or disarms whatever speaks against it."""
@@ -33,7 +33,7 @@ ACCEPTED, DENIED, UNSUPPORTED, FAILED = (
 )
 
 
-def hear(board: StandIn, message: Any) -> None:
+def hear(board: SimulatedAutopilot, message: Any) -> None:
     """Do what a message asks for, if it is for this vehicle's autopilot."""
     own, component = board.system, board.component
     if message.get_srcSystem() == own and message.get_srcComponent() == component:
@@ -65,12 +65,12 @@ def raw_record(message: Any) -> str:
     return record.decode("latin-1")
 
 
-def _heartbeat(board: StandIn, message: Any) -> None:
+def _heartbeat(board: SimulatedAutopilot, message: Any) -> None:
     if message.get_srcSystem() == board.ground_station and message.type == mavlink.MAV_TYPE_GCS:
         board.heard_station()
 
 
-def _manual_control(board: StandIn, message: Any) -> None:
+def _manual_control(board: SimulatedAutopilot, message: Any) -> None:
     if message.get_srcSystem() != board.ground_station or message.target != board.system:
         return
     gain = board.parameters.value("JS_GAIN_DEFAULT", otherwise=0.5)
@@ -90,21 +90,21 @@ def _manual_control(board: StandIn, message: Any) -> None:
     board.joystick.take(board, message.buttons)
 
 
-def _set_mode(board: StandIn, message: Any) -> None:
+def _set_mode(board: SimulatedAutopilot, message: Any) -> None:
     board.set_mode(message.custom_mode)
 
 
-def _param_list(board: StandIn, _message: Any) -> None:
+def _param_list(board: SimulatedAutopilot, _message: Any) -> None:
     board.list_parameters()
 
 
-def _param_read(board: StandIn, message: Any) -> None:
+def _param_read(board: SimulatedAutopilot, message: Any) -> None:
     name = board.parameters.at(message.param_index) if message.param_index != _NO_INDEX else _name(message.param_id)
     if name is not None and board.parameters.get(name) is not None:
         board.send(parameter(board, name))
 
 
-def _param_set(board: StandIn, message: Any) -> None:
+def _param_set(board: SimulatedAutopilot, message: Any) -> None:
     name = _name(message.param_id)
     if board.parameters.get(name) is not None:
         # A value that is refused is answered with the one that stays.
@@ -117,14 +117,14 @@ def _name(given: Any) -> str:
     return text.partition("\0")[0]
 
 
-def _data_stream(board: StandIn, message: Any) -> None:
+def _data_stream(board: SimulatedAutopilot, message: Any) -> None:
     every_us = 1e6 / message.req_message_rate if message.start_stop and message.req_message_rate else -1.0
     for identity in BUILDERS:
         if identity not in (mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION):
             board.timetable.ask(identity, every_us)
 
 
-def _files(board: StandIn, message: Any) -> None:
+def _files(board: SimulatedAutopilot, message: Any) -> None:
     answer = board.files.answer(bytes(message.payload))
     board.send(
         mavlink.MAVLink_file_transfer_protocol_message(
@@ -133,7 +133,7 @@ def _files(board: StandIn, message: Any) -> None:
     )
 
 
-def _command(board: StandIn, message: Any) -> None:
+def _command(board: SimulatedAutopilot, message: Any) -> None:
     numbers = [float(getattr(message, f"param{i}")) for i in range(1, 5)]
     # COMMAND_INT has whole numbers for the fifth and sixth.
     numbers += [float(getattr(message, name, getattr(message, other, 0.0))) for name, other in _LAST]
@@ -146,26 +146,26 @@ def _command(board: StandIn, message: Any) -> None:
     )
 
 
-def _arm(board: StandIn, numbers: list[float]) -> int:
+def _arm(board: SimulatedAutopilot, numbers: list[float]) -> int:
     if numbers[0] not in (0.0, 1.0):
         return int(UNSUPPORTED)
     fine = board.arm() if numbers[0] == 1.0 else board.disarm("command")
     return int(ACCEPTED if fine or numbers[1] == FORCED else FAILED)
 
 
-def _mode(board: StandIn, numbers: list[float]) -> int:
+def _mode(board: SimulatedAutopilot, numbers: list[float]) -> int:
     if not math.isfinite(numbers[1]):
         return int(DENIED)
     return int(ACCEPTED if board.set_mode(round(numbers[1])) else FAILED)
 
 
-def _interval(board: StandIn, numbers: list[float]) -> int:
+def _interval(board: SimulatedAutopilot, numbers: list[float]) -> int:
     if not math.isfinite(numbers[0]):
         return int(DENIED)
     return int(ACCEPTED if board.timetable.ask(round(numbers[0]), numbers[1]) else FAILED)
 
 
-def _request(board: StandIn, numbers: list[float]) -> int:
+def _request(board: SimulatedAutopilot, numbers: list[float]) -> int:
     build = BUILDERS.get(round(numbers[0])) if math.isfinite(numbers[0]) else None
     if build is None:
         return int(FAILED)
@@ -173,30 +173,30 @@ def _request(board: StandIn, numbers: list[float]) -> int:
     return int(ACCEPTED)
 
 
-def _motor_test(board: StandIn, numbers: list[float]) -> int:
+def _motor_test(board: SimulatedAutopilot, numbers: list[float]) -> int:
     turned = board.motor_test.ask(numbers, board.now_s, board.armed, board.say)
     return int(ACCEPTED if turned else FAILED)
 
 
-def _capabilities(board: StandIn, _numbers: list[float]) -> int:
+def _capabilities(board: SimulatedAutopilot, _numbers: list[float]) -> int:
     return _request(board, [float(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)])
 
 
-def _reboot(board: StandIn, numbers: list[float]) -> int:
+def _reboot(board: SimulatedAutopilot, numbers: list[float]) -> int:
     if board.armed or numbers[0] != _REBOOT:
         return int(DENIED)
     board.reboot()
     return int(ACCEPTED)
 
 
-def _scripting(board: StandIn, numbers: list[float]) -> int:
+def _scripting(board: SimulatedAutopilot, numbers: list[float]) -> int:
     if numbers[0] != _SCRIPTING_RESTART:
         return int(UNSUPPORTED)
     board.start_scripts()
     return int(ACCEPTED)
 
 
-_COMMANDS: dict[int, Callable[[StandIn, list[float]], int]] = {
+_COMMANDS: dict[int, Callable[[SimulatedAutopilot, list[float]], int]] = {
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
     mavlink.MAV_CMD_DO_SET_MODE: _mode,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _interval,
@@ -207,7 +207,7 @@ _COMMANDS: dict[int, Callable[[StandIn, list[float]], int]] = {
     _SCRIPTING: _scripting,
 }
 
-_DOES: dict[str, Callable[[StandIn, Any], None]] = {
+_DOES: dict[str, Callable[[SimulatedAutopilot, Any], None]] = {
     "HEARTBEAT": _heartbeat,
     "MANUAL_CONTROL": _manual_control,
     "SET_MODE": _set_mode,

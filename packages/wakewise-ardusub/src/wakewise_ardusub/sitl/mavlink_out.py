@@ -1,7 +1,7 @@
 """What the stand-in tells, and how often: the messages that ground stations, companions and logs live on.
 
 Each is built from the truth that physics told last: there is no noise, no estimator and no magnetometer here. Only the
-depth is the sensor's, which may have been calibrated under water (`StandIn.depth_m`).
+depth is the sensor's, which may have been calibrated under water (`SimulatedAutopilot.depth_m`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.geometry import euler_from_quat
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+    from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 
 SURFACE_HPA = 1013.25
 _EARTH_M = 6_378_137.0
@@ -44,7 +44,7 @@ RATES_HZ: dict[int, float] = {
 FASTEST_HZ = 200.0
 
 
-def heartbeat(board: StandIn) -> Any:
+def heartbeat(board: SimulatedAutopilot) -> Any:
     """Who it is, mode, armed or not."""
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
     base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED if board.armed else 0
@@ -54,7 +54,7 @@ def heartbeat(board: StandIn) -> Any:
     )
 
 
-def autopilot_version(board: StandIn) -> Any:
+def autopilot_version(board: SimulatedAutopilot) -> Any:
     """Release and what the protocol end can do."""
     can = (
         mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
@@ -66,7 +66,7 @@ def autopilot_version(board: StandIn) -> Any:
     return mavlink.MAVLink_autopilot_version_message(can, release, 0, 0, 0, b"standin\0", bytes(8), bytes(8), 0, 0, 0)
 
 
-def parameter(board: StandIn, name: str) -> Any:
+def parameter(board: SimulatedAutopilot, name: str) -> Any:
     """One parameter and its place in the list."""
     table = board.parameters
     return mavlink.MAVLink_param_value_message(
@@ -78,22 +78,22 @@ def parameter(board: StandIn, name: str) -> Any:
     )
 
 
-def _attitude(board: StandIn) -> Any:
+def _attitude(board: SimulatedAutopilot) -> Any:
     roll, pitch, yaw = euler_from_quat(board.motion.q_WB)
     return mavlink.MAVLink_attitude_message(board.boot_ms, roll, pitch, yaw, *board.motion.omega_B_rad_s)
 
 
-def _attitude_quaternion(board: StandIn) -> Any:
+def _attitude_quaternion(board: SimulatedAutopilot) -> Any:
     motion = board.motion
     return mavlink.MAVLink_attitude_quaternion_message(board.boot_ms, *motion.q_WB, *motion.omega_B_rad_s)
 
 
-def _local_position(board: StandIn) -> Any:
+def _local_position(board: SimulatedAutopilot) -> Any:
     north, east, _ = board.motion.p_WB_m
     return mavlink.MAVLink_local_position_ned_message(board.boot_ms, north, east, board.depth_m, *board.motion.v_W_m_s)
 
 
-def _global_position(board: StandIn) -> Any:
+def _global_position(board: SimulatedAutopilot) -> Any:
     north, east, _ = board.motion.p_WB_m
     latitude, longitude = board.home_deg
     turn = math.degrees(1.0 / _EARTH_M)
@@ -109,29 +109,29 @@ def _global_position(board: StandIn) -> Any:
     )
 
 
-def _vfr_hud(board: StandIn) -> Any:
+def _vfr_hud(board: SimulatedAutopilot) -> Any:
     velocity = board.motion.v_W_m_s
     heading = math.degrees(euler_from_quat(board.motion.q_WB)[2]) % 360.0
     speed = float(np.hypot(velocity[0], velocity[1]))
     return mavlink.MAVLink_vfr_hud_message(speed, speed, round(heading) % 360, 0, -board.depth_m, -float(velocity[2]))
 
 
-def _pressure_in_hull(board: StandIn) -> Any:
+def _pressure_in_hull(board: SimulatedAutopilot) -> Any:
     return mavlink.MAVLink_scaled_pressure_message(board.boot_ms, SURFACE_HPA, 0.0, 2500)
 
 
-def _pressure_of_water(board: StandIn) -> Any:
+def _pressure_of_water(board: SimulatedAutopilot) -> Any:
     water_hPa = 1e-2 * TRIM_WATER_KG_M3 * GRAVITY_M_S2 * float(board.motion.p_WB_m[2])
     return mavlink.MAVLink_scaled_pressure2_message(board.boot_ms, SURFACE_HPA + water_hPa, 0.0, 1500)
 
 
-def _servo_output(board: StandIn) -> Any:
+def _servo_output(board: SimulatedAutopilot) -> Any:
     pulses = board.pulses_us
     micros = round(1e6 * board.now_s) & 0xFFFFFFFF
     return mavlink.MAVLink_servo_output_raw_message(micros, 0, *pulses[:8], *pulses[8:16])
 
 
-def _raw_imu(board: StandIn) -> Any:
+def _raw_imu(board: SimulatedAutopilot) -> Any:
     """Specific force in thousandths of g and rates in mrad/s, whole ones, as ArduPilot fills it."""
     force = [round(1e3 * v / GRAVITY_M_S2) for v in board.motion.force_B_m_s2]
     rates = [round(1e3 * v) for v in board.motion.omega_B_rad_s]
@@ -139,22 +139,22 @@ def _raw_imu(board: StandIn) -> Any:
     return mavlink.MAVLink_raw_imu_message(round(1e6 * board.now_s), *within, 0, 0, 0)
 
 
-def _sys_status(board: StandIn) -> Any:
+def _sys_status(board: SimulatedAutopilot) -> Any:
     millivolt = round(1e3 * board.parameters.value("SIM_BATT_VOLTAGE", otherwise=_VOLTAGE_V))
     return mavlink.MAVLink_sys_status_message(0, 0, 0, 0, millivolt, -1, -1, 0, 0, 0, 0, 0, 0)
 
 
-def _battery(board: StandIn) -> Any:
+def _battery(board: SimulatedAutopilot) -> Any:
     millivolt = round(1e3 * board.parameters.value("SIM_BATT_VOLTAGE", otherwise=_VOLTAGE_V))
     cells = [millivolt] + [_NO_CELL] * 9
     return mavlink.MAVLink_battery_status_message(0, 0, 0, 32767, cells, -1, -1, -1, -1)
 
 
-def _system_time(board: StandIn) -> Any:
+def _system_time(board: SimulatedAutopilot) -> Any:
     return mavlink.MAVLink_system_time_message(0, board.boot_ms)
 
 
-BUILDERS: dict[int, Callable[[StandIn], Any]] = {
+BUILDERS: dict[int, Callable[[SimulatedAutopilot], Any]] = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
     mavlink.MAVLINK_MSG_ID_RAW_IMU: _raw_imu,
@@ -173,7 +173,7 @@ BUILDERS: dict[int, Callable[[StandIn], Any]] = {
 """What can be told, by message id."""
 
 
-class Timetable:
+class MessageSchedule:
     """When each message is due."""
 
     def __init__(self) -> None:

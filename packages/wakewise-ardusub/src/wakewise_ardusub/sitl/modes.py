@@ -18,9 +18,9 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import euler_from_quat
 from wakewise_ardusub.link.protocol import ALT_HOLD, MANUAL, STABILIZE
-from wakewise_ardusub.physics.datagrams import Motion
+from wakewise_ardusub.physics.datagrams import PhysicsState
 from wakewise_ardusub.sitl.parameters import ParameterTable
-from wakewise_ardusub.sitl.sticks import Demands
+from wakewise_ardusub.sitl.sticks import PilotDemands
 
 MODES = {MANUAL: "MANUAL", STABILIZE: "STABILIZE", ALT_HOLD: "ALT_HOLD"}
 """Modes that the stand-in flies."""
@@ -32,7 +32,7 @@ _PER_MILLE, _CM = 1e-3, 1e2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Loops:
+class ModeControllers:
     """Memory of the loops; `heading_rad` and `depth_m` are held, None until there is something to hold.
 
     `throttle` is what was last asked of the attitude's loops; MANUAL goes past them and leaves it as it was.
@@ -45,17 +45,22 @@ class Loops:
     climb_sum: float = 0.0
     throttle: float = 0.0
 
-    def entered(self, mode: int) -> Loops:
+    def entered(self, mode: int) -> ModeControllers:
         """Afresh in a mode; ALT_HOLD goes on with the throttle of before."""
-        return Loops(throttle=self.throttle, climb_sum=-self.throttle if mode == ALT_HOLD else 0.0)
+        return ModeControllers(throttle=self.throttle, climb_sum=-self.throttle if mode == ALT_HOLD else 0.0)
 
 
 def fly(
-    mode: int, loops: Loops, demands: Demands, motion: Motion, parameters: ParameterTable, dt_s: float
-) -> tuple[Loops, Demands]:
+    mode: int,
+    loops: ModeControllers,
+    demands: PilotDemands,
+    motion: PhysicsState,
+    parameters: ParameterTable,
+    dt_s: float,
+) -> tuple[ModeControllers, PilotDemands]:
     """Demands on the mixer in a mode, and the loops after it."""
     if mode == MANUAL:
-        return Loops(throttle=loops.throttle), demands
+        return ModeControllers(throttle=loops.throttle), demands
     loops, turns = _attitude(loops, demands, motion, parameters, dt_s)
     after = replace(demands, roll=turns[0], pitch=turns[1], yaw=turns[2])
     if mode == ALT_HOLD:
@@ -65,8 +70,8 @@ def fly(
 
 
 def _attitude(
-    loops: Loops, demands: Demands, motion: Motion, parameters: ParameterTable, dt_s: float
-) -> tuple[Loops, list[float]]:
+    loops: ModeControllers, demands: PilotDemands, motion: PhysicsState, parameters: ParameterTable, dt_s: float
+) -> tuple[ModeControllers, list[float]]:
     angles = euler_from_quat(motion.q_WB)
     largest = math.radians(parameters.value("ANGLE_MAX", otherwise=4500.0) * 1e-2)
     steered = abs(demands.yaw) > CENTRED
@@ -86,8 +91,8 @@ def _attitude(
 
 
 def _depth(
-    loops: Loops, throttle: float, motion: Motion, parameters: ParameterTable, dt_s: float
-) -> tuple[Loops, float]:
+    loops: ModeControllers, throttle: float, motion: PhysicsState, parameters: ParameterTable, dt_s: float
+) -> tuple[ModeControllers, float]:
     depth, down = float(motion.p_WB_m[2]), float(motion.v_W_m_s[2])
     dead = 1e-3 * parameters.value("THR_DZ", otherwise=100.0)
     steered = abs(throttle) > dead

@@ -14,7 +14,7 @@ from wakewise.robot.vehicles.mixing import ARDUSUB_VECTORED, ARDUSUB_VECTORED_6D
 from wakewise_ardusub.link.protocol import FULL_US, MIDDLE_US
 from wakewise_ardusub.sitl.own_parameters import FRAME_VECTORED
 from wakewise_ardusub.sitl.parameters import ParameterTable
-from wakewise_ardusub.sitl.sticks import Demands
+from wakewise_ardusub.sitl.sticks import PilotDemands
 
 
 def factors_of(parameters: ParameterTable) -> Array:
@@ -29,7 +29,7 @@ def directions_of(parameters: ParameterTable, motors: int) -> Array:
     return np.where(np.array(said) < 0.0, -1.0, 1.0)
 
 
-def motor_pulses_us(demands: Demands, factors: Array, directions: Array) -> list[int]:
+def motor_pulses_us(demands: PilotDemands, factors: Array, directions: Array) -> list[int]:
     """Pulse of each motor, shape (n,), for demands."""
     asked = np.array(
         [demands.roll, demands.pitch, demands.yaw, demands.throttle, demands.forward, demands.lateral], dtype=np.float64

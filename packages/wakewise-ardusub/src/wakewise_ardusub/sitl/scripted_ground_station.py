@@ -14,28 +14,28 @@ from wakewise.robot.importers import any_vehicle
 from wakewise_ardusub.link.protocol import ENABLE_PARAMETER, STICKS_MIDDLE
 from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
-from wakewise_ardusub.sitl.inprocess_session import STATION, STATION_COMPONENT, Speaker, shipped_script
+from wakewise_ardusub.sitl.inprocess_session import STATION, STATION_COMPONENT, MavlinkSender, shipped_script
 from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.simulated_autopilot import StandIn
-from wakewise_ardusub.sitl.udp_endpoints import Embedded, Link, run
+from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics, UdpEndpoint, run
 
 STICKS_S, BEAT_S, ASKS_S = 0.05, 1.0, 2.0
 FIRST_S = 0.4
 """When it is first asked to arm: after the script has switched itself off, which it does as it starts."""
 
 
-class Ashore:
+class ScriptedGroundStation:
     """Heartbeats and sticks of a ground station; arms and switches on once after each start.
 
     Parameters
     ----------
-    made : StandIn
+    made : SimulatedAutopilot
     carry : callable
         Takes bytes and the name of a link: to the stand-in and to everybody else.
     """
 
-    def __init__(self, made: StandIn, carry: Callable[[bytes, str], None]) -> None:
-        self._made, self._pilot = made, Speaker(carry, STATION, STATION_COMPONENT, "pilot ashore")
+    def __init__(self, made: SimulatedAutopilot, carry: Callable[[bytes, str], None]) -> None:
+        self._made, self._pilot = made, MavlinkSender(carry, STATION, STATION_COMPONENT, "pilot ashore")
         self._begin()
 
     def _begin(self) -> None:
@@ -69,7 +69,7 @@ class Ashore:
         return True
 
 
-def carry_to(made: StandIn, links: list[Link]) -> Callable[[bytes, str], None]:
+def carry_to(made: SimulatedAutopilot, links: list[UdpEndpoint]) -> Callable[[bytes, str], None]:
     """Carries bytes to the stand-in and out on its links, as its router does."""
 
     def carry(data: bytes, name: str) -> None:
@@ -84,10 +84,10 @@ def fly_piloted(vehicle: str, port: int, seconds: float = 3600.0, loop_hz: float
     """Fly until the time is over, or the process is ended; a companion listens at the port of this computer."""
     chosen = any_vehicle(vehicle)
     values = own_parameters(len(chosen.thrusters))
-    made = StandIn(values, loop_hz=loop_hz, scripts=shipped_script())
-    link = Link("127.0.0.1", port, out=True)
-    behind = Embedded(body=FreeWater(chosen), table=PulseTable.of(chosen, values))
+    made = SimulatedAutopilot(values, loop_hz=loop_hz, scripts=shipped_script())
+    link = UdpEndpoint("127.0.0.1", port, out=True)
+    behind = InProcessPhysics(body=FreeWater(chosen), table=PulseTable.of(chosen, values))
     end_s = time.monotonic() + seconds
-    ashore = Ashore(made, carry_to(made, [link]))
+    ashore = ScriptedGroundStation(made, carry_to(made, [link]))
     run(made, behind, [link], lambda: time.monotonic() < end_s, turn=ashore.turn)
     link.close()

@@ -25,7 +25,7 @@ _LETTERS = 200
 _ERROR, _INFO = 3, 6
 
 
-class Board(Protocol):
+class ScriptHost(Protocol):
     """What a script may see and do."""
 
     parameters: ParameterTable
@@ -70,7 +70,7 @@ class Board(Protocol):
         ...
 
 
-class Script:
+class LuaScript:
     """One script on a board.
 
     Parameters
@@ -78,7 +78,7 @@ class Script:
     text : str
     name : str
         For messages.
-    board : Board
+    board : ScriptHost
 
     Raises
     ------
@@ -86,7 +86,7 @@ class Script:
         If there is no Lua.
     """
 
-    def __init__(self, text: str, name: str, board: Board) -> None:
+    def __init__(self, text: str, name: str, board: ScriptHost) -> None:
         need("the stand-in autopilot's scripting", "links", only=("lupa",))
         from lupa import lua53
 

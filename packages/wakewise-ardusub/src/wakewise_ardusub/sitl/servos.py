@@ -18,7 +18,7 @@ _MOST_LOOPS = 65535
 _DISABLED = 0
 
 
-class Servos:
+class ServoOutputs:
     """16 outputs and the overrides on them."""
 
     def __init__(self, loop_hz: float) -> None:

@@ -22,20 +22,20 @@ from wakewise_ardusub.link.protocol import (
     MANUAL,
     MIDDLE_US,
 )
-from wakewise_ardusub.physics.datagrams import Motion
+from wakewise_ardusub.physics.datagrams import PhysicsState
 from wakewise_ardusub.sitl.failsafes import Action, ground_station, pilot_input
-from wakewise_ardusub.sitl.files import Files
-from wakewise_ardusub.sitl.joystick import Joystick, can_disarm
+from wakewise_ardusub.sitl.files import MavftpServer
+from wakewise_ardusub.sitl.joystick import ButtonHandler, can_disarm
 from wakewise_ardusub.sitl.mavlink_in import hear
-from wakewise_ardusub.sitl.mavlink_out import BUILDERS, Timetable, parameter
-from wakewise_ardusub.sitl.modes import MODES, Loops, fly
+from wakewise_ardusub.sitl.mavlink_out import BUILDERS, MessageSchedule, parameter
+from wakewise_ardusub.sitl.modes import MODES, ModeControllers, fly
 from wakewise_ardusub.sitl.motor_tests import MotorTest
 from wakewise_ardusub.sitl.motors import directions_of, factors_of, motor_pulses_us
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 from wakewise_ardusub.sitl.parameters import ParameterTable
-from wakewise_ardusub.sitl.scripting import Script
-from wakewise_ardusub.sitl.servos import OUTPUTS, Servos, find_channel
-from wakewise_ardusub.sitl.sticks import Demands
+from wakewise_ardusub.sitl.scripting import LuaScript
+from wakewise_ardusub.sitl.servos import OUTPUTS, ServoOutputs, find_channel
+from wakewise_ardusub.sitl.sticks import PilotDemands
 
 FIRMWARE = (4, 5, 3)
 """Release that it says it is: the one that BlueOS 1.4 brings."""
@@ -47,7 +47,7 @@ _MOST_WAITING = 4000
 TEXT_LETTERS = 50
 _MOST_TEXT_ID = 65535
 _CRITICAL, _ERROR, _WARNING, _INFO = 2, 3, 4, 6
-_AT_REST = Motion(
+_AT_REST = PhysicsState(
     time_s=0.0,
     omega_B_rad_s=np.zeros(3),
     force_B_m_s2=np.array([0.0, 0.0, -GRAVITY_M_S2]),
@@ -59,7 +59,7 @@ _AT_REST = Motion(
 log = logging.getLogger(__name__)
 
 
-class StandIn:
+class SimulatedAutopilot:
     """An autopilot of an eight- or six-motor submarine.
 
     Parameters
@@ -88,13 +88,13 @@ class StandIn:
 
     armed: bool
     mode: int
-    timetable: Timetable
-    joystick: Joystick
+    timetable: MessageSchedule
+    joystick: ButtonHandler
     motor_test: MotorTest
-    _loops: Loops
-    _demands: Demands
-    _servos: Servos
-    _scripts: list[Script]
+    _loops: ModeControllers
+    _demands: PilotDemands
+    _servos: ServoOutputs
+    _scripts: list[LuaScript]
     _to_list: deque[str]
     _station_s: float | None
     _sticks_s: float | None
@@ -116,7 +116,7 @@ class StandIn:
         self.loop_hz, self.firmware, self.home_deg = loop_hz, firmware, home_deg
         self._calibrated_m, self.zero_depth_m = zero_depth_m, 0.0
         self.parameters = ParameterTable(own_parameters() | dict(values or {}))
-        self.files = Files()
+        self.files = MavftpServer()
         for name, text in (scripts or {}).items():
             self.files.put(f"/APM/scripts/{name}", text.encode("latin-1", "replace"))
         self._mav = mavlink.MAVLink(None, srcSystem=self.system, srcComponent=self.component)
@@ -201,7 +201,7 @@ class StandIn:
         out, self._out = self._out, []
         return out
 
-    def step(self, motion: Motion) -> tuple[int, ...]:
+    def step(self, motion: PhysicsState) -> tuple[int, ...]:
         """One loop: the pulses of its outputs, 16 of them, after physics told how the vehicle moves."""
         dt_s = max(motion.time_s - self.motion.time_s, 0.0)
         self.motion = motion
@@ -220,7 +220,7 @@ class StandIn:
             factors = factors_of(self.parameters)
             motors = motor_pulses_us(demands, factors, directions_of(self.parameters, len(factors)))
         else:
-            self._loops = Loops()
+            self._loops = ModeControllers()
         self.pulses_us = self._servos.step(motors, self.parameters)
         for message in self.timetable.due(self.now_s):
             self.send(BUILDERS[message](self))
@@ -242,10 +242,10 @@ class StandIn:
         """Start anew: disarmed, in MANUAL, nobody heard; parameters and files stay."""
         self._began_s = self.motion.time_s
         self.armed, self.mode = False, int(MANUAL)
-        self._loops, self._demands = Loops(), Demands()
-        self._servos = Servos(self.loop_hz)
+        self._loops, self._demands = ModeControllers(), PilotDemands()
+        self._servos = ServoOutputs(self.loop_hz)
         self.motor_test = MotorTest(len(factors_of(self.parameters)))
-        self.timetable, self.joystick = Timetable(), Joystick()
+        self.timetable, self.joystick = MessageSchedule(), ButtonHandler()
         self._zeroed = False
         self._station_s = None
         self._sticks_s = None
@@ -259,7 +259,7 @@ class StandIn:
         self.parameters.forget_tables()
         self._scripts = []
         if self.parameters.value("SCR_ENABLE", otherwise=0.0) == 1.0:
-            self._scripts = [Script(text, name, self) for name, text in self.files.scripts().items()]
+            self._scripts = [LuaScript(text, name, self) for name, text in self.files.scripts().items()]
 
     @property
     def script_faults(self) -> list[str]:
@@ -279,7 +279,7 @@ class StandIn:
             self.say(_CRITICAL, "Arm: Must assign a disarm or arm_toggle button")
             return False
         if not self.armed:
-            self.armed, self._loops = True, Loops()
+            self.armed, self._loops = True, ModeControllers()
             # Sticks and heartbeats from before count from now: a pilot has as long as ever to begin.
             self._sticks_s = self.now_s
             self.say(_INFO, "Arming motors")
@@ -288,7 +288,7 @@ class StandIn:
     def disarm(self, why: str) -> bool:
         """Disarm them."""
         if self.armed:
-            self.armed, self._demands = False, Demands()
+            self.armed, self._demands = False, PilotDemands()
             self.say(_INFO, f"Disarming motors ({why})")
         return True
 
@@ -313,7 +313,7 @@ class StandIn:
         """A heartbeat of the ground station."""
         self._station_s = self.now_s
 
-    def take_sticks(self, demands: Demands) -> None:
+    def take_sticks(self, demands: PilotDemands) -> None:
         """Sticks of the pilot; they steer once armed."""
         self._sticks_s = self.now_s
         self._demands = demands
@@ -323,7 +323,7 @@ class StandIn:
         station = ground_station(self.parameters, self._station_s, self.now_s) if self.armed else "none"
         pilot = pilot_input(self.parameters, self._sticks_s, self.now_s) if self.armed else "none"
         if pilot != "none":
-            self._demands = Demands()
+            self._demands = PilotDemands()
         faults = {"Lost ground station": station, "Lost manual control": pilot}
         for who, action in faults.items():
             if action not in ("none", self._told.get(who)):

@@ -14,7 +14,7 @@ _EXTENSIONS_PITCH, _EXTENSIONS_ROLL = 1, 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Demands:
+class PilotDemands:
     """What is asked of the mixer, each in [-1, 1]; forward, right and up are positive."""
 
     roll: float = 0.0
@@ -27,11 +27,11 @@ class Demands:
 
 def demands_of(
     x: int, y: int, z: int, r: int, *, pitch: int = 0, roll: int = 0, extensions: int = 0, gain: float, throttle: float
-) -> Demands:
+) -> PilotDemands:
     """Demands of MANUAL_CONTROL's numbers at a gain, and at one of the throttle on top; numbers out of range count as
     the end of their range.
     """
-    return Demands(
+    return PilotDemands(
         roll=_share(roll) * gain if extensions & _EXTENSIONS_ROLL else 0.0,
         pitch=_share(pitch) * gain if extensions & _EXTENSIONS_PITCH else 0.0,
         yaw=_share(r) * gain,

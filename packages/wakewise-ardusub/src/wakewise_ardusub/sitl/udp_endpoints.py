@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from wakewise.core.errors import InputError
-from wakewise_ardusub.physics.datagrams import LARGEST_B, Motion, Request, read_reply, write_request
-from wakewise_ardusub.physics.physics import Body
+from wakewise_ardusub.physics.datagrams import LARGEST_B, PhysicsState, ServoFrame, read_reply, write_request
+from wakewise_ardusub.physics.physics import SimulatedBody
 from wakewise_ardusub.physics.pulses import PulseTable
-from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 
 RESEND_S = 0.1
 """How long an answer of physics is waited for before the frame is sent again."""
@@ -25,7 +25,7 @@ _BEHIND_S = 0.5
 _DATAGRAMS_PER_LOOP = 50
 
 
-class Link:
+class UdpEndpoint:
     """A UDP socket to one program: `out` speaks to an address, else whoever speaks to it first is answered.
 
     Raises
@@ -75,10 +75,10 @@ class Link:
         self._socket.close()
 
 
-class Behind(Protocol):
+class PhysicsBackend(Protocol):
     """What moves the vehicle: physics over a socket, or a body in this process."""
 
-    def exchange(self, pulses_us: tuple[int, ...], rate_hz: int) -> Motion | None:
+    def exchange(self, pulses_us: tuple[int, ...], rate_hz: int) -> PhysicsState | None:
         """One frame of pulses for one motion; None where nobody answers for now."""
         ...
 
@@ -88,13 +88,13 @@ class Behind(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Embedded:
+class InProcessPhysics:
     """A body in this process."""
 
-    body: Body
+    body: SimulatedBody
     table: PulseTable
 
-    def exchange(self, pulses_us: tuple[int, ...], rate_hz: int) -> Motion | None:
+    def exchange(self, pulses_us: tuple[int, ...], rate_hz: int) -> PhysicsState | None:
         """One step of the body."""
         return self.body.step(self.table.thrusts(pulses_us), 1.0 / rate_hz)
 
@@ -102,7 +102,7 @@ class Embedded:
         """Nothing is held."""
 
 
-class OverUdp:
+class UdpPhysics:
     """The JSON physics link, as its client: a frame, its answer, the next frame."""
 
     def __init__(self, host: str, port: int) -> None:
@@ -114,11 +114,11 @@ class OverUdp:
         self._socket.settimeout(RESEND_S)
         self._socket.bind((_own_side(host), 0))
 
-    def exchange(self, pulses_us: tuple[int, ...], rate_hz: int) -> Motion | None:
+    def exchange(self, pulses_us: tuple[int, ...], rate_hz: int) -> PhysicsState | None:
         """Send a frame and wait for its answer for a while; the same frame goes out next time if there is none."""
         if self._waiting is None:
             self._frame += 1
-            self._waiting = write_request(Request(rate_hz=rate_hz, frame=self._frame, pulses_us=pulses_us))
+            self._waiting = write_request(ServoFrame(rate_hz=rate_hz, frame=self._frame, pulses_us=pulses_us))
         else:
             self.resent += 1
         try:
@@ -140,9 +140,9 @@ def _own_side(host: str) -> str:
 
 
 def run(
-    stand_in: StandIn,
-    behind: Behind,
-    links: list[Link],
+    stand_in: SimulatedAutopilot,
+    behind: PhysicsBackend,
+    links: list[UdpEndpoint],
     going: Callable[[], bool],
     *,
     turn: Callable[[], None] | None = None,

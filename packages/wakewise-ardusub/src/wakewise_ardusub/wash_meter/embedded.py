@@ -19,7 +19,7 @@ import numpy as np
 from wakewise.core.errors import InputError
 from wakewise_ardusub.link.parameters import read_parameter_file
 from wakewise_ardusub.vehicle_summary import read_craft
-from wakewise_ardusub.wash_meter.run import Work
+from wakewise_ardusub.wash_meter.run import MeterLoop
 from wakewise_ardusub.wash_meter.settings import PORT, MeterSettings
 from wakewise_ardusub.wash_savings import bow_ball
 
@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         known = {} if asked.params is None else read_parameter_file(asked.params)
         words = f"of a ball {asked.ahead:g} m ahead of the bow"
-        work = Work(settings, craft, points, np.ones(len(points)), words, known, _say)
+        work = MeterLoop(settings, craft, points, np.ones(len(points)), words, known, _say)
     except InputError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return 2

@@ -7,13 +7,13 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
-from wakewise_ardusub.wash_meter.meter import Reading
+from wakewise_ardusub.wash_meter.meter import MeterReading
 
 KEPT_S = 600
 
 
 @dataclass
-class History:
+class WashHistory:
     """Mean D of each second, as flown and with gentle thrusts; a second without readings is a gap."""
 
     weight: float
@@ -22,7 +22,7 @@ class History:
     _flown: list[float] = field(default_factory=list)
     _gentle: list[float] = field(default_factory=list)
 
-    def add(self, reading: Reading) -> None:
+    def add(self, reading: MeterReading) -> None:
         """Take in a reading."""
         second = math.floor(reading.time_s)
         if self._now is None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from wakewise_ardusub.wash_meter.history import History
-from wakewise_ardusub.wash_meter.meter import Meter, Reading
+from wakewise_ardusub.wash_meter.history import WashHistory
+from wakewise_ardusub.wash_meter.meter import MeterReading, WashMeter
 from wakewise_ardusub.wash_savings import SHARES
 
 
-def told(meter: Meter, reading: Reading, history: History, points: str) -> dict[str, Any]:
+def told(meter: WashMeter, reading: MeterReading, history: WashHistory, points: str) -> dict[str, Any]:
     """How it stands; no number is NaN, what is not known is null."""
     craft, hearing, now_s = meter.craft, meter.hearing, reading.time_s
     armed = hearing.number("armed", now_s)

@@ -25,7 +25,7 @@ _BIGGEST = 65535
 
 
 @dataclass(frozen=True)
-class Heard:
+class TimedMessage:
     """One message: when, from whom, what it is called, and its fields."""
 
     time_s: float
@@ -35,7 +35,7 @@ class Heard:
     fields: dict[str, Any]
 
 
-class Wire:
+class MavlinkSocket:
     """A UDP socket with MAVLink on it.
 
     Parameters
@@ -80,7 +80,7 @@ class Wire:
         """Until something is there, or time is up."""
         select.select([self._socket], [], [], max(seconds, 0.0))
 
-    def heard(self) -> Iterator[Heard]:
+    def heard(self) -> Iterator[TimedMessage]:
         """The messages that have come, those that somebody here wants; what is no message is counted in `bad`."""
         for _ in range(_MOST_DATAGRAMS):
             try:
@@ -97,7 +97,9 @@ class Wire:
                 if name == "BAD_DATA":
                     self.bad += 1
                 elif name in WANTED:
-                    yield Heard(now_s, message.get_srcSystem(), message.get_srcComponent(), name, message.to_dict())
+                    yield TimedMessage(
+                        now_s, message.get_srcSystem(), message.get_srcComponent(), name, message.to_dict()
+                    )
 
     def _messages(self, sender: Any, data: bytes) -> list[Any]:
         """Messages in a datagram; each sender has a parser, so that nobody's rubbish spoils another's messages."""

@@ -11,12 +11,12 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.wake.disturbance import split_roots
-from wakewise.wake.influence import WakeView
+from wakewise.wake.influence import InfluenceModel
 from wakewise_ardusub.logs.channels import SERVOS
 from wakewise_ardusub.motors import directions_of_motors, motor_channels
-from wakewise_ardusub.vehicle_summary import Craft
-from wakewise_ardusub.wash_meter.vehicle_listener import Hearing
-from wakewise_ardusub.wash_savings import SHARES, Shares, Spared, Sparing, look, saved_pct
+from wakewise_ardusub.vehicle_summary import VehicleSummary
+from wakewise_ardusub.wash_meter.vehicle_listener import VehicleListener
+from wakewise_ardusub.wash_savings import SHARES, Shares, WashSavings, WashSavingsCalculator, look, saved_pct
 
 MINUTE_S = 60.0
 """Over how long the one number is taken: long enough to be calm, short enough to answer what a pilot tries."""
@@ -24,7 +24,7 @@ _HERE = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Reading:
+class MeterReading:
     """One instant of m thrusters.
 
     Parameters
@@ -44,7 +44,7 @@ class Reading:
 
     time_s: float
     why_not: str | None = None
-    spared: Spared | None = None
+    spared: WashSavings | None = None
     peak_m_s: dict[Shares, float] = field(default_factory=dict)
     rms_m_s: dict[Shares, float] = field(default_factory=dict)
     shares: Array = field(default_factory=lambda: np.zeros(0))
@@ -57,7 +57,7 @@ class Reading:
 
 
 @dataclass
-class Sum:
+class WashTotals:
     """D added up over instants in which thrusters ran."""
 
     instants: int = 0
@@ -75,13 +75,13 @@ class Sum:
         return saved_pct(self.flown, self.gentle, self.instants * weight) if self.instants else None
 
 
-class Meter:
-    """Judges what a `Hearing` holds, whenever it is asked.
+class WashMeter:
+    """Judges what a `VehicleListener` holds, whenever it is asked.
 
     Parameters
     ----------
-    craft : Craft
-    hearing : Hearing
+    craft : VehicleSummary
+    hearing : VehicleListener
     points_B_m, weights : ndarray, shape (n, 3) and (n,)
         What is to be spared, in the vehicle's frame.
 
@@ -91,17 +91,17 @@ class Meter:
         If the autopilot's parameters as known beforehand do not fit the craft, or this computer cannot judge it.
     """
 
-    def __init__(self, craft: Craft, hearing: Hearing, points_B_m: Array, weights: Array) -> None:
+    def __init__(self, craft: VehicleSummary, hearing: VehicleListener, points_B_m: Array, weights: Array) -> None:
         self.craft, self.hearing = craft, hearing
         self.weight = float(np.sum(weights))
-        self.dive = Sum()
+        self.dive = WashTotals()
         self._points_B_m, self._weights = points_B_m, weights
         self._carried = _Seen.at(look(craft, points_B_m, weights), _HERE)
-        self._mark: WakeView | None = None
+        self._mark: InfluenceModel | None = None
         self._minute: deque[tuple[float, float, float]] = deque()
         self._known: dict[str, float] | None = None
         self._misfit: str | None = None
-        self._sparing = Sparing(craft, directions_of_motors({}, craft.count))
+        self._sparing = WashSavingsCalculator(craft, directions_of_motors({}, craft.count))
         self._channels = motor_channels(craft, {})
         self._fit()
         if self._misfit is not None:
@@ -134,33 +134,33 @@ class Meter:
 
     def saved_pct(self) -> float | None:
         """Spared over the last minute; None where there was nothing to spare."""
-        last = Sum(len(self._minute), sum(d for _, d, _ in self._minute), sum(g for _, _, g in self._minute))
+        last = WashTotals(len(self._minute), sum(d for _, d, _ in self._minute), sum(g for _, _, g in self._minute))
         return last.saved_pct(self.weight)
 
-    def read(self, now_s: float) -> Reading:
+    def read(self, now_s: float) -> MeterReading:
         """The reading at a time, which must not run back."""
         self._fit()
         while self._minute and self._minute[0][0] < now_s - MINUTE_S:
             self._minute.popleft()
         pulses = self.hearing.last("servo", now_s)
         if self.hearing.identity.is_other:
-            return Reading(time_s=now_s, why_not=f"the vehicle is no ArduSub: {self.hearing.identity.words}")
+            return MeterReading(time_s=now_s, why_not=f"the vehicle is no ArduSub: {self.hearing.identity.words}")
         if self._misfit is not None:
-            return Reading(time_s=now_s, why_not=self._misfit)
+            return MeterReading(time_s=now_s, why_not=self._misfit)
         if pulses is None:
-            return Reading(time_s=now_s, why_not="no servo outputs are heard")
+            return MeterReading(time_s=now_s, why_not="no servo outputs are heard")
         own = pulses[[channel - 1 for channel in self._channels]]
         if not np.isfinite(own).all():
-            return Reading(time_s=now_s, why_not="a motor's servo output says nothing")
+            return MeterReading(time_s=now_s, why_not="a motor's servo output says nothing")
         seen = self._carried
         if self._mark is not None:
             pose = self.hearing.pose(now_s)
             if pose is None:
-                return Reading(time_s=now_s, why_not="the vehicle's place is not known, so the mark's is not")
+                return MeterReading(time_s=now_s, why_not="the vehicle's place is not known, so the mark's is not")
             seen = _Seen.at(self._mark, pose)
         supply_V = self._sparing.supply_V(self.hearing.number("voltage", now_s))
         spared = self._sparing.judge(own, supply_V, seen.gram)
-        reading = Reading(
+        reading = MeterReading(
             time_s=now_s,
             spared=spared,
             peak_m_s={share: seen.peak_m_s(spared.thrusts_N[share]) for share in SHARES},
@@ -189,7 +189,7 @@ class Meter:
             self._misfit = str(fault) if all(f"SERVO{i + 1}_FUNCTION" in known for i in range(SERVOS)) else None
         directions = directions_of_motors(known, self.craft.count)
         if not np.array_equal(directions, self._sparing.directions):
-            self._sparing = Sparing(self.craft, directions)
+            self._sparing = WashSavingsCalculator(self.craft, directions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +200,7 @@ class _Seen:
     velocity: Array
 
     @classmethod
-    def at(cls, view: WakeView, pose: Pose) -> _Seen:
+    def at(cls, view: InfluenceModel, pose: Pose) -> _Seen:
         """What a pose makes of a view."""
         R = pose.R
         origins, axes = pose.apply(view.positions_B_m), view.axes_B @ R.T

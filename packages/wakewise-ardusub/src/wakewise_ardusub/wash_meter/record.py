@@ -8,24 +8,24 @@ from pathlib import Path
 from typing import IO, Any
 
 from wakewise.core.files import write_json
-from wakewise_ardusub.vehicle_summary import Craft
-from wakewise_ardusub.wash_meter.meter import Reading
+from wakewise_ardusub.vehicle_summary import VehicleSummary
+from wakewise_ardusub.wash_meter.meter import MeterReading
 from wakewise_ardusub.wash_savings import SHARES
 
 ROWS, SUMMARY = "meter.csv", "meter.json"
 
 
-class Record:
+class DiveRecord:
     """Writes one dive into a folder; a row is whole or not there.
 
     Parameters
     ----------
     folder : Path
         Made where it is not there; a record in it is gone on with where its columns are the same, else put aside.
-    craft : Craft
+    craft : VehicleSummary
     """
 
-    def __init__(self, folder: Path, craft: Craft) -> None:
+    def __init__(self, folder: Path, craft: VehicleSummary) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder = folder
         names = ["time_s", *(f"disturbance_{share}" for share in SHARES), "peak_flown_m_s", "peak_gentle_m_s"]
@@ -41,7 +41,7 @@ class Record:
         if not before:
             self._rows.writerow(names)
 
-    def add(self, unix_s: float, reading: Reading) -> None:
+    def add(self, unix_s: float, reading: MeterReading) -> None:
         """Write a reading under the time of day, if thrusters ran."""
         if reading.spared is None or not reading.running:
             return

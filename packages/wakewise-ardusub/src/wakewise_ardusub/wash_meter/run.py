@@ -14,15 +14,15 @@ from wakewise.core.arrays import Array
 from wakewise.ui.web.origin_check import is_loopback
 from wakewise_ardusub.link.protocol import DISTURBANCE_NAME, SAVED_NAME
 from wakewise_ardusub.logs.channels import SERVOS
-from wakewise_ardusub.vehicle_summary import Craft
-from wakewise_ardusub.wash_meter.history import History
+from wakewise_ardusub.vehicle_summary import VehicleSummary
+from wakewise_ardusub.wash_meter.history import WashHistory
 from wakewise_ardusub.wash_meter.json_state import told
-from wakewise_ardusub.wash_meter.mavlink_socket import Wire
-from wakewise_ardusub.wash_meter.meter import Meter, Reading, Sum
-from wakewise_ardusub.wash_meter.record import Record
-from wakewise_ardusub.wash_meter.server import Server
+from wakewise_ardusub.wash_meter.mavlink_socket import MavlinkSocket
+from wakewise_ardusub.wash_meter.meter import MeterReading, WashMeter, WashTotals
+from wakewise_ardusub.wash_meter.record import DiveRecord
+from wakewise_ardusub.wash_meter.server import MeterServer
 from wakewise_ardusub.wash_meter.settings import TICK_S, MeterSettings
-from wakewise_ardusub.wash_meter.vehicle_listener import Hearing
+from wakewise_ardusub.wash_meter.vehicle_listener import VehicleListener
 
 BEAT_S, PUBLISH_S, ASK_S = 1.0, 0.5, 0.5
 _MOST_ROUNDS, _AT_ONCE = 5, 6
@@ -31,13 +31,13 @@ _MOST_ROUNDS, _AT_ONCE = 5, 6
 Say = Callable[[str], None]
 
 
-class Work:
+class MeterLoop:
     """One meter at work; `run` until `over` is set.
 
     Parameters
     ----------
     settings : MeterSettings
-    craft : Craft
+    craft : VehicleSummary
     points_B_m, weights : ndarray, shape (n, 3) and (n,)
         What is to be spared, in the vehicle's frame.
     points : str
@@ -56,7 +56,7 @@ class Work:
     def __init__(
         self,
         settings: MeterSettings,
-        craft: Craft,
+        craft: VehicleSummary,
         points_B_m: Array,
         weights: Array,
         points: str,
@@ -65,19 +65,19 @@ class Work:
     ) -> None:
         self.settings, self.points, self.say = settings, points, say
         self.over = threading.Event()
-        self.hearing = Hearing(settings.system, parameters)
-        self.meter = Meter(craft, self.hearing, points_B_m, weights)
-        self.history = History(weight=float(np.sum(weights)))
+        self.hearing = VehicleListener(settings.system, parameters)
+        self.meter = WashMeter(craft, self.hearing, points_B_m, weights)
+        self.history = WashHistory(weight=float(np.sum(weights)))
         self._lock = threading.Lock()
         self._began_s = time.monotonic()
-        self._reading = Reading(time_s=self._began_s, why_not="nothing is heard yet")
+        self._reading = MeterReading(time_s=self._began_s, why_not="nothing is heard yet")
         self._asked = 0
         self._due_s = {"beat": 0.0, "publish": 0.0, "ask": 0.0}
         with ExitStack() as stack:
-            self.wire = Wire(settings.ends)
+            self.wire = MavlinkSocket(settings.ends)
             stack.callback(self.wire.close)
             where = (settings.host, settings.port)
-            self.server = Server(self.state, self._past, self._wish, *where, token=settings.token)
+            self.server = MeterServer(self.state, self._past, self._wish, *where, token=settings.token)
             stack.pop_all()
 
     def run(self) -> dict[str, Any]:
@@ -86,7 +86,7 @@ class Work:
             stack.callback(self.wire.close)
             self.server.start()
             stack.callback(self.server.stop)
-            record = None if self.settings.out is None else Record(self.settings.out, self.meter.craft)
+            record = None if self.settings.out is None else DiveRecord(self.settings.out, self.meter.craft)
             self._introduce()
             due_s = time.monotonic()
             while not self.over.is_set():
@@ -127,7 +127,7 @@ class Work:
             if what == "unmark":
                 self.meter.unmark()
             else:
-                self.meter.dive = Sum()
+                self.meter.dive = WashTotals()
             return None
 
     def _listen(self, until_s: float) -> None:

@@ -22,13 +22,13 @@ from typing import Any
 
 from wakewise.core.errors import InputError
 from wakewise.ui.web.addresses import page_addresses
-from wakewise.ui.web.blueos import Offer, as_json
-from wakewise.ui.web.files import File, Files
-from wakewise.ui.web.origin_check import TOKEN_HEADER, Caller, Gate, is_loopback, page_headers
-from wakewise.ui.web.pending import Pending
+from wakewise.ui.web.blueos import ServiceDescription, as_json
+from wakewise.ui.web.files import StaticFile, StaticFiles
+from wakewise.ui.web.origin_check import TOKEN_HEADER, OriginCheck, RequestOrigin, is_loopback, page_headers
+from wakewise.ui.web.pending import PendingConnections
 
 PAGE = Path(__file__).with_name("page")
-OFFER = Offer(
+OFFER = ServiceDescription(
     name="Wakewise gentle meter",
     description="What the thrusters do to the target's water, and what gentler thrusts would spare. Listens only.",
     widget="Wakewise: gentle meter",
@@ -43,7 +43,7 @@ Told = Callable[[], dict[str, Any]]
 Wish = Callable[[str], str | None]
 
 
-class Server:
+class MeterServer:
     """Serves one meter.
 
     Parameters
@@ -70,14 +70,14 @@ class Server:
         self.over = False
         self._wish = wish
         more = {_STATE: lambda: as_json(state()), _HISTORY: lambda: as_json(history())}
-        self._files = Files(folder=PAGE, more=OFFER.files() | more)
+        self._files = StaticFiles(folder=PAGE, more=OFFER.files() | more)
         try:
             self._http = _Listening((host, port), _handler(self))
         except OSError as fault:
             why = (fault.strerror or str(fault)).lower()
             raise InputError(f"--port {port} at {host}: {why}; give another --port, or 0 for any") from None
         self.port = int(self._http.server_address[1])
-        self._gate = Gate(port=self.port, token=self.token or "", open_to_net=not is_loopback(host))
+        self._gate = OriginCheck(port=self.port, token=self.token or "", open_to_net=not is_loopback(host))
         self._thread = threading.Thread(target=self._http.serve_forever, name="meter page", daemon=True)
 
     @property
@@ -103,12 +103,12 @@ class Server:
         self._http.pending.close()
         self._thread.join(timeout=10.0)
 
-    def answer(self, method: str, path: str, caller: Caller, token: str | None) -> tuple[int, File]:
+    def answer(self, method: str, path: str, caller: RequestOrigin, token: str | None) -> tuple[int, StaticFile]:
         """What a request gets, and its status."""
         address = path.partition("?")[0]
         file = self._files.at(path) if method == "GET" and address not in (_STATE, _HISTORY) else None
         if file is not None and file.shared:
-            caller = Caller(address=caller.address, host=caller.host, origin=None)
+            caller = RequestOrigin(address=caller.address, host=caller.host, origin=None)
         refused = self._gate.refusal(caller)
         if refused is not None:
             return 403, _line(f"refused: {refused}")
@@ -123,13 +123,13 @@ class Server:
             return (200, as_json({"done": True})) if why_not is None else (409, as_json({"why_not": why_not}))
         return 404, _line("there is nothing here")
 
-    def lets_in(self, caller: Caller, token: str | None) -> bool:
+    def lets_in(self, caller: RequestOrigin, token: str | None) -> bool:
         """Whether a caller may see the state: by the token, where one is needed."""
         return self.token is None or not self._gate.needs_token(caller) or self._gate.fits(token)
 
 
-def _line(text: str) -> File:
-    return File(body=f"{text}\n".encode(), kind="text/plain; charset=utf-8")
+def _line(text: str) -> StaticFile:
+    return StaticFile(body=f"{text}\n".encode(), kind="text/plain; charset=utf-8")
 
 
 class _Listening(ThreadingHTTPServer):
@@ -140,7 +140,7 @@ class _Listening(ThreadingHTTPServer):
     request_queue_size = 128
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
-        self.pending = Pending()
+        self.pending = PendingConnections()
         self._numbers: dict[Any, int] = {}
         self._named: set[Any] = set()
         super().__init__(*args, **kwargs)
@@ -181,7 +181,7 @@ def _shut(request: Any) -> None:
         request.shutdown(socket.SHUT_RDWR)
 
 
-def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
+def _handler(server: MeterServer) -> type[BaseHTTPRequestHandler]:
     """The class of requests to one server."""
 
     class Request(BaseHTTPRequestHandler):
@@ -206,7 +206,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
             if server.over:
                 self.close_connection = True
                 return
-            caller = Caller(address=self.client_address[0], host=self._only("Host"), origin=self._only("Origin"))
+            caller = RequestOrigin(address=self.client_address[0], host=self._only("Host"), origin=self._only("Origin"))
             token = self._only(TOKEN_HEADER)
             status, file = server.answer(method, self.path, caller, token)
             if status == http.HTTPStatus.FORBIDDEN or not server.lets_in(caller, token) or not self._kept():

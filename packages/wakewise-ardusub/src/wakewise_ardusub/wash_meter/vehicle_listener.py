@@ -12,19 +12,19 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise_ardusub.logs.channels import HELD_S, MODES, is_parameter, sound
-from wakewise_ardusub.logs.identity import Identity
-from wakewise_ardusub.logs.mavlink import AUTOPILOT, Stamped, take
+from wakewise_ardusub.logs.identity import VehicleIdentity
+from wakewise_ardusub.logs.mavlink import AUTOPILOT, ClockModel, take
 
 _SLACK_S = 1e-9
 
 
 @dataclass
-class Said:
+class LatestSamples:
     """The last sample of each channel of one system, and its parameters."""
 
     samples: dict[str, tuple[float, tuple[float, ...]]] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
-    identity: Identity = field(default_factory=Identity)
+    identity: VehicleIdentity = field(default_factory=VehicleIdentity)
 
     def put(self, channel: str, time_s: float, values: Iterable[float]) -> None:
         """Keep a sample in place of the last."""
@@ -37,7 +37,7 @@ class Said:
 
     def beat(self, mav_type: int, autopilot: int) -> None:
         """Keep what the last heartbeat says the vehicle is."""
-        self.identity = Identity(mav_type=mav_type, autopilot=autopilot)
+        self.identity = VehicleIdentity(mav_type=mav_type, autopilot=autopilot)
 
 
 class _AsStamped:
@@ -47,7 +47,7 @@ class _AsStamped:
         return stamp_s
 
 
-class Hearing:
+class VehicleListener:
     """Hears one vehicle.
 
     Parameters
@@ -61,17 +61,17 @@ class Hearing:
     """
 
     def __init__(
-        self, system: int | None = None, parameters: Mapping[str, float] | None = None, clock: Stamped | None = None
+        self, system: int | None = None, parameters: Mapping[str, float] | None = None, clock: ClockModel | None = None
     ) -> None:
         self.system = system
-        self.clock: Stamped = clock or _AsStamped()
+        self.clock: ClockModel = clock or _AsStamped()
         self.messages = 0
         self._before = dict(parameters or {})
-        self._said: dict[int, Said] = {}
+        self._said: dict[int, LatestSamples] = {}
 
-    def vessel(self, system: int) -> Said:
+    def vessel(self, system: int) -> LatestSamples:
         """Where a system's samples go."""
-        return self._said.setdefault(system, Said())
+        return self._said.setdefault(system, LatestSamples())
 
     def hear(self, stamp_s: float, system: int, component: int, name: str, fields: Mapping[str, Any]) -> None:
         """Take in one message; one whose fields make no sense is passed over."""
@@ -89,9 +89,9 @@ class Hearing:
         return self._before | (self._own.parameters if self._own is not None else {})
 
     @property
-    def identity(self) -> Identity:
+    def identity(self) -> VehicleIdentity:
         """What the vehicle says it is."""
-        return self._own.identity if self._own is not None else Identity()
+        return self._own.identity if self._own is not None else VehicleIdentity()
 
     @property
     def others(self) -> tuple[int, ...]:
@@ -128,5 +128,5 @@ class Hearing:
         return Pose(position, quat_from_euler(*attitude))
 
     @property
-    def _own(self) -> Said | None:
+    def _own(self) -> LatestSamples | None:
         return None if self.system is None else self._said.get(self.system)

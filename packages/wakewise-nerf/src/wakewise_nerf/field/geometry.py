@@ -11,9 +11,9 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import StageError
 from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.cells import CellMeans
-from wakewise.vision.reconstruction.clouds import Cloud
+from wakewise.vision.reconstruction.clouds import OrientedPointCloud
 from wakewise.vision.reconstruction.fusion import facing_normals, fuse, lonely
-from wakewise.vision.reconstruction.registered_photos import Ball
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise.vision.reconstruction.stereo import DepthMap
 from wakewise_nerf.field.posed import PosedPhoto
 
@@ -73,7 +73,9 @@ def depth_camera(photo: PosedPhoto, depth_px: float) -> DepthCamera | None:
     return DepthCamera(focal_px=focal, centre_px=-low, R_CW=R_CW, p_WC_m=photo.p_WC_m, width=width, height=height)
 
 
-def depth_map(index: int, camera: DepthCamera, distance_m: Array, colours: NDArray[np.uint8], region: Ball) -> DepthMap:
+def depth_map(
+    index: int, camera: DepthCamera, distance_m: Array, colours: NDArray[np.uint8], region: RegionOfInterest
+) -> DepthMap:
     """A rendered view as fusion wants it.
 
     Parameters
@@ -103,7 +105,7 @@ def depth_map(index: int, camera: DepthCamera, distance_m: Array, colours: NDArr
     )
 
 
-def fuse_depth(maps: list[DepthMap], agreeing: int, progress: Progress) -> tuple[Cloud, float]:
+def fuse_depth(maps: list[DepthMap], agreeing: int, progress: Progress) -> tuple[OrientedPointCloud, float]:
     """Points that `agreeing` other maps confirm within a pixel's footprint, thinned and cleaned; and their spacing.
 
     Raises
@@ -130,4 +132,4 @@ def fuse_depth(maps: list[DepthMap], agreeing: int, progress: Progress) -> tuple
     cloud, _ = gathered.means()
     cloud = cloud[~lonely(cloud[:, :3])]
     points, colours, towards = cloud[:, :3], cloud[:, 3:6], cloud[:, 6:]
-    return Cloud(points_m=points, normals=facing_normals(points, towards), colours=colours), spacing
+    return OrientedPointCloud(points_m=points, normals=facing_normals(points, towards), colours=colours), spacing

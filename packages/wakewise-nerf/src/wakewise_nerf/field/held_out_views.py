@@ -13,11 +13,11 @@ from skimage.metrics import structural_similarity
 from wakewise.core.arrays import Array
 from wakewise.core.files import write_bytes
 from wakewise.core.interfaces import Progress
-from wakewise.vision.reconstruction.registered_photos import Ball
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise_nerf.field.posed import PosedPhoto
 from wakewise_nerf.field.rays import origin_in
 from wakewise_nerf.field.rendering import render
-from wakewise_nerf.field.training import Training
+from wakewise_nerf.field.training import TrainingState
 
 # Points that one pass may ask about at most, which bounds memory.
 PASS_POINTS = 2**21
@@ -48,7 +48,7 @@ def ssim(image: Array, truth: Array) -> float:
     return float(value)
 
 
-def draw(training: Training, origin: Any, directions: Any) -> tuple[Array, Array, Array]:
+def draw(training: TrainingState, origin: Any, directions: Any) -> tuple[Array, Array, Array]:
     """Colours (h, w, 3), distance in radii and opacity (h, w) of rays from one place, shape (h, w, 3).
 
     A ray that is no number is drawn black and without distance.
@@ -75,7 +75,7 @@ def draw(training: Training, origin: Any, directions: Any) -> tuple[Array, Array
     )
 
 
-def draw_surface(training: Training, origin: Any, directions: Any) -> tuple[Array, Array]:
+def draw_surface(training: TrainingState, origin: Any, directions: Any) -> tuple[Array, Array]:
     """Colour of the surface that each ray meets, (h, w, 3), and distance in radii, (h, w), 0 where it meets none.
 
     Half the work of `draw`: the colour network is asked once a ray, where half the light is stopped.
@@ -101,7 +101,7 @@ def draw_surface(training: Training, origin: Any, directions: Any) -> tuple[Arra
     return colour.reshape(*shape, 3).double().numpy(), distance.reshape(shape).double().numpy()
 
 
-def _passes(training: Training, origin: Any, directions: Any) -> tuple[Any, Any, Any]:
+def _passes(training: TrainingState, origin: Any, directions: Any) -> tuple[Any, Any, Any]:
     """Rays in one row, shape (n, 3); numbers of those that are rays, in parts that fit into memory; their origin."""
     flat = torch.from_numpy(np.ascontiguousarray(directions.reshape(-1, 3), dtype=np.float32))
     rows = torch.isfinite(flat).all(dim=1).nonzero()[:, 0]
@@ -110,7 +110,7 @@ def _passes(training: Training, origin: Any, directions: Any) -> tuple[Any, Any,
 
 
 def judge(
-    training: Training, photos: tuple[PosedPhoto, ...], region: Ball, folder: Path, progress: Progress
+    training: TrainingState, photos: tuple[PosedPhoto, ...], region: RegionOfInterest, folder: Path, progress: Progress
 ) -> dict[str, Any]:
     """Compare each held-out photo with its render; leave `<name>.png` with the photo left and the render right.
 

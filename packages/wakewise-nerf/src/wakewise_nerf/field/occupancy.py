@@ -17,7 +17,7 @@ LEAST_ALPHA = 0.01
 BATCH = 2**18
 
 
-class Occupancy(torch.nn.Module):
+class OccupancyGrid(torch.nn.Module):
     """Grid of the largest density met of late, `cells` along each side of the contracted cube.
 
     Parameters

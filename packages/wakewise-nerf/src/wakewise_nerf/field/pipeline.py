@@ -15,7 +15,7 @@ from wakewise.core.interfaces import Progress, no_progress
 from wakewise.vision.reconstruction.clouds import write_cloud
 from wakewise.vision.reconstruction.meshing import FIGURES as MESH_FIGURES
 from wakewise.vision.reconstruction.meshing import mesh_points
-from wakewise.vision.reconstruction.registered_photos import Ball
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.stages import StageResult, fingerprint, make_folder, run_stage
 from wakewise_nerf.field.backend import pick_device
@@ -87,15 +87,15 @@ def build_field(
     train_key = fingerprint(VERSION, "train", used, _digest(posed), ball.centre_W_m.tolist(), ball.radius_m)
     checkpoint = out / "checkpoint.pt"
     make_folder(out)
-    held: list[training.Training] = []
+    held: list[training.TrainingState] = []
 
-    def trained() -> training.Training:
+    def trained() -> training.TrainingState:
         """Return the trained field, from the checkpoint where this run did not train it."""
         if not held:
             kept = training.read_checkpoint(checkpoint, where)
             if kept is None or kept["key"] != train_key:
                 raise StageError(f"{checkpoint}: is damaged; remove it and run the same command again")
-            fresh = training.Training(settings, where)
+            fresh = training.TrainingState(settings, where)
             fresh.restore(kept["training"])
             held.append(fresh)
         return held[0]
@@ -182,8 +182,8 @@ def _digest(posed: tuple[PosedPhoto, ...]) -> str:
     return digest.hexdigest()
 
 
-def _ball(region: tuple[Any, float]) -> Ball:
+def _ball(region: tuple[Any, float]) -> RegionOfInterest:
     centre, radius = region
     if not (np.isfinite(radius) and radius > 0.0):
         raise InputError(f"region of interest: radius {radius:g} m, must be above 0")
-    return Ball(centre_W_m=np.asarray(centre, dtype=np.float64), radius_m=float(radius))
+    return RegionOfInterest(centre_W_m=np.asarray(centre, dtype=np.float64), radius_m=float(radius))

@@ -13,7 +13,7 @@ from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.errors import InputError, StageError
 from wakewise.vision.reconstruction.colmap import pycolmap
 from wakewise.vision.reconstruction.photos import decode
-from wakewise.vision.reconstruction.registered_photos import Ball
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
@@ -61,16 +61,20 @@ def read_model(sparse: Path) -> pycolmap.Reconstruction:
         raise InputError(f"{sparse}: is no sparse model that can be read ({reason})") from None
 
 
-def surroundings(model: pycolmap.Reconstruction) -> Ball:
+def surroundings(model: pycolmap.Reconstruction) -> RegionOfInterest:
     """Ball that holds 9 in 10 sparse points, about their median: the region where none is given."""
     points = np.array([point.xyz for point in model.points3D.values()]).reshape(-1, 3)
     if len(points) < 20:
         raise StageError(f"neural field: the sparse model has {len(points)} points, at least 20 must tell the region")
     centre = np.median(points, axis=0)
-    return Ball(centre_W_m=centre, radius_m=1.1 * float(np.percentile(np.linalg.norm(points - centre, axis=1), 90)))
+    return RegionOfInterest(
+        centre_W_m=centre, radius_m=1.1 * float(np.percentile(np.linalg.norm(points - centre, axis=1), 90))
+    )
 
 
-def read_posed(model: pycolmap.Reconstruction, photos: Path, region: Ball, photo_px: int) -> tuple[PosedPhoto, ...]:
+def read_posed(
+    model: pycolmap.Reconstruction, photos: Path, region: RegionOfInterest, photo_px: int
+) -> tuple[PosedPhoto, ...]:
     """Registered photos that see the region, in order of name, each cut to the rectangle about it.
 
     Rays follow the photo's own camera model, so that nothing is resampled to undo a distortion; COLMAP has the centre

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from wakewise.vision.reconstruction.registered_photos import Ball
+from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise_nerf.field.posed import PosedPhoto
 
 
@@ -18,7 +18,7 @@ class RayTable:
     Pixels that the camera model gives no ray to are left out.
     """
 
-    def __init__(self, photos: Sequence[PosedPhoto], region: Ball, device: Any) -> None:
+    def __init__(self, photos: Sequence[PosedPhoto], region: RegionOfInterest, device: Any) -> None:
         directions = [photo.directions_W.reshape(-1, 3) for photo in photos]
         whole = [np.isfinite(d).all(axis=1) for d in directions]
         colours = [photo.colours.reshape(-1, 3)[keep] for photo, keep in zip(photos, whole, strict=True)]
@@ -37,6 +37,6 @@ class RayTable:
         return self.origins[self.photo[rows].long()], self.directions[rows], self.colours[rows].float() / 255.0
 
 
-def origin_in(photo: PosedPhoto, region: Ball) -> np.ndarray[Any, np.dtype[np.float32]]:
+def origin_in(photo: PosedPhoto, region: RegionOfInterest) -> np.ndarray[Any, np.dtype[np.float32]]:
     """Camera centre in radii of the region about its centre, shape (3,)."""
     return ((photo.p_WC_m - region.centre_W_m) / region.radius_m).astype(np.float32)

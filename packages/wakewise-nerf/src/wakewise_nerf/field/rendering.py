@@ -16,7 +16,7 @@ DARKEST = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rendered:
+class RenderedRays:
     """What rays see. colour (n, 3); opacity (n,); depth (n,): where half the light is stopped, along the unit ray in
     radii, 0 where less than half is; points: how many the networks were asked about, of `intervals` that there are.
     """
@@ -82,7 +82,7 @@ def median_depth(density: Any, edges: Any) -> Any:
 
 def render(
     field: Any, occupancy: Any, origins: Any, directions: Any, *, samples: int, jitter: Any = None, colours: bool = True
-) -> Rendered:
+) -> RenderedRays:
     """Colour, opacity and depth of rays.
 
     Parameters
@@ -110,7 +110,7 @@ def render(
         bright = through[rays, columns] > DARKEST
     if not colours:
         opacity = 1.0 - torch.exp(-(known * lengths).sum(dim=1))
-        return Rendered(
+        return RenderedRays(
             colour=None,
             opacity=opacity,
             depth=median_depth(known, edges),
@@ -124,7 +124,7 @@ def render(
     lit = weights[rays, columns, None] * colour_there
     opacity = weights.sum(dim=1)
     colour = torch.zeros_like(origins).index_add(0, rays, lit) + (1.0 - opacity)[:, None] * field.background()
-    return Rendered(
+    return RenderedRays(
         colour=colour,
         opacity=opacity,
         depth=median_depth(density.detach(), edges),

@@ -14,7 +14,7 @@ from wakewise.core.errors import StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import Progress
 from wakewise_nerf.field.field import RadianceField
-from wakewise_nerf.field.occupancy import Occupancy
+from wakewise_nerf.field.occupancy import OccupancyGrid
 from wakewise_nerf.field.rays import RayTable
 from wakewise_nerf.field.rendering import render
 from wakewise_nerf.field.settings import FieldSettings
@@ -29,7 +29,7 @@ WARMUP_COARSENING = 4
 REPORT_EVERY = 20
 
 
-class Training:
+class TrainingState:
     """All that changes while a field learns: field, occupancy, optimiser, step, and rays per step.
 
     Every random draw of a step follows from the seed and the step's number alone, so nothing of it has to be kept.
@@ -39,7 +39,7 @@ class Training:
         self.settings = settings
         self.device = device
         self.field = RadianceField(settings).to(device)
-        self.occupancy = Occupancy(settings.occupancy, 2.0 / settings.samples).to(device)
+        self.occupancy = OccupancyGrid(settings.occupancy, 2.0 / settings.samples).to(device)
         networks = [*self.field.density_network.parameters(), *self.field.colour_network.parameters()]
         # Adam as in the paper: a tiny epsilon, since many entries of the grid see few and small gradients.
         self.optimiser = torch.optim.Adam(
@@ -108,7 +108,7 @@ class Training:
 
 def train(
     table: RayTable, settings: FieldSettings, device: Any, checkpoint: Path, key: str, progress: Progress
-) -> Training:
+) -> TrainingState:
     """Train to the last step, from the checkpoint where it is of the same key.
 
     Parameters
@@ -122,7 +122,7 @@ def train(
         If the loss is no longer finite.
     """
     torch.set_num_threads(settings.threads)
-    training = Training(settings, device)
+    training = TrainingState(settings, device)
     kept = read_checkpoint(checkpoint, device)
     if kept is not None and kept["key"] == key:
         training.restore(kept["training"])

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import Bars, print_json, print_table, shown, write_page
+from wakewise.ui.cli.console import ProgressBars, print_json, print_table, shown, write_page
 from wakewise.ui.cli.options import Json, Preset, Sets, TargetName
 
 Out = Annotated[Path, typer.Option("--out", help="Folder of the study; what is done there is not done again.")]
@@ -42,7 +42,7 @@ def degrade(
 
     changes = overrides(sets, seed=None, vehicle=None, target=target, target_size=None)
     scenario = load_scenario(preset, None, changes)
-    rows = degrade(scenario, out, dict(_levels(word) for word in levels) if levels else None, Bars())
+    rows = degrade(scenario, out, dict(_levels(word) for word in levels) if levels else None, ProgressBars())
     for name in {row["factor"]: None for row in rows}:
         factor = FACTORS[name]
         some = [row for row in rows if row["factor"] == name]

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import Bars, plain, print_json, print_table, shown, write_page
+from wakewise.ui.cli.console import ProgressBars, plain, print_json, print_table, shown, write_page
 from wakewise.ui.cli.options import Json
 
 Names = Annotated[
@@ -88,20 +88,20 @@ def reproduce(
     """
     from wakewise.core.optional_dependencies import need
     from wakewise_paper.reproduction.claim import TABLES
-    from wakewise_paper.reproduction.run import Options
+    from wakewise_paper.reproduction.run import ReproduceOptions
 
     need("wakewise reproduce", "photos", "reports", "logs")
     chosen = list(TABLES) if "all" in names else list(dict.fromkeys(names))
     for name in chosen:
         if name not in TABLES:
             raise InputError(f"table '{name}': not known, allowed: {', '.join(TABLES)}, all")
-    with Bars().stage("reproduce") as progress:
+    with ProgressBars().stage("reproduce") as progress:
         from wakewise_paper.reproduction.run import reproduce as run
 
         tables = run(
             chosen,
             store,
-            Options(
+            ReproduceOptions(
                 trials=trials,
                 budget_s=None if budget is None else seconds("--budget", budget),
                 worlds=_listed(worlds),

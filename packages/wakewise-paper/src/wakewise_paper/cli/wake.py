@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import Bars, print_json, print_table, shown, write_page
+from wakewise.ui.cli.console import ProgressBars, print_json, print_table, shown, write_page
 from wakewise.ui.cli.options import Json, seed_option
 
 Seed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of the split and of the resamples.")]
@@ -38,7 +38,7 @@ def validate(
 
     if out is not None:
         need("--out", "reports")
-    with Bars().stage("validate") as progress:
+    with ProgressBars().stage("validate") as progress:
         result = run(
             ValidationOptions(
                 quick=quick,
@@ -104,13 +104,13 @@ def learn(
     """Train the learned rival on tank and lattice; hold every model against water that none was fitted to."""
     from wakewise.wake.learned import load_network
     from wakewise_paper.learned_wake import evaluation
-    from wakewise_paper.learned_wake.making import Recipe, make
+    from wakewise_paper.learned_wake.making import TrainingRecipe, make
 
-    with Bars().stage("learn") as progress:
+    with ProgressBars().stage("learn") as progress:
         if shipped:
             network = load_network()
         else:
-            network, _ = make(Recipe(draws=draws, steps=steps, seed=seed), out, progress)
+            network, _ = make(TrainingRecipe(draws=draws, steps=steps, seed=seed), out, progress)
         result = evaluation.judge(network, evaluation.held_out(held_out, progress=progress))
     if json:
         print_json(result | {"out": None if out is None else str(out)})
@@ -160,7 +160,7 @@ def calibrate_flight(
     if held:
         result = held_curve(world, seed, minutes)
     else:
-        with Bars().stage("fly") as progress:
+        with ProgressBars().stage("fly") as progress:
             result = curve(CalibrationFlight(world=world, method=method, seed=seed, minutes=minutes), progress)
     if json:
         print_json(result)

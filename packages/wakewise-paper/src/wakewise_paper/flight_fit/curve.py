@@ -21,10 +21,10 @@ from wakewise.scene.missions import Leg, Route
 from wakewise.vision.imaging import PinholeCamera
 from wakewise.wake import RoundJet
 from wakewise_paper.flight_fit.flake_likelihood import FlightFit, fit_flight
-from wakewise_paper.flight_fit.flake_tracks import Sightings, Watcher
+from wakewise_paper.flight_fit.flake_tracks import FlakeObserver, FlakeTracks
 from wakewise_paper.flight_fit.held_vehicle import held_sightings
-from wakewise_paper.learned_wake.evaluation import Score, unit_f
-from wakewise_paper.learned_wake.truth import Drawn, even_parcel_rows
+from wakewise_paper.learned_wake.evaluation import WakeModelScore, unit_f
+from wakewise_paper.learned_wake.truth import SampledWater, even_parcel_rows
 
 MINUTES = (0.5, 1.0, 2.0, 5.0)
 SETTLE_S = 8.0
@@ -73,12 +73,12 @@ def hover_parts(flight: CalibrationFlight) -> Parts:
     return parts.replace(route=route)
 
 
-def watched(flight: CalibrationFlight, progress: Progress = no_progress) -> tuple[Sightings, Parts, Array | None]:
+def watched(flight: CalibrationFlight, progress: Progress = no_progress) -> tuple[FlakeTracks, Parts, Array | None]:
     """What the camera saw on the flight, its parts, and the last current that the filter had."""
     parts = hover_parts(flight)
     rng = np.random.default_rng([flight.seed, 11])
     per_m3 = parts.scenario.imaging.flakes_per_m3
-    watcher = Watcher(camera=camera_of(parts), vehicle=parts.vehicle, rng=rng, per_m3=per_m3)
+    watcher = FlakeObserver(camera=camera_of(parts), vehicle=parts.vehicle, rng=rng, per_m3=per_m3)
     current: list[Array | None] = [None]
 
     def watch(step: Any, witness: Any) -> None:
@@ -95,7 +95,7 @@ def curve(flight: CalibrationFlight, progress: Progress = no_progress) -> dict[s
     began = time.process_time()
     seen, parts, current = watched(flight, progress)
     jets = parts.scenario.tank.jets
-    water = Drawn(half_width_growth=jets.half_width_growth, wake_life=jets.wake_life)
+    water = SampledWater(half_width_growth=jets.half_width_growth, wake_life=jets.wake_life)
     found = _curve(seen, camera_of(parts), parts.vehicle, water, flight.minutes, SETTLE_S, current)
     true_current = [float(v) for v in parts.scenario.tank.current.velocity_m_s]
     told = {"way": flight.method, "world": flight.world, "seed": flight.seed, "true_current_m_s": true_current}
@@ -107,7 +107,7 @@ def held_curve(world: str, seed: int, minutes: float = 5.0) -> dict[str, Any]:
     began = time.process_time()
     parts = Scenario.preset("quick", world=world, seed=seed).parts()
     jets = parts.scenario.tank.jets
-    water = Drawn(half_width_growth=jets.half_width_growth, wake_life=jets.wake_life)
+    water = SampledWater(half_width_growth=jets.half_width_growth, wake_life=jets.wake_life)
     current = np.array(parts.scenario.tank.current.velocity_m_s)
     rng = np.random.default_rng([seed, 13])
     camera, per_m3 = camera_of(parts), parts.scenario.imaging.flakes_per_m3
@@ -124,10 +124,10 @@ def camera_of(parts: Parts) -> PinholeCamera:
 
 
 def _curve(
-    seen: Sightings,
+    seen: FlakeTracks,
     camera: PinholeCamera,
     vehicle: Vehicle,
-    water: Drawn,
+    water: SampledWater,
     minutes: float,
     start_s: float,
     current_m_s: Array | None,
@@ -143,7 +143,7 @@ def _curve(
     }
 
 
-def fit_figures(fit: FlightFit, water: Drawn) -> dict[str, Any]:
+def fit_figures(fit: FlightFit, water: SampledWater) -> dict[str, Any]:
     """A fit as plain values; what is not known is None."""
     error = fit.slope_error
     return {
@@ -159,8 +159,8 @@ def fit_figures(fit: FlightFit, water: Drawn) -> dict[str, Any]:
     }
 
 
-def judged(slope: float, gain: float, water: Drawn) -> dict[str, float]:
+def judged(slope: float, gain: float, water: SampledWater) -> dict[str, float]:
     """How the round jet with these numbers meets an even jet of that water, where a target may be."""
     rows = even_parcel_rows(water, np.random.default_rng(5), instants=3, count=200, judged=True, likes=2)
-    score = Score.of(gain * unit_f(RoundJet(half_width_slope=float(np.clip(slope, 0.05, 0.4))), rows), rows)
+    score = WakeModelScore.of(gain * unit_f(RoundJet(half_width_slope=float(np.clip(slope, 0.05, 0.4))), rows), rows)
     return {"error_share": score.error_share, "factor_of_2_pct": score.factor_of_2_pct}

@@ -33,7 +33,7 @@ from wakewise_paper.flight_fit.flake_tracks import (
     LEAST_COVER,
     LOST_PX,
     PIXEL_NOISE,
-    Sightings,
+    FlakeTracks,
     blur_radius_px,
     cover,
 )
@@ -93,12 +93,12 @@ class _Table:
     axis_m_s: Array
 
 
-def fit_flight(seen: Sightings, camera: Camera, vehicle: Vehicle, current_m_s: Array | None = None) -> FlightFit:
+def fit_flight(seen: FlakeTracks, camera: Camera, vehicle: Vehicle, current_m_s: Array | None = None) -> FlightFit:
     """Calibrate the round jet on what was seen.
 
     Parameters
     ----------
-    seen : Sightings
+    seen : FlakeTracks
     camera : Camera
     vehicle : Vehicle
         As it is believed to be.
@@ -204,7 +204,7 @@ def _errors(table: _Table, at: Array) -> Array:
     return np.asarray(np.where(found > 0.0, np.sqrt(np.maximum(found, 0.0)), np.inf))
 
 
-def _tabulated(seen: Sightings, camera: Camera, vehicle: Vehicle, current_m_s: Array) -> _Table:
+def _tabulated(seen: FlakeTracks, camera: Camera, vehicle: Vehicle, current_m_s: Array) -> _Table:
     n, q = len(seen), len(DEPTHS_M)
     rest, slopes = np.empty((n, q, 2)), np.empty((n, q, 2, 3))
     jets = np.zeros((len(SLOPES), n, q, 4))
@@ -230,7 +230,7 @@ def _tabulated(seen: Sightings, camera: Camera, vehicle: Vehicle, current_m_s: A
 
 
 def _jets(
-    models: list[RoundJet], seen: Sightings, k: int, vehicle: Vehicle, points_W_m: Array, current_m_s: Array
+    models: list[RoundJet], seen: FlakeTracks, k: int, vehicle: Vehicle, points_W_m: Array, current_m_s: Array
 ) -> Array:
     """Water of all jets, bent by a current, and the greatest speed on an axis there, at points, (models, n, 4)."""
     X_WB, m = seen.X_WB[k], len(vehicle.thrusters)

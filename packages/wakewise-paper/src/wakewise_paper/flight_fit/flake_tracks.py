@@ -14,7 +14,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import FlakeCloud, Witness
+from wakewise.core.interfaces import FlakeCloud, TruthProvider
 from wakewise.operation.loop import Step
 from wakewise.robot.vehicles import Vehicle
 from wakewise.vision.imaging.camera import Camera
@@ -41,7 +41,7 @@ PUSHING_S = 3.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sightings:
+class FlakeTracks:
     """Flakes seen twice, n of them in k pairs of frames.
 
     Parameters
@@ -82,11 +82,11 @@ class Sightings:
     def __len__(self) -> int:
         return len(self.blur_px)
 
-    def until(self, time_s: float) -> Sightings:
+    def until(self, time_s: float) -> FlakeTracks:
         """Those of the pairs that began before a time."""
         pairs = int(np.searchsorted(self.times_s, time_s))
         kept = self.pair < pairs
-        return Sightings(
+        return FlakeTracks(
             pair=self.pair[kept],
             first_px=self.first_px[kept],
             moved_px=self.moved_px[kept],
@@ -119,7 +119,7 @@ def _own_radius(camera: Camera, depth_m: Array, size: Array) -> Array:
 
 
 @dataclass
-class Watcher:
+class FlakeObserver:
     """Looks at the flakes through a flight: hand its `watch` to `wakewise.operation.fly`.
 
     Parameters
@@ -142,7 +142,7 @@ class Watcher:
     _clock: list[float] = field(default_factory=list)
     _next_s: float = 0.0
 
-    def watch(self, step: Step, witness: Witness | None) -> None:
+    def watch(self, step: Step, witness: TruthProvider | None) -> None:
         """Take a frame if it is time for one."""
         thrusts = step.command.thrusts_N
         self._pushes.append(np.concatenate([np.maximum(thrusts, 0.0), np.maximum(-thrusts, 0.0)]))
@@ -175,14 +175,14 @@ class Watcher:
         radius = blur_radius_px(self.camera, p_C[inside, 2], looks[inside, 1])
         return looks[inside, 0], noisy, radius + self.rng.normal(0.0, BLUR_NOISE, count)
 
-    def sightings(self) -> Sightings:
+    def sightings(self) -> FlakeTracks:
         """All that was seen twice so far."""
         parts: list[tuple[Array, Array, Array]] = []
         pairs = list(zip(self._frames[:-1:2], self._frames[1::2], strict=True))
         for before, after in pairs:
             parts.append(self._again(before, after))
         counts = [len(part[2]) for part in parts]
-        return Sightings(
+        return FlakeTracks(
             pair=np.repeat(np.arange(len(pairs)), counts),
             first_px=np.concatenate([part[0] for part in parts]),
             moved_px=np.concatenate([part[1] for part in parts]),

@@ -20,10 +20,10 @@ from wakewise.operation.loop import Step
 from wakewise.robot.vehicles import Vehicle
 from wakewise.simulation.tank.flakes import Flakes
 from wakewise.simulation.water import Water
-from wakewise.simulation.water.round_jet_closure import Spreading
+from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.vision.imaging.camera import Camera
-from wakewise_paper.flight_fit.flake_tracks import Sightings, Watcher
-from wakewise_paper.learned_wake.truth import Drawn
+from wakewise_paper.flight_fit.flake_tracks import FlakeObserver, FlakeTracks
+from wakewise_paper.learned_wake.truth import SampledWater
 
 PUSH_S, LEVELS_N = 15.0, (0.3, 0.5, 0.8)
 """How long each push is, and how hard, in turn: harder ones are too fast for the frames, weaker ones bend at once."""
@@ -75,13 +75,13 @@ def bow_jets(vehicle: Vehicle) -> list[tuple[int, float]]:
 def held_sightings(
     vehicle: Vehicle,
     camera: Camera,
-    drawn: Drawn,
+    drawn: SampledWater,
     current_m_s: Array,
     rng: np.random.Generator,
     *,
     minutes: float,
     per_m3: float,
-) -> Sightings:
+) -> FlakeTracks:
     """What the camera sees of so many minutes of pushes; pairs of frames count once a push has gone on for a while."""
     X_WB = Pose(np.array([0.0, 0.0, DEPTH_M]))
     X_WC = X_WB @ vehicle.X_BC_at(0.0)
@@ -93,12 +93,12 @@ def held_sightings(
         rng=rng.spawn(1)[0],
         ambient=ambient,
         turbulence=TURBULENCE,
-        spreading=Spreading.of_width(drawn.half_width_growth),
+        spreading=JetSpreading.of_width(drawn.half_width_growth),
         wake_life=drawn.wake_life,
     )
     middle = X_WC.apply(np.array([[0.0, 0.0, 0.35]]))[0]
     held = _Held(Flakes(middle, BED_M, ambient, rng.spawn(1)[0]), water)
-    watcher = Watcher(camera=camera, vehicle=vehicle, rng=rng.spawn(1)[0], per_m3=per_m3)
+    watcher = FlakeObserver(camera=camera, vehicle=vehicle, rng=rng.spawn(1)[0], per_m3=per_m3)
     origins, axes = X_WB.apply(vehicle.thruster_positions_B_m), vehicle.thruster_axes_B @ X_WB.R.T
     n = len(vehicle.thrusters)
     true_share = rng.uniform(1.0 - THRUST_ERROR, 1.0 + THRUST_ERROR, n)

@@ -21,8 +21,8 @@ from wakewise.wake.learned import CIRCULAR, LearnedWake, shape
 from wakewise.wake.network import EDGES, Network
 from wakewise_paper.learned_wake.truth import (
     DIAMETER_M,
-    Drawn,
-    Rows,
+    SampledWater,
+    TruthSamples,
     even_lattice_rows,
     even_parcel_rows,
     lattice_rows,
@@ -38,7 +38,7 @@ ROOT = math.sqrt(1.0 / FRESH_WATER_KG_M3)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Score:
+class WakeModelScore:
     """How one model meets one truth.
 
     `rmse_mm_s` is of the velocity's two parts, every push scaled so that the greatest thrust remembered is 1 N;
@@ -51,7 +51,7 @@ class Score:
     factor_of_2_pct: float
 
     @classmethod
-    def of(cls, found: Array, rows: Rows) -> Score:
+    def of(cls, found: Array, rows: TruthSamples) -> WakeModelScore:
         """Score of f, shape (n, 2)."""
         unit = ROOT / (DIAMETER_M * (rows.points.away_D + 1.0))
         error = np.linalg.norm(found - rows.f, axis=1) * unit
@@ -67,13 +67,13 @@ class Score:
         )
 
 
-def predictors(network: Network) -> dict[str, Callable[[Rows], Array]]:
+def predictors(network: Network) -> dict[str, Callable[[TruthSamples], Array]]:
     """What each model says of rows, f of shape (n, 2), by the name it has in the table."""
 
-    def memoryless(model: WakeModel) -> Callable[[Rows], Array]:
+    def memoryless(model: WakeModel) -> Callable[[TruthSamples], Array]:
         return lambda rows: unit_f(model, rows) * np.sqrt(rows.now)[:, None]
 
-    def true_width(rows: Rows) -> Array:
+    def true_width(rows: TruthSamples) -> Array:
         if not math.isfinite(rows.half_width_growth):
             return np.full((len(rows), 2), math.nan)
         return memoryless(RoundJet(half_width_slope=rows.half_width_growth))(rows)
@@ -86,7 +86,7 @@ def predictors(network: Network) -> dict[str, Callable[[Rows], Array]]:
     return found
 
 
-def unit_f(model: WakeModel, rows: Rows) -> Array:
+def unit_f(model: WakeModel, rows: TruthSamples) -> Array:
     """Values of f at an even push, shape (n, 2), as a wake model has it."""
     at = DIAMETER_M * np.stack([rows.points.x_D, rows.points.r_D, np.zeros(len(rows))], axis=1)
     area = np.array([0.25 * math.pi * DIAMETER_M**2])
@@ -94,13 +94,13 @@ def unit_f(model: WakeModel, rows: Rows) -> Array:
     return np.asarray(unit * (DIAMETER_M * (rows.points.away_D + 1.0) / ROOT)[:, None])
 
 
-def held_out(draws: int, lattice: bool = True, progress: Progress = no_progress) -> dict[str, list[Rows]]:
+def held_out(draws: int, lattice: bool = True, progress: Progress = no_progress) -> dict[str, list[TruthSamples]]:
     """Truth that was not trained on, by the name it has in the table; a few minutes of a core with the lattice."""
-    found: dict[str, list[Rows]] = {"parcels, even": [], "parcels, drawn pushes": []}
+    found: dict[str, list[TruthSamples]] = {"parcels, even": [], "parcels, drawn pushes": []}
     for k in range(draws):
         progress(k, draws + 1, "parcels")
         rng = np.random.default_rng([TEST_SEED, k])
-        water = Drawn.of(rng)
+        water = SampledWater.of(rng)
         found["parcels, even"].append(even_parcel_rows(water, rng, count=200, judged=True, likes=2))
         found["parcels, drawn pushes"].append(parcel_rows(water, rng, judged=True, likes=2))
     rng = np.random.default_rng([TEST_SEED, draws])
@@ -111,16 +111,16 @@ def held_out(draws: int, lattice: bool = True, progress: Progress = no_progress)
     return found
 
 
-def _judged(rows: Rows) -> Rows:
+def _judged(rows: TruthSamples) -> TruthSamples:
     """Those rows that lie where a target may: 0.2 m and more from the disk, within 30 degrees of the axis."""
     points = rows.points
     chosen = (points.away_D > 0.2 / DIAMETER_M) & (points.x_D > math.cos(math.pi / 6) * points.away_D)
     return taken(rows, chosen)
 
 
-def taken(rows: Rows, chosen: BoolArray) -> Rows:
+def taken(rows: TruthSamples, chosen: BoolArray) -> TruthSamples:
     """Some of the rows."""
-    return Rows(
+    return TruthSamples(
         source=rows.source,
         points=type(rows.points)(x_D=rows.points.x_D[chosen], r_D=rows.points.r_D[chosen]),
         history=rows.history[chosen],
@@ -131,18 +131,18 @@ def taken(rows: Rows, chosen: BoolArray) -> Rows:
     )
 
 
-def judge(network: Network, truths: dict[str, list[Rows]]) -> dict[str, Any]:
+def judge(network: Network, truths: dict[str, list[TruthSamples]]) -> dict[str, Any]:
     """Scores of every model on every truth: means over its draws, and the least and the greatest share of error."""
     table: dict[str, Any] = {}
     for truth, draws in truths.items():
         table[truth] = {}
         for name, predict in predictors(network).items():
-            scores = [Score.of(found, rows) for rows in draws if np.isfinite(found := predict(rows)).all()]
+            scores = [WakeModelScore.of(found, rows) for rows in draws if np.isfinite(found := predict(rows)).all()]
             table[truth][name] = _means(scores)
     return {"scores": table, "circular": CIRCULAR, "weights": network.size, "bins": len(EDGES) - 1}
 
 
-def _means(scores: list[Score]) -> dict[str, Any]:
+def _means(scores: list[WakeModelScore]) -> dict[str, Any]:
     if not scores:
         return {"rmse_mm_s": None, "error_share": None, "factor_of_2_pct": None, "why": "nobody set this water's width"}
     shares = [score.error_share for score in scores]

@@ -12,8 +12,8 @@ from wakewise.wake.learned import CIRCULAR, save_network
 from wakewise.wake.network import Network
 from wakewise_paper.learned_wake.training import Batch, train
 from wakewise_paper.learned_wake.truth import (
-    Drawn,
-    Rows,
+    SampledWater,
+    TruthSamples,
     even_lattice_rows,
     even_parcel_rows,
     lattice_rows,
@@ -25,7 +25,7 @@ SHARES = {"parcels": 0.4, "parcels, even": 0.25, "lattice": 0.15, "lattice, even
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recipe:
+class TrainingRecipe:
     """How much is computed: draws of the tank's water, steps of Adam, and whether the lattice runs."""
 
     draws: int = 60
@@ -34,13 +34,13 @@ class Recipe:
     seed: int = 0
 
 
-def training_rows(recipe: Recipe, progress: Progress = no_progress) -> dict[str, list[Rows]]:
+def training_rows(recipe: TrainingRecipe, progress: Progress = no_progress) -> dict[str, list[TruthSamples]]:
     """Truth to train on, by the names of `SHARES`."""
-    found: dict[str, list[Rows]] = {name: [] for name in SHARES}
+    found: dict[str, list[TruthSamples]] = {name: [] for name in SHARES}
     for k in range(recipe.draws):
         progress(k, recipe.draws + 1, "parcels")
         rng = np.random.default_rng([recipe.seed, k])
-        water = Drawn.of(rng)
+        water = SampledWater.of(rng)
         found["parcels"].append(parcel_rows(water, rng, instants=40))
         found["parcels, even"].append(even_parcel_rows(water, rng))
     rng = np.random.default_rng([recipe.seed, recipe.draws])
@@ -51,7 +51,9 @@ def training_rows(recipe: Recipe, progress: Progress = no_progress) -> dict[str,
     return found
 
 
-def make(recipe: Recipe, out: Path | None = None, progress: Progress = no_progress) -> tuple[Network, list[float]]:
+def make(
+    recipe: TrainingRecipe, out: Path | None = None, progress: Progress = no_progress
+) -> tuple[Network, list[float]]:
     """Train a network, write it if told where, and return it with the losses of its training."""
     rows = training_rows(recipe, progress)
     parts, shares = [], []

@@ -15,7 +15,7 @@ from wakewise.core.arrays import Array, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.wake.network import Network
-from wakewise_paper.learned_wake.truth import Rows
+from wakewise_paper.learned_wake.truth import TruthSamples
 
 SOFT = 0.3
 """Of f, whose greatest is about 7: errors of what is weaker count as they are, of what is stronger by their share."""
@@ -32,7 +32,7 @@ class Batch:
     weights: Array
 
     @classmethod
-    def of(cls, parts: Sequence[Rows], shares: Sequence[float]) -> Batch:
+    def of(cls, parts: Sequence[TruthSamples], shares: Sequence[float]) -> Batch:
         """Rows of several truths, each of which has a share of all weight, spread over its rows.
 
         An error counts over SOFT and the true speed's size together: a mean of squares alone would fit the core only.

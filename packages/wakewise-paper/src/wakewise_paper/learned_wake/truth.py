@@ -15,9 +15,9 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.simulation.lattice import CASES, Case, DiskJet, LatticeRun, load_mean_field
+from wakewise.simulation.lattice import CASES, DiskJet, LatticeCase, LatticeRun, load_mean_field
 from wakewise.simulation.water import Water
-from wakewise.simulation.water.round_jet_closure import Spreading
+from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.wake.learned import MEMORY_S
 from wakewise.wake.network import EDGES, JetPoints, history_bins, remembered
 
@@ -35,7 +35,7 @@ _DEVELOPED = 3.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rows:
+class TruthSamples:
     """Samples of one truth, n of them.
 
     Parameters
@@ -68,14 +68,14 @@ class Rows:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drawn:
+class SampledWater:
     """A water of the tank: width of its jets and life of its wakes."""
 
     half_width_growth: float
     wake_life: float
 
     @classmethod
-    def of(cls, rng: np.random.Generator) -> Drawn:
+    def of(cls, rng: np.random.Generator) -> SampledWater:
         """As a world draws it."""
         return cls(half_width_growth=float(rng.uniform(*WIDTHS)), wake_life=float(rng.uniform(*LIVES)))
 
@@ -110,7 +110,7 @@ def judged_points(rng: np.random.Generator, count: int) -> JetPoints:
 
 
 def parcel_rows(
-    drawn: Drawn,
+    drawn: SampledWater,
     rng: np.random.Generator,
     *,
     duration_s: float = 45.0,
@@ -118,7 +118,7 @@ def parcel_rows(
     count: int = 60,
     judged: bool = False,
     likes: int = 1,
-) -> Rows:
+) -> TruthSamples:
     """Samples of the tank's water under a drawn history of one thruster, at drawn instants.
 
     `likes` waters that differ in their gusts alone are averaged.
@@ -133,8 +133,14 @@ def parcel_rows(
 
 
 def even_parcel_rows(
-    drawn: Drawn, rng: np.random.Generator, *, instants: int = 4, count: int = 400, judged: bool = False, likes: int = 1
-) -> Rows:
+    drawn: SampledWater,
+    rng: np.random.Generator,
+    *,
+    instants: int = 4,
+    count: int = 400,
+    judged: bool = False,
+    likes: int = 1,
+) -> TruthSamples:
     """Samples of the tank's water about a jet that has pushed evenly for long."""
     thrust = 1.0
     root = math.sqrt(thrust / FRESH_WATER_KG_M3)
@@ -151,7 +157,7 @@ def even_parcel_rows(
     return _even(points, f, "parcels", drawn.half_width_growth)
 
 
-def even_lattice_rows(case: str, rng: np.random.Generator, count: int, *, judged: bool = False) -> Rows:
+def even_lattice_rows(case: str, rng: np.random.Generator, count: int, *, judged: bool = False) -> TruthSamples:
     """Samples of the lattice's mean jet, within the box that was computed and a diameter behind the disk."""
     table = load_mean_field(case)
     points = (judged_points if judged else drawn_points)(rng, 4 * count)
@@ -173,7 +179,7 @@ LATTICE_HISTORIES = {
 """From, until (D / U0) and thrust over the unit of the lattice's two histories; the second is not trained on."""
 
 
-def lattice_case(which: str, cells_per_D: int = 6) -> Case:
+def lattice_case(which: str, cells_per_D: int = 6) -> LatticeCase:
     """The open box of the lattice's free jet with one of the histories."""
     free = CASES["free"]
     jets = tuple(DiskJet(start=a, stop=b, strength=s) for a, b, s in LATTICE_HISTORIES[which])
@@ -182,7 +188,7 @@ def lattice_case(which: str, cells_per_D: int = 6) -> Case:
 
 def lattice_rows(
     which: str, rng: np.random.Generator, *, count: int = 150, cells_per_D: int = 6, progress: Progress = no_progress
-) -> Rows:
+) -> TruthSamples:
     """Samples of a lattice's run under one of the histories, each a mean round the axis; a minute or two of a core."""
     case = lattice_case(which, cells_per_D)
     starts = np.array([a for a, _, _ in LATTICE_HISTORIES[which]])
@@ -195,7 +201,7 @@ def lattice_rows(
 
 
 def _lattice_instants(
-    case: Case, rng: np.random.Generator, count: int, until: float
+    case: LatticeCase, rng: np.random.Generator, count: int, until: float
 ) -> Iterator[tuple[float, JetPoints, Array]]:
     run = LatticeRun(case)
     reach = case.high_D[0] - case.sponge_D
@@ -228,14 +234,19 @@ def _stepped(pushes: tuple[tuple[float, float, float], ...]) -> tuple[Array, Arr
 
 
 def _mean_run(
-    drawn: Drawn, times: Array, thrusts: Array, asked: Array, places: list[JetPoints], rngs: list[np.random.Generator]
+    drawn: SampledWater,
+    times: Array,
+    thrusts: Array,
+    asked: Array,
+    places: list[JetPoints],
+    rngs: list[np.random.Generator],
 ) -> Array:
     """Mean over waters that differ in their gusts, as `_run`."""
     return np.asarray(np.mean([_run(drawn, times, thrusts, asked, places, rng) for rng in rngs], axis=0))
 
 
 def _run(
-    drawn: Drawn, times: Array, thrusts: Array, asked: Array, places: list[JetPoints], rng: np.random.Generator
+    drawn: SampledWater, times: Array, thrusts: Array, asked: Array, places: list[JetPoints], rng: np.random.Generator
 ) -> Array:
     """Velocity along and across, shape (instants, n, 2), of the tank's water about one thruster at the origin."""
     water = Water(
@@ -244,7 +255,7 @@ def _run(
         bed_z_m=math.inf,
         rng=rng,
         turbulence=TURBULENCE,
-        spreading=Spreading.of_width(drawn.half_width_growth),
+        spreading=JetSpreading.of_width(drawn.half_width_growth),
         wake_life=drawn.wake_life,
     )
     origin, force_axis = np.zeros((1, 3)), np.array([[-1.0, 0.0, 0.0]])
@@ -294,8 +305,8 @@ def _rows(
     return _Part(points, history, np.full(len(velocity), thrusts[row] / greatest), velocity / scale[:, None])
 
 
-def _joined(parts: list[_Part], source: str, steady: bool, width: float) -> Rows:
-    return Rows(
+def _joined(parts: list[_Part], source: str, steady: bool, width: float) -> TruthSamples:
+    return TruthSamples(
         source=source,
         points=_stacked([part.points for part in parts]),
         history=np.concatenate([part.history for part in parts]),
@@ -306,9 +317,9 @@ def _joined(parts: list[_Part], source: str, steady: bool, width: float) -> Rows
     )
 
 
-def _even(points: JetPoints, f: Array, source: str, width: float) -> Rows:
+def _even(points: JetPoints, f: Array, source: str, width: float) -> TruthSamples:
     even = np.ones((len(f), len(EDGES) - 1))
-    return Rows(
+    return TruthSamples(
         source=source, points=points, history=even, now=np.ones(len(f)), f=f, steady=True, half_width_growth=width
     )
 

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from wakewise.control.intent import PAPER_W_TRACK
-from wakewise.experiments.campaigns import Processes
+from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import load_scenario
 from wakewise.operation.worlds.library import load_world
 from wakewise_paper import flight_batches
-from wakewise_paper.flight_batches import Failure, Key
+from wakewise_paper.flight_batches import FlightFailure, Key
 from wakewise_paper.flight_store import FLIES, FlightStore, store_folder
 from wakewise_paper.operator_study import paper
 from wakewise_paper.operator_study.figures import Flights, Known, sliced, table
@@ -51,7 +51,7 @@ ELSEWHERE = {
     "coverage_ms_per_photo": "the coverage guide is not timed by this bench",
 }
 
-_engine = Processes
+_engine = ProcessExecutor
 _FLY, _FLY_PAPER = "wakewise_paper.operator_study.flight:fly_trial", "wakewise_paper.operator_study.paper:fly_trial"
 
 
@@ -73,7 +73,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     rows, failures, kept = flight_batches.fly_all(trials, _FLY, store, options, _engine)
     own = paper.paper_trials(w_tracks, min(options.seeds, paper.SEEDS))
     papers, lost, known = flight_batches.fly_all(own, _FLY_PAPER, store, options, _engine)
-    told = Told(trials, rows, failures)
+    told = OperatorBenchResults(trials, rows, failures)
     default = load_scenario("quick", None, {}).world
     tables = {name: world_figures(name, w_tracks, told) for name in worlds}
     answer: dict[str, Any] = {
@@ -98,10 +98,12 @@ def run(options: BenchOptions) -> dict[str, Any]:
     return answer
 
 
-class Told:
+class OperatorBenchResults:
     """Rows of the bench by method, w_track and flight."""
 
-    def __init__(self, trials: Mapping[Key, OperatorTrial], rows: Mapping[Key, Row], failures: list[Failure]) -> None:
+    def __init__(
+        self, trials: Mapping[Key, OperatorTrial], rows: Mapping[Key, Row], failures: list[FlightFailure]
+    ) -> None:
         self._rows: dict[str, dict[Known, Row]] = {}
         self._lost: dict[str, set[Known]] = {}
         gone = {(failure.flow, failure.name, failure.seed) for failure in failures}
@@ -150,7 +152,7 @@ class Told:
         return table(here(self.of(method, w_track)), here(self.of(DIRECT)), self.trims, frozenset(lost))
 
 
-def world_figures(name: str, w_tracks: tuple[float, ...], told: Told) -> dict[str, Any]:
+def world_figures(name: str, w_tracks: tuple[float, ...], told: OperatorBenchResults) -> dict[str, Any]:
     """Tables of one world: by w_track ours, each pilot's alone and `unaware`; the bow rule once.
 
     `grid` is over the flights that all w_tracks have, for holding one w_track against another.
@@ -165,7 +167,7 @@ def world_figures(name: str, w_tracks: tuple[float, ...], told: Told) -> dict[st
     return {"title": load_world(name).file.title, "w_track": sweep, RULE: told.table(RULE, PAPER_W_TRACK, name)}
 
 
-def claim(worlds: tuple[str, ...], told: Told) -> dict[str, Any]:
+def claim(worlds: tuple[str, ...], told: OperatorBenchResults) -> dict[str, Any]:
     """All worlds and both pilots together at the paper's w_track, against the bars; rivals, pilots, courses beside."""
     ours = told.table(OURS, PAPER_W_TRACK)
     deviation, wash, D = (

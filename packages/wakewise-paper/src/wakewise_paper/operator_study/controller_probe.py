@@ -18,7 +18,7 @@ DEEPEST = 6
 
 
 @dataclass(eq=False)
-class Overheard:
+class ControllerProbe:
     """A controller, and what was asked of it and what its plan expects at the last step; implements `Controller`.
 
     `asked_W_m_s`, shape (3,); `planned_W_m_s`, shape (3,), None where nothing is planned.

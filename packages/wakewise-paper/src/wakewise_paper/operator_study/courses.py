@@ -57,7 +57,7 @@ class Course:
 
 
 @dataclass(frozen=True, eq=False)
-class CourseHands:
+class CourseInput:
     """A `ControlSource` that flies a course; `share` is what full stick asks for, of the fastest."""
 
     course: Course

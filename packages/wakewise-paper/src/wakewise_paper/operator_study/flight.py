@@ -12,18 +12,18 @@ from wakewise.allocation import disturbance_of
 from wakewise.control.intent import FULL_M_S, PAPER_W_TRACK
 from wakewise.control.spare import watching
 from wakewise.core.arrays import Array
-from wakewise.core.interfaces import BodyState, Witness
+from wakewise.core.interfaces import BodyState, TruthProvider
 from wakewise.operation import Parts, Scenario, fly
 from wakewise.operation.loop import Step
 from wakewise.operation.teleop.assist_modes import level_frame
 from wakewise.operation.teleop.assisted import AssistedPilot, assisted_pilot
 from wakewise.operation.teleop.input import ControlSource
-from wakewise.operation.teleop.operator_state import Desk, DeskState
-from wakewise.operation.teleop.simulated_operator import PersonsHands
+from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
+from wakewise.operation.teleop.simulated_operator import SimulatedOperatorInput
 from wakewise.scene.missions import SETTLING, RoutePilot
 from wakewise.vision.evaluation import flight_figures
-from wakewise_paper.operator_study.controller_probe import Overheard
-from wakewise_paper.operator_study.courses import COURSES, SQUARE, CourseHands, look_route, operator_route, start_pose
+from wakewise_paper.operator_study.controller_probe import ControllerProbe
+from wakewise_paper.operator_study.courses import COURSES, SQUARE, CourseInput, look_route, operator_route, start_pose
 from wakewise_paper.operator_study.worlds import water_of
 from wakewise_paper.wash_reduction.paper import WATER_EVERY_S
 from wakewise_paper.wash_reduction.routes import SETTLE_S
@@ -92,7 +92,7 @@ def course_of(trial: OperatorTrial) -> str:
 
 
 def parts_of(trial: OperatorTrial) -> Parts:
-    """Parts of the flight: the assisted pilot under script or person, and the method itself, `Overheard`."""
+    """Parts of the flight: the assisted pilot under script or person, and the method itself, `ControllerProbe`."""
     water = water_of(trial.world, trial.seed)
     parts = Scenario.preset("quick", method=trial.method, **water.fields).parts()
     course, target = COURSES[course_of(trial)], parts.found_target
@@ -100,7 +100,7 @@ def parts_of(trial: OperatorTrial) -> Parts:
     dt_s, hands = 1.0 / parts.control.rate_hz, None
     if trial.pilot == "human":
         parts = parts.replace(route=look_route(target.centre_W_m, water.azimuth_rad, standoff_m))
-        hands = PersonsHands(
+        hands = SimulatedOperatorInput(
             wish=RoutePilot(route=parts.route, aim=parts.aim),
             X_BC=parts.vehicle.X_BC,
             target_W_m=target.centre_W_m,
@@ -111,10 +111,10 @@ def parts_of(trial: OperatorTrial) -> Parts:
         X_WB = start_pose(course, target, water.azimuth_rad, standoff_m, parts.vehicle.X_BC)
         route = operator_route(target.centre_W_m, course.duration_s)
         parts = parts.replace(start=BodyState(X_WB=X_WB), route=route)
-    begin = DeskState(mode="operator", w_track=trial.w_track, watch_target=course.watches)
-    source: ControlSource = hands or CourseHands(course, begin.share)
-    parts = parts.replace(pilot=assisted_pilot(parts, source, Desk(begin), begin))
-    return parts.replace(controller=Overheard(parts.controller))
+    begin = OperatorSettings(mode="operator", w_track=trial.w_track, watch_target=course.watches)
+    source: ControlSource = hands or CourseInput(course, begin.share)
+    parts = parts.replace(pilot=assisted_pilot(parts, source, OperatorState(begin), begin))
+    return parts.replace(controller=ControllerProbe(parts.controller))
 
 
 def fly_trial(trial: OperatorTrial) -> dict[str, float | None]:
@@ -122,7 +122,7 @@ def fly_trial(trial: OperatorTrial) -> dict[str, float | None]:
     began = time.process_time()
     parts = parts_of(trial)
     heard, pilot = parts.controller, parts.pilot
-    assert isinstance(heard, Overheard)
+    assert isinstance(heard, ControllerProbe)
     assert isinstance(pilot, AssistedPilot)
     # One yardstick for all methods: what the levers know, in the current that the estimator finds.
     watch = watching(parts.vehicle, parts.region, parts.wake, parts.control)
@@ -131,7 +131,7 @@ def fly_trial(trial: OperatorTrial) -> dict[str, float | None]:
     solve_ms: list[float] = []
     every = round(DISTURBANCE_EVERY_S * parts.control.rate_hz)
 
-    def listen(step: Step, witness: Witness | None) -> None:  # noqa: ARG001
+    def listen(step: Step, witness: TruthProvider | None) -> None:  # noqa: ARG001
         if step.time_s < SETTLE_S or step.truth is None or heard.asked_W_m_s is None:
             return
         state = step.truth.state

@@ -20,16 +20,16 @@ import numpy as np
 from wakewise.control import ControlSettings, LeverSettings, make_controller
 from wakewise.control.intent import PAPER_W_TRACK, Intent, goal_of, moved_on, obeying, slewed
 from wakewise.core.arrays import Array
-from wakewise.core.interfaces import BodyState, Goal, Witness
+from wakewise.core.interfaces import BodyState, Goal, TruthProvider
 from wakewise.operation import Scenario, fly
 from wakewise.operation.loop import Step
-from wakewise.operation.worlds.quasi_steady_world import InstantWorld, paper_jets
+from wakewise.operation.worlds.quasi_steady_world import QuasiSteadyWorld, paper_jets
 from wakewise.robot.vehicles import load_vehicle, perturbed
 from wakewise.scene.missions import open_route
 from wakewise.simulation.tank import TankSettings
-from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
+from wakewise.wake import InfluenceModel, WakeSettings, disturbance, wake_model
 from wakewise_paper.flight_batches import Key
-from wakewise_paper.operator_study.controller_probe import Overheard
+from wakewise_paper.operator_study.controller_probe import ControllerProbe
 from wakewise_paper.operator_study.flight import deviations
 from wakewise_paper.wash_reduction.figures import Row
 from wakewise_paper.wash_reduction.paper import OFF, PAPER_WAKE, paper_place
@@ -72,7 +72,7 @@ PAPER_COURSES = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class PaperTrial:
+class PaperOperatorTrial:
     """One flight there; hashable, so that it can be handed to a worker."""
 
     course: str
@@ -105,10 +105,10 @@ class ScriptedOperator:
         return goal_of(Intent(velocity_W_m_s=self.velocity_W, watch_W_m=self.watch_W_m), self.place_W)
 
 
-def paper_trials(w_tracks: tuple[float, ...], seeds: int) -> dict[Key, PaperTrial]:
+def paper_trials(w_tracks: tuple[float, ...], seeds: int) -> dict[Key, PaperOperatorTrial]:
     """Flights to make, seed by seed; `dp`, which has no w_track, once a seed."""
     trials = [
-        PaperTrial(course=course, method=method, seed=seed, w_track=w_track)
+        PaperOperatorTrial(course=course, method=method, seed=seed, w_track=w_track)
         for seed in range(1, seeds + 1)
         for course in PAPER_COURSES
         for method, weights in ((DIRECT, (PAPER_W_TRACK,)), (OURS, w_tracks), (UNAWARE, w_tracks))
@@ -150,7 +150,7 @@ def _mean(rows: list[Row], key: str) -> float | None:
     return float(np.mean(known)) if known else None
 
 
-def fly_trial(trial: PaperTrial) -> dict[str, float | None]:
+def fly_trial(trial: PaperOperatorTrial) -> dict[str, float | None]:
     """Figures of one flight, from the end of rest on."""
     began = time.process_time()
     course, seed = PAPER_COURSES[trial.course], trial.seed
@@ -173,7 +173,7 @@ def fly_trial(trial: PaperTrial) -> dict[str, float | None]:
     rest = Intent(velocity_W_m_s=np.zeros(3), watch_W_m=watch)
     here = goal_of(rest, target.centre_W_m + np.array(course.from_target_m))
     start = BodyState(X_WB=here.X_WB)
-    world = InstantWorld(
+    world = QuasiSteadyWorld(
         name="paper",
         jets=paper_jets(),
         vehicle=true,
@@ -183,13 +183,13 @@ def fly_trial(trial: PaperTrial) -> dict[str, float | None]:
         draw=lambda: np.random.default_rng([seed, 13]).spawn(2)[1],
     )
     pilot = ScriptedOperator(course, watch, here, 1.0 / control.rate_hz)
-    controller = Overheard(make_controller(trial.method, vehicle, region, wake_model(control.wake), control))
-    view = WakeView.of(vehicle, region, wake_model(WakeSettings(**PAPER_WAKE)))
+    controller = ControllerProbe(make_controller(trial.method, vehicle, region, wake_model(control.wake), control))
+    view = InfluenceModel.of(vehicle, region, wake_model(WakeSettings(**PAPER_WAKE)))
     velocities: list[tuple[Array, Array, Array]] = []
     D: list[float] = []
     speed: list[float] = []
 
-    def record(step: Step, witness: Witness | None) -> None:
+    def record(step: Step, witness: TruthProvider | None) -> None:
         if step.time_s < HOLD_S or step.truth is None or witness is None:
             return
         state, asked, planned = step.truth.state, pilot.velocity_W, controller.planned_W_m_s

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.operation.randomization import Draw
+from wakewise.operation.randomization import FieldDistribution
 from wakewise.operation.worlds.library import load_world, world_names
 from wakewise_paper.wash_reduction.strata import Side, current_W_m_s, stratum
 
@@ -28,7 +28,7 @@ SEEDS_EACH = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Water:
+class OperatorWorld:
     """What a seed of a world is, beside what its own seed draws.
 
     `trim_N` is the buoyancy beyond the believed one; `course_number` counts the courses of a script from 0. `side` is
@@ -51,7 +51,7 @@ class Water:
         return told if self.current_W_m_s is None else told | {CURRENT: self.current_W_m_s}
 
 
-def water_of(name: str, seed: int) -> Water:
+def water_of(name: str, seed: int) -> OperatorWorld:
     """The water of a seed, from 1, of a world of the library.
 
     Raises
@@ -74,7 +74,7 @@ def water_of(name: str, seed: int) -> Water:
     current = None
     if flows is not None and flows.level is not None:
         current = current_W_m_s(side, azimuth, float(rng("current").uniform(*flows.level)), rng("side"))
-    return Water(
+    return OperatorWorld(
         world=name,
         seed=own,
         azimuth_rad=azimuth,
@@ -86,6 +86,6 @@ def water_of(name: str, seed: int) -> Water:
     )
 
 
-def _range(drawn: Draw | None) -> tuple[float, float]:
+def _range(drawn: FieldDistribution | None) -> tuple[float, float]:
     """Of a world's trim: what it draws from, else the default of the plant."""
     return (-TRIM_RANGE_N, TRIM_RANGE_N) if drawn is None or drawn.between is None else drawn.between

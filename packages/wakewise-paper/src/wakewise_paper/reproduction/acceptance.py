@@ -5,23 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from wakewise.experiments.campaigns.summary import Glance, Measure, Place, glance
+from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place, glance
 
 JUDGED = {
-    "dynamic": Measure("rmse_mm", "mm RMSE", 1.0, True),
-    "success": Measure("success", "% of models", 100.0, False),
-    "station": Measure("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
-    "ablation": Measure("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
-    "sediment": Measure("rmse_mm", "mm RMSE", 1.0, True),
-    "flow": Measure("piv_speed_m_s", "mm/s by PIV", 1e3, True),
-    "field": Measure("rmse_mm", "mm RMSE", 1.0, True),
-    "operator": Measure("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
-    "comparison": Measure("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
+    "dynamic": ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True),
+    "success": ComparisonMetric("success", "% of models", 100.0, False),
+    "station": ComparisonMetric("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
+    "ablation": ComparisonMetric("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
+    "sediment": ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True),
+    "flow": ComparisonMetric("piv_speed_m_s", "mm/s by PIV", 1e3, True),
+    "field": ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True),
+    "operator": ComparisonMetric("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
+    "comparison": ComparisonMetric("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
 }
 """By table what it is judged by."""
 
 
-def glances(table: str, places: Sequence[Place]) -> list[Glance]:
+def glances(table: str, places: Sequence[Place]) -> list[MethodSummary]:
     """One for each world of a table, over the trials that all of its methods have; none of tables without methods."""
     if table not in JUDGED:
         return []

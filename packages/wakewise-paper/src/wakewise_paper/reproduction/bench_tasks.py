@@ -24,7 +24,7 @@ def operator_one(settings: Mapping[str, Any], folder: Path, progress: Progress) 
     """
     told = dict(settings)
     if told.pop("world") == "paper":
-        found = paper.fly_trial(paper.PaperTrial(**told))
+        found = paper.fly_trial(paper.PaperOperatorTrial(**told))
     else:
         found = fly_trial(OperatorTrial(world=settings["world"], **told))
     return {key: found.get(key) for key in (*_TOLD, "cpu_s")}

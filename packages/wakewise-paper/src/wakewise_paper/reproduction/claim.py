@@ -38,7 +38,7 @@ ORDER = ("manual", "unaware", "smooth", "wake-aware")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Claim:
+class PublishedFigure:
     """One figure of a table.
 
     Parameters
@@ -101,19 +101,19 @@ SUCCESS = "rmse below 3 mm and completeness above 85 %"
 """What counts as a success."""
 
 
-def model_claims(paper_rmse: dict[str, float | None], paper_complete: dict[str, float | None]) -> list[Claim]:
+def model_claims(paper_rmse: dict[str, float | None], paper_complete: dict[str, float | None]) -> list[PublishedFigure]:
     """RMSE, failed trials left out and counted as 20 mm, and completeness of each method.
 
     Only ours is held against the paper's: a rival that is better here than there meets no claim.
     """
-    claims: list[Claim] = []
+    claims: list[PublishedFigure] = []
     for method, value in paper_rmse.items():
         said = UNQUOTED if value is None else f"RMSE {value:g} mm"
         judged = value is not None and method == OURS
         for itt in (False, True):
             words = "RMSE, failed trials 20 mm" if itt else "RMSE of models that were made"
             claims.append(
-                Claim(
+                PublishedFigure(
                     method=method,
                     figure="rmse_mm",
                     title=words,
@@ -128,7 +128,7 @@ def model_claims(paper_rmse: dict[str, float | None], paper_complete: dict[str, 
             )
         share = paper_complete.get(method)
         claims.append(
-            Claim(
+            PublishedFigure(
                 method=method,
                 figure="completeness_pct",
                 title="completeness",
@@ -152,9 +152,9 @@ def less(
     *,
     asked: float | None = None,
     method: str = "wake-aware",
-) -> Claim:
+) -> PublishedFigure:
     """How much less a figure is than another method's, in percent."""
-    return Claim(
+    return PublishedFigure(
         method=method,
         figure=figure,
         title=f"{title}, less than {than}",
@@ -169,10 +169,10 @@ def less(
     )
 
 
-def washes(methods: tuple[str, ...]) -> list[Claim]:
+def washes(methods: tuple[str, ...]) -> list[PublishedFigure]:
     """The wash itself, whose size says whether there is anything to take away."""
     return [
-        Claim(
+        PublishedFigure(
             method=method,
             figure="target_speed_mean_m_s",
             title="wash at the target",

@@ -6,7 +6,7 @@ methods of this package, and ways to stir less that need no such method.
 
 from __future__ import annotations
 
-from wakewise_paper.reproduction.claim import UNQUOTED, Claim
+from wakewise_paper.reproduction.claim import UNQUOTED, PublishedFigure
 from wakewise_paper.reproduction.table_trials import APPROACHES, COMPARED
 
 COLUMNS = (
@@ -22,10 +22,10 @@ COLUMNS = (
 """Figure, title, unit and factor of each column."""
 
 
-def comparison_claims() -> tuple[Claim, ...]:
+def comparison_claims() -> tuple[PublishedFigure, ...]:
     """A claim for each cell; the paper's value is not known for any."""
     return tuple(
-        Claim(
+        PublishedFigure(
             method=method,
             figure=figure,
             title=title,

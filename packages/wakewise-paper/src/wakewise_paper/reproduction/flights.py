@@ -18,12 +18,12 @@ from wakewise.control.spare import watching
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.core.interfaces import Progress, Witness
+from wakewise.core.interfaces import Progress, TruthProvider
 from wakewise.operation import Parts, Scenario, fly
 from wakewise.operation.loop import Step
 from wakewise.scene.missions import SETTLING
 from wakewise.vision.evaluation import flight_figures
-from wakewise_paper.reproduction.piv_flights import PivWatch
+from wakewise_paper.reproduction.piv_flights import PivRecorder
 from wakewise_paper.wash_reduction.ballasted_world import ballasted_world, blocks_of
 from wakewise_paper.wash_reduction.paper import WATER_EVERY_S
 from wakewise_paper.wash_reduction.routes import gentle_route, station_route
@@ -82,12 +82,12 @@ def fly_one(settings: Mapping[str, Any], folder: Path, progress: Progress) -> di
     watch = watching(parts.vehicle, parts.region, parts.wake, parts.control)
     every = max(1, round(SERIES_EVERY_S * rate_hz))
     duration_s = settings.get("duration_s") or parts.route.duration_s
-    piv = PivWatch.over(parts, float(duration_s), int(settings.get("piv_instants") or 0))
+    piv = PivRecorder.over(parts, float(duration_s), int(settings.get("piv_instants") or 0))
     D: list[tuple[float, float]] = []
     solve_ms: list[float] = []
     heard = 0
 
-    def listen(step: Step, witness: Witness | None) -> None:
+    def listen(step: Step, witness: TruthProvider | None) -> None:
         nonlocal heard
         heard += 1
         solve_ms.append(1e3 * step.solve_s)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, BoolArray
-from wakewise.core.interfaces import Flow, Witness
+from wakewise.core.interfaces import Flow, TruthProvider
 from wakewise.operation import Parts
 from wakewise.scene.targets import Target
 from wakewise.vision.piv.images import CameraSettings, photograph_pair
@@ -48,7 +48,7 @@ def _ambient(water: Any, points_W_m: Array) -> Array:
 
 
 @dataclass(eq=False)
-class PivWatch:
+class PivRecorder:
     """Photographs the water of a flight at given times; make one with `over`."""
 
     target: Target
@@ -58,7 +58,7 @@ class PivWatch:
     rows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
 
     @classmethod
-    def over(cls, parts: Parts, duration_s: float, instants: int) -> PivWatch:
+    def over(cls, parts: Parts, duration_s: float, instants: int) -> PivRecorder:
         """At instants spread evenly over a flight after its settling; none of them, and nothing is looked at."""
         target = parts.target
         out = parts.start.X_WB.p_m - target.centre_W_m
@@ -73,7 +73,7 @@ class PivWatch:
         rng = np.random.default_rng([parts.scenario.seed, 37])
         return cls(target=target, sheet=sheet, times_s=list(times), rng=rng)
 
-    def look(self, time_s: float, witness: Witness | None) -> None:
+    def look(self, time_s: float, witness: TruthProvider | None) -> None:
         """Photograph the water if it is time."""
         if not self.times_s or time_s < self.times_s[0] or witness is None:
             return

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from wakewise_paper.reproduction.claim import UNQUOTED, WASH, Claim, less, washes
+from wakewise_paper.reproduction.claim import UNQUOTED, WASH, PublishedFigure, less, washes
 
 
-def station() -> list[Claim]:
+def station() -> list[PublishedFigure]:
     """Station keeping."""
     what = "rms over 180 s of hovering in the stream"
     claims = [
-        Claim(
+        PublishedFigure(
             method="wake-aware",
             figure="position_rmse_mm",
             title="distance from the wished place",
@@ -19,7 +19,7 @@ def station() -> list[Claim]:
             side="less",
             how=f"true vehicle from where it was wished to be, {what}",
         ),
-        Claim(
+        PublishedFigure(
             method="wake-aware",
             figure="estimate_rmse_mm",
             title="error of the estimated place",
@@ -29,7 +29,7 @@ def station() -> list[Claim]:
             side="less",
             how=f"estimated from true vehicle, {what}",
         ),
-        Claim(
+        PublishedFigure(
             method="wake-aware",
             figure="tracking_rmse_mm",
             title="distance of the estimated place from the wished one",
@@ -58,14 +58,14 @@ def station() -> list[Claim]:
     return claims + washes(("manual", "dp", "unaware", "smooth", "wake-aware"))
 
 
-def flow() -> list[Claim]:
+def flow() -> list[PublishedFigure]:
     """The water by PIV."""
     how = (
         "vectors of two pictures of tracers in a light sheet through the target, less those of the same water "
         "without the vehicle, within 5 cm of the target"
     )
     claims = [
-        Claim(
+        PublishedFigure(
             method=method,
             figure="piv_speed_m_s",
             title="speed at the target by PIV",
@@ -81,7 +81,7 @@ def flow() -> list[Claim]:
     claims.append(less("piv_speed_m_s", "speed at the target by PIV", "dp", None, UNQUOTED, how, asked=0.0))
     claims.append(less("target_speed_mean_m_s", "true excess speed", "unaware", None, UNQUOTED, WASH, asked=67.0))
     claims.append(
-        Claim(
+        PublishedFigure(
             method="wake-aware",
             figure="piv_floor_m_s",
             title="what PIV reads where there is no wash",
@@ -93,7 +93,7 @@ def flow() -> list[Claim]:
         )
     )
     claims.append(
-        Claim(
+        PublishedFigure(
             method="wake-aware",
             figure="piv_error_m_s",
             title="PIV against the truth at its own vectors",
@@ -123,7 +123,7 @@ PAPER_ABLATION = {
 """What the paper gives of each (table Ablation Study, 20 trials each): of models, where ours are of flights."""
 
 
-def ablation() -> list[Claim]:
+def ablation() -> list[PublishedFigure]:
     """Parts left out."""
     claims = []
     for variant, words in VARIANTS.items():
@@ -134,13 +134,13 @@ def ablation() -> list[Claim]:
     return claims + [less("position_rmse_mm", place, variant, None, UNQUOTED, "rms") for variant in VARIANTS]
 
 
-def operator_claims(w_tracks: tuple[float, ...]) -> list[Claim]:
+def operator_claims(w_tracks: tuple[float, ...]) -> list[PublishedFigure]:
     """Claims of the operator's table, by w_track; the paper's numbers are at 5."""
     claims = []
     for w in w_tracks:
         method, at_5 = f"wake-aware, w_track {w:g}", w == 5.0
         claims.append(
-            Claim(
+            PublishedFigure(
                 method=method,
                 figure="velocity_deviation_pct",
                 title="deviation from the velocity asked for",

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from wakewise_paper.reproduction.claim import ORDER, RMSE, SUCCESS, UNQUOTED, WASH, Claim, less, model_claims
+from wakewise_paper.reproduction.claim import ORDER, RMSE, SUCCESS, UNQUOTED, WASH, PublishedFigure, less, model_claims
 
 
-def dynamic() -> list[Claim]:
+def dynamic() -> list[PublishedFigure]:
     """Models while flying round."""
     rmse: dict[str, float | None] = {"manual": 8.7, "unaware": 4.3, "smooth": 2.8, "wake-aware": 1.9}
     claims = model_claims(rmse, {"manual": 34.2, "unaware": 68.5, "smooth": 87.0, "wake-aware": 94.8})
     claims.append(
-        Claim(
+        PublishedFigure(
             method="wake-aware",
             figure="rmse_mm",
             title="order of the methods by RMSE",
@@ -32,7 +32,7 @@ def dynamic() -> list[Claim]:
         ("collisions", "times the hull touched something", ""),
     ):
         claims += [
-            Claim(
+            PublishedFigure(
                 method=method,
                 figure=figure,
                 title=title,
@@ -46,7 +46,7 @@ def dynamic() -> list[Claim]:
         ]
     for figure, title in (("area_cm2", "area of the model"), ("volume_cm3", "volume of the model")):
         claims += [
-            Claim(
+            PublishedFigure(
                 method=method,
                 figure=figure,
                 title=f"{title}, repeated",
@@ -63,12 +63,12 @@ def dynamic() -> list[Claim]:
     return claims
 
 
-def success() -> list[Claim]:
+def success() -> list[PublishedFigure]:
     """Models that succeed."""
     quoted = {"wake-aware": 98.5, "unaware": 45.0}
     table = {"wake-aware": "98.3 % (59 of 60)", "unaware": "45 % (27 of 60)"}
     return [
-        Claim(
+        PublishedFigure(
             method=method,
             figure="success",
             title=f"models with {SUCCESS}",
@@ -84,7 +84,7 @@ def success() -> list[Claim]:
     ]
 
 
-def sediment() -> list[Claim]:
+def sediment() -> list[PublishedFigure]:
     """Calcium carbonate."""
     claims = model_claims({"wake-aware": None, "unaware": None}, {})
     rays = "beam attenuation by silt along the rays from camera to target, mean over rays and time"
@@ -97,10 +97,10 @@ def sediment() -> list[Claim]:
     return claims
 
 
-def field() -> list[Claim]:
+def field() -> list[PublishedFigure]:
     """A dive at sea."""
     claims = [
-        Claim(
+        PublishedFigure(
             method=method,
             figure="rmse_mm",
             title="RMSE of models that were made",
@@ -113,7 +113,7 @@ def field() -> list[Claim]:
         for method in ("wake-aware", "dp")
     ]
     claims += [
-        Claim(
+        PublishedFigure(
             method=method,
             figure="success",
             title=f"models with {SUCCESS}",

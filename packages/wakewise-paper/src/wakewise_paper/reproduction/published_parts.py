@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from wakewise_paper.reproduction.claim import UNQUOTED, Claim, Side
+from wakewise_paper.reproduction.claim import UNQUOTED, PublishedFigure, Side
 
 
-def solver() -> list[Claim]:
+def solver() -> list[PublishedFigure]:
     """The planner."""
 
     def claim(
         method: str, figure: str, title: str, unit: str, paper: float | None, said: str, side: Side, how: str
-    ) -> Claim:
-        return Claim(
+    ) -> PublishedFigure:
+        return PublishedFigure(
             method=method,
             figure=figure,
             title=title,
@@ -64,7 +64,7 @@ def solver() -> list[Claim]:
 WAKE_MODELS = ("paper", "paper-calibrated", "fitted", "jet-fitted")
 
 
-def wake() -> list[Claim]:
+def wake() -> list[PublishedFigure]:
     """Wake models against flows."""
     claims = []
     for method in WAKE_MODELS:
@@ -73,7 +73,7 @@ def wake() -> list[Claim]:
             ("r2_wake", "R2 of the wake", 0.82, "within 30 deg and 0.1 to 0.5 m"),
         ):
             claims.append(
-                Claim(
+                PublishedFigure(
                     method=method,
                     figure=figure,
                     title=title,
@@ -87,7 +87,7 @@ def wake() -> list[Claim]:
                 )
             )
         claims.append(
-            Claim(
+            PublishedFigure(
                 method=method,
                 figure="bias_far_pct",
                 title="overestimate beyond 0.4 m",

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from wakewise_paper.reproduction.claim import Claim
+from wakewise_paper.reproduction.claim import PublishedFigure
 from wakewise_paper.reproduction.published_flights import ablation, flow, operator_claims, station
 from wakewise_paper.reproduction.published_models import dynamic, field, sediment, success
 from wakewise_paper.reproduction.published_parts import solver, wake
 
 W_TRACKS = (1.0, 2.0, 5.0, 10.0, 20.0)
 
-CLAIMS: dict[str, tuple[Claim, ...]] = {
+CLAIMS: dict[str, tuple[PublishedFigure, ...]] = {
     "dynamic": tuple(dynamic()),
     "success": tuple(success()),
     "station": tuple(station()),

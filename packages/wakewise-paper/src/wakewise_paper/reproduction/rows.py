@@ -22,9 +22,9 @@ from wakewise.experiments.campaigns.statistics import (
 )
 from wakewise.experiments.campaigns.statistics.intervals import RESAMPLES, ratio_of_sums
 from wakewise.experiments.campaigns.summary import by_target
-from wakewise.experiments.campaigns.task import Outcome
-from wakewise_paper.reproduction.claim import ORDER, Claim
-from wakewise_paper.reproduction.table_trials import NOWHERE, Plan
+from wakewise.experiments.campaigns.task import TrialOutcome
+from wakewise_paper.reproduction.claim import ORDER, PublishedFigure
+from wakewise_paper.reproduction.table_trials import NOWHERE, TableCase
 
 Row = dict[str, Any]
 Known = tuple[str, int]
@@ -32,11 +32,11 @@ Known = tuple[str, int]
 
 
 @dataclass(frozen=True)
-class Made:
+class CompletedCase:
     """A trial and what became of it."""
 
-    plan: Plan
-    outcome: Outcome
+    plan: TableCase
+    outcome: TrialOutcome
 
     @property
     def flown(self) -> bool:
@@ -48,10 +48,10 @@ NOT_MADE = "not finished"
 """What a campaign says of a trial that it has not come to, or was stopped at."""
 
 
-class Trials:
+class TableTrials:
     """The trials of one table in one world, by method."""
 
-    def __init__(self, made: Iterable[Made]) -> None:
+    def __init__(self, made: Iterable[CompletedCase]) -> None:
         self._rows: dict[str, dict[Known, Mapping[str, Any] | None]] = {}
         for one in made:
             if one.flown:
@@ -84,7 +84,7 @@ class Trials:
         return list(dict.fromkeys(known[0] for known in self._rows.get(method, {})))
 
 
-def table_rows(claims: Sequence[Claim], worlds: Mapping[str, Trials]) -> list[Row]:
+def table_rows(claims: Sequence[PublishedFigure], worlds: Mapping[str, TableTrials]) -> list[Row]:
     """Rows of a table whose trials are flights or scans, world by world; claims without a trial have none there."""
     rows: list[Row] = []
     for world, trials in worlds.items():
@@ -110,7 +110,7 @@ def table_rows(claims: Sequence[Claim], worlds: Mapping[str, Trials]) -> list[Ro
     return rows
 
 
-def once_rows(claims: Sequence[Claim], figures: Mapping[str, Any], world: str = NOWHERE) -> list[Row]:
+def once_rows(claims: Sequence[PublishedFigure], figures: Mapping[str, Any], world: str = NOWHERE) -> list[Row]:
     """Rows of one measurement, whose figures are called "METHOD/FIGURE", or "METHOD/TARGET/FIGURE"."""
     rows: list[Row] = []
     for claim in claims:
@@ -128,7 +128,7 @@ def once_rows(claims: Sequence[Claim], figures: Mapping[str, Any], world: str = 
     return rows
 
 
-def _whole(claim: Claim, world: str, target: str | None, found: Row, quoted: bool = True) -> Row:
+def _whole(claim: PublishedFigure, world: str, target: str | None, found: Row, quoted: bool = True) -> Row:
     """A row with all its keys; of a part of what the paper's figure is about, no paper's figure."""
     ours, low, high = found["ours"], found["low"], found["high"]
     met = found.pop("met") if "met" in found else claim.met(ours) if quoted else None
@@ -169,7 +169,7 @@ def _whole(claim: Claim, world: str, target: str | None, found: Row, quoted: boo
     return row | {"why": why}
 
 
-def _mean(claim: Claim, trials: Trials, target: str | None = None) -> Row | None:
+def _mean(claim: PublishedFigure, trials: TableTrials, target: str | None = None) -> Row | None:
     values = trials.values(claim.method, claim.figure, target, claim.itt)
     rows = trials.of(claim.method, target)
     failed = sum(known not in trials.values(claim.method, claim.figure, target) for known in rows)
@@ -181,7 +181,7 @@ def _mean(claim: Claim, trials: Trials, target: str | None = None) -> Row | None
     return _told(mean, ends, len(values), failed)
 
 
-def _less_pct(claim: Claim, trials: Trials) -> Row | None:
+def _less_pct(claim: PublishedFigure, trials: TableTrials) -> Row | None:
     """Ratio of means over pairs that both have, with the tests of the differences."""
     assert claim.than is not None
     ours, theirs = (trials.values(method, claim.figure) for method in (claim.method, claim.than))
@@ -210,7 +210,7 @@ def _less_pct(claim: Claim, trials: Trials) -> Row | None:
     }
 
 
-def _share_pct(claim: Claim, trials: Trials) -> Row | None:
+def _share_pct(claim: PublishedFigure, trials: TableTrials) -> Row | None:
     values = trials.values(claim.method, claim.figure, itt=True)
     if not values:
         return {"ours": None, "low": None, "high": None, "n": 0, "failed": 0, "why": "not flown"}
@@ -219,7 +219,7 @@ def _share_pct(claim: Claim, trials: Trials) -> Row | None:
     return _told(100.0 * good / n, Interval(100.0 * ends.low, 100.0 * ends.high), n, n - good)
 
 
-def _spread_pct(claim: Claim, trials: Trials) -> Row | None:
+def _spread_pct(claim: PublishedFigure, trials: TableTrials) -> Row | None:
     """Coefficient of variation over seeds, mean over the targets that have two or more."""
     shares, n = [], 0
     for target in trials.targets(claim.method):
@@ -232,7 +232,7 @@ def _spread_pct(claim: Claim, trials: Trials) -> Row | None:
     return _told(float(np.mean(shares)), None, n, 0)
 
 
-def _order(claim: Claim, trials: Trials) -> Row | None:
+def _order(claim: PublishedFigure, trials: TableTrials) -> Row | None:
     """How often a bootstrap's draws have the paper's order, over the trials that all methods have."""
     named = [method for method in ORDER if method in trials.methods]
     if len(named) < len(ORDER):
@@ -254,7 +254,7 @@ def _falls(means: Array) -> Array:
     return np.asarray((np.diff(means, axis=1) < 0.0).all(axis=1))
 
 
-def _counted(claim: Claim, figures: Mapping[str, Any]) -> Row:
+def _counted(claim: PublishedFigure, figures: Mapping[str, Any]) -> Row:
     """Intervals of the planner's figures, which come with their counts."""
     plans = figures.get(f"{claim.method}/plans")
     if not plans:

@@ -17,14 +17,14 @@ from typing import Any
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.jit.precompile import warm
-from wakewise.experiments.campaigns import Processes
+from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.campaigns import run as run_campaign
-from wakewise.experiments.campaigns.store import Store, open_store
+from wakewise.experiments.campaigns.store import CampaignStore, open_store
 from wakewise_paper.reproduction.claim import TABLES
 from wakewise_paper.reproduction.comparison import comparison_claims
 from wakewise_paper.reproduction.published_tables import CLAIMS
-from wakewise_paper.reproduction.rows import Made, Row, Trials, once_rows, table_rows
-from wakewise_paper.reproduction.table_trials import NOWHERE, TABLE, Block, Wish, blocks_of
+from wakewise_paper.reproduction.rows import CompletedCase, Row, TableTrials, once_rows, table_rows
+from wakewise_paper.reproduction.table_trials import NOWHERE, TABLE, Block, TableRequest, blocks_of
 
 MOST_TRIALS = 1000
 TRIAL_LIMIT_S = 3600.0
@@ -36,7 +36,7 @@ LAST = 1.25
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class ReproduceOptions:
     """How tables are made.
 
     Parameters
@@ -72,10 +72,10 @@ class Options:
             raise InputError(f"--budget {self.budget_s:g} s, must be more than 0")
 
     @property
-    def wish(self) -> Wish:
+    def wish(self) -> TableRequest:
         """What is asked of each table."""
         trials = self.trials or (MOST_TRIALS if self.budget_s is not None else 1)
-        return Wish(
+        return TableRequest(
             trials=trials,
             worlds=self.worlds,
             methods=self.methods,
@@ -91,7 +91,7 @@ class _Growing:
     name: str
     coming: Iterator[Block]
     taken: list[Block] = field(default_factory=list)
-    made: list[Made] = field(default_factory=list)
+    made: list[CompletedCase] = field(default_factory=list)
     block_s: float = 0.0
     spent_s: float = 0.0
     why: str | None = None
@@ -103,11 +103,11 @@ class _Growing:
             self.taken.append(block)
         return block
 
-    def is_made(self, block: Block, store: Store) -> bool:
+    def is_made(self, block: Block, store: CampaignStore) -> bool:
         """Whether an earlier run made all of a block."""
         return all(store.figures(plan.task.key) is not None for plan in block)
 
-    def leave(self, block: Block, store: Store) -> bool:
+    def leave(self, block: Block, store: CampaignStore) -> bool:
         """Take a block back for which there is no room, unless an earlier run made a part of it, which is shown."""
         begun = any(store.figures(plan.task.key) is not None for plan in block)
         if not begun:
@@ -115,7 +115,7 @@ class _Growing:
         return not begun
 
 
-def reproduce(names: Sequence[str], folder: Path, options: Options) -> dict[str, dict[str, Any]]:
+def reproduce(names: Sequence[str], folder: Path, options: ReproduceOptions) -> dict[str, dict[str, Any]]:
     """Tables by name: `rows` of paper and ours, `trials` (most seeds of a target), `seeds`, `config_hash` and more.
 
     Parameters
@@ -151,7 +151,7 @@ def reproduce(names: Sequence[str], folder: Path, options: Options) -> dict[str,
     return {table.name: _figures(table) for table in tables}
 
 
-def _fitting(name: str, wish: Wish) -> Wish:
+def _fitting(name: str, wish: TableRequest) -> TableRequest:
     """What is wished of one table: methods that only others have say nothing of it."""
     if wish.methods is None:
         return wish
@@ -159,7 +159,7 @@ def _fitting(name: str, wish: Wish) -> Wish:
     return replace(wish, methods=own or wish.methods)
 
 
-def _within(tables: list[_Growing], folder: Path, options: Options, began: float) -> None:
+def _within(tables: list[_Growing], folder: Path, options: ReproduceOptions, began: float) -> None:
     """The first block of each table that has room, then more of what cost least so far."""
     budget_s = options.budget_s or 0.0
     until = began + LAST * budget_s
@@ -197,7 +197,7 @@ def _within(tables: list[_Growing], folder: Path, options: Options, began: float
     _make(tables, folder, options, until)
 
 
-def _telling(options: Options, words: str) -> Options:
+def _telling(options: ReproduceOptions, words: str) -> ReproduceOptions:
     """The same, with these words before what is told of progress: its time left is not that of the budget."""
 
     def progress(done: float, total: float, note: str = "") -> None:
@@ -206,7 +206,7 @@ def _telling(options: Options, words: str) -> Options:
     return replace(options, progress=progress)
 
 
-def _make(tables: list[_Growing], folder: Path, options: Options, until: float | None) -> None:
+def _make(tables: list[_Growing], folder: Path, options: ReproduceOptions, until: float | None) -> None:
     """Have all that was taken made, side by side; what is known already costs nothing."""
     plans = [(table, plan) for table in tables for block in table.taken for plan in block]
     if not plans:
@@ -214,14 +214,16 @@ def _make(tables: list[_Growing], folder: Path, options: Options, until: float |
     outcomes = run_campaign(
         [plan.task for _, plan in plans],
         folder,
-        Processes(options.workers),
+        ProcessExecutor(options.workers),
         timeout_s=TRIAL_LIMIT_S,
         progress=options.progress,
         until=until,
         again=options.again,
     )
     for table in tables:
-        table.made = [Made(plan, out) for (own, plan), out in zip(plans, outcomes, strict=True) if own is table]
+        table.made = [
+            CompletedCase(plan, out) for (own, plan), out in zip(plans, outcomes, strict=True) if own is table
+        ]
         took = [one.outcome.took_s for one in table.made if one.outcome.took_s > 0.0]
         if took and table.taken:
             table.spent_s = sum(took)
@@ -252,7 +254,7 @@ def _figures(table: _Growing) -> dict[str, Any]:
     }
 
 
-def rows_of(name: str, made: Sequence[Made]) -> list[Row]:
+def rows_of(name: str, made: Sequence[CompletedCase]) -> list[Row]:
     """Rows of a table from its trials."""
     claims = comparison_claims() if name == "comparison" else CLAIMS[name]
     if TABLE[name].once:
@@ -262,19 +264,19 @@ def rows_of(name: str, made: Sequence[Made]) -> list[Row]:
             if one.outcome.figures is not None
             for row in once_rows(claims, one.outcome.figures, one.plan.world)
         ]
-    worlds: dict[str, list[Made]] = {}
+    worlds: dict[str, list[CompletedCase]] = {}
     for one in made:
         worlds.setdefault(one.plan.world, []).append(one)
-    return table_rows(claims, {world: Trials(own) for world, own in worlds.items()})
+    return table_rows(claims, {world: TableTrials(own) for world, own in worlds.items()})
 
 
-def config_hash(made: Sequence[Made]) -> str:
+def config_hash(made: Sequence[CompletedCase]) -> str:
     """Hash of all trials of a table: what was flown, by which source."""
     keys = "\n".join(sorted(one.plan.task.key for one in made))
     return hashlib.sha256(keys.encode()).hexdigest()[:16]
 
 
-def place_of(one: Made) -> dict[str, Any]:
+def place_of(one: CompletedCase) -> dict[str, Any]:
     """Where a page finds what a trial left, below the campaign's folder."""
     figures: Mapping[str, Any] = one.outcome.figures or {}
     return {
@@ -288,7 +290,7 @@ def place_of(one: Made) -> dict[str, Any]:
     }
 
 
-def _trials(flown: Sequence[Made]) -> int:
+def _trials(flown: Sequence[CompletedCase]) -> int:
     counts: dict[tuple[str, str, str], int] = {}
     for one in flown:
         key = (one.plan.world, one.plan.method, one.plan.target)

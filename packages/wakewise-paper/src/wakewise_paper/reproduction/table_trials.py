@@ -18,7 +18,7 @@ from wakewise_paper.reproduction.claim import ORDER, TABLES
 from wakewise_paper.reproduction.mission_variation import varied_mission
 from wakewise_paper.reproduction.published_flights import VARIANTS
 from wakewise_paper.reproduction.published_tables import W_TRACKS
-from wakewise_paper.reproduction.worlds import CACO3, FIELD, PAPER, PUMP_TANK, Water, water, water_names
+from wakewise_paper.reproduction.worlds import CACO3, FIELD, PAPER, PUMP_TANK, TableWorld, water, water_names
 
 CORALS = ("branching", "brain", "plate")
 """In place of the paper's three."""
@@ -38,7 +38,7 @@ _WAKE = ("wake", "water", "lattice", "studies/wake_validation.py", "studies/flow
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class TableCase:
     """One trial of a table, and what it is called in it."""
 
     table: str
@@ -49,11 +49,11 @@ class Plan:
     task: Task
 
 
-Block = tuple[Plan, ...]
+Block = tuple[TableCase, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wish:
+class TableRequest:
     """What is wished of a table; None takes the table's own.
 
     Parameters
@@ -73,7 +73,7 @@ class Wish:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class TableDefinition:
     """How a table is made.
 
     Parameters
@@ -97,14 +97,14 @@ class Table:
     methods: tuple[str, ...]
     worlds: tuple[str, ...]
     targets: Callable[[str], tuple[str, ...]]
-    plan: Callable[[str, str, str, int, Wish], Task]
+    plan: Callable[[str, str, str, int, TableRequest], Task]
     block_s: float
     weight: float = 1.0
     once: bool = False
     has_targets: bool = True
 
 
-def blocks_of(name: str, wish: Wish) -> Iterator[Block]:
+def blocks_of(name: str, wish: TableRequest) -> Iterator[Block]:
     """Blocks of a table, seed by seed, worlds and targets in turn.
 
     Raises
@@ -120,7 +120,11 @@ def blocks_of(name: str, wish: Wish) -> Iterator[Block]:
 
 
 def _blocks(
-    name: str, wish: Wish, worlds: tuple[str, ...], methods: tuple[str, ...], targets: Mapping[str, tuple[str, ...]]
+    name: str,
+    wish: TableRequest,
+    worlds: tuple[str, ...],
+    methods: tuple[str, ...],
+    targets: Mapping[str, tuple[str, ...]],
 ) -> Iterator[Block]:
     table = TABLE[name]
     for seed in range(1, (1 if table.once else wish.trials) + 1):
@@ -128,7 +132,7 @@ def _blocks(
             for world in (world for world in worlds if number < len(targets[world])):
                 target = targets[world][number]
                 yield tuple(
-                    Plan(
+                    TableCase(
                         table=name,
                         world=world,
                         method=method,
@@ -170,12 +174,12 @@ def _name(*parts: object) -> str:
     return "/".join(str(part) for part in parts if part != OWN)
 
 
-def _fields(where: Water, method: str, target: str, seed: int) -> dict[str, Any]:
+def _fields(where: TableWorld, method: str, target: str, seed: int) -> dict[str, Any]:
     own: dict[str, Any] = {} if target == OWN else {"target.kind": target}
     return where.told | own | {"method": method, "seed": seed}
 
 
-def _scan(world: str, method: str, target: str, seed: int, wish: Wish) -> Task:  # noqa: ARG001
+def _scan(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:  # noqa: ARG001
     fields = _fields(water(world), method, target, seed)
     return Task(
         name=_name("scan", world, target, method, seed),
@@ -185,7 +189,7 @@ def _scan(world: str, method: str, target: str, seed: int, wish: Wish) -> Task: 
     )
 
 
-def _varied(world: str, method: str, target: str, seed: int, wish: Wish) -> Task:  # noqa: ARG001
+def _varied(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:  # noqa: ARG001
     kind = CORALS[(seed - 1) % len(CORALS)] if target == OWN and world == PUMP_TANK else target
     mission = varied_mission(world, None if kind == OWN else kind, seed)
     fields = _fields(water(world), method, kind, seed) | dict(mission)
@@ -197,7 +201,7 @@ def _varied(world: str, method: str, target: str, seed: int, wish: Wish) -> Task
     )
 
 
-def _plain_scan(world: str, method: str, target: str, seed: int, wish: Wish) -> Task:  # noqa: ARG001
+def _plain_scan(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:  # noqa: ARG001
     fields = _fields(water(world), method, target, seed)
     return Task(
         name=_name("scan", world, target, method, seed),
@@ -207,8 +211,8 @@ def _plain_scan(world: str, method: str, target: str, seed: int, wish: Wish) -> 
     )
 
 
-def _flight(course: str, piv_instants: int = 0) -> Callable[[str, str, str, int, Wish], Task]:
-    def plan(world: str, method: str, target: str, seed: int, wish: Wish) -> Task:
+def _flight(course: str, piv_instants: int = 0) -> Callable[[str, str, str, int, TableRequest], Task]:
+    def plan(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:
         settings: dict[str, Any] = {
             "fields": _fields(water(world), method, target, seed),
             "course": course,
@@ -225,7 +229,7 @@ def _fly(name: str, settings: Mapping[str, Any]) -> Task:
     return Task(name=name, work="wakewise_paper.reproduction.flights:fly_one", settings=settings, sources=_FLIGHT)
 
 
-def _ablated(world: str, method: str, target: str, seed: int, wish: Wish) -> Task:
+def _ablated(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:
     six = method == "six thrusters"
     task = _flight("round")(world, "wake-aware" if six else method, target, seed, wish)
     settings = dict(task.settings)
@@ -237,7 +241,7 @@ def _ablated(world: str, method: str, target: str, seed: int, wish: Wish) -> Tas
 _SCRIPT = "script"
 
 
-def _operated(world: str, method: str, target: str, seed: int, wish: Wish) -> Task:
+def _operated(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:
     who, _, w_track = method.partition(", w_track ")
     told: dict[str, Any] = {"world": world, "method": who, "seed": seed}
     told["course" if world == PAPER else "pilot"] = target
@@ -253,11 +257,11 @@ def _operated(world: str, method: str, target: str, seed: int, wish: Wish) -> Ta
     )
 
 
-def _solved(world: str, method: str, target: str, seed: int, wish: Wish) -> Task:  # noqa: ARG001
+def _solved(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:  # noqa: ARG001
     return Task(name="solver", work="wakewise_benchmarks.solver:solve_one", settings={"instants": 100}, sources=_SOLVER)
 
 
-def _validated(world: str, method: str, target: str, seed: int, wish: Wish) -> Task:  # noqa: ARG001
+def _validated(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:  # noqa: ARG001
     return Task(
         name="wake",
         work="wakewise_paper.reproduction.bench_tasks:wake_one",
@@ -293,7 +297,7 @@ COMPARED = (
 """Methods of the comparison."""
 
 
-def _compared(world: str, method: str, target: str, seed: int, wish: Wish) -> Task:
+def _compared(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:
     told = dict(APPROACHES.get(method, {"method": method}))
     ballast = bool(told.pop("ballast", False))
     fields = _fields(water(world), told.pop("method"), target, seed) | told
@@ -322,11 +326,11 @@ def _asked(world: str) -> tuple[str, ...]:
 _FLOWN = (PUMP_TANK, TROUBLE, PAPER)
 _STATION = ("manual", "dp", "unaware", "smooth", "wake-aware")
 
-TABLE: dict[str, Table] = {
-    "dynamic": Table(
+TABLE: dict[str, TableDefinition] = {
+    "dynamic": TableDefinition(
         methods=ORDER, worlds=(PUMP_TANK, TROUBLE), targets=_corals, plan=_scan, block_s=400.0, weight=4.0
     ),
-    "success": Table(
+    "success": TableDefinition(
         methods=("unaware", "wake-aware"),
         worlds=(PUMP_TANK, TROUBLE),
         targets=_own,
@@ -334,15 +338,19 @@ TABLE: dict[str, Table] = {
         block_s=200.0,
         weight=2.0,
     ),
-    "station": Table(methods=_STATION, worlds=_FLOWN, targets=_own, plan=_flight("station"), block_s=150.0, weight=3.0),
-    "ablation": Table(methods=("wake-aware", *VARIANTS), worlds=_FLOWN, targets=_own, plan=_ablated, block_s=45.0),
-    "sediment": Table(
+    "station": TableDefinition(
+        methods=_STATION, worlds=_FLOWN, targets=_own, plan=_flight("station"), block_s=150.0, weight=3.0
+    ),
+    "ablation": TableDefinition(
+        methods=("wake-aware", *VARIANTS), worlds=_FLOWN, targets=_own, plan=_ablated, block_s=45.0
+    ),
+    "sediment": TableDefinition(
         methods=("unaware", "wake-aware"), worlds=(CACO3, "fluff"), targets=_own, plan=_plain_scan, block_s=220.0
     ),
-    "flow": Table(
+    "flow": TableDefinition(
         methods=("dp", "unaware", "wake-aware"), worlds=_FLOWN, targets=_own, plan=_flight("round", 3), block_s=50.0
     ),
-    "solver": Table(
+    "solver": TableDefinition(
         methods=(NOWHERE,),
         worlds=(NOWHERE,),
         targets=_nothing,
@@ -351,7 +359,7 @@ TABLE: dict[str, Table] = {
         once=True,
         has_targets=False,
     ),
-    "wake": Table(
+    "wake": TableDefinition(
         methods=(NOWHERE,),
         worlds=(NOWHERE,),
         targets=_nothing,
@@ -360,8 +368,10 @@ TABLE: dict[str, Table] = {
         once=True,
         has_targets=False,
     ),
-    "field": Table(methods=("dp", "wake-aware"), worlds=(FIELD,), targets=_own, plan=_plain_scan, block_s=220.0),
-    "operator": Table(
+    "field": TableDefinition(
+        methods=("dp", "wake-aware"), worlds=(FIELD,), targets=_own, plan=_plain_scan, block_s=220.0
+    ),
+    "operator": TableDefinition(
         methods=("dp", *(f"wake-aware, w_track {w:g}" for w in W_TRACKS)),
         worlds=(TROUBLE, PAPER),
         targets=_asked,
@@ -369,7 +379,7 @@ TABLE: dict[str, Table] = {
         block_s=45.0,
         has_targets=False,
     ),
-    "comparison": Table(
+    "comparison": TableDefinition(
         methods=(*COMPARED, *APPROACHES), worlds=(TROUBLE,), targets=_own, plan=_compared, block_s=170.0
     ),
 }

@@ -19,7 +19,7 @@ PUMP_TANK, PAPER, LATTICE, CACO3, FIELD = "pump-tank", "paper", "lattice", "caco
 
 
 @dataclass(frozen=True, kw_only=True)
-class Water:
+class TableWorld:
     """A world as a table knows it.
 
     Parameters
@@ -51,7 +51,7 @@ class Water:
 
 _STILL_TARGET = {"target.sway": "none"}
 _OWN = {
-    PAPER: Water(
+    PAPER: TableWorld(
         name=PAPER,
         title="the pump tank, its water the paper's own wake model (circular)",
         world=PUMP_TANK,
@@ -62,19 +62,19 @@ _OWN = {
         draws={"tank.mismatch.trim_N": [-3.3, -1.0]},
         circular=True,
     ),
-    LATTICE: Water(
+    LATTICE: TableWorld(
         name=LATTICE,
         title="the pump tank, judged by the lattice",
         world=PUMP_TANK,
         fields=_STILL_TARGET | {"flow": "lattice"},
     ),
-    CACO3: Water(
+    CACO3: TableWorld(
         name=CACO3,
         title="the pump tank with 50 mg/l of calcium carbonate of 0.3 mm",
         world=PUMP_TANK,
         fields={"tank.silt.kind": "caco3-50mg"},
     ),
-    FIELD: Water(
+    FIELD: TableWorld(
         name=FIELD,
         # 4.8 over 1.54 per metre in green is 3.1 m of sight (Zaneveld and Pegau 2003, doi 10.1364/OE.11.002997).
         title="a reef with swell, a current to 0.5 m/s and 3 m of sight",
@@ -91,7 +91,7 @@ def water_names() -> tuple[str, ...]:
     return (*world_names(), *_OWN)
 
 
-def water(name: str) -> Water:
+def water(name: str) -> TableWorld:
     """The water of that name.
 
     Raises
@@ -103,4 +103,4 @@ def water(name: str) -> Water:
         return _OWN[name]
     if name not in world_names():
         raise InputError(f"--world '{name}': not known, allowed: {', '.join(water_names())}")
-    return Water(name=name, title=load_world(name).file.title, world=name)
+    return TableWorld(name=name, title=load_world(name).file.title, world=name)

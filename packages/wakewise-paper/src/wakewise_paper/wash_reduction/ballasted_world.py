@@ -12,21 +12,21 @@ from typing import Any
 from wakewise.core.errors import InputError
 from wakewise.operation import Parts, fly
 from wakewise.operation.flight_trim import flight_trim
-from wakewise.robot.vehicles.ballast import Block, with_blocks
+from wakewise.robot.vehicles.ballast import BallastBlock, with_blocks
 from wakewise_paper.wash_reduction.routes import held
 
 HOVER_S = 15.0
 """How long the hover is: by its end integral and estimate have settled for some seconds."""
 
 
-def blocks_of(parts: Parts) -> tuple[Block, ...]:
+def blocks_of(parts: Parts) -> tuple[BallastBlock, ...]:
     """Blocks that `vehicle trim --flight` proposes after a hover at the start of the flight's own route."""
     hover = parts.replace(route=held(parts.route, HOVER_S))
     flown = fly(hover, checked=False, duration_s=HOVER_S, water_every_s=60).steps
     return tuple(flight_trim(parts.vehicle, flown).blocks)
 
 
-def ballasted_world(parts: Parts, blocks: tuple[Block, ...]) -> Parts:
+def ballasted_world(parts: Parts, blocks: tuple[BallastBlock, ...]) -> Parts:
     """The same flight with blocks on the true vehicle, all else drawn alike.
 
     Raises

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.experiments.campaigns import Processes
+from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise_paper import flight_batches
-from wakewise_paper.flight_batches import Failure, Key
+from wakewise_paper.flight_batches import FlightFailure, Key
 from wakewise_paper.flight_store import FlightStore, store_folder
 from wakewise_paper.wash_reduction.ablations import LEVERS, NONE, alone, left_out, wished_levers
 from wakewise_paper.wash_reduction.energy_optimum import BoundTrial
@@ -29,7 +29,7 @@ from wakewise_paper.wash_reduction.flight import FIGURES
 from wakewise_paper.wash_reduction.paper import FIGURES as PAPER_FIGURES
 from wakewise_paper.wash_reduction.paper import METHODS as PAPER_METHODS
 from wakewise_paper.wash_reduction.paper import SEEDS as PAPER_SEEDS
-from wakewise_paper.wash_reduction.paper import PaperTrial
+from wakewise_paper.wash_reduction.paper import PaperWashTrial
 from wakewise_paper.wash_reduction.plan import METHODS, flight_s, flown_methods, planned_trials
 from wakewise_paper.wash_reduction.scenario_files import names_of, title_of, trim_of
 from wakewise_paper.wash_reduction.summary_table import PLACE, RIVALS, WRONG, headline, tag_of
@@ -37,7 +37,7 @@ from wakewise_paper.wash_reduction.summary_table import PLACE, RIVALS, WRONG, he
 MODEL_FIGURES = ("rmse_mm", "completeness_pct", "success_pct")
 PAPER = "paper"
 
-_engine = Processes
+_engine = ProcessExecutor
 _FLY, _FLY_PAPER = "wakewise_paper.wash_reduction.flight:fly_trial", "wakewise_paper.wash_reduction.paper:fly_paper"
 _BOUND = "wakewise_paper.wash_reduction.energy_optimum:fly_bound"
 
@@ -64,14 +64,14 @@ def run(options: BenchOptions) -> dict[str, Any]:
     options.progress(0, max(len(trials), 1), words)
     rows, failures, kept = flight_batches.fly_all(trials, _FLY, store, options, _engine)
     papers: dict[Key, Row] = {}
-    lost: list[Failure] = []
+    lost: list[FlightFailure] = []
     known = 0
     if with_paper:
         papers, lost, known = flight_batches.fly_all(
             paper_trials(methods, options.seeds), _FLY_PAPER, store, options, _engine
         )
     bounds: dict[Key, Row] = {}
-    unbound: list[Failure] = []
+    unbound: list[FlightFailure] = []
     if options.bound:
         bounds, unbound, _ = flight_batches.fly_all(
             bound_trials(scenarios, options.bound), _BOUND, store, options, _engine
@@ -111,7 +111,11 @@ def by_method(rows: Mapping[Key, Row]) -> dict[str, dict[tuple[str, int], Row]]:
 
 
 def scenario_figures(
-    scenario: str, methods: tuple[str, ...], levers: tuple[str, ...], rows: Mapping[Key, Row], failures: list[Failure]
+    scenario: str,
+    methods: tuple[str, ...],
+    levers: tuple[str, ...],
+    rows: Mapping[Key, Row],
+    failures: list[FlightFailure],
 ) -> dict[str, Any]:
     """Table of one scenario: methods, what `wake-aware` is worth, levers; flights that failed are with their method."""
     here: dict[str, dict[int, Row]] = {}
@@ -174,10 +178,10 @@ def lever_figures(name: str, here: Mapping[str, Mapping[int, Row]], strata: Mapp
     return answer
 
 
-def paper_trials(methods: tuple[str, ...], seeds: int) -> dict[Key, PaperTrial]:
+def paper_trials(methods: tuple[str, ...], seeds: int) -> dict[Key, PaperWashTrial]:
     """Flights in the paper's own world."""
     return {
-        (PAPER, method, seed): PaperTrial(method=method, seed=seed)
+        (PAPER, method, seed): PaperWashTrial(method=method, seed=seed)
         for seed in range(1, min(seeds, PAPER_SEEDS) + 1)
         for method in PAPER_METHODS
         if method in methods

@@ -31,18 +31,18 @@ from wakewise.control.thrift import power_law
 from wakewise.control.watch import EVERY_S, JUMP_EVERY_S, Watch
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.errors import InputError
-from wakewise.core.interfaces import BodyState, Witness
+from wakewise.core.interfaces import BodyState, TruthProvider
 from wakewise.operation import Parts, fly
 from wakewise.operation.loop import Step
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.missions import SETTLING
-from wakewise.simulation.tank.prescribed_motion import LedTank, Way
+from wakewise.simulation.tank.prescribed_motion import PrescribedMotionTank, PrescribedPath
 from wakewise.simulation.tank.tank import tank_ambient, tank_points
 from wakewise.simulation.tank.world import TankWorld
 from wakewise.wake import bed_of
 from wakewise_paper.wash_reduction.allocations import sharings, split
 from wakewise_paper.wash_reduction.energy_bound import chosen, sum_of
-from wakewise_paper.wash_reduction.flight import Trial, parts_of
+from wakewise_paper.wash_reduction.flight import WashTrial, parts_of
 
 ENERGIES: dict[str, float] = {"1.05": 1.05, "1.15": 1.15, "1.3": 1.3, "1.5": 1.5, "1.7": 1.7, "any": np.inf}
 """Bounds on energy over that of the least thrusts, by what they are called."""
@@ -69,7 +69,7 @@ Led = Callable[[IntArray], tuple[float, float]]
 class BoundTrial:
     """One flight whose sharings are judged; hashable, so that it can be handed to a worker.
 
-    `duration_s` is as in `Trial`.
+    `duration_s` is as in `WashTrial`.
     """
 
     scenario: str
@@ -78,7 +78,7 @@ class BoundTrial:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Flown:
+class RecordedFlight:
     """A flight of `dp` as its water needs it, at the water's own steps.
 
     `least_N`, shape (k, n), are the least true thrusts of its wrench without noise; `wrench_B`, shape (k, 6), what the
@@ -88,7 +88,7 @@ class Flown:
     parts: Parts
     vehicle: Vehicle
     layout: Layout
-    led: LedTank
+    led: PrescribedMotionTank
     least_N: Array
     wrench_B: Array
     estimates: list[BodyState]
@@ -109,7 +109,7 @@ def fly_bound(trial: BoundTrial) -> dict[str, float | None]:
     began = time.process_time()
     flown = fly_dp(trial)
     grid, named = candidates(flown)
-    judge = Judge.of(flown, grid)
+    judge = AllocationJudge.of(flown, grid)
     found: dict[str, float | None] = {
         "dp_m_s": flown.wash_m_s,
         "dp_power_W": flown.power_W,
@@ -126,7 +126,7 @@ def fly_bound(trial: BoundTrial) -> dict[str, float | None]:
     return found
 
 
-def fly_dp(trial: BoundTrial) -> Flown:
+def fly_dp(trial: BoundTrial) -> RecordedFlight:
     """Fly `dp` and keep what its water needs.
 
     Raises
@@ -134,14 +134,14 @@ def fly_dp(trial: BoundTrial) -> Flown:
     InputError
         If the scenario is not flown in the tank.
     """
-    parts = parts_of(Trial(scenario=trial.scenario, method="dp", seed=trial.seed))
+    parts = parts_of(WashTrial(scenario=trial.scenario, method="dp", seed=trial.seed))
     world = parts.world
     if not isinstance(world, TankWorld):
         raise InputError(f"bound: {trial.scenario} is not flown in the tank")
     every, estimates = round(EVERY_S * parts.scenario.control.rate_hz), []
     seen: list[int] = []
 
-    def heard(step: Step, witness: Witness | None) -> None:  # noqa: ARG001
+    def heard(step: Step, witness: TruthProvider | None) -> None:  # noqa: ARG001
         if len(seen) % every == 0:
             estimates.append(step.estimate)
         seen.append(1)
@@ -149,8 +149,8 @@ def fly_dp(trial: BoundTrial) -> Flown:
     steps = fly(parts, checked=False, water_every_s=0.25, duration_s=trial.duration_s, watch=heard).steps
     times = steps["time_s"].to_numpy()
     state = [steps.select(f"true_{name}" for name in names).to_numpy() for names in _STATE]
-    way = Way(times_s=times, p_WB_m=state[0], q_WB=state[1], nu_B=state[2])
-    led = LedTank(
+    way = PrescribedPath(times_s=times, p_WB_m=state[0], q_WB=state[1], nu_B=state[2])
+    led = PrescribedMotionTank(
         vehicle=world.vehicle,
         target=world.target,
         settings=world.settings,
@@ -164,7 +164,7 @@ def fly_dp(trial: BoundTrial) -> Flown:
     rows = round(SMOOTH_S * parts.scenario.control.rate_hz) | 1
     least, _ = split(layout, _at(led.times_s, times, smoothed(thrusts, rows)))
     judged = steps.filter(pl.col("leg") != SETTLING)
-    return Flown(
+    return RecordedFlight(
         parts=parts,
         vehicle=world.vehicle,
         layout=layout,
@@ -178,7 +178,7 @@ def fly_dp(trial: BoundTrial) -> Flown:
     )
 
 
-def candidates(flown: Flown) -> tuple[Array, dict[str, int]]:
+def candidates(flown: RecordedFlight) -> tuple[Array, dict[str, int]]:
     """Thrusts of all sharings of a flight, shape (j, k, n), the least first, and the numbers of those with a name."""
     rows, named = list(sharings(flown.layout, flown.least_N)), {}
     try:
@@ -197,7 +197,7 @@ def candidates(flown: Flown) -> tuple[Array, dict[str, int]]:
     return np.array(rows), named
 
 
-def believed(watch: Watch, flown: Flown) -> Array:
+def believed(watch: Watch, flown: RecordedFlight) -> Array:
     """Spare thrusts that a belief chooses on the flight's way, as they are given, shape (k, n).
 
     Shares are sought as often as in flight, from the same estimates, for the wrench without its noise.
@@ -218,7 +218,7 @@ def believed(watch: Watch, flown: Flown) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Judge:
+class AllocationJudge:
     """What each sharing of a flight does to its water, look by look, and what it costs.
 
     `sharings_N` has shape (j, k, n); `speeds_m_s` and `power_W`, shape (j, l), are those of the looks that count,
@@ -226,7 +226,7 @@ class Judge:
     the same of the water's steps (those of settling are in the first).
     """
 
-    led: LedTank
+    led: PrescribedMotionTank
     sharings_N: Array
     speeds_m_s: Array
     power_W: Array
@@ -236,7 +236,7 @@ class Judge:
     stretch: IntArray
 
     @classmethod
-    def of(cls, flown: Flown, grid: Array) -> Judge:
+    def of(cls, flown: RecordedFlight, grid: Array) -> AllocationJudge:
         """Lead the flight with each sharing."""
         led, times = flown.led, flown.led.times_s
         looks = times[LOOK_STEPS::LOOK_STEPS]
@@ -289,7 +289,7 @@ class Judge:
         return float(wash.mean()), sum_of(self.by_stretch()[1], picks)
 
 
-def attained(judge: Judge) -> dict[str, float | None]:
+def attained(judge: AllocationJudge) -> dict[str, float | None]:
     """What the bounds on energy allow: `bound_*` by putting stretches together, `attained_*` by leading the choice."""
     found: dict[str, float | None] = {}
     waters = {lag: judge.by_stretch(lag) for lag in LAGS_S}
@@ -316,14 +316,14 @@ def attained(judge: Judge) -> dict[str, float | None]:
     return found
 
 
-def _throughout(judge: Judge, most: float) -> IntArray:
+def _throughout(judge: AllocationJudge, most: float) -> IntArray:
     """The best sharing that is flown throughout within a bound on energy."""
     own = [number for number in range(len(judge.sharings_N)) if judge.energy(number) <= most + 1e-9]
     best = min(own, key=judge.wash_m_s)
     return judge.throughout(best)
 
 
-def _tried_anew(judge: Judge, picks: IntArray, most: float, led: Led) -> None:
+def _tried_anew(judge: AllocationJudge, picks: IntArray, most: float, led: Led) -> None:
     """Try other sharings in single stretches, from the first to the last, and go on from what is better."""
     wash, energy = judge.by_stretch(LAGS_S[1])
     for b in range(len(picks)):

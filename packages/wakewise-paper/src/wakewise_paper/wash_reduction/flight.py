@@ -11,7 +11,7 @@ import polars as pl
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import Witness
+from wakewise.core.interfaces import TruthProvider
 from wakewise.operation import Parts, Scenario, fly
 from wakewise.operation.loop import Step
 from wakewise.robot.vehicles import Vehicle
@@ -32,7 +32,7 @@ from wakewise_paper.wash_reduction.routes import (
     station_route,
     transect_route,
 )
-from wakewise_paper.wash_reduction.scenario_files import WORLD, Drawn, drawn, fields_of, load_scenario_file
+from wakewise_paper.wash_reduction.scenario_files import WORLD, SampledConditions, drawn, fields_of, load_scenario_file
 from wakewise_paper.world_study.flight import WorldTrial, short_flight
 
 TRIM = "+trim"
@@ -76,7 +76,7 @@ FIGURES = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trial:
+class WashTrial:
     """One flight to make; hashable and plain, so that it can be handed to a worker.
 
     Parameters
@@ -103,7 +103,7 @@ class Trial:
     duration_s: float | None = None
 
 
-def parts_of(trial: Trial) -> Parts:
+def parts_of(trial: WashTrial) -> Parts:
     """Parts of the flight, but for what +trim adds."""
     method = trial.method.removesuffix(TRIM)
     if trial.scenario.startswith(WORLD):
@@ -138,7 +138,7 @@ def scenario_parts(name: str, vehicle: str, method: str, seed: int) -> Parts:
     return parts.replace(**cable(parts, what)) if what.pull_N is not None else parts
 
 
-def route_of(course: str, parts: Parts, what: Drawn) -> Route:
+def route_of(course: str, parts: Parts, what: SampledConditions) -> Route:
     """The route of a course, about where the target is taken to be."""
     centre, azimuth = parts.found_target.centre_W_m, what.azimuth_rad
     if course == "station":
@@ -154,7 +154,7 @@ def route_of(course: str, parts: Parts, what: Drawn) -> Route:
     return brake_route(centre, azimuth, low_deg)
 
 
-def cable(parts: Parts, what: Drawn) -> dict[str, Any]:
+def cable(parts: Parts, what: SampledConditions) -> dict[str, Any]:
     """Fields of a cable that pulls `pull_N` down the current at the flight's start.
 
     From the tank's own law of a straight cable across a current: half of its drag comes to the vehicle,
@@ -186,7 +186,7 @@ def wrong_current(current_W_m_s: tuple[float, ...], seed: int) -> dict[str, Any]
     return {"levers.drift_m_s": tuple(round(float(v), 6) for v in stated)}
 
 
-def fly_trial(trial: Trial) -> dict[str, float | None]:
+def fly_trial(trial: WashTrial) -> dict[str, float | None]:
     """Figures of one flight."""
     began = time.process_time()
     parts, float_N = parts_of(trial), None
@@ -196,7 +196,7 @@ def fly_trial(trial: Trial) -> dict[str, float | None]:
         parts = ballasted_world(parts, blocks)
     solve_ms: list[float] = []
 
-    def heard(step: Step, witness: Witness | None) -> None:  # noqa: ARG001
+    def heard(step: Step, witness: TruthProvider | None) -> None:  # noqa: ARG001
         solve_ms.append(1e3 * step.solve_s)
 
     # Courses clear the bed by their own check, orbits by the mission's.

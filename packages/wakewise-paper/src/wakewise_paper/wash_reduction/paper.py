@@ -19,7 +19,7 @@ from wakewise.operation.seeds import Seeds
 from wakewise.scene.missions import SETTLING
 from wakewise.scene.targets import Region, find_target, sample_region
 from wakewise.vision.evaluation import flight_figures
-from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
+from wakewise.wake import InfluenceModel, WakeSettings, disturbance, wake_model
 from wakewise_paper.wash_reduction.routes import STANDOFF_M, gentle_route
 
 WATER_EVERY_S = 0.25
@@ -43,14 +43,14 @@ FIGURES = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class PaperTrial:
+class PaperWashTrial:
     """One flight there; hashable, so that it can be handed to a worker."""
 
     method: str
     seed: int
 
 
-def paper_scenario(trial: PaperTrial) -> Scenario:
+def paper_scenario(trial: PaperWashTrial) -> Scenario:
     """Everything at its default but for the levers, which are off, the belief, the method and the seed."""
     told = {"method": trial.method, "seed": trial.seed, "world": "paper"}
     return check_scenario(told | {"control": {"wake": PAPER_WAKE, "levers": OFF}}, "gentle bench")
@@ -69,7 +69,7 @@ def true_disturbance(frame: pl.DataFrame, parts: Parts, region: Region, rate_hz:
 
     The same yardstick for all methods, whatever each of them weighs itself; looked at five times a second.
     """
-    view = WakeView.of(parts.vehicle, region, wake_model(WakeSettings(**PAPER_WAKE)))
+    view = InfluenceModel.of(parts.vehicle, region, wake_model(WakeSettings(**PAPER_WAKE)))
     rows = frame.gather_every(round(0.2 * rate_hz))
     places = rows.select("true_x_m", "true_y_m", "true_z_m").to_numpy()
     turns = rows.select("true_qw", "true_qx", "true_qy", "true_qz").to_numpy()
@@ -78,7 +78,7 @@ def true_disturbance(frame: pl.DataFrame, parts: Parts, region: Region, rate_hz:
     return float(np.mean([disturbance(view.gram(Pose(p, q)), T) for p, q, T in steps]))
 
 
-def fly_paper(trial: PaperTrial) -> dict[str, float | None]:
+def fly_paper(trial: PaperWashTrial) -> dict[str, float | None]:
     """Figures of one flight, from the end of settling on."""
     began = time.process_time()
     scenario = paper_scenario(trial)

@@ -7,7 +7,7 @@ from wakewise.core.errors import InputError
 from wakewise.operation.worlds.library import load_world
 from wakewise_paper.flight_batches import Key
 from wakewise_paper.wash_reduction.ablations import LEVER_SEEDS, Settings, lever_settings
-from wakewise_paper.wash_reduction.flight import TRIM, Trial
+from wakewise_paper.wash_reduction.flight import TRIM, WashTrial
 from wakewise_paper.wash_reduction.scenario_files import WORLD
 from wakewise_paper.wash_reduction.summary_table import WRONG
 
@@ -50,15 +50,15 @@ def flown_methods(wished: tuple[str, ...] | None) -> tuple[tuple[str, ...], dict
 
 def planned_trials(
     scenarios: tuple[str, ...], methods: tuple[str, ...], levers: tuple[str, ...], seeds: int
-) -> dict[Key, Trial]:
+) -> dict[Key, WashTrial]:
     """Flights to make, seed by seed, so that a run that is stopped has whole seeds; dearest levers last."""
-    trials: dict[Key, Trial] = {}
+    trials: dict[Key, WashTrial] = {}
     for seed in range(1, seeds + 1):
         for scenario in scenarios:
             for method in methods:
-                trials[scenario, method, seed] = Trial(scenario=scenario, method=method, seed=seed)
+                trials[scenario, method, seed] = WashTrial(scenario=scenario, method=method, seed=seed)
             if "wake-aware" in methods and runs(scenario):
-                trials[scenario, WRONG, seed] = Trial(
+                trials[scenario, WRONG, seed] = WashTrial(
                     scenario=scenario, method="wake-aware", seed=seed, wrong_current=True
                 )
     table = lever_settings(levers) if "wake-aware" in methods else {}
@@ -69,9 +69,9 @@ def planned_trials(
     return trials
 
 
-def lever_trial(scenario: str, settings: Settings, seed: int) -> Trial:
+def lever_trial(scenario: str, settings: Settings, seed: int) -> WashTrial:
     """Flight of `wake-aware` with some fields changed."""
-    return Trial(scenario=scenario, method="wake-aware", seed=seed, control=tuple(sorted(settings.items())))
+    return WashTrial(scenario=scenario, method="wake-aware", seed=seed, control=tuple(sorted(settings.items())))
 
 
 def runs(scenario: str) -> bool:
@@ -83,7 +83,7 @@ def runs(scenario: str) -> bool:
     return field in world.draws or any(world.values.get(field, ()))
 
 
-def flight_s(trial: Trial) -> float:
+def flight_s(trial: WashTrial) -> float:
     """About how much CPU time a flight takes, in seconds: measured on two cores, for saying how long a run is."""
     if trial.duration_s is not None:
         return 0.2 * trial.duration_s

@@ -17,7 +17,7 @@ from pydantic import Field, ValidationError
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import read_yaml
 from wakewise.core.settings import Settings, describe_faults
-from wakewise.operation.randomization import Draw
+from wakewise.operation.randomization import FieldDistribution
 from wakewise.operation.worlds.library import NamedWorld, WorldField, WorldFile, every_world, load_world, world_names
 from wakewise_paper.wash_reduction.strata import Side, current_W_m_s, stratum
 
@@ -50,7 +50,7 @@ class ScenarioFile(Settings):
     fields: dict[str, WorldField] = Field(..., min_length=1, description="fields of a scenario by their dotted names")
 
 
-class Drawn(Settings):
+class SampledConditions(Settings):
     """What a seed of a scenario is, beside the fields that the scenario's own seed draws."""
 
     seed: int
@@ -81,7 +81,7 @@ def load_scenario_file(name: str) -> ScenarioFile:
         raise InputError(f"scenario {name}: {describe_faults(fault, ScenarioFile, 'file')}") from None
 
 
-def drawn(name: str, seed: int) -> Drawn:
+def drawn(name: str, seed: int) -> SampledConditions:
     """What a seed, from 1, of a scenario is: its stratum, and what is drawn within."""
     file, number = load_scenario_file(name), SCENARIOS.index(name)
     own = SEEDS_EACH * (number + 1) + seed
@@ -95,7 +95,7 @@ def drawn(name: str, seed: int) -> Drawn:
 
     azimuth = float(rng("azimuth").uniform(-np.pi, np.pi))
     speed = float(rng("current").uniform(*file.current_m_s))
-    return Drawn(
+    return SampledConditions(
         seed=own,
         azimuth_rad=azimuth,
         trim=trim,
@@ -107,7 +107,7 @@ def drawn(name: str, seed: int) -> Drawn:
     )
 
 
-def fields_of(name: str) -> tuple[dict[str, Any], dict[str, Draw]]:
+def fields_of(name: str) -> tuple[dict[str, Any], dict[str, FieldDistribution]]:
     """Values and draws of a scenario's own fields and of those that every world has, by dotted name."""
     file = load_scenario_file(name)
     fields = file.fields if file.plain else every_world() | file.fields

@@ -17,12 +17,12 @@ import time
 from typing import Any
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.campaigns import Processes
+from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import load_scenario
 from wakewise.operation.worlds.library import load_world, world_names
 from wakewise_paper import flight_batches
-from wakewise_paper.flight_batches import Failure, Key, Row
+from wakewise_paper.flight_batches import FlightFailure, Key, Row
 from wakewise_paper.flight_store import PHOTOGRAPHS, FlightStore, store_folder
 from wakewise_paper.world_study.figures import method_figures, ratios
 from wakewise_paper.world_study.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial
@@ -37,7 +37,7 @@ EMERGENT = (
 )
 TYPED_IN = "constants of the laws and numbers of the worlds, each with its source (wakewise world show NAME)"
 
-_engine = Processes
+_engine = ProcessExecutor
 _FLY, _SCAN = (f"wakewise_paper.world_study.flight:{name}_trial" for name in ("fly", "scan"))
 _JUDGE = "wakewise_paper.world_study.lattice_comparison:judged_trial"
 
@@ -101,7 +101,7 @@ def planned(worlds: tuple[str, ...], methods: tuple[str, ...], seeds: int) -> di
 
 
 def world_figures(
-    name: str, methods: tuple[str, ...], flown: dict[Key, Row], models: dict[Key, Row], failures: list[Failure]
+    name: str, methods: tuple[str, ...], flown: dict[Key, Row], models: dict[Key, Row], failures: list[FlightFailure]
 ) -> dict[str, Any]:
     """Table of one world. A flight or scan that failed counts as a failure of its method: no success."""
     world = load_world(name)

@@ -11,28 +11,28 @@ import polars as pl
 import pytest
 
 from wakewise.experiments.campaigns.pictures import MODEL
-from wakewise.experiments.campaigns.task import Outcome, Task
+from wakewise.experiments.campaigns.task import Task, TrialOutcome
 from wakewise.ui.reports.methods_compared import methods_compared, profiles
 from wakewise_paper.reports.reproduction import plots, write_pages, write_results
 from wakewise_paper.reports.reproduction.results import standalone_svg
 from wakewise_paper.reports.reproduction.sentences import machine, reproduced
 from wakewise_paper.reproduction.acceptance import JUDGED
 from wakewise_paper.reproduction.flights import SERIES
-from wakewise_paper.reproduction.rows import Made
+from wakewise_paper.reproduction.rows import CompletedCase
 from wakewise_paper.reproduction.run import _figures, _Growing
-from wakewise_paper.reproduction.table_trials import TABLE, Wish, blocks_of
+from wakewise_paper.reproduction.table_trials import TABLE, TableRequest, blocks_of
 
 
 def table(name, figures, trials=4, worlds=None):
     """A table whose trials became what `figures(plan)` says; None: it failed."""
     growing = _Growing(name, iter(()))
-    growing.taken = list(blocks_of(name, Wish(trials=trials, worlds=worlds)))
+    growing.taken = list(blocks_of(name, TableRequest(trials=trials, worlds=worlds)))
     for block in growing.taken:
         for plan in block:
             found = figures(plan)
             reason = None if found is not None else "it <fell> over"
             growing.made.append(
-                Made(plan, Outcome(task=plan.task, figures=found, reason=reason, attempts=1, took_s=9.0))
+                CompletedCase(plan, TrialOutcome(task=plan.task, figures=found, reason=reason, attempts=1, took_s=9.0))
             )
     return _figures(growing)
 
@@ -190,4 +190,4 @@ def test_every_flown_table_has_a_plot_of_its_methods(tables):
 def test_a_task_of_a_table_is_plain(tables):
     """What a page is told of a trial can be written down."""
     assert all(isinstance(place["folder"], str) for place in tables["dynamic"]["places"])
-    assert isinstance(next(blocks_of("wake", Wish(trials=1)))[0].task, Task)
+    assert isinstance(next(blocks_of("wake", TableRequest(trials=1)))[0].task, Task)

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
-    from wakewise.experiments.trials.dataset.build import Built, build_dataset
-    from wakewise.experiments.trials.dataset.checking import Checked, check_dataset
+    from wakewise.experiments.trials.dataset.build import DatasetBuildResult, build_dataset
+    from wakewise.experiments.trials.dataset.checking import ChecksumReport, check_dataset
     from wakewise.experiments.trials.dataset.statement import read_words
 
-__all__ = ["Built", "Checked", "build_dataset", "check_dataset", "read_words"]
+__all__ = ["ChecksumReport", "DatasetBuildResult", "build_dataset", "check_dataset", "read_words"]
 
 lazy_door(__name__)

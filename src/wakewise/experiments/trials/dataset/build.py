@@ -18,16 +18,16 @@ from wakewise.core.interfaces import no_progress
 from wakewise.core.run_lock import LOCK, alone
 from wakewise.experiments.exports.checksums import SUMS, sha256_of, sums_text
 from wakewise.experiments.trials.dataset.metadata import FIGURES, METADATA, SHEET, TRIALS, columns_of, metadata
-from wakewise.experiments.trials.dataset.part import KNOWN, NOTE, TRUTH, Part, part_of
+from wakewise.experiments.trials.dataset.part import KNOWN, NOTE, TRUTH, TrialPart, part_of
 from wakewise.experiments.trials.dataset.sheet import data_sheet, description_of
-from wakewise.experiments.trials.dataset.statement import Words
-from wakewise.experiments.trials.dataset.trial_sources import Source, trials_of
+from wakewise.experiments.trials.dataset.statement import DatasetStatement
+from wakewise.experiments.trials.dataset.trial_sources import TrialSource, trials_of
 
 _PARTS = ".parts"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Built:
+class DatasetBuildResult:
     """What was written; `made` trials are new, the others were there from an attempt before."""
 
     path: Path
@@ -39,7 +39,9 @@ class Built:
     bytes: int
 
 
-def build_dataset(folder: Path, out: Path, words: Words, progress: Callable[..., None] = no_progress) -> Built:
+def build_dataset(
+    folder: Path, out: Path, words: DatasetStatement, progress: Callable[..., None] = no_progress
+) -> DatasetBuildResult:
     """Make a data set.
 
     Parameters
@@ -48,7 +50,7 @@ def build_dataset(folder: Path, out: Path, words: Words, progress: Callable[...,
         Of a campaign, of trials, or of one trial.
     out : Path
         Folder that does not exist yet, or is empty.
-    words : Words
+    words : DatasetStatement
         What only a person can say.
     progress : callable
         Called as `(done, total, note)`.
@@ -76,7 +78,7 @@ def build_dataset(folder: Path, out: Path, words: Words, progress: Callable[...,
     if out.exists():
         out.rmdir()
     growing.replace(out)
-    return Built(
+    return DatasetBuildResult(
         path=out,
         trials=len(parts),
         made=made,
@@ -88,8 +90,8 @@ def build_dataset(folder: Path, out: Path, words: Words, progress: Callable[...,
 
 
 def _gather(
-    trials: dict[str, Source], place: Path, progress: Callable[..., None]
-) -> tuple[list[Part], dict[str, str], int]:
+    trials: dict[str, TrialSource], place: Path, progress: Callable[..., None]
+) -> tuple[list[TrialPart], dict[str, str], int]:
     """Every trial's part; those that cannot be taken, and why; and how many were made now."""
     parts, left_out, made = [], {}, 0
     for number, (name, source) in enumerate(trials.items()):
@@ -112,7 +114,9 @@ def _forget_others(growing: Path, names: set[str]) -> None:
             shutil.rmtree(path)
 
 
-def _finish(growing: Path, parts: Sequence[Part], left_out: dict[str, str], words: Words) -> dict[str, int]:
+def _finish(
+    growing: Path, parts: Sequence[TrialPart], left_out: dict[str, str], words: DatasetStatement
+) -> dict[str, int]:
     """Lay everything out anew from the parts, and write what tells of all of them; returns sizes by path."""
     for path in growing.iterdir():
         if path.name in (_PARTS, LOCK):

@@ -9,20 +9,20 @@ from pathlib import Path
 
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import no_progress
-from wakewise.experiments.exports.checksums import SUMS, Difference, differences, read_sums, sha256_of
+from wakewise.experiments.exports.checksums import SUMS, ChecksumMismatch, differences, read_sums, sha256_of
 from wakewise.experiments.trials.dataset.metadata import METADATA
 
 
 @dataclass(frozen=True, kw_only=True)
-class Checked:
+class ChecksumReport:
     """How many files were read, and those that are not as they were."""
 
     files: int
     bytes: int
-    differences: tuple[Difference, ...]
+    differences: tuple[ChecksumMismatch, ...]
 
 
-def check_dataset(folder: Path, progress: Callable[..., None] = no_progress) -> Checked:
+def check_dataset(folder: Path, progress: Callable[..., None] = no_progress) -> ChecksumReport:
     """Hold every file against its check sum, and the list of these against croissant.json.
 
     Raises
@@ -41,10 +41,10 @@ def check_dataset(folder: Path, progress: Callable[..., None] = no_progress) -> 
     if SUMS not in wanted:
         raise InputError(f"{path}: does not name {SUMS}; it was changed")
     if sha256_of(folder / SUMS) != wanted[SUMS]:
-        return Checked(files=0, bytes=0, differences=(Difference(SUMS, "changed"),))
+        return ChecksumReport(files=0, bytes=0, differences=(ChecksumMismatch(SUMS, "changed"),))
     sums = read_sums(folder / SUMS)
     found = differences(folder, sums, frozenset({METADATA, SUMS}), progress)
-    told_wrong = [Difference(name, "other check sum in croissant.json") for name, digest in sorted(wanted.items())
+    told_wrong = [ChecksumMismatch(name, "other check sum in croissant.json") for name, digest in sorted(wanted.items())
                   if name != SUMS and sums.get(name) != digest]  # fmt: skip
     size = sum((folder / name).stat().st_size for name in sums if (folder / name).is_file())
-    return Checked(files=len(sums), bytes=size, differences=(*found, *told_wrong))
+    return ChecksumReport(files=len(sums), bytes=size, differences=(*found, *told_wrong))

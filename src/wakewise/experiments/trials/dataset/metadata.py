@@ -8,10 +8,18 @@ from typing import Any
 
 from wakewise.core.errors import InputError
 from wakewise.experiments.exports.checksums import SUMS, sha256_of
-from wakewise.experiments.exports.croissant import About, Column, FileObject, FileSet, Kind, Table, croissant
+from wakewise.experiments.exports.croissant import (
+    Column,
+    DatasetDescription,
+    FileObject,
+    FileSet,
+    Kind,
+    RecordSet,
+    croissant,
+)
 from wakewise.experiments.trials.dataset.columns import meaning
-from wakewise.experiments.trials.dataset.part import KNOWN, TRUTH, Part
-from wakewise.experiments.trials.dataset.statement import Words
+from wakewise.experiments.trials.dataset.part import KNOWN, TRUTH, TrialPart
+from wakewise.experiments.trials.dataset.statement import DatasetStatement
 
 METADATA, SHEET, TRIALS, FIGURES = "croissant.json", "DATASHEET.md", "trials.parquet", "truth/figures.parquet"
 PARQUET = "application/x-parquet"
@@ -44,7 +52,7 @@ _FACTS = {
 }  # fmt: skip
 
 
-def columns_of(parts: Sequence[Part]) -> dict[str, dict[str, str]]:
+def columns_of(parts: Sequence[TrialPart]) -> dict[str, dict[str, str]]:
     """Names and types of every table's columns over all trials.
 
     Raises
@@ -63,7 +71,7 @@ def columns_of(parts: Sequence[Part]) -> dict[str, dict[str, str]]:
 
 
 def metadata(
-    folder: Path, words: Words, description: str, parts: Sequence[Part], figures: Sequence[str]
+    folder: Path, words: DatasetStatement, description: str, parts: Sequence[TrialPart], figures: Sequence[str]
 ) -> dict[str, Any]:
     """Croissant of a data set whose other files are all in `folder`."""
     trials = _object(folder, TRIALS, PARQUET, "all trials, a row each")
@@ -74,7 +82,7 @@ def metadata(
     ]
     facts = {name: kind for name, kind in _types_of_facts(parts).items() if name in _FACTS}
     fields = tuple(Column(name=name, kind=kind, description=_FACTS[name]) for name, kind in facts.items())
-    tables = [Table(name="trials", source=trials, columns=fields, key=("trial",), description="one row per trial")]
+    tables = [RecordSet(name="trials", source=trials, columns=fields, key=("trial",), description="one row per trial")]
     if figures:
         true = _object(folder, FIGURES, PARQUET, "figures by which trials were judged, which need the truth")
         files.append(true)
@@ -84,7 +92,7 @@ def metadata(
             for name in names
         )
         tables.append(
-            Table(name="figures", source=true, columns=columns, key=("trial",), description="one row per trial")
+            RecordSet(name="figures", source=true, columns=columns, key=("trial",), description="one row per trial")
         )
     for path, columns_told in columns_of(parts).items():
         about, name = _SETS[path]
@@ -92,7 +100,7 @@ def metadata(
         source = FileSet(name=f"{name}-files", includes=f"{side}/*/{what}.parquet", mime=PARQUET, description=about)
         files.append(source)
         tables.append(
-            Table(
+            RecordSet(
                 name=name,
                 source=source,
                 columns=_columns(columns_told, what == "images"),
@@ -106,7 +114,7 @@ def metadata(
         if matching:
             mime = _MIME.get(Path(matching[0]).suffix.lower(), "application/octet-stream")
             files.append(FileSet(name=name, includes=pattern, mime=mime, description=about))
-    about_it = About(
+    about_it = DatasetDescription(
         name=words.name,
         description=description,
         licence=words.licence,
@@ -134,7 +142,7 @@ def _kind(dtype: str) -> Kind:
     return _KINDS.get(dtype, "sc:Integer" if dtype.startswith(("Int", "UInt")) else "sc:Text")
 
 
-def _types_of_facts(parts: Sequence[Part]) -> dict[str, Kind]:
+def _types_of_facts(parts: Sequence[TrialPart]) -> dict[str, Kind]:
     kinds: dict[type, Kind] = {bool: "sc:Boolean", int: "sc:Integer", float: "sc:Float"}
     found: dict[str, Kind] = {"trial": "sc:Text"}
     for part in parts:

@@ -15,7 +15,7 @@ from wakewise.core.files import whole_folder
 from wakewise.experiments.exports.checksums import copied, sha256_of
 from wakewise.experiments.trials.dataset.columns import known_and_true
 from wakewise.experiments.trials.dataset.settings import TrialSettings, figures_of, settings_of
-from wakewise.experiments.trials.dataset.trial_sources import METRICS, SCENARIO, STEPS, Source
+from wakewise.experiments.trials.dataset.trial_sources import METRICS, SCENARIO, STEPS, TrialSource
 from wakewise.scene.targets import read_mesh
 
 KNOWN, TRUTH = "known", "truth"
@@ -31,7 +31,7 @@ PICTURES = (".png", ".jpg", ".jpeg")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part:
+class TrialPart:
     """What was taken of a trial.
 
     `sums` are check sums by path in the data set, `sizes` their bytes; `columns` the names and types of each table's
@@ -48,7 +48,7 @@ class Part:
     lacks: tuple[str, ...] = ()
 
 
-def part_of(name: str, source: Source, folder: Path) -> tuple[Part, bool]:
+def part_of(name: str, source: TrialSource, folder: Path) -> tuple[TrialPart, bool]:
     """A trial's share in `folder`, made if it is not there or the trial has changed since; and whether it was made.
 
     Raises
@@ -67,16 +67,16 @@ def part_of(name: str, source: Source, folder: Path) -> tuple[Part, bool]:
     return part, True
 
 
-def read_part(folder: Path) -> Part | None:
+def read_part(folder: Path) -> TrialPart | None:
     """The part that stands in a folder; None if there is none that is whole."""
     try:
         told = json.loads((folder / NOTE).read_text(encoding="utf-8"))
-        return Part(**told | {"lacks": tuple(told["lacks"])})
+        return TrialPart(**told | {"lacks": tuple(told["lacks"])})
     except (OSError, ValueError, TypeError, KeyError):
         return None
 
 
-def _marks(source: Source) -> dict[str, list[int]]:
+def _marks(source: TrialSource) -> dict[str, list[int]]:
     """Size and time of change of what a part is made from."""
     found = {}
     paths = [*(source.folder / name for name in _WATCHED), source.settings, source.figures]
@@ -118,7 +118,7 @@ class _Gathered:
             self.columns[f"{side}/{what}"] = {column: str(kind) for column, kind in share.schema.items()}
 
 
-def _make(name: str, source: Source, into: Path, marks: dict[str, list[int]]) -> Part:
+def _make(name: str, source: TrialSource, into: Path, marks: dict[str, list[int]]) -> TrialPart:
     gathered = _Gathered(name, into)
     for side in (KNOWN, TRUTH):
         (into / side).mkdir()
@@ -138,7 +138,7 @@ def _make(name: str, source: Source, into: Path, marks: dict[str, list[int]]) ->
         scenario = into / TRUTH / SCENARIO
         scenario.write_text(told.text, encoding="utf-8")
         gathered.note(TRUTH, SCENARIO, sha256_of(scenario))
-    return Part(
+    return TrialPart(
         trial=name,
         marks=marks,
         sums=gathered.sums,

@@ -14,7 +14,7 @@ import yaml
 
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import YamlError, read_yaml
-from wakewise.experiments.trials.dataset.trial_sources import Source
+from wakewise.experiments.trials.dataset.trial_sources import TrialSource
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class TrialSettings:
         return Path(value).name if isinstance(value, str) else None
 
 
-def settings_of(source: Source) -> TrialSettings:
+def settings_of(source: TrialSource) -> TrialSettings:
     """Settings of a trial.
 
     Raises
@@ -68,7 +68,7 @@ def settings_of(source: Source) -> TrialSettings:
     )
 
 
-def figures_of(source: Source) -> dict[str, float]:
+def figures_of(source: TrialSource) -> dict[str, float]:
     """What was measured of a trial, as far as it is numbers.
 
     Raises

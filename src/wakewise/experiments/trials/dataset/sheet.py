@@ -12,13 +12,13 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
-from wakewise.experiments.trials.dataset.part import Part
-from wakewise.experiments.trials.dataset.statement import QUESTIONS, Words
+from wakewise.experiments.trials.dataset.part import TrialPart
+from wakewise.experiments.trials.dataset.statement import QUESTIONS, DatasetStatement
 
 UNSAID = "*For its makers to say.*"
 
 
-def description_of(parts: Sequence[Part]) -> str:
+def description_of(parts: Sequence[TrialPart]) -> str:
     """A few sentences for search engines."""
     photographs = sum(part.facts["photographs"] for part in parts)
     minutes = sum(part.facts["duration_s"] for part in parts) / 60.0
@@ -32,7 +32,9 @@ def description_of(parts: Sequence[Part]) -> str:
     )
 
 
-def data_sheet(words: Words, parts: Sequence[Part], left_out: Mapping[str, str], sizes: Mapping[str, int]) -> str:
+def data_sheet(
+    words: DatasetStatement, parts: Sequence[TrialPart], left_out: Mapping[str, str], sizes: Mapping[str, int]
+) -> str:
     """Text of DATASHEET.md."""
     facts = [part.facts for part in parts]
     simulated = sum(fact["simulated"] for fact in facts)
@@ -69,7 +71,7 @@ def data_sheet(words: Words, parts: Sequence[Part], left_out: Mapping[str, str],
     )
 
 
-def _rows(parts: Sequence[Part], sizes: Mapping[str, int]) -> list[tuple[str, str]]:
+def _rows(parts: Sequence[TrialPart], sizes: Mapping[str, int]) -> list[tuple[str, str]]:
     facts = [part.facts for part in parts]
     with_truth = sum(any(path.endswith("/target.ply") for path in part.sums) for part in parts)
     return [

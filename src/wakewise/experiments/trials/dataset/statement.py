@@ -24,7 +24,7 @@ _VERSION = re.compile(r"\d+\.\d+\.\d+\Z")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Words:
+class DatasetStatement:
     """Licence as an address, and the rest as it was given."""
 
     name: str
@@ -45,7 +45,7 @@ def read_words(
     published: str | None = None,
     version: str = "1.0.0",
     answers: Path | None = None,
-) -> Words:
+) -> DatasetStatement:
     """Check what was said.
 
     Parameters
@@ -89,7 +89,7 @@ def read_words(
             datetime.date.fromisoformat(published)
         except ValueError:
             raise InputError(f"--date: '{published}', must be YYYY-MM-DD") from None
-    return Words(
+    return DatasetStatement(
         name=name.strip(),
         licence=f"https://spdx.org/licenses/{spdx}.html" if spdx else licence,
         creators=told,

@@ -16,7 +16,7 @@ _WORK = ("work/trial", "work")
 
 
 @dataclass(frozen=True)
-class Source:
+class TrialSource:
     """A trial: the folder of its flight; settings and figures, which a campaign keeps elsewhere.
 
     `settings` is a scenario (YAML) or a campaign's task (JSON); files may not be there.
@@ -27,16 +27,16 @@ class Source:
     figures: Path
 
 
-def source_in(folder: Path) -> Source | None:
+def source_in(folder: Path) -> TrialSource | None:
     """The trial in a folder, its own or a campaign's; None where none was flown to its end."""
     if (folder / STEPS).is_file():
-        return Source(folder, folder / SCENARIO, folder / METRICS)
+        return TrialSource(folder, folder / SCENARIO, folder / METRICS)
     if (folder / TASK).is_file() and (folder / FIGURES).is_file():
         for work in _WORK:
             flown = folder / work
             if (flown / STEPS).is_file():
                 settings, figures = flown / SCENARIO, flown / METRICS
-                return Source(
+                return TrialSource(
                     flown,
                     settings if settings.is_file() else folder / TASK,
                     figures if figures.is_file() else folder / FIGURES,
@@ -44,7 +44,7 @@ def source_in(folder: Path) -> Source | None:
     return None
 
 
-def trials_of(folder: Path) -> tuple[dict[str, Source], list[str]]:
+def trials_of(folder: Path) -> tuple[dict[str, TrialSource], list[str]]:
     """Trials by name, and names of folders that hold one that was not flown to its end.
 
     A trial's own folder is one trial; a campaign's holds them below trials/; else every folder in it that is a trial,
@@ -61,7 +61,7 @@ def trials_of(folder: Path) -> tuple[dict[str, Source], list[str]]:
     if alone is not None:
         return {_name(folder.resolve().name): alone}, []
     top = folder / "trials" if (folder / "trials").is_dir() else folder
-    found: dict[str, Source] = {}
+    found: dict[str, TrialSource] = {}
     unfinished: list[str] = []
     for path in _folders(top):
         inner = [path] if _is_trial(path) else [deep for deep in _folders(path) if _is_trial(deep)]

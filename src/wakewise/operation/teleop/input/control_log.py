@@ -29,7 +29,7 @@ _NOBODY = (math.nan,) * len(CONTROL_AXES)
 
 
 @dataclass(eq=False)
-class TraceWriter:
+class ControlLogWriter:
     """Collects hands and desk as they are read; what does not change takes no room."""
 
     _rows: array[float] = field(default_factory=lambda: array("d"), init=False)
@@ -77,7 +77,7 @@ class TraceWriter:
                 self.frame().write_parquet(temporary)
 
 
-class Trace:
+class ControlLog:
     """A `ControlSource` that reads off a record; after its end nobody is there.
 
     Raises
@@ -115,19 +115,19 @@ class Trace:
         return self._desks[at] if at >= 0 else None
 
 
-def read_trace(path: Path) -> Trace:
+def read_trace(path: Path) -> ControlLog:
     """Trace from a Parquet or CSV file.
 
     Raises
     ------
     InputError
-        If it cannot be read, or see `Trace`.
+        If it cannot be read, or see `ControlLog`.
     """
     try:
         frame = pl.read_csv(path) if path.suffix == ".csv" else pl.read_parquet(path)
     except (OSError, pl.exceptions.PolarsError) as fault:
         raise InputError(f"{path}: cannot be read as a table ({' '.join(str(fault).split())})") from fault
-    return Trace(frame, str(path))
+    return ControlLog(frame, str(path))
 
 
 def _checked(

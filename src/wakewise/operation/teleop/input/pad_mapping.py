@@ -50,7 +50,7 @@ class PadState:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part:
+class AxisBinding:
     """One stick, trigger or button that moves an axis.
 
     `rest` is what it says untouched: -1 for a trigger of a pad that SDL does not know.
@@ -68,8 +68,8 @@ class Part:
         return self.sign * float(shaped([raw], self.dead_zone)[0])
 
 
-def _parts(*names: str) -> tuple[Part, ...]:
-    return tuple(Part(of=name.removeprefix("-"), sign=-1.0 if name.startswith("-") else 1.0) for name in names)
+def _parts(*names: str) -> tuple[AxisBinding, ...]:
+    return tuple(AxisBinding(of=name.removeprefix("-"), sign=-1.0 if name.startswith("-") else 1.0) for name in names)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +81,7 @@ class PadMapping:
     """
 
     pad: str = ""
-    axes: tuple[tuple[Part, ...], ...] = (
+    axes: tuple[tuple[AxisBinding, ...], ...] = (
         _parts("-lefty"),
         _parts("leftx"),
         _parts("righty"),
@@ -155,7 +155,7 @@ def mapping_of(tree: Any, what: str = "mapping") -> PadMapping:
     axes = tuple(
         tuple(_part(one, dead_zone, f"{what}, axes.{name}") for one in _several(given[name]))
         if name in given
-        else tuple(Part(of=part.of, sign=part.sign, dead_zone=dead_zone) for part in parts)
+        else tuple(AxisBinding(of=part.of, sign=part.sign, dead_zone=dead_zone) for part in parts)
         for name, parts in zip(CONTROL_AXES, usual.axes, strict=True)
     )
     buttons = _mapping(tree.get("buttons", dict(usual.buttons)), f"{what}, buttons", None)
@@ -170,7 +170,7 @@ def _several(value: Any) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
 
-def _part(value: Any, dead_zone: float, what: str) -> Part:
+def _part(value: Any, dead_zone: float, what: str) -> AxisBinding:
     given = {"of": value} if isinstance(value, str) else _mapping(value, what, ("of", "dead_zone", "rest"))
     name = given.get("of")
     if not isinstance(name, str):
@@ -181,7 +181,9 @@ def _part(value: Any, dead_zone: float, what: str) -> Part:
     of = name.strip().removeprefix("-")
     _known(of, what)
     sign = -1.0 if name.strip().startswith("-") else 1.0
-    return Part(of=of, sign=sign, dead_zone=_dead_zone(given.get("dead_zone", dead_zone), what), rest=float(rest))
+    return AxisBinding(
+        of=of, sign=sign, dead_zone=_dead_zone(given.get("dead_zone", dead_zone), what), rest=float(rest)
+    )
 
 
 def _known(name: Any, what: str) -> None:

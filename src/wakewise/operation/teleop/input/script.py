@@ -27,7 +27,7 @@ _KEYS = ("at_s", *CONTROL_AXES, "pressed", "gone")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Moment:
+class ScriptEntry:
     """From `at_s` on the hands do this, None: nobody is there; what is pressed is pressed once."""
 
     at_s: float
@@ -35,7 +35,7 @@ class Moment:
 
 
 @dataclass(eq=False)
-class Script:
+class ScriptedInput:
     """A `ControlSource` that reads off moments in order; before the first the sticks are centred.
 
     Raises
@@ -44,7 +44,7 @@ class Script:
         If the times do not increase.
     """
 
-    moments: tuple[Moment, ...]
+    moments: tuple[ScriptEntry, ...]
     _read: int = field(default=0, init=False)
     _until_s: float = field(default=-1.0, init=False)
 
@@ -66,7 +66,7 @@ class Script:
         return None if held is None else Controls(axes=held.axes, pressed=tuple(pressed))
 
 
-def script_of(entries: Any, what: str = "script") -> Script:
+def script_of(entries: Any, what: str = "script") -> ScriptedInput:
     """Script of entries as in the file (see the top); `what` names them in messages.
 
     Raises
@@ -78,10 +78,10 @@ def script_of(entries: Any, what: str = "script") -> Script:
         raise InputError(f"{what}: must be a list of entries, such as - {{at_s: 2, right: 0.6}}")
     if len(entries) > LONGEST:
         raise InputError(f"{what}: {len(entries)} entries, at most {LONGEST} are allowed")
-    return Script(tuple(_moment(entry, f"{what}, entry {k}") for k, entry in enumerate(entries, 1)))
+    return ScriptedInput(tuple(_moment(entry, f"{what}, entry {k}") for k, entry in enumerate(entries, 1)))
 
 
-def load_script(path: Path) -> Script:
+def load_script(path: Path) -> ScriptedInput:
     """Script from a YAML file.
 
     Raises
@@ -92,7 +92,7 @@ def load_script(path: Path) -> Script:
     return script_of(yaml_file(path), str(path))
 
 
-def _moment(entry: Mapping[str, Any], what: str) -> Moment:
+def _moment(entry: Mapping[str, Any], what: str) -> ScriptEntry:
     if not isinstance(entry, Mapping) or "at_s" not in entry:
         raise InputError(f"{what}: must be a mapping with at_s, such as {{at_s: 2, right: 0.6}}")
     for key in entry:
@@ -111,7 +111,7 @@ def _moment(entry: Mapping[str, Any], what: str) -> Moment:
         controls = Controls(axes=np.array(axes), pressed=tuple(pressed))
     except InputError as fault:
         raise InputError(f"{what}: {fault}") from fault
-    return Moment(at_s=at_s, controls=None if gone else controls)
+    return ScriptEntry(at_s=at_s, controls=None if gone else controls)
 
 
 def _number(value: Any, what: str) -> float:

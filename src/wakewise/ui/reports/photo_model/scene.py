@@ -14,7 +14,7 @@ import viser
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import quat_from_matrix
 from wakewise.ui.reports.scene3d import CAMERA_RGB, MAX_POINTS, lightened, unheard
-from wakewise.ui.reports.trial import Surface
+from wakewise.ui.reports.trial import TrialMesh
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import read_cloud
 from wakewise.vision.reconstruction.photo_facts import ModelFacts, PhotoFact
@@ -68,7 +68,7 @@ def _subject(server: viser.ViserServer, model: Path, facts: ModelFacts) -> Array
     surface = (model / "mesh.glb").is_file()
     if surface:
         vertices, faces, colours = read_textured(model / "mesh.glb")
-        light, chosen = lightened(Surface(vertices_m=vertices, faces=faces))
+        light, chosen = lightened(TrialMesh(vertices_m=vertices, faces=faces))
         mesh = trimesh.Trimesh(light.vertices_m, light.faces, process=False)
         mesh.visual = trimesh.visual.TextureVisuals(
             material=trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)

@@ -20,8 +20,8 @@ from wakewise.ui.reports.vehicle.drawing_marks import (
     INK,
     JET,
     MUTED,
+    ProjectionPanel,
     Sizes,
-    View,
     arrow,
     badge,
     buoyancy_mark,
@@ -111,7 +111,7 @@ def _sizes(draft: VehicleDraft) -> Sizes:
 
 def _views(
     draft: VehicleDraft, sizes: Sizes, top: float
-) -> tuple[list[View], float, tuple[float, float, float, float]]:
+) -> tuple[list[ProjectionPanel], float, tuple[float, float, float, float]]:
     """Three panels to one scale, the page's height, and the box that is left for the legend."""
     low, high = _extent(draft, sizes)
     span = high - low
@@ -126,9 +126,9 @@ def _views(
 
     def panel(
         title: str, right_B: Array, down_B: Array, toward_B: Array, box: tuple[float, float, float, float]
-    ) -> View:
+    ) -> ProjectionPanel:
         middle = 0.5 * (low + high)
-        return View(
+        return ProjectionPanel(
             title=title,
             right_B=right_B,
             down_B=down_B,
@@ -166,7 +166,7 @@ def _extent(draft: VehicleDraft, sizes: Sizes) -> tuple[Array, Array]:
     return low - edge, high + edge
 
 
-def _panel(draft: VehicleDraft, view: View, sizes: Sizes, number: int) -> list[str]:
+def _panel(draft: VehicleDraft, view: ProjectionPanel, sizes: Sizes, number: int) -> list[str]:
     left, top, width, height = view.box_px
     parts = [
         f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}" rx="10" fill="#ffffff" '
@@ -196,7 +196,7 @@ def _panel(draft: VehicleDraft, view: View, sizes: Sizes, number: int) -> list[s
     return parts
 
 
-def _axes(view: View, x: float, y: float) -> list[str]:
+def _axes(view: ProjectionPanel, x: float, y: float) -> list[str]:
     """Which body axes the panel shows, as a small corner; a negative axis points the other way."""
     across, down = int(np.argmax(np.abs(view.right_B))), int(np.argmax(np.abs(view.down_B)))
     sign = float(np.sign(view.right_B[across]))

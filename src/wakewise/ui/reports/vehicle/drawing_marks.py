@@ -21,7 +21,7 @@ V. H. Chu, Turbulent Jets and Plumes, Springer 2003, chapter 2)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class View:
+class ProjectionPanel:
     """One panel: body directions that point right, down and at the reader, and where the body origin lies on paper.
 
     `right_B`, `down_B` and `toward_B` are unit vectors of the body frame, shape (3,); `origin_px` is the place of the
@@ -63,7 +63,7 @@ def disk_radius_m(thruster: ThrusterDraft, sizes: Sizes) -> float:
     return math.sqrt(thruster.disk_area_m2 / math.pi)
 
 
-def thruster_marks(draft: VehicleDraft, view: View, index: int, sizes: Sizes, key: str) -> list[str]:
+def thruster_marks(draft: VehicleDraft, view: ProjectionPanel, index: int, sizes: Sizes, key: str) -> list[str]:
     """A thruster with its jet: a disk and a widening stream, or a ring with a dot (toward the reader) or a cross."""
     thruster = draft.thrusters[index]
     x, y = view.place(thruster.p_BT_m)
@@ -101,7 +101,7 @@ def thruster_marks(draft: VehicleDraft, view: View, index: int, sizes: Sizes, ke
     ]
 
 
-def label_place(draft: VehicleDraft, view: View, index: int, sizes: Sizes) -> tuple[int, int]:
+def label_place(draft: VehicleDraft, view: ProjectionPanel, index: int, sizes: Sizes) -> tuple[int, int]:
     """Where the number goes: behind the disk as its jet sees it, or beside a ring, toward the middle."""
     thruster = draft.thrusters[index]
     x, y = view.place(thruster.p_BT_m)
@@ -123,7 +123,7 @@ def badge(x: float, y: float, words: str) -> list[str]:
     ]
 
 
-def camera_marks(draft: VehicleDraft, view: View, sizes: Sizes) -> list[str]:
+def camera_marks(draft: VehicleDraft, view: ProjectionPanel, sizes: Sizes) -> list[str]:
     """The camera, its axis, and its horizontal field of view where the view shows it."""
     if draft.X_BC is None:
         return []
@@ -149,7 +149,7 @@ def camera_marks(draft: VehicleDraft, view: View, sizes: Sizes) -> list[str]:
     return [*parts, camera_mark(x, y)]
 
 
-def centre_marks(draft: VehicleDraft, view: View) -> list[str]:
+def centre_marks(draft: VehicleDraft, view: ProjectionPanel) -> list[str]:
     """Centre of gravity (quartered) and of buoyancy (ring), where the file states them."""
     parts = []
     if draft.p_BB_m is not None:

@@ -21,7 +21,7 @@ from wakewise.ui.reports.vehicle.drawing import drawing_svg
 
 
 @dataclass(frozen=True)
-class Cell:
+class HtmlCell:
     """A table cell that is written as HTML already."""
 
     html: str
@@ -157,11 +157,11 @@ def _failures(facts: dict[str, Any]) -> str:
         for axis in WRENCH_AXES:
             values = [] if left is None else [v for v in left[axis] if v is not None]
             if not values:
-                cells.append(Cell('<td class="cell muted">–</td>'))
+                cells.append(HtmlCell('<td class="cell muted">–</td>'))
                 continue
             worst = min(values)
             lost_share = 1.0 - min(max(worst, 0.0), 100.0) / 100.0
-            cells.append(Cell(f'<td class="cell lost" style="--share:{lost_share:.2f}">{worst:.0f}</td>'))
+            cells.append(HtmlCell(f'<td class="cell lost" style="--share:{lost_share:.2f}">{worst:.0f}</td>'))
         lost = ", ".join(failure["lost"]) or "none"
         rows.append([shown(failure["thruster"]), failure["name"], shown(failure["rank"]), lost, *cells])
     heads = ["", "thruster", "rank left", "axes lost", *WRENCH_AXES]
@@ -214,7 +214,7 @@ def _matrix(matrix: Array) -> str:
         for value in matrix[i] + 0.0:
             kind, share = "plus" if value > 0 else "minus", abs(float(value)) / largest
             shown = f"{value:+.3f}" if abs(value) > 5e-4 else "0"
-            cells.append(Cell(f'<td class="cell {kind}" style="--share:{share:.2f}">{shown}</td>'))
+            cells.append(HtmlCell(f'<td class="cell {kind}" style="--share:{share:.2f}">{shown}</td>'))
         rows.append([axis, *cells])
     return _table(["", *(f"T{j}" for j in range(1, matrix.shape[1] + 1))], rows)
 
@@ -229,13 +229,13 @@ def _parameters(draft: VehicleDraft) -> str:
             if p.value is None:
                 mark = '<span class="badge warn">missing</span>'
             row = [
-                Cell(f'<td class="nowrap">{escape(p.quantity)}</td>'),
-                Cell(f'<td class="value">{escape(p.value or "")}</td>'),
-                Cell(f'<td class="nowrap">{escape(p.unit)}</td>'),
-                Cell(f"<td>{mark}</td>"),
+                HtmlCell(f'<td class="nowrap">{escape(p.quantity)}</td>'),
+                HtmlCell(f'<td class="value">{escape(p.value or "")}</td>'),
+                HtmlCell(f'<td class="nowrap">{escape(p.unit)}</td>'),
+                HtmlCell(f"<td>{mark}</td>"),
             ]
             if number == 0:
-                row.append(Cell(f'<td class="source" rowspan="{len(alike)}">{escape(source)}</td>'))
+                row.append(HtmlCell(f'<td class="source" rowspan="{len(alike)}">{escape(source)}</td>'))
             rows.append(row)
     return _table(["quantity", "value", "unit", "", "source"], rows)
 
@@ -255,11 +255,11 @@ def _full_matrices(draft: VehicleDraft) -> str:
 
 
 def _table(heads: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
-    """A table; anything but a `Cell` is written as text."""
+    """A table; anything but a `HtmlCell` is written as text."""
     top = "".join(f"<th>{escape(head)}</th>" for head in heads)
     lines = []
     for row in rows:
-        cells = (c.html if isinstance(c, Cell) else f"<td>{escape(str(c))}</td>" for c in row)
+        cells = (c.html if isinstance(c, HtmlCell) else f"<td>{escape(str(c))}</td>" for c in row)
         lines.append(f"<tr>{''.join(cells)}</tr>")
     return f"<table><thead><tr>{top}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
 

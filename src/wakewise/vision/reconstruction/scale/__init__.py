@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
-    from wakewise.vision.reconstruction.scale.bars import Bar, Bars, parse_bar, read_bars
-    from wakewise.vision.reconstruction.scale.position_fixes import Fixes, exif_fixes, read_fixes
+    from wakewise.vision.reconstruction.scale.bars import ScaleBar, ScaleBars, parse_bar, read_bars
+    from wakewise.vision.reconstruction.scale.position_fixes import PositionFixes, exif_fixes, read_fixes
 
-__all__ = ["Bar", "Bars", "Fixes", "exif_fixes", "parse_bar", "read_bars", "read_fixes"]
+__all__ = ["PositionFixes", "ScaleBar", "ScaleBars", "exif_fixes", "parse_bar", "read_bars", "read_fixes"]
 
 lazy_door(__name__, "photos")

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import yaml_file
 from wakewise.core.settings import Settings, describe_faults
-from wakewise.vision.reconstruction.calibration import Board
+from wakewise.vision.reconstruction.calibration import CalibrationBoard
 
 SIGMA_SHARE = 1e-3
 """Standard deviation of a length whose uncertainty nobody says, as a share of it: a steel rule read to half a mm."""
@@ -32,7 +32,7 @@ FAMILIES = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bar:
+class ScaleBar:
     """Distance between the middles of two targets, by number, in m, with its standard deviation."""
 
     ends: tuple[int, int]
@@ -58,13 +58,13 @@ class Bar:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bars:
+class ScaleBars:
     """All that is known of lengths. family: of the targets, found out if None; tag_m: side of their black square."""
 
-    bars: tuple[Bar, ...] = ()
+    bars: tuple[ScaleBar, ...] = ()
     family: str | None = None
     tag_m: float | None = None
-    board: Board | None = None
+    board: CalibrationBoard | None = None
     board_sigma: float = SIGMA_SHARE
 
     def __post_init__(self) -> None:
@@ -91,7 +91,7 @@ class Bars:
         return [[[*bar.ends, bar.length_m, bar.sigma_m] for bar in self.bars], self.family, self.tag_m, size]
 
 
-def parse_bar(words: str) -> Bar:
+def parse_bar(words: str) -> ScaleBar:
     """A bar of `A,B,LENGTH[,SIGMA]`: numbers of two targets, and metres.
 
     Raises
@@ -110,7 +110,7 @@ def parse_bar(words: str) -> Bar:
             f"bar '{words}': must be A,B,LENGTH or A,B,LENGTH,SIGMA: numbers of two targets, metres; such as "
             "3,7,0.500,0.0002"
         ) from None
-    return Bar(ends=ends, length_m=length, sigma_m=sigma)
+    return ScaleBar(ends=ends, length_m=length, sigma_m=sigma)
 
 
 class _BarEntry(Settings):
@@ -134,7 +134,7 @@ class _BarsFile(Settings):
     board: _BoardEntry | None = None
 
 
-def read_bars(path: Path) -> Bars:
+def read_bars(path: Path) -> ScaleBars:
     """Bars of a YAML file: `bars` (ends, length_m, sigma_m), `targets`, `tag_m`, `board`.
 
     Raises
@@ -151,9 +151,9 @@ def read_bars(path: Path) -> Bars:
         told = describe_faults(fault, _BarsFile, "bars")
         raise InputError(f"{path}: {told}; a bar has ends: [3, 7], length_m, sigma_m") from None
     try:
-        return Bars(
+        return ScaleBars(
             bars=tuple(
-                Bar(
+                ScaleBar(
                     ends=one.ends,
                     length_m=one.length_m,
                     sigma_m=SIGMA_SHARE * one.length_m if one.sigma_m is None else one.sigma_m,
@@ -164,7 +164,7 @@ def read_bars(path: Path) -> Bars:
             tag_m=said.tag_m,
             board=None
             if said.board is None
-            else Board(
+            else CalibrationBoard(
                 columns=said.board.columns,
                 rows=said.board.rows,
                 square_m=said.board.square_m,

@@ -14,7 +14,7 @@ MOST_OFF_PCT, MOST_OFF_SIGMAS = 1.0, 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Measured:
+class BarMeasurement:
     """A bar as stated, in m, and as the model has it, in its own units, each with its standard deviation."""
 
     name: str
@@ -36,7 +36,7 @@ class Measured:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Residual:
+class BarResidual:
     """What a bar is in the scaled model. off_*: its length there less the stated one; check_pct: the same if the scale
     came from the other bars alone, None for the only one; photos: fewest that one of its ends is seen in.
     """
@@ -52,19 +52,19 @@ class Residual:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fit:
+class ScaleFit:
     """Metres per unit of the model, relative standard deviation in percent, and each bar's residual."""
 
     scale: float
     uncertainty_pct: float
-    bars: tuple[Residual, ...]
+    bars: tuple[BarResidual, ...]
 
     def figures(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return {"uncertainty_pct": self.uncertainty_pct, "bars": [asdict(bar) for bar in self.bars]}
 
 
-def fit_scale(bars: list[Measured], keep: bool = False) -> Fit:
+def fit_scale(bars: list[BarMeasurement], keep: bool = False) -> ScaleFit:
     """Weighted mean of the bars' scales; residuals are those at that scale, or if it is to `keep` its own, at that.
 
     The uncertainty is that of the mean, enlarged where bars scatter by more than they say (R. T. Birge, Physical Review
@@ -103,11 +103,11 @@ def fit_scale(bars: list[Measured], keep: bool = False) -> Fit:
             "ends are right and its targets stayed where they were"
         )
     applied = 1.0 if keep else mean
-    return Fit(
+    return ScaleFit(
         scale=mean,
         uncertainty_pct=100.0 * share * max(1.0, float(np.sqrt(scatter))),
         bars=tuple(
-            Residual(
+            BarResidual(
                 name=bar.name,
                 length_m=bar.length_m,
                 sigma_m=bar.sigma_m,

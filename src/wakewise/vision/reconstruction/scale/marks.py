@@ -15,7 +15,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress
-from wakewise.vision.reconstruction.calibration import Board, board_detector
+from wakewise.vision.reconstruction.calibration import CalibrationBoard, board_detector
 from wakewise.vision.reconstruction.dense import in_order
 from wakewise.vision.reconstruction.photos import Image, PhotoStore
 from wakewise.vision.reconstruction.scale.bars import FAMILIES
@@ -97,7 +97,7 @@ def find_squares(grey: Image, family: str) -> dict[int, Array]:
 
 
 def find_board(
-    store: PhotoStore, names: list[str], board: Board, progress: Progress
+    store: PhotoStore, names: list[str], board: CalibrationBoard, progress: Progress
 ) -> tuple[Mapping[int, Array], dict[int, dict[str, Array]]]:
     """A ChArUco board's inner corners: places on it in m, shape (3,), and by photograph in pixels, shape (1, 2).
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
-from wakewise.vision.reconstruction.registered_photos import View
+from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
 
 MOST_ERROR_PX = 3.0
 """Farther from where the others put it, a photograph shows something else: a misread target, or a moved one."""
@@ -23,7 +23,7 @@ STEPS, SHIFT = 10, 1e-6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Place:
+class TriangulatedPoint:
     """A point of the model, its covariance, shape (3, 3), photographs it rests on and their rms error in px."""
 
     point_W: Array
@@ -36,7 +36,7 @@ class Place:
         freeze(self, point_W=(3,), covariance=(3, 3))
 
 
-def place(views: Mapping[str, View], seen: Mapping[str, Array]) -> Place | None:
+def place(views: Mapping[str, RegisteredPhoto], seen: Mapping[str, Array]) -> TriangulatedPoint | None:
     """The point that photographs show at these pixels, each of shape (2,); None where fewer than two agree on one.
 
     Photographs that stick out are left out one after the other, the worst first.
@@ -54,7 +54,7 @@ def place(views: Mapping[str, View], seen: Mapping[str, Array]) -> Place | None:
                 return None
             freedom = max(error.size - 3, 1)
             sigma = max(LEAST_SIGMA_PX, float(np.sqrt((error**2).sum() / freedom)))
-            return Place(
+            return TriangulatedPoint(
                 point_W=point,
                 covariance=np.asarray(sigma**2 * np.linalg.inv(slope.T @ slope), dtype=np.float64),
                 photos=tuple(names),
@@ -67,7 +67,7 @@ def place(views: Mapping[str, View], seen: Mapping[str, Array]) -> Place | None:
     return None
 
 
-def _met(views: Mapping[str, View], seen: Mapping[str, Array], names: list[str]) -> Array | None:
+def _met(views: Mapping[str, RegisteredPhoto], seen: Mapping[str, Array], names: list[str]) -> Array | None:
     """The point nearest to all rays; None where they run side by side or it lies behind a camera."""
     total, sums = np.zeros((3, 3)), np.zeros(3)
     for name in names:
@@ -84,7 +84,7 @@ def _met(views: Mapping[str, View], seen: Mapping[str, Array], names: list[str])
 
 
 def _refined(
-    views: Mapping[str, View], seen: Mapping[str, Array], names: list[str], point: Array
+    views: Mapping[str, RegisteredPhoto], seen: Mapping[str, Array], names: list[str], point: Array
 ) -> tuple[Array, Array, Array]:
     """The point of least squares in pixels, its errors, shape (2 n,), and their slopes, shape (2 n, 3)."""
 
@@ -105,7 +105,7 @@ def _refined(
     return point, errors(point), slope
 
 
-def _widest_deg(views: Mapping[str, View], names: list[str], point: Array) -> float:
+def _widest_deg(views: Mapping[str, RegisteredPhoto], names: list[str], point: Array) -> float:
     """Largest angle between two lines of sight."""
     rays = np.array([point - views[name].p_WC_m for name in names])
     rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)

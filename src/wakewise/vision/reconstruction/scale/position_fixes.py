@@ -38,7 +38,7 @@ _NUMBERS = (*_FLAT, *_ROUND, "depth_m", "sigma_m", "depth_sigma_m")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Fix:
+class PositionFix:
     """A photo's place north, east and down in m, shape (3,), NaN where nothing is known, and standard deviations."""
 
     place_W_m: Array
@@ -52,17 +52,17 @@ class Fix:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Fixes:
+class PositionFixes:
     """Fixes by photo name. origin: latitude and longitude in degrees of where north and east are 0, where known."""
 
-    fixes: Mapping[str, Fix]
+    fixes: Mapping[str, PositionFix]
     origin: tuple[float, float] | None = None
 
     @cached_property
-    def _by_stem(self) -> dict[str, Fix]:
+    def _by_stem(self) -> dict[str, PositionFix]:
         return {_stem(name): fix for name, fix in self.fixes.items()}
 
-    def of(self, name: str) -> Fix | None:
+    def of(self, name: str) -> PositionFix | None:
         """The fix of a photo; a name matches whole or without its suffix."""
         return self.fixes.get(name) or self._by_stem.get(_stem(name))
 
@@ -90,7 +90,7 @@ class _Told:
     depth_sigma_m: float = DEPTH_SIGMA_M
 
 
-def read_fixes(path: Path) -> Fixes:
+def read_fixes(path: Path) -> PositionFixes:
     """Fixes of a CSV file.
 
     Parameters
@@ -131,7 +131,7 @@ def read_fixes(path: Path) -> Fixes:
     return _flattened(told, str(path))
 
 
-def exif_fixes(folder: Path) -> Fixes:
+def exif_fixes(folder: Path) -> PositionFixes:
     """Fixes that cameras wrote into the photos of a folder.
 
     Raises
@@ -219,7 +219,7 @@ def _row(where: str, row: Mapping[str, str | None]) -> _Told:
     )
 
 
-def _flattened(told: Mapping[str, _Told], source: str) -> Fixes:
+def _flattened(told: Mapping[str, _Told], source: str) -> PositionFixes:
     """All in metres, about the first that has degrees.
 
     Raises
@@ -230,7 +230,7 @@ def _flattened(told: Mapping[str, _Told], source: str) -> Fixes:
     origin = next((one.angles for one in told.values() if one.angles is not None), None)
     if origin is not None and any(one.flat is not None for one in told.values()):
         raise InputError(f"{source}: has places in degrees and in metres, must be one of them")
-    fixes: dict[str, Fix] = {}
+    fixes: dict[str, PositionFix] = {}
     for name, one in told.items():
         place = np.full(3, np.nan)
         if one.angles is not None and origin is not None:
@@ -239,7 +239,7 @@ def _flattened(told: Mapping[str, _Told], source: str) -> Fixes:
             place[:2] = one.flat
         if one.depth_m is not None:
             place[2] = one.depth_m
-        fixes[name] = Fix(place_W_m=place, sigma_m=np.array([one.sigma_m, one.sigma_m, one.depth_sigma_m]))
+        fixes[name] = PositionFix(place_W_m=place, sigma_m=np.array([one.sigma_m, one.sigma_m, one.depth_sigma_m]))
     known = np.array([fix.place_W_m for fix in fixes.values()])
     for axis, words in enumerate(("north", "east", "down")):
         values = known[np.isfinite(known[:, axis]), axis]
@@ -248,7 +248,7 @@ def _flattened(told: Mapping[str, _Told], source: str) -> Fixes:
                 f"{source}: fixes lie {np.ptp(values) / 1e3:.0f} km apart ({words}), {MOST_APART_M / 1e3:.0f} km are "
                 "believed; are latitude and longitude mixed up?"
             )
-    return Fixes(fixes=fixes, origin=origin)
+    return PositionFixes(fixes=fixes, origin=origin)
 
 
 def _on_map(angles: tuple[float, float], origin: tuple[float, float]) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
 from wakewise.vision.evaluation import umeyama
-from wakewise.vision.reconstruction.scale.position_fixes import Fixes
+from wakewise.vision.reconstruction.scale.position_fixes import PositionFixes
 
 MOST_UNSURE_PCT = 20.0
 """A scale less sure than this is told and not used."""
@@ -28,7 +28,7 @@ _BEND = 2.0  # sigmas from which residuals count linearly
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Placed:
+class Georeference:
     """Similarity from the model to north, east, down in m: scale, R (3, 3), t (3,); and how well the fixes fit.
 
     uncertainty_pct: standard deviation of the scale, inf where it is open; off_m: of each photo with a fix, its fix
@@ -54,7 +54,7 @@ class Placed:
         return float(np.sqrt((known**2).mean())) if known.size else None
 
 
-def place_by_fixes(centres: Mapping[str, Array], fixes: Fixes) -> Placed:
+def place_by_fixes(centres: Mapping[str, Array], fixes: PositionFixes) -> Georeference:
     """Fit cameras' places in a model, shape (3,) by photo, to fixes.
 
     Raises
@@ -79,7 +79,7 @@ def place_by_fixes(centres: Mapping[str, Array], fixes: Fixes) -> Placed:
     if not turned:
         off[:, :2] = np.nan
     far = np.nanmax(np.abs(off) / sigmas, axis=1) > FAR_SIGMAS
-    return Placed(
+    return Georeference(
         scale=scale,
         R=R,
         t=t,
@@ -90,7 +90,7 @@ def place_by_fixes(centres: Mapping[str, Array], fixes: Fixes) -> Placed:
     )
 
 
-def why_unused(placed: Placed) -> str | None:
+def why_unused(placed: Georeference) -> str | None:
     """Why the scale is not used; None where it can be."""
     if placed.uncertainty_pct <= MOST_UNSURE_PCT:
         return None
@@ -99,7 +99,7 @@ def why_unused(placed: Placed) -> str | None:
     return f"the scale would be uncertain by {how}, {MOST_UNSURE_PCT:g} % is the most; photos must {what}"
 
 
-def figures(placed: Placed, fixes: Fixes, used: bool, checks: bool) -> dict[str, Any]:
+def figures(placed: Georeference, fixes: PositionFixes, used: bool, checks: bool) -> dict[str, Any]:
     """Plain values for JSON."""
     return {
         "used": used,

@@ -16,15 +16,15 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import whole_folder
 from wakewise.core.interfaces import Progress
 from wakewise.vision.evaluation import umeyama
-from wakewise.vision.reconstruction.calibration import Board
+from wakewise.vision.reconstruction.calibration import CalibrationBoard
 from wakewise.vision.reconstruction.colmap import pycolmap
 from wakewise.vision.reconstruction.photos import PhotoStore
-from wakewise.vision.reconstruction.registered_photos import View, read_views
-from wakewise.vision.reconstruction.scale.bars import Bars
-from wakewise.vision.reconstruction.scale.fitting import Measured, fit_scale
+from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto, read_views
+from wakewise.vision.reconstruction.scale.bars import ScaleBars
+from wakewise.vision.reconstruction.scale.fitting import BarMeasurement, fit_scale
 from wakewise.vision.reconstruction.scale.marks import Sightings, find_board, find_marks
-from wakewise.vision.reconstruction.scale.places import Place, place
-from wakewise.vision.reconstruction.scale.position_fixes import Fixes
+from wakewise.vision.reconstruction.scale.places import TriangulatedPoint, place
+from wakewise.vision.reconstruction.scale.position_fixes import PositionFixes
 from wakewise.vision.reconstruction.scale.scale_from_positions import figures, place_by_fixes, why_unused
 
 MOST_SIDE_PCT = 2.0
@@ -33,7 +33,7 @@ LEAST_CORNERS = 6
 
 
 def scale_model(
-    store: PhotoStore, sparse: Path, bars: Bars, threads: int, progress: Progress, keep: bool = False
+    store: PhotoStore, sparse: Path, bars: ScaleBars, threads: int, progress: Progress, keep: bool = False
 ) -> dict[str, Any]:
     """Scale a sparse model so that bars have their lengths; about its origin, without turning it.
 
@@ -56,7 +56,7 @@ def scale_model(
     """
     views = {view.name: view for view in read_views(sparse, None)[0]}
     names = sorted(views)
-    measured: list[Measured] = []
+    measured: list[BarMeasurement] = []
     family, targets = None, {}
     if bars.bars:
         family, sightings = find_marks(store, names, bars.wanted, bars.family, threads, progress)
@@ -89,7 +89,7 @@ def scale_model(
     return {"scale_bars": told}
 
 
-def place_model(sparse: Path, fixes: Fixes, keep: bool = False) -> dict[str, Any]:
+def place_model(sparse: Path, fixes: PositionFixes, keep: bool = False) -> dict[str, Any]:
     """Lay a sparse model where fixes say that its cameras were, in m, down along its third axis.
 
     Parameters
@@ -121,7 +121,7 @@ def place_model(sparse: Path, fixes: Fixes, keep: bool = False) -> dict[str, Any
     return {"scale_fixes": figures(placed, fixes, used, keep)}
 
 
-def _said(number: int, corners: list[Place], scale: float) -> dict[str, Any]:
+def _said(number: int, corners: list[TriangulatedPoint], scale: float) -> dict[str, Any]:
     """A target's figures."""
     sigma = float(np.sqrt(np.mean([np.trace(corner.covariance) / 3.0 for corner in corners])))
     return {
@@ -134,36 +134,43 @@ def _said(number: int, corners: list[Place], scale: float) -> dict[str, Any]:
     }
 
 
-def _square(views: Mapping[str, View], seen: Mapping[str, Array]) -> list[Place] | None:
+def _square(views: Mapping[str, RegisteredPhoto], seen: Mapping[str, Array]) -> list[TriangulatedPoint] | None:
     """The four corners of a target in the model; None where one cannot be placed."""
     corners = [place(views, {name: four[k] for name, four in seen.items()}) for k in range(4)]
     known = [corner for corner in corners if corner is not None]
     return known if len(known) == 4 else None
 
 
-def _middle(corners: list[Place]) -> Array:
+def _middle(corners: list[TriangulatedPoint]) -> Array:
     return np.asarray(np.mean([corner.point_W for corner in corners], axis=0))
 
 
-def _sides(corners: list[Place]) -> Array:
+def _sides(corners: list[TriangulatedPoint]) -> Array:
     """Lengths of a target's four sides."""
     points = np.array([corner.point_W for corner in corners])
     return np.asarray(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))
 
 
-def _measured(name: str, length_m: float, sigma_m: float, one: list[Place], two: list[Place]) -> Measured:
+def _measured(
+    name: str, length_m: float, sigma_m: float, one: list[TriangulatedPoint], two: list[TriangulatedPoint]
+) -> BarMeasurement:
     way = _middle(two) - _middle(one)
     found = float(np.linalg.norm(way))
     # A photograph's pose moves all four corners alike, so the middle is held for no surer than a corner.
     spread = np.mean([corner.covariance for corner in one], axis=0) + np.mean([c.covariance for c in two], axis=0)
     sigma = float(np.sqrt(way @ spread @ way)) / found
     photos = min(len(corner.photos) for corner in (*one, *two))
-    return Measured(name=name, length_m=length_m, sigma_m=sigma_m, found=found, found_sigma=sigma, photos=photos)
+    return BarMeasurement(name=name, length_m=length_m, sigma_m=sigma_m, found=found, found_sigma=sigma, photos=photos)
 
 
 def _of_board(
-    store: PhotoStore, names: list[str], views: Mapping[str, View], board: Board, sigma: float, progress: Progress
-) -> Measured:
+    store: PhotoStore,
+    names: list[str],
+    views: Mapping[str, RegisteredPhoto],
+    board: CalibrationBoard,
+    sigma: float,
+    progress: Progress,
+) -> BarMeasurement:
     """A board as one bar: its corners' rms distance from their middle, on it and in the model."""
     wanted, seen = find_board(store, names, board, progress)
     placed = {number: place(views, {name: at[0] for name, at in by.items()}) for number, by in seen.items()}
@@ -180,7 +187,7 @@ def _of_board(
     length = float(np.sqrt(((flat - flat.mean(axis=0)) ** 2).sum(axis=1).mean()))
     # The rms misfit over the corners that average it out.
     misfit = float(np.sqrt((error**2).mean() / len(known))) / similarity.scale
-    return Measured(
+    return BarMeasurement(
         name="board",
         length_m=length,
         sigma_m=sigma * length,
@@ -190,7 +197,7 @@ def _of_board(
     )
 
 
-def _unseen(number: int, family: str, sightings: Sightings, bars: Bars) -> str:
+def _unseen(number: int, family: str, sightings: Sightings, bars: ScaleBars) -> str:
     """Why a target has no place, in a line."""
     name = next(bar.name for bar in bars.bars if number in bar.ends)
     photos = sorted(sightings.get(number, {}))
