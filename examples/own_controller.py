@@ -3,7 +3,7 @@
 import sys
 
 import wakewise as ww
-from wakewise.allocation import least_thrusts
+from wakewise.allocation import min_norm_allocation
 from wakewise.control import TrackerState as State, make_tracker, vehicle_layout
 
 
@@ -17,7 +17,7 @@ class Mine:
 
     def step(self, state: State, dt_s: float, estimate: ww.BodyState, goal: ww.Goal) -> tuple[State, ww.Command]:
         state, wrench = self.tracker.wrench(state, dt_s, estimate, goal)
-        return state, ww.Command(thrusts_N=least_thrusts(self.layout, wrench).thrusts_N, wrench_B=wrench)
+        return state, ww.Command(thrusts_N=min_norm_allocation(self.layout, wrench).thrusts_N, wrench_B=wrench)
 
 
 parts = ww.Scenario.preset("quick").parts()

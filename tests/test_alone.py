@@ -10,13 +10,13 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.core.run_lock import LOCK, alone, half_done, is_running, sweep
+from wakewise.core.run_lock import LOCK, exclusive_run, is_running, remove_stale, temporary_prefix
 
 HOLD = """
 import sys, time
 from pathlib import Path
 from wakewise.core.files import whole_file, whole_folder
-from wakewise.core.run_lock import alone
+from wakewise.core.run_lock import exclusive_run
 folder = Path(sys.argv[1])
 with alone(folder), whole_file(folder / "a.db"), whole_folder(folder / "images" / "b"):
     print("held", flush=True)
@@ -40,9 +40,9 @@ def test_a_second_run_is_refused_and_touches_nothing(holder: tuple[subprocess.Po
     """The message names the folder and the process; what that one has half-done stays."""
     process, folder = holder
     before = sorted(folder.rglob("*"))
-    with pytest.raises(InputError, match=rf"run: another run is at it \(pid {process.pid}\)"), alone(folder):
+    with pytest.raises(InputError, match=rf"run: another run is at it \(pid {process.pid}\)"), exclusive_run(folder):
         pass
-    sweep(folder)
+    remove_stale(folder)
     assert sorted(folder.rglob("*")) == before
     assert len(before) == 4  # the lock, a file, a folder with a folder
 
@@ -56,7 +56,7 @@ def test_what_a_killed_run_left_is_taken_over(holder: tuple[subprocess.Popen[str
     for other in others:
         other.touch()
     assert len([path for path in folder.rglob(".*") if path not in others]) == 3
-    with alone(folder):
+    with exclusive_run(folder):
         assert sorted(folder.rglob(".*")) == sorted([*others, folder / LOCK])
         assert (folder / LOCK).read_text().split()[0] == str(os.getpid())
     assert sorted(folder.rglob(".*")) == sorted(others)
@@ -64,8 +64,8 @@ def test_what_a_killed_run_left_is_taken_over(holder: tuple[subprocess.Popen[str
 
 def test_a_run_inside_a_run_is_the_same_one(tmp_path: Path) -> None:
     """A block inside another passes and leaves the lock to it; afterwards the folder is empty, also after a failure."""
-    with pytest.raises(RuntimeError), alone(tmp_path):
-        with alone(tmp_path / "."):
+    with pytest.raises(RuntimeError), exclusive_run(tmp_path):
+        with exclusive_run(tmp_path / "."):
             pass
         assert (tmp_path / LOCK).exists()
         raise RuntimeError
@@ -75,14 +75,14 @@ def test_a_run_inside_a_run_is_the_same_one(tmp_path: Path) -> None:
 def test_ones_own_half_done_files_are_not_swept(tmp_path: Path) -> None:
     """A process that sweeps while it writes keeps what it writes."""
     with whole_file(tmp_path / "x.png") as temporary:
-        sweep(tmp_path)
+        remove_stale(tmp_path)
         temporary.write_text("x")
     assert (tmp_path / "x.png").read_text() == "x"
 
 
 def test_a_number_used_again_is_another_process() -> None:
     """A process is known by its number and its start; one that ended, or has another start, does not run."""
-    me = half_done("x").split(".w")[1].rstrip(".")
+    me = temporary_prefix("x").split(".w")[1].rstrip(".")
     pid, start = me.split("-")
     assert is_running(int(pid), int(start, 16))
     assert not is_running(int(pid), int(start, 16) + 1)
@@ -96,7 +96,8 @@ def test_many_that_begin_at_once_take_turns_or_are_refused(tmp_path: Path) -> No
     """Of six processes that try again and again, never two are inside."""
     code = (
         "import sys, time\nfrom pathlib import Path\nfrom wakewise.core.errors import InputError\n"
-        "from wakewise.core.run_lock import alone\nfolder, end, inside = Path(sys.argv[1]), time.time() + 1.5, 0\n"
+        "from wakewise.core.run_lock import exclusive_run\n"
+        "folder, end, inside = Path(sys.argv[1]), time.time() + 1.5, 0\n"
         "while time.time() < end:\n"
         "    try:\n"
         "        with alone(folder):\n"

@@ -24,9 +24,12 @@ def crafts() -> dict[str, str]:
     """Craft files by name, with the wake model that is the meter's own choice."""
     from wakewise.robot.vehicles import load_vehicle
     from wakewise.wake import wake_model
-    from wakewise_ardusub.vehicle_summary import VehicleSummary, craft_json
+    from wakewise_ardusub.vehicle_summary import VehicleSummary, vehicle_summary_json
 
-    return {f"{name}.json": craft_json(VehicleSummary.of(load_vehicle(name), wake_model("jet"))) for name in VEHICLES}
+    return {
+        f"{name}.json": vehicle_summary_json(VehicleSummary.of(load_vehicle(name), wake_model("jet")))
+        for name in VEHICLES
+    }
 
 
 def logo(*, needle: bool) -> np.ndarray:

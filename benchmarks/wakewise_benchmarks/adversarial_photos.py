@@ -29,7 +29,7 @@ from wakewise.vision.reconstruction.features import match_photos
 from wakewise.vision.reconstruction.lens_groups import group_photos, known_groups
 from wakewise.vision.reconstruction.mapping import map_photos
 from wakewise.vision.reconstruction.pairs import choose_pairs
-from wakewise.vision.reconstruction.photos import Image, passed_over, without_duplicates
+from wakewise.vision.reconstruction.photos import Image, unsupported_files, without_duplicates
 from wakewise_benchmarks import adversarial_scenes as scenes
 from wakewise_benchmarks.adversarial_scenes import SceneCamera
 
@@ -131,7 +131,7 @@ def _model(
     """Doubts, and the cameras of the photographs that found a place, in the model's frame."""
     settings = SETTINGS.model_copy(update=dict(trap.settings))
     photos, _ = without_duplicates(read_photos(folder))
-    assert not passed_over(folder)
+    assert not unsupported_files(folder)
     names = [photo.name for photo in photos]
     known = None if trap.cameras is None else trap.cameras(shots)
     poses = None if known is None else {name: (known.rotations[name], known.positions[name]) for name in names}

@@ -11,7 +11,7 @@ import daqp
 import numpy as np
 from scipy.optimize import LinearConstraint, minimize
 
-from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocation, least_thrusts
+from wakewise.allocation import Layout, Weights, compile_layout, min_norm_allocation, min_wash_allocation
 from wakewise.allocation.allocate import COUPLING_LIMIT
 from wakewise.allocation.line_search import box_range, cost, coupling, split_allocation
 from wakewise.core.arrays import Array
@@ -72,8 +72,8 @@ def _speed(layout: Layout, problems: list[Problem], weights: Weights) -> dict[st
     search, call, pinv = [], [], []
     for G, wrench in problems:
         search.append(timed_us(partial(split_allocation, G, layout.inverse, wrench, *fixed), 200)["median_us"])
-        call.append(timed_us(partial(gentle_allocation, layout, wrench, G, weights), 100)["median_us"])
-        pinv.append(timed_us(partial(least_thrusts, layout, wrench), 100)["median_us"])
+        call.append(timed_us(partial(min_wash_allocation, layout, wrench, G, weights), 100)["median_us"])
+        pinv.append(timed_us(partial(min_norm_allocation, layout, wrench), 100)["median_us"])
     return {
         "search_us": float(np.median(search)),
         "search_worst_case_us": float(np.max(search)),
@@ -130,7 +130,7 @@ def _against_grid(
             options.progress(done, len(problems), "grid")
         weights = kinds[done % 2]
         packed = weights.packed
-        found = gentle_allocation(layout, wrench, G, weights)
+        found = min_wash_allocation(layout, wrench, G, weights)
         value = cost(G, found.thrusts_N.copy(), rest, packed)
         start = layout.inverse @ wrench
         ends = np.array([box_range(start, line, layout.lower_N, layout.upper_N) for line in layout.lines])
@@ -172,12 +172,12 @@ def _potential(layout: Layout, view: InfluenceModel, weights: Weights) -> dict[s
             eye = bench_target().centre_W_m - reach * (np.cos(below) * side + np.sin(below) * np.array([0.0, 0.0, 1.0]))
             level = quat_from_matrix(look_at(eye, eye + side))
             G, wrench = view.gram(Pose(eye, level)), rng.normal(size=6) * [6.0, 6.0, 4.0, 0.3, 0.5, 0.5]
-            before = float(least_thrusts(layout, wrench, G).disturbance or 0.0)
+            before = float(min_norm_allocation(layout, wrench, G).disturbance or 0.0)
             if before <= 0.0:
                 still += 1
                 continue
             for row, chosen in zip(rows.values(), (weights, pure), strict=True):
-                row.append(float(gentle_allocation(layout, wrench, G, chosen).disturbance or 0.0) / before)
+                row.append(float(min_wash_allocation(layout, wrench, G, chosen).disturbance or 0.0) / before)
         ratios += rows["weighted"]
         table[name] = {what: _quartiles(row) for what, row in rows.items()} | {"n": len(row), "no_disturbance": still}
     return {"pinv_ratio_median": float(np.median(ratios)), "pinv_ratio": table}
@@ -191,8 +191,8 @@ def _coupled(layout: Layout, problems: list[Problem], weights: Weights) -> dict[
     """Branch and bound where wall jets along the floor couple horizontal and vertical thrusters."""
     spans, gaps = [], []
     for G, wrench in problems:
-        spans.append(timed_us(partial(gentle_allocation, layout, wrench, G, weights), 3)["median_us"])
-        gaps.append(gentle_allocation(layout, wrench, G, weights).gap)
+        spans.append(timed_us(partial(min_wash_allocation, layout, wrench, G, weights), 3)["median_us"])
+        gaps.append(min_wash_allocation(layout, wrench, G, weights).gap)
     return {"call_us": float(np.median(spans)), "call_us_max": float(np.max(spans)), "gap_max": float(np.max(gaps))}
 
 
@@ -212,7 +212,7 @@ def _chatter(layout: Layout, views: dict[str, InfluenceModel], weights: Weights)
             wrench = 0.8 * wrench + 0.6 * rng.normal(size=6) * [1.0, 1.0, 1.0, 0.05, 0.05, 0.08]
             course.append((view.gram(X_WB), wrench - np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])))
         ways: dict[str, Callable[[Array, Array, Array], Array]] = {
-            "pseudo-inverse": lambda _G, w, _T: least_thrusts(layout, w).thrusts_N
+            "pseudo-inverse": lambda _G, w, _T: min_norm_allocation(layout, w).thrusts_N
         }
         for proximal in (0.0, 1e-4, 1e-3, 1e-2):
             chosen = Weights(disturbance=weights.disturbance, effort=weights.effort, previous=proximal)
@@ -236,7 +236,7 @@ def _chatter(layout: Layout, views: dict[str, InfluenceModel], weights: Weights)
 
 
 def _step(layout: Layout, weights: Weights, G: Array, wrench: Array, before: Array) -> Array:
-    return gentle_allocation(layout, wrench, G, weights, before).thrusts_N
+    return min_wash_allocation(layout, wrench, G, weights, before).thrusts_N
 
 
 def _peers(layout: Layout, problems: list[Problem], weights: Weights) -> dict[str, Any]:
@@ -252,7 +252,7 @@ def _peers(layout: Layout, problems: list[Problem], weights: Weights) -> dict[st
         return float(cost(G, T, rest, packed))
 
     def slsqp(G: Array, wrench: Array) -> Array:
-        start = least_thrusts(layout, wrench).thrusts_N
+        start = min_norm_allocation(layout, wrench).thrusts_N
         bounds = list(zip(layout.lower_N, layout.upper_N, strict=True))
         held = LinearConstraint(layout.B, layout.B @ start, layout.B @ start)
         found = minimize(cost_of, start, args=(G,), method="SLSQP", bounds=bounds, constraints=[held])
@@ -264,7 +264,7 @@ def _peers(layout: Layout, problems: list[Problem], weights: Weights) -> dict[st
         x, _, _, _ = daqp.solve(H, weights.disturbance * np.diag(G).copy(), rows, most, least, sense)
         return np.asarray(x[:n] - x[n:])
 
-    values = [cost(G, gentle_allocation(layout, w, G, weights).thrusts_N.copy(), rest, packed) for G, w in problems]
+    values = [cost(G, min_wash_allocation(layout, w, G, weights).thrusts_N.copy(), rest, packed) for G, w in problems]
     table: dict[str, Any] = {}
     for name, peer in {"slsqp": slsqp, "l1_qp": split}.items():
         spans, excess = [], []

@@ -16,9 +16,9 @@ from typing import Any
 
 from wakewise.core.errors import StageError
 from wakewise.core.files import write_json, write_text
-from wakewise.core.jit.precompile import warm
+from wakewise.core.jit.precompile import compile_kernels
 from wakewise.core.optional_dependencies import has, how_to_install
-from wakewise.experiments.campaigns import ProcessExecutor, Task, TrialExecutor, planned
+from wakewise.experiments.campaigns import ProcessExecutor, Task, TrialExecutor, planned_trials
 from wakewise.experiments.campaigns import run as make
 from wakewise.experiments.campaigns.attempt_log import ATTEMPTS
 from wakewise.experiments.campaigns.definition import check_campaign
@@ -48,7 +48,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
         if not (has("photos") and has("logs")):
             reason = f"a trial needs more: {how_to_install('photos,logs')}"
             return found | dict.fromkeys(_OF_TRIALS) | {"why": why | dict.fromkeys(_OF_TRIALS, reason)}
-        warm(progress=options.progress)
+        compile_kernels(progress=options.progress)
         options.progress(2, 5, f"{TRIALS} trials, one worker")
         alone_s, took_s = standard_trials(folder / "one", ProcessExecutor(1))
         options.progress(4, 5, f"{TRIALS} trials, two workers")
@@ -124,7 +124,7 @@ def list_many(folder: Path, count: int) -> dict[str, float]:
 def standard_trials(folder: Path, engine: TrialExecutor) -> tuple[float, list[float]]:
     """Wall time of some standard trials, and how long each took."""
     campaign = check_campaign({"methods": ["wake-aware"], "seeds": TRIALS, "stages": "model"})
-    tasks = [one.task for one in planned(campaign)]
+    tasks = [one.task for one in planned_trials(campaign)]
     began = time.perf_counter()
     outcomes = make(tasks, folder, engine, retries=0)
     wall_s = time.perf_counter() - began

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from wakewise.ui.cli.commands import STUDIES, Command
-from wakewise.ui.cli.console import ProgressBars, print_json, shown, write_page
+from wakewise.ui.cli.console import ProgressBars, format_value, print_json, write_page
 from wakewise.ui.cli.options import Json
 from wakewise_benchmarks.bench_adversarial import show_traps
 from wakewise_paper.cli.bench_operator import show_operator
@@ -229,7 +229,7 @@ def _show(result: dict[str, Any], indent: str) -> None:
             typer.echo(f"{indent}{key}")
             _show(value, indent + "  ")
         else:
-            typer.echo(f"{indent}{key:<34}{shown(value):>10}")
+            typer.echo(f"{indent}{key:<34}{format_value(value):>10}")
 
 
 COMMANDS = (Command(STUDIES, "bench", bench),)

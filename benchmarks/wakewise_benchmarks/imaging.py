@@ -24,6 +24,7 @@ from wakewise.vision.imaging import (
     Render,
     Scene,
     SiltOptics,
+    attenuate,
     calibrate,
     haze_between,
     motion_blur,
@@ -32,7 +33,6 @@ from wakewise.vision.imaging import (
     photograph_of,
     render,
     sharpness,
-    through_water,
 )
 from wakewise.vision.imaging.particles import draw_flakes, flakes_before
 from wakewise.vision.imaging.sensor import expose
@@ -108,7 +108,7 @@ def parts(scene: Scene, settings: ImagingSettings, views: list[Pose], silt: Scal
     for view in views:
         clean: Render = timed("render", render, scene, camera, view, lights, settings.samples)
         haze = timed("haze", haze_between, camera, view, water, SiltOptics(), silt, lights)
-        wet, _ = timed("water", through_water, clean, camera, haze, water, lights.from_above, SiltOptics())
+        wet, _ = timed("water", attenuate, clean, camera, haze, water, lights.from_above, SiltOptics())
         soft = timed("blur", motion_blur, wet, clean.depth_m, camera, moving(view))
         flakes = timed("flakes", flakes_before, camera, view, silt, settings.flakes_per_m3, FLAKES_PER_KG, rng)
         soft = timed(

@@ -145,7 +145,7 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
     A step is when its decision begins, by the newest estimate. A process that only sleeps at the same rate says how
     much of it is the computer's.
     """
-    from wakewise.core.jit.precompile import warm
+    from wakewise.core.jit.precompile import compile_kernels
     from wakewise_ardusub.link.connection import Endpoint
     from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
     from wakewise_ardusub.link.transports import UdpTransport
@@ -154,7 +154,7 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
     from wakewise_ardusub.session.session import VehicleSession
     from wakewise_ardusub.sitl.scripted_ground_station import fly_piloted
 
-    warm(("plan", "fly"), options.progress)
+    compile_kernels(("plan", "fly"), options.progress)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind((LOOPBACK, 0))
         port = free.getsockname()[1]
@@ -242,12 +242,14 @@ def _engage(session: Any, within_s: float = _READY_S) -> bool:
 def loss_figures() -> dict[str, Any]:
     """How long after each loss a script still drove an output, and thrusts while disarmed."""
     from wakewise.robot.vehicles import load_vehicle
-    from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD, suffer_aboard
-    from wakewise_ardusub.sitl.inprocess_session import FAULTS, FaultOutcome, suffer
+    from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD, run_companion_fault
+    from wakewise_ardusub.sitl.inprocess_session import FAULTS, FaultOutcome, run_fault
 
     vehicle = load_vehicle(VEHICLE)
-    after: dict[str, FaultOutcome] = {f"script alone: {name}": suffer(vehicle, fault) for name, fault in FAULTS.items()}
-    after |= {name: suffer_aboard(vehicle, fault) for name, fault in FAULTS_ABOARD.items()}
+    after: dict[str, FaultOutcome] = {
+        f"script alone: {name}": run_fault(vehicle, fault) for name, fault in FAULTS.items()
+    }
+    after |= {name: run_companion_fault(vehicle, fault) for name, fault in FAULTS_ABOARD.items()}
     return {
         "neutral_ms_max": max(one.neutral_ms for one in after.values()),
         "neutral_ms": {name: round(one.neutral_ms, 1) for name, one in after.items()},

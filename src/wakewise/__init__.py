@@ -22,7 +22,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from wakewise.core.jit import cache_dir as cache_dir  # before Numba is imported anywhere
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.api import (
@@ -65,4 +65,4 @@ __all__ = [
 
 __version__ = "0.1.0"
 
-lazy_door(__name__)
+lazy_attributes(__name__)

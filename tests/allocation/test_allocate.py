@@ -11,8 +11,8 @@ from wakewise.allocation import (
     Weights,
     compile_layout,
     disturbance_of,
-    gentle_allocation,
-    least_thrusts,
+    min_norm_allocation,
+    min_wash_allocation,
     pseudo_inverse,
 )
 from wakewise.allocation.line_search import cost
@@ -68,7 +68,7 @@ def test_never_worse_than_a_dense_grid(decoupled, method):
     for _ in range(5):
         G, weights = random_gram(rng, decoupled=decoupled), random_weights(rng)
         wrench, previous = random_wrench(rng), rng.normal(size=8)
-        found = gentle_allocation(LAYOUT, wrench, G, weights, previous)
+        found = min_wash_allocation(LAYOUT, wrench, G, weights, previous)
         value = cost(G, found.thrusts_N.copy(), previous, weights.packed)
         start = LAYOUT.inverse @ wrench
         fine = LAYOUT.null.T @ (found.thrusts_N - start)
@@ -93,7 +93,7 @@ def test_limits_hold_and_the_wrench_keeps_its_direction(seed, size, failed, deco
     layout = compile_layout(PAPER.allocation_matrix, lower, upper)
     wrench, G = random_wrench(rng, size), random_gram(rng, decoupled=decoupled)
     least = pseudo_inverse(PAPER.allocation_matrix, wrench, lower, upper)
-    gentle = gentle_allocation(layout, wrench, G, Weights(), rng.normal(size=8))
+    gentle = min_wash_allocation(layout, wrench, G, Weights(), rng.normal(size=8))
     for found in (least, gentle):
         assert np.all(found.thrusts_N >= lower) and np.all(found.thrusts_N <= upper)
         assert 0.0 <= found.scale <= 1.0
@@ -110,7 +110,7 @@ def test_never_costs_more_than_least_thrusts(seed, decoupled):
     rng = np.random.default_rng(seed)
     G, weights, previous = random_gram(rng, decoupled=decoupled), random_weights(rng), rng.normal(size=8)
     wrench = random_wrench(rng, 10 ** rng.uniform(-2, 1))
-    least, gentle = least_thrusts(LAYOUT, wrench, G), gentle_allocation(LAYOUT, wrench, G, weights, previous)
+    least, gentle = min_norm_allocation(LAYOUT, wrench, G), min_wash_allocation(LAYOUT, wrench, G, weights, previous)
     ours, theirs = (cost(G, a.thrusts_N.copy(), previous, weights.packed) for a in (gentle, least))
     assert ours <= theirs * (1.0 + 1e-12)
 
@@ -143,7 +143,7 @@ def test_scale_is_the_largest_that_the_limits_allow():
             b_eq=np.zeros(6),
             bounds=[*zip(PAPER.thrust_lower_N, PAPER.thrust_upper_N, strict=True), (0.0, 1.0)],
         )
-        assert least_thrusts(LAYOUT, wrench).scale == pytest.approx(program.x[-1], rel=1e-7)
+        assert min_norm_allocation(LAYOUT, wrench).scale == pytest.approx(program.x[-1], rel=1e-7)
 
 
 def test_a_null_space_in_one_piece_is_scaled_and_shifted_too():
@@ -154,10 +154,10 @@ def test_a_null_space_in_one_piece_is_scaled_and_shifted_too():
     rng = np.random.default_rng(2)
     for size in (1.0, 8.0, 40.0):
         wrench = random_wrench(rng, size)
-        found = least_thrusts(layout, wrench)
+        found = min_norm_allocation(layout, wrench)
         assert np.all(found.thrusts_N >= layout.lower_N) and np.all(found.thrusts_N <= layout.upper_N)
         np.testing.assert_allclose(found.wrench_B, found.scale * wrench, atol=1e-8 * np.linalg.norm(wrench))
-    gentle = gentle_allocation(layout, random_wrench(rng), random_gram(rng, decoupled=False), Weights())
+    gentle = min_wash_allocation(layout, random_wrench(rng), random_gram(rng, decoupled=False), Weights())
     assert gentle.method == "boxes"
 
 
@@ -168,7 +168,7 @@ def test_more_than_two_spare_thrusters_are_searched_from_several_starts():
     lower, upper = np.full(10, -40.0), np.full(10, 51.0)
     layout = compile_layout(B, lower, upper)
     wrench, G, weights = random_wrench(rng), random_gram(rng, 10, decoupled=False), Weights(effort=1e-2)
-    found = gentle_allocation(layout, wrench, G, weights)
+    found = min_wash_allocation(layout, wrench, G, weights)
     assert layout.k == 4 and found.method == "boxes"
     np.testing.assert_allclose(found.wrench_B, wrench, atol=1e-9)
     value = cost(G, found.thrusts_N.copy(), np.zeros(10), weights.packed)
@@ -186,9 +186,9 @@ def test_without_spare_thrusters_the_answer_is_unique():
     lower[[0, 4]] = upper[[0, 4]] = 0.0
     layout = compile_layout(PAPER.allocation_matrix, lower, upper)
     wrench, G = np.array([2.0, -1.0, 3.0, 0.05, 0.02, 0.1]), random_gram(np.random.default_rng(1))
-    gentle = gentle_allocation(layout, wrench, G, Weights())
+    gentle = min_wash_allocation(layout, wrench, G, Weights())
     assert layout.k == 0 and gentle.method == "unique" and gentle.gap == 0.0
-    np.testing.assert_allclose(gentle.thrusts_N, least_thrusts(layout, wrench).thrusts_N)
+    np.testing.assert_allclose(gentle.thrusts_N, min_norm_allocation(layout, wrench).thrusts_N)
 
 
 def test_too_few_thrusters_make_the_nearest_wrench():

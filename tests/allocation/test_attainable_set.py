@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wakewise.allocation import Weights, compile_layout, gentle_allocation, least_thrusts
+from wakewise.allocation import Weights, compile_layout, min_norm_allocation, min_wash_allocation
 from wakewise.allocation.attainable_set import AXES, parse_priority
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
@@ -22,10 +22,10 @@ def layout(lower=-40.0, upper=51.0, failed=()):
 def test_priority_gives_up_surge_and_keeps_heave_and_attitude():
     """A surge far beyond the limits leaves heave and moments whole when they come first, and is all that is lost."""
     wrench = np.array([300.0, 0.0, 20.0, 0.5, -0.5, 1.0])
-    found = least_thrusts(layout(), wrench, priority="ZKMN,XY")
+    found = min_norm_allocation(layout(), wrench, priority="ZKMN,XY")
     assert set(found.given_up) == {"X"}
     np.testing.assert_allclose(found.wrench_B[2:], wrench[2:], atol=1e-5)
-    kept = least_thrusts(layout(), wrench)
+    kept = min_norm_allocation(layout(), wrench)
     np.testing.assert_allclose(kept.wrench_B, kept.scale * wrench, atol=1e-8)
     assert kept.scale < 1.0 and set(kept.given_up) == {"X", "Z", "K", "M", "N"}
 
@@ -36,8 +36,10 @@ def test_what_comes_first_is_never_paid_for_by_what_comes_later():
         alone, among = np.zeros(6), np.array([200.0, 150.0, 250.0, 30.0, 40.0, 50.0])
         i = AXES.index(axis)
         alone[i] = among[i]
-        first = least_thrusts(layout(), alone, priority=axis).wrench_B[i]
-        assert least_thrusts(layout(), among, priority=axis).wrench_B[i] == pytest.approx(first, rel=1e-4, abs=1e-4)
+        first = min_norm_allocation(layout(), alone, priority=axis).wrench_B[i]
+        assert min_norm_allocation(layout(), among, priority=axis).wrench_B[i] == pytest.approx(
+            first, rel=1e-4, abs=1e-4
+        )
 
 
 @settings(max_examples=40, deadline=None)
@@ -49,8 +51,8 @@ def test_gentle_thrusts_give_up_what_least_thrusts_give_up(seed, size, failed):
     wrench, order = rng.normal(size=6) * size, ",".join(rng.permutation(list(AXES)))
     A = rng.normal(size=(16, 5))
     for priority in (None, order):
-        least = least_thrusts(here, wrench, priority=priority)
-        gentle = gentle_allocation(here, wrench, A @ A.T, Weights(effort=1e-2), priority=priority, budget=60)
+        least = min_norm_allocation(here, wrench, priority=priority)
+        gentle = min_wash_allocation(here, wrench, A @ A.T, Weights(effort=1e-2), priority=priority, budget=60)
         np.testing.assert_allclose(gentle.wrench_B, least.wrench_B, atol=1e-7 * (1.0 + size))
         for found in (least, gentle):
             assert np.all((found.thrusts_N >= here.lower_N) & (found.thrusts_N <= here.upper_N))
@@ -61,7 +63,7 @@ def test_a_wrench_that_can_be_made_needs_no_priority():
     """Within limits the priority changes nothing."""
     wrench = np.array([3.0, -2.0, 4.0, 0.1, 0.1, 0.2])
     np.testing.assert_array_equal(
-        least_thrusts(layout(), wrench, priority="N").thrusts_N, least_thrusts(layout(), wrench).thrusts_N
+        min_norm_allocation(layout(), wrench, priority="N").thrusts_N, min_norm_allocation(layout(), wrench).thrusts_N
     )
 
 
@@ -69,15 +71,15 @@ def test_lost_rank_is_reported_by_axis():
     """Without the two front horizontals a pure sway cannot be made without yaw: what is missing is named."""
     here = layout(failed=(0, 1))
     assert here.rank == 5
-    found = least_thrusts(here, np.array([0.0, 5.0, 2.0, 0.0, 0.0, 0.0]))
+    found = min_norm_allocation(here, np.array([0.0, 5.0, 2.0, 0.0, 0.0, 0.0]))
     assert set(found.given_up) and "Z" not in found.given_up
-    first = least_thrusts(here, np.array([0.0, 5.0, 2.0, 0.0, 0.0, 0.0]), priority="Y,ZKM")
+    first = min_norm_allocation(here, np.array([0.0, 5.0, 2.0, 0.0, 0.0, 0.0]), priority="Y,ZKM")
     assert "Y" not in first.given_up and "N" in first.given_up
 
 
 def test_all_thrusters_failed_make_nothing():
     """With no thruster left everything is given up and nothing breaks."""
-    found = least_thrusts(layout(failed=range(8)), np.ones(6), priority="Z")
+    found = min_norm_allocation(layout(failed=range(8)), np.ones(6), priority="Z")
     assert set(found.given_up) == set(AXES) and not np.any(found.thrusts_N)
 
 

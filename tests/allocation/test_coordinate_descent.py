@@ -3,7 +3,7 @@
 import numpy as np
 
 from wakewise.allocation import compile_layout
-from wakewise.allocation.coordinate_descent import feasible_starts, reach, start_directions, tied_parts
+from wakewise.allocation.coordinate_descent import coupled_directions, feasible_starts, start_directions, step_limit
 from wakewise.robot.vehicles import load_vehicle
 
 PAPER = load_vehicle("paper")
@@ -43,11 +43,11 @@ def test_parts_are_tied_by_any_gram_entry_that_is_more_than_rounding():
     for slot in ((1, 6), (9, 6), (1, 14), (9, 14)):
         G = np.diag(np.full(16, 1.0))
         G[0, 2] = G[2, 0] = 0.5
-        assert not np.any(tied_parts(G, LAYOUT.owners, 1e-10) & ~np.eye(2, dtype=bool))
+        assert not np.any(coupled_directions(G, LAYOUT.owners, 1e-10) & ~np.eye(2, dtype=bool))
         G[slot] = G[slot[::-1]] = 0.9e-10
-        assert not tied_parts(G, LAYOUT.owners, 1e-10)[0, 1]
+        assert not coupled_directions(G, LAYOUT.owners, 1e-10)[0, 1]
         G[slot] = G[slot[::-1]] = -1.1e-10
-        assert tied_parts(G, LAYOUT.owners, 1e-10)[0, 1] and tied_parts(G, LAYOUT.owners, 1e-10)[1, 0]
+        assert coupled_directions(G, LAYOUT.owners, 1e-10)[0, 1] and coupled_directions(G, LAYOUT.owners, 1e-10)[1, 0]
 
 
 def test_a_step_reaches_to_the_first_limit_on_either_side():
@@ -57,14 +57,14 @@ def test_a_step_reaches_to_the_first_limit_on_either_side():
     for _ in range(200):
         start = rng.uniform(0.9 * LAYOUT.lower_N, 0.9 * LAYOUT.upper_N)
         step = LAYOUT.null @ rng.normal(size=LAYOUT.null.shape[1])
-        end = start + reach(start, step, LAYOUT.lower_N, LAYOUT.upper_N, np.inf) * step
+        end = start + step_limit(start, step, LAYOUT.lower_N, LAYOUT.upper_N, np.inf) * step
         assert np.all(end >= LAYOUT.lower_N - 1e-9)
         assert np.all(end <= LAYOUT.upper_N + 1e-9)
         low, high = np.isclose(end, LAYOUT.lower_N), np.isclose(end, LAYOUT.upper_N)
         assert np.any(low | high)
         met["lower"] += bool(np.any(low))
         met["upper"] += bool(np.any(high))
-        assert reach(start, 1e-6 * step, LAYOUT.lower_N, LAYOUT.upper_N, 1.0) == 1.0
+        assert step_limit(start, 1e-6 * step, LAYOUT.lower_N, LAYOUT.upper_N, 1.0) == 1.0
     assert min(met.values()) > 20
     outside = LAYOUT.lower_N - 1.0
-    assert reach(outside, -np.ones(8), LAYOUT.lower_N, LAYOUT.upper_N, 1.0) == 0.0
+    assert step_limit(outside, -np.ones(8), LAYOUT.lower_N, LAYOUT.upper_N, 1.0) == 0.0

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wakewise.allocation import Weights, compile_layout, gentle_allocation, least_thrusts
+from wakewise.allocation import Weights, compile_layout, min_norm_allocation, min_wash_allocation
 from wakewise.allocation.allocate import is_incoherent
-from wakewise.allocation.branch_and_bound import box_search, coordinates
+from wakewise.allocation.branch_and_bound import coordinates, global_minimum
 from wakewise.allocation.convex import convex_allocation
 from wakewise.allocation.layout import independent_blocks
 from wakewise.allocation.line_search import cost
@@ -61,7 +61,7 @@ def test_no_thrusts_of_the_same_wrench_cost_less(n, kind):
         layout, G = layout_of(rng, n), gram_of(rng, n, kind)
         weights, previous = Weights(effort=10 ** rng.uniform(-3, -1), previous=5e-3), rng.normal(size=n)
         wrench = layout.B @ rng.normal(size=n) * 2.0
-        found = gentle_allocation(layout, wrench, G, weights, previous, budget=400)
+        found = min_wash_allocation(layout, wrench, G, weights, previous, budget=400)
         value = cost(G, found.thrusts_N.copy(), previous, weights.packed)
         np.testing.assert_allclose(found.wrench_B, wrench, atol=1e-9 * (1.0 + np.linalg.norm(wrench)))
         assert 0.0 <= found.gap <= 1.0
@@ -78,9 +78,9 @@ def test_the_bound_is_true_whatever_the_budget(seed, n, kind, budget):
     layout, G = layout_of(rng, n), gram_of(rng, n, kind)
     weights = Weights(effort=10 ** rng.uniform(-4, -1))
     wrench, rest = layout.B @ rng.normal(size=n), np.zeros(n)
-    stopped = gentle_allocation(layout, wrench, G, weights, budget=budget)
+    stopped = min_wash_allocation(layout, wrench, G, weights, budget=budget)
     value = cost(G, stopped.thrusts_N.copy(), rest, weights.packed)
-    longer = gentle_allocation(layout, wrench, G, weights, budget=600)
+    longer = min_wash_allocation(layout, wrench, G, weights, budget=600)
     others = lowest_nearby(layout, longer, G, rest, weights, rng)
     assert value * (1.0 - stopped.gap) <= others * (1.0 + 1e-9) + 1e-12
 
@@ -90,7 +90,7 @@ def test_a_larger_budget_closes_the_gap():
     rng = np.random.default_rng(1)
     layout, G = layout_of(rng, 8), gram_of(rng, 8, "random")
     wrench = layout.B @ rng.normal(size=8)
-    gaps = [gentle_allocation(layout, wrench, G, Weights(), budget=budget).gap for budget in (1, 30, 5000)]
+    gaps = [min_wash_allocation(layout, wrench, G, Weights(), budget=budget).gap for budget in (1, 30, 5000)]
     assert gaps[0] >= gaps[1] >= gaps[2]
     assert gaps[2] <= 1e-5
 
@@ -105,9 +105,9 @@ def test_boxes_and_lines_agree_where_both_apply():
     for _ in range(3):
         G = np.where(horizontal[:, None] == horizontal[None, :], gram_of(rng, 8, "random"), 0.0)
         wrench, weights = layout.B @ rng.normal(size=8) * 3.0, Weights(effort=1e-2)
-        lines = gentle_allocation(layout, wrench, G, weights)
-        starts = least_thrusts(layout, wrench).thrusts_N[None, :].copy()
-        T, gap, _ = box_search(
+        lines = min_wash_allocation(layout, wrench, G, weights)
+        starts = min_norm_allocation(layout, wrench).thrusts_N[None, :].copy()
+        T, gap, _ = global_minimum(
             G, starts, layout.null.copy(), layout.lower_N, layout.upper_N, rest, weights.packed, 4000
         )
         a, b = cost(G, lines.thrusts_N.copy(), rest, weights.packed), cost(G, T, rest, weights.packed)
@@ -124,11 +124,11 @@ def test_the_incoherent_sum_is_one_quadratic_program():
     for _ in range(8):
         layout, G = layout_of(rng, 10), gram_of(rng, 10, "diagonal")
         wrench, previous, weights = layout.B @ rng.normal(size=10) * 2, rng.normal(size=10), Weights(effort=1e-2)
-        found = gentle_allocation(layout, wrench, G, weights, previous)
+        found = min_wash_allocation(layout, wrench, G, weights, previous)
         methods.append(found.method)
         value = cost(G, found.thrusts_N.copy(), previous, weights.packed)
         starts = found.thrusts_N[None, :].copy()
-        T, _, _ = box_search(
+        T, _, _ = global_minimum(
             G, starts, layout.null.copy(), layout.lower_N, layout.upper_N, previous, weights.packed, 300
         )
         assert value <= cost(G, T, previous, weights.packed) * (1.0 + 2e-5)
@@ -182,7 +182,7 @@ def test_the_proximal_term_calms_the_thrusts():
     for proximal in (0.0, 0.5):
         path, thrusts = [], np.zeros(8)
         for wrench in course:
-            found = gentle_allocation(layout, wrench, G, Weights(effort=1e-3, previous=proximal), thrusts)
+            found = min_wash_allocation(layout, wrench, G, Weights(effort=1e-3, previous=proximal), thrusts)
             thrusts = found.thrusts_N
             path.append(thrusts)
         jumps.append(np.abs(np.diff(path, axis=0)).mean())
@@ -195,4 +195,4 @@ def test_too_many_spare_thrusters_and_no_budget_are_refused():
         compile_layout(np.random.default_rng(0).normal(size=(6, 15)), np.full(15, -1.0), np.full(15, 1.0))
     layout = layout_of(np.random.default_rng(0), 8)
     with pytest.raises(InputError, match="budget"):
-        gentle_allocation(layout, np.zeros(6), np.eye(16), Weights(), budget=0)
+        min_wash_allocation(layout, np.zeros(6), np.eye(16), Weights(), budget=0)

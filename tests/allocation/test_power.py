@@ -9,11 +9,11 @@ import pytest
 from wakewise.allocation import (
     PowerLaw,
     Weights,
+    best_by_power,
     compile_layout,
-    gentle_allocation,
-    least_thrusts,
-    worth,
-    worthiest,
+    min_norm_allocation,
+    min_wash_allocation,
+    power_adjusted_cost,
 )
 from wakewise.allocation.line_search import cost
 
@@ -38,11 +38,13 @@ def gram():
 def problem():
     wrench = RNG.uniform(-1.0, 1.0, 6) * [4.0, 4.0, 8.0, 0.2, 0.6, 0.3]
     G = gram()
-    return wrench, G, least_thrusts(LAYOUT, wrench, G), gentle_allocation(LAYOUT, wrench, G, WEIGHTS)
+    return wrench, G, min_norm_allocation(LAYOUT, wrench, G), min_wash_allocation(LAYOUT, wrench, G, WEIGHTS)
 
 
 def value(thrusts_N, G, calm):
-    return worth(cost(G, np.array(thrusts_N), np.zeros(8), WEIGHTS.packed), float(LAW.power_W(thrusts_N)), calm)
+    return power_adjusted_cost(
+        cost(G, np.array(thrusts_N), np.zeros(8), WEIGHTS.packed), float(LAW.power_W(thrusts_N)), calm
+    )
 
 
 @pytest.mark.parametrize("share", [1.0, 1.05, 1.3, 2.0])
@@ -51,7 +53,7 @@ def test_the_bound_holds_at_the_same_wrench_within_limits(share):
     for _ in range(30):
         wrench, G, least, found = problem()
         most_W = share * float(LAW.power_W(least.thrusts_N))
-        best = worthiest(LAYOUT, found, least.thrusts_N, LAW, most_W, 1e-4, G, WEIGHTS).thrusts_N
+        best = best_by_power(LAYOUT, found, least.thrusts_N, LAW, most_W, 1e-4, G, WEIGHTS).thrusts_N
         assert float(LAW.power_W(best)) <= most_W * (1.0 + 1e-12)
         np.testing.assert_allclose(B @ best, wrench, atol=1e-9)
         assert np.all(best >= LAYOUT.lower_N) and np.all(best <= LAYOUT.upper_N)
@@ -65,14 +67,14 @@ def test_the_best_deal_is_that_of_all_combinations_of_the_parts():
     for _ in range(10):
         _, G, least, found = problem()
         most_W = 1.4 * float(LAW.power_W(least.thrusts_N))
-        best = worthiest(LAYOUT, found, least.thrusts_N, LAW, most_W, 1e-4, G, WEIGHTS)
+        best = best_by_power(LAYOUT, found, least.thrusts_N, LAW, most_W, 1e-4, G, WEIGHTS)
         ways = [np.where(own, found.thrusts_N - least.thrusts_N, 0.0) for own in LAYOUT.owners]
         assert len(ways) == 2
         points = [least.thrusts_N + i / 16 * ways[0] + j / 16 * ways[1] for i, j in product(range(17), repeat=2)]
         allowed = [T for T in points if float(LAW.power_W(T)) <= most_W]
         assert value(best.thrusts_N, G, 1e-4) == pytest.approx(min(value(T, G, 1e-4) for T in allowed), rel=1e-9)
         assert best.disturbance == pytest.approx(
-            worthiest(LAYOUT, best, best.thrusts_N, LAW, 0.0, 1e-4, G, WEIGHTS).disturbance
+            best_by_power(LAYOUT, best, best.thrusts_N, LAW, 0.0, 1e-4, G, WEIGHTS).disturbance
         )
 
 
@@ -84,7 +86,7 @@ def test_what_stands_beside_makes_power_cheap():
         left = []
         for standing_W in (0.0, 20.0, 1e6):
             law = replace(LAW, standing_W=standing_W)
-            best = worthiest(LAYOUT, found, least.thrusts_N, law, most_W, 1e-4, G, WEIGHTS)
+            best = best_by_power(LAYOUT, found, least.thrusts_N, law, most_W, 1e-4, G, WEIGHTS)
             assert float(LAW.power_W(best.thrusts_N)) <= most_W * (1.0 + 1e-9)
             left.append(cost(G, best.thrusts_N, np.zeros(8), WEIGHTS.packed))
         assert left[0] >= left[1] >= left[2]
@@ -94,7 +96,7 @@ def test_nobody_pays_for_water_stiller_than_calm():
     """Where all shares count as calm those of least power are taken, whatever they do."""
     for _ in range(10):
         _, G, least, found = problem()
-        best = worthiest(LAYOUT, found, least.thrusts_N, LAW, np.inf, 1e9, G, WEIGHTS)
+        best = best_by_power(LAYOUT, found, least.thrusts_N, LAW, np.inf, 1e9, G, WEIGHTS)
         assert float(LAW.power_W(best.thrusts_N)) <= float(LAW.power_W(least.thrusts_N)) * (1.0 + 1e-9)
 
 
@@ -105,8 +107,8 @@ def test_what_saves_little_is_mostly_left():
     for slot in (0, 1):
         G[slot, slot] = 1e-3
     G[4, 4] = 1e-4
-    found, least = gentle_allocation(LAYOUT, wrench, G, WEIGHTS), least_thrusts(LAYOUT, wrench, G)
-    best = worthiest(LAYOUT, found, least.thrusts_N, LAW, np.inf, 0.3, G, WEIGHTS)
+    found, least = min_wash_allocation(LAYOUT, wrench, G, WEIGHTS), min_norm_allocation(LAYOUT, wrench, G)
+    best = best_by_power(LAYOUT, found, least.thrusts_N, LAW, np.inf, 0.3, G, WEIGHTS)
     assert best.disturbance < 0.1 * least.disturbance
     assert found.thrusts_N[4] < 0.1 < least.thrusts_N[4]
     np.testing.assert_allclose(best.thrusts_N[:4], found.thrusts_N[:4], atol=1e-9)
@@ -125,8 +127,8 @@ def test_any_number_of_parts_is_gone_along(pairs):
     law = PowerLaw(forward=np.full(n, 30.0), reverse=np.full(n, 30.0))
     G = np.diag(np.r_[np.full(6, 1e-3), np.full(pairs, 1e-9), np.zeros(n)])
     wrench = np.full(6, 2.0)
-    found, least = gentle_allocation(layout, wrench, G, WEIGHTS), least_thrusts(layout, wrench, G)
-    best = worthiest(layout, found, least.thrusts_N, law, np.inf, 0.0, G, WEIGHTS)
+    found, least = min_wash_allocation(layout, wrench, G, WEIGHTS), min_norm_allocation(layout, wrench, G)
+    best = best_by_power(layout, found, least.thrusts_N, law, np.inf, 0.0, G, WEIGHTS)
     np.testing.assert_allclose(layout.B @ best.thrusts_N, wrench, atol=1e-9)
     if pairs == 6:
         np.testing.assert_allclose(best.thrusts_N[6:], 2.0, atol=1e-6)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wakewise.allocation import Weights, compile_layout, disturbance_of, gentle_allocation, least_thrusts
+from wakewise.allocation import Weights, compile_layout, disturbance_of, min_norm_allocation, min_wash_allocation
 from wakewise.allocation.attainable_set import _at_limits, _box_scale
 from wakewise.allocation.layout import axis_scaling
 from wakewise.robot.vehicles import load_vehicle
@@ -26,7 +26,7 @@ def test_four_thrusters_without_any_to_spare_keep_the_direction_of_a_wrench() ->
     """Beyond their limits the wrench shrinks to the share that the weakest one allows, and stays what it was."""
     B = np.vstack([np.eye(4), np.zeros((2, 4))])
     layout = compile_layout(B, np.full(4, -5.0), np.full(4, 8.0))
-    found = least_thrusts(layout, np.array([16.0, -8.0, 2.0, 0.0, 0.0, 0.0]))
+    found = min_norm_allocation(layout, np.array([16.0, -8.0, 2.0, 0.0, 0.0, 0.0]))
     assert found.scale == pytest.approx(0.5)
     np.testing.assert_allclose(found.thrusts_N, [8.0, -4.0, 1.0, 0.0], atol=1e-12)
 
@@ -87,11 +87,11 @@ def test_a_weak_coupling_of_two_lines_is_not_left_out() -> None:
                 gram[a, b] = gram[b, a] = -0.05
     weights = Weights(disturbance=1.0, effort=1e-6, previous=0.0)
     wrench = np.array([3.0, -2.0, 4.0, 0.1, 0.2, 0.3])
-    found = gentle_allocation(layout, wrench, gram, weights, budget=20_000)
+    found = min_wash_allocation(layout, wrench, gram, weights, budget=20_000)
     assert found.method == "boxes"
     assert found.disturbance == pytest.approx(disturbance_of(gram, found.thrusts_N))
     grid = np.linspace(-12.0, 12.0, 121)
-    base = least_thrusts(layout, wrench).thrusts_N
+    base = min_norm_allocation(layout, wrench).thrusts_N
     best = min(
         disturbance_of(gram, base + a * layout.lines[0] + b * layout.lines[1])
         + 1e-6 * float(np.sum((base + a * layout.lines[0] + b * layout.lines[1]) ** 2))

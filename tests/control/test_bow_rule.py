@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wakewise.allocation import least_thrusts
+from wakewise.allocation import min_norm_allocation
 from wakewise.control import METHODS
 from wakewise.control.bow_rule import bow_layout
 from wakewise.control.loop import vehicle_layout
@@ -25,11 +25,11 @@ def test_the_bow_never_blows_forward_and_the_wrench_is_made_all_the_same(name):
     forward = 0
     for _ in range(60):
         wrench = rng.uniform(-1.0, 1.0, 6) * [3.0, 3.0, 5.0, 0.2, 0.5, 0.3]
-        thrusts = least_thrusts(layout, wrench).thrusts_N
+        thrusts = min_norm_allocation(layout, wrench).thrusts_N
         jets = -thrusts[level] * axes[level, 0]
         assert np.all(jets <= 1e-9)
         assert vehicle.allocation_matrix @ thrusts == pytest.approx(wrench, abs=1e-6)
-        forward += bool(np.any(-least_thrusts(free, wrench).thrusts_N[level] * axes[level, 0] > 1e-3))
+        forward += bool(np.any(-min_norm_allocation(free, wrench).thrusts_N[level] * axes[level, 0] > 1e-3))
     assert forward > 20 and "bow-rule" in METHODS
 
 
@@ -68,7 +68,7 @@ def test_thrusters_beside_the_middle_are_under_the_rule_where_others_push_astern
     )
     layout = bow_layout(replace(paper, thrusters=(*paper.thrusters, *beside)))
     assert np.all(layout.lower_N[8:] == 0.0) and np.all(layout.upper_N[:2] == 0.0)
-    astern = least_thrusts(layout, np.array([-3.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    astern = min_norm_allocation(layout, np.array([-3.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     assert astern.scale == 1.0 and astern.wrench_B[0] == pytest.approx(-3.0)
 
 

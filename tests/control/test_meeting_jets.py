@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.allocation import Weights, gentle_allocation
+from wakewise.allocation import Weights, min_wash_allocation
 from wakewise.control import vehicle_layout
 from wakewise.control.meeting import joined_jets, meeting_pairs, meeting_view
 from wakewise.core.geometry import Pose, quat_from_rotvec
@@ -77,8 +77,8 @@ def test_knowing_that_jets_meet_moves_the_push_to_the_rear():
     weights = Weights(disturbance=150.0, effort=1e-3)
     plain = InfluenceModel.of(VEHICLE, AHEAD, RoundJet())
     X_WB = Pose(np.zeros(3))
-    blind = gentle_allocation(LAYOUT, wrench, plain.gram(X_WB), weights).thrusts_N
-    found = gentle_allocation(LAYOUT, wrench, meeting_view(plain, LAYOUT).gram(X_WB), weights)
+    blind = min_wash_allocation(LAYOUT, wrench, plain.gram(X_WB), weights).thrusts_N
+    found = min_wash_allocation(LAYOUT, wrench, meeting_view(plain, LAYOUT).gram(X_WB), weights)
     assert min(blind[0], blind[1]) > 0.05
     assert max(found.thrusts_N[0], found.thrusts_N[1]) < 1e-3 and found.method == "lines"
     np.testing.assert_allclose(found.wrench_B, wrench, atol=1e-9)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.allocation import Weights, gentle_allocation
+from wakewise.allocation import Weights, min_wash_allocation
 from wakewise.control import ControlSettings, make_controller, vehicle_layout
 from wakewise.control.levers import LeverSettings
 from wakewise.control.meeting import meeting_view
@@ -82,7 +82,7 @@ def test_shares_leave_a_poor_minimum_within_two_seconds():
     )
     view = InfluenceModel.of(VEHICLE, below, RoundJet())
     spared = Respared(name="x", inner=inner, watch=watching(view, previous=1e5))
-    best = gentle_allocation(LAYOUT, inner.wrench, view.gram(body.X_WB), Weights(disturbance=150.0, effort=1e-3))
+    best = min_wash_allocation(LAYOUT, inner.wrench, view.gram(body.X_WB), Weights(disturbance=150.0, effort=1e-3))
     poor = LAYOUT.inverse @ inner.wrench
     state = SpareState(inner=0, thrusts_N=poor, free_age_s=0.0)
     shares = []

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wakewise.allocation import Weights, least_thrusts
+from wakewise.allocation import Weights, min_norm_allocation
 from wakewise.control import vehicle_layout
 from wakewise.control.thrift import (
     CALM,
@@ -65,7 +65,7 @@ def shared(scale, law=LAW):
     """Thrusts by a share of the wake's own matrix, and what is drawn for them over that for the least thrusts."""
     G = scale * VIEW.gram(Pose(np.zeros(3)))
     found = Sharer(layout=LAYOUT, law=law).shares(WRENCH, InfluenceMatrices(gram=G, sent=G), WEIGHTS, 3.0)
-    least = least_thrusts(LAYOUT, WRENCH, G)
+    least = min_norm_allocation(LAYOUT, WRENCH, G)
     return found, least, drawn_W(found.thrusts_N) / drawn_W(least.thrusts_N)
 
 
@@ -77,7 +77,7 @@ def drawn_W(thrusts_N):
 def speed_m_s(scale):
     """What the least thrusts leave at the target, by the wake model and what it is known to be wrong by."""
     G = scale * VIEW.gram(Pose(np.zeros(3)))
-    return float(np.sqrt(least_thrusts(LAYOUT, WRENCH, G).disturbance / 3.0)) / TOO_FAST
+    return float(np.sqrt(min_norm_allocation(LAYOUT, WRENCH, G).disturbance / 3.0)) / TOO_FAST
 
 
 def test_trouble_is_worth_half_as_much_power_again():
@@ -118,14 +118,14 @@ def test_what_may_join_a_jet_opens_no_bound():
     found = Sharer(layout=LAYOUT, law=LAW).shares(
         wrench, InfluenceMatrices(gram=G, sent=1e-5 * G), Weights(disturbance=50.0, effort=1e-3), 3.0
     )
-    assert 1.0 < drawn_W(found.thrusts_N) / drawn_W(least_thrusts(LAYOUT, wrench).thrusts_N) <= CALM + 1e-9
+    assert 1.0 < drawn_W(found.thrusts_N) / drawn_W(min_norm_allocation(LAYOUT, wrench).thrusts_N) <= CALM + 1e-9
 
 
 def test_a_vehicle_that_hovers_on_a_watt_may_spend_another():
     """Jets of a light load that stir the target are taken away whole, where a share of its own power would not do."""
     G, wrench = VIEW.gram(Pose(np.zeros(3))), 0.3 * WRENCH
-    G = G * 3.0 * (TOO_FAST * TROUBLE_M_S) ** 2 / least_thrusts(LAYOUT, wrench, G).disturbance
-    seen, least = InfluenceMatrices(gram=G, sent=G), least_thrusts(LAYOUT, wrench, G)
+    G = G * 3.0 * (TOO_FAST * TROUBLE_M_S) ** 2 / min_norm_allocation(LAYOUT, wrench, G).disturbance
+    seen, least = InfluenceMatrices(gram=G, sent=G), min_norm_allocation(LAYOUT, wrench, G)
     assert float(LAW.power_W(least.thrusts_N)) < 3.0
     with_it, without = (
         Sharer(layout=LAYOUT, law=law).shares(wrench, seen, WEIGHTS, 3.0).disturbance

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.allocation import least_thrusts
+from wakewise.allocation import min_norm_allocation
 from wakewise.control import ControlSettings, LeverSettings, make_controller
 from wakewise.control.spare import watching
 from wakewise.control.watch import DOUBT, UNSURE, WORTH
@@ -83,7 +83,7 @@ def test_shares_make_the_wrench_and_are_never_worse_than_those_of_before_by_thei
     for angle in np.linspace(0.0, 2.0 * np.pi, 7)[:-1]:
         here = estimate(0.09 * np.cos(angle), 0.09 * np.sin(angle), 0.0)
         wrench = np.array([-2.6, 0.9, -3.3, 0.0, -0.3, 0.0]) + 0.1 * rng.normal(size=6)
-        before = least_thrusts(layout, wrench).thrusts_N
+        before = min_norm_allocation(layout, wrench).thrusts_N
         found, seen = eyes.share_out(wrench, here, before)
         np.testing.assert_allclose(layout.B @ found.thrusts_N, wrench, atol=1e-9)
         np.testing.assert_allclose(seen.gram, eyes.seen(here, found.thrusts_N).gram, atol=1e-15)
@@ -98,7 +98,7 @@ def test_a_jump_is_worth_it_or_not_made():
     for angle in np.linspace(0.0, 2.0 * np.pi, 7)[:-1]:
         here = estimate(0.09 * np.cos(angle), 0.09 * np.sin(angle), 0.0)
         wrench = np.array([-2.6, 0.9, -3.3, 0.0, -0.3, 0.0])
-        present = least_thrusts(layout, wrench).thrusts_N
+        present = min_norm_allocation(layout, wrench).thrusts_N
         anew = eyes.jump(wrench, here, present)
         if anew is None:
             continue
@@ -151,7 +151,7 @@ def test_where_the_current_brings_the_wash_back_shares_are_gentler_for_knowing_i
     wrench, here = np.array([-2.64, 0.93, -3.33, 0.0, -0.28, 0.0]), estimate(-0.017, -0.083, 0.0)
     floor = ImpingingJet(jet=RoundJet(), bed_z_m=0.6)
     eyes, blind = watch(floor, doubt=False), watch(floor, doubt=False, drift=False)
-    least = least_thrusts(eyes.layout, wrench).thrusts_N
+    least = min_norm_allocation(eyes.layout, wrench).thrusts_N
     unknowing = blind.jump(wrench, here, least)[0].thrusts_N
     thrusts = least
     for k in range(20):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import wakewise as ww
-from wakewise.allocation import Layout, least_thrusts
+from wakewise.allocation import Layout, min_norm_allocation
 from wakewise.control import ControlTask, Tracker, TrackerState, make_tracker, vehicle_layout
 from wakewise.core.arrays import Array
 from wakewise.operation.worlds.makers import tank_world
@@ -32,7 +32,7 @@ class SternOnly:
         self, state: TrackerState, dt_s: float, estimate: ww.BodyState, goal: ww.Goal
     ) -> tuple[TrackerState, ww.Command]:
         state, wrench_B = self.tracker.wrench(state, dt_s, estimate, goal, saturated=False)
-        return state, ww.Command(thrusts_N=least_thrusts(self.layout, wrench_B).thrusts_N, wrench_B=wrench_B)
+        return state, ww.Command(thrusts_N=min_norm_allocation(self.layout, wrench_B).thrusts_N, wrench_B=wrench_B)
 
 
 def stern_only(task: ControlTask) -> SternOnly:

@@ -125,12 +125,12 @@ def test_a_part_given_in_python_is_named_in_the_record(installed: Path, tmp_path
     import reef_parts
 
     from wakewise.control import ControlTask
-    from wakewise.operation.trial_folder import as_flown
+    from wakewise.operation.trial_folder import resolved_scenario
 
     parts = ww.Scenario.preset("quick").parts()
     task = ControlTask(vehicle=parts.vehicle, region=parts.region, wake=parts.wake, settings=parts.control)
     mine = parts.replace(controller=reef_parts.stern_only(task))
-    left = as_flown(mine)
+    left = resolved_scenario(mine)
     assert left.method == "stern-only"
     assert left.replaced == {"controller": "stern-only (reef_parts.SternOnly)"}
     assert ww.Scenario.model_validate(left.model_dump()) == left

@@ -7,7 +7,7 @@ import pytest
 
 import wakewise as ww
 from wakewise.core.arrays import frozen
-from wakewise.core.checks import callable_of, path_of, truth
+from wakewise.core.checks import boolean, callable_of, path_of
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import YamlError, text_of
 from wakewise.wake import point_files
@@ -98,15 +98,15 @@ def test_the_size_of_a_target_is_a_number(tmp_path):
 @pytest.mark.parametrize("value", ["no", 0, 1.0, None, np.array([True, False]), np.array([True])])
 def test_a_truth_value_is_true_or_false(value):
     """Nothing is taken by its truth."""
-    assert refused(truth, value, "icp").startswith("icp: ")
+    assert refused(boolean, value, "icp").startswith("icp: ")
     if value is not None:
         assert refused(ww.evaluate, np.zeros((5, 3)), ww.load_target("plate").mesh, icp=value).startswith("icp: ")
 
 
 def test_both_truth_values_are_taken():
     """NumPy's too."""
-    assert truth(np.bool_(True), "icp") is True
-    assert truth(False, "icp") is False
+    assert boolean(np.bool_(True), "icp") is True
+    assert boolean(False, "icp") is False
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -169,11 +169,11 @@ def test_a_look_refuses_pictures_that_are_lines(tmp_path, shape):
     """By name and size, as a file that is no picture is."""
     cv2 = pytest.importorskip("cv2")
     pytest.importorskip("pycolmap")
-    from wakewise.vision.reconstruction.photo_preview import look_at
+    from wakewise.vision.reconstruction.photo_preview import preview_photos
 
     for name, size in (("a.png", shape), ("b.png", (60, 80, 3)), ("c.png", (60, 80, 3))):
         cv2.imwrite(str(tmp_path / name), np.random.default_rng(0).integers(0, 255, size, dtype=np.uint8))
-    assert f"a.png: {shape[1]} x {shape[0]} pixels" in refused(look_at, tmp_path)
+    assert f"a.png: {shape[1]} x {shape[0]} pixels" in refused(preview_photos, tmp_path)
 
 
 @pytest.mark.parametrize("shape", [(60, 5000, 3), (5000, 32, 3), (4, 4, 3)])
@@ -181,10 +181,10 @@ def test_a_look_at_narrow_pictures_is_finite(tmp_path, shape):
     """Those that are no lines are looked at."""
     cv2 = pytest.importorskip("cv2")
     pytest.importorskip("pycolmap")
-    from wakewise.vision.reconstruction.photo_preview import look_at
+    from wakewise.vision.reconstruction.photo_preview import preview_photos
 
     for name, size in (("a.png", shape), ("b.png", (60, 80, 3)), ("c.png", (60, 80, 3))):
         cv2.imwrite(str(tmp_path / name), np.random.default_rng(0).integers(0, 255, size, dtype=np.uint8))
-    look, thumbs = look_at(tmp_path)
+    look, thumbs = preview_photos(tmp_path)
     assert np.isfinite([photo.sharpness_pct for photo in look.photos]).all()
     assert set(thumbs) == {"a.png", "b.png", "c.png"}

@@ -13,7 +13,7 @@ from PIL import Image
 
 from wakewise.api import compare as compare_flights
 from wakewise.core.errors import FileFailure, InputError, is_full
-from wakewise.core.files import named, whole_file, whole_folder, write_bytes, write_json
+from wakewise.core.files import child_path, whole_file, whole_folder, write_bytes, write_json
 from wakewise.experiments.campaigns.definition import check_campaign
 from wakewise.experiments.trials import compare_methods
 from wakewise.operation import Scenario
@@ -154,7 +154,7 @@ BAD_NAMES = ("../../evil", "/etc/x", "a/b", "a\\b", "..", ".", ".hidden", "", " 
 def test_a_name_stands_for_a_place_in_its_folder_and_nowhere_else(name: str, tmp_path: Path) -> None:
     """Whatever is named: a campaign, a scenario, what is compared. One rule refuses, before anything is made."""
     with pytest.raises(InputError, match="names a folder, so"):
-        named(tmp_path, name, "compare")
+        child_path(tmp_path, name, "compare")
     for refuse in (lambda: Scenario.preset("quick", name=name), lambda: check_campaign({"name": name})):
         with pytest.raises(InputError, match="name: found"):
             refuse()
@@ -168,7 +168,7 @@ def test_a_name_stands_for_a_place_in_its_folder_and_nowhere_else(name: str, tmp
 @pytest.mark.parametrize("name", ["dp", "package.module:make", "first comparison", "Äxt-1", "a..b"])
 def test_names_as_people_give_them_are_places(name: str, tmp_path: Path) -> None:
     """Spaces within, letters of any script, and the colon of a plug-in."""
-    assert named(tmp_path, name, "x").parent == tmp_path
+    assert child_path(tmp_path, name, "x").parent == tmp_path
 
 
 def test_a_place_that_cannot_be_written_is_told_by_its_own_name(tmp_path: Path) -> None:

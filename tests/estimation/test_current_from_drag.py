@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.geometry import matrix_from_quat, quat_from_euler
-from wakewise.estimation.current_from_drag import KNOWN_M_S, current_of_force, level_drag, told_current
+from wakewise.estimation.current_from_drag import KNOWN_M_S, current_if_known, current_of_force, level_drag
 from wakewise.robot.vehicles import acceleration, compile_body, load_vehicle, with_each_drag
 
 TIGHT = 1e-4 * np.eye(3)
@@ -37,7 +37,7 @@ def test_trim_says_nothing_of_the_current():
     """A pull straight down leaves the level current as it is and claims none that sinks."""
     packed, q = compile_body(load_vehicle("paper")).packed, np.array([1.0, 0, 0, 0])
     level = level_drag(packed, q, 0.05, 0.0)
-    found = [told_current([packed], q, np.array([*level, trim]), TIGHT, 0.2) for trim in (0.0, 5.0)]
+    found = [current_if_known([packed], q, np.array([*level, trim]), TIGHT, 0.2) for trim in (0.0, 5.0)]
     np.testing.assert_array_equal(found[0][0], found[1][0])
     assert found[0][0][2] == 0.0
 
@@ -46,8 +46,8 @@ def test_an_uncertain_load_tells_no_current():
     """Known only to 1 N, it is None; and what is told is claimed no better than drag is known."""
     packed, q = compile_body(load_vehicle("paper")).packed, np.array([1.0, 0, 0, 0])
     force = np.array([*level_drag(packed, q, 0.1, 0.0), 0.0])
-    assert told_current([packed], q, force, np.eye(3), 0.2) is None
-    current, covariance = told_current([packed], q, force, TIGHT, 0.2)
+    assert current_if_known([packed], q, force, np.eye(3), 0.2) is None
+    current, covariance = current_if_known([packed], q, force, TIGHT, 0.2)
     assert np.sqrt(covariance[0, 0]) > 0.2 * current[0]
     assert np.sqrt(covariance[1, 1]) < KNOWN_M_S
 
@@ -55,7 +55,7 @@ def test_an_uncertain_load_tells_no_current():
 def test_a_force_that_is_no_number_tells_no_current():
     """NaN is refused, not handed on."""
     packed, q = compile_body(load_vehicle("paper")).packed, np.array([1.0, 0, 0, 0])
-    assert told_current([packed], q, np.array([np.nan, 0.0, 0.0]), TIGHT, 0.2) is None
+    assert current_if_known([packed], q, np.array([np.nan, 0.0, 0.0]), TIGHT, 0.2) is None
 
 
 @pytest.mark.parametrize("name", ["paper", "bluerov2-heavy"])
@@ -68,7 +68,7 @@ def test_whichever_published_drag_is_the_true_one_the_current_is_within_what_is_
             for c in current:
                 force = np.array([*level_drag(true, q, *c), 0.0])
                 for told, many in ((off, sets), (alone, sets[:1])):
-                    found, spread = told_current(many, q, force, 0.01 * TIGHT, 0.2)
+                    found, spread = current_if_known(many, q, force, 0.01 * TIGHT, 0.2)
                     e = found[:2] - c
                     told.append(float(np.sqrt(e @ np.linalg.solve(spread[:2, :2], e))))
     assert len(sets) > 2 and max(off) < 2.5 < max(alone)
@@ -85,7 +85,7 @@ def test_the_current_told_is_that_of_a_readable_twin():
     told = np.array([current_of_force(packed, q, *f)[:2] for packed in sets for f in forces])
     level = told.mean(axis=0)
     spread = (told - level).T @ (told - level) / len(told) + 0.2**2 * np.outer(level, level)
-    current, covariance = told_current(sets, q, force, around, 0.2)
+    current, covariance = current_if_known(sets, q, force, around, 0.2)
     np.testing.assert_allclose(current, [*level, 0.0], rtol=1e-9)
     np.testing.assert_allclose(covariance[:2, :2], spread, rtol=1e-9)
     assert not covariance[2].any()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from wakewise.core.geometry import matrix_from_quat
-from wakewise.estimation.drag_bias import DRAG, at_rest, rest_effects
-from wakewise.estimation.eskf_kernels import CURRENT, GAINS, INERTIA, believed, moved
+from wakewise.estimation.drag_bias import DRAG, drag_at_rest, drag_at_rest_jacobian
+from wakewise.estimation.eskf_kernels import CURRENT, GAINS, INERTIA, adapted_parameters, propagate_mean
 from wakewise.robot.vehicles import acceleration, compile_body, load_vehicle
 
 VEHICLE = load_vehicle("paper")
@@ -24,7 +24,7 @@ def _mean(rng, *, attitude=None):
 def test_it_is_what_keeps_the_vehicle_at_rest():
     """With the negative of it as a load, a vehicle at rest in this attitude does not begin to move in a current."""
     mean = _mean(np.random.default_rng(1), attitude=REST)
-    found = at_rest(PACKED, mean, REST)
+    found = drag_at_rest(PACKED, mean, REST)
     load = np.concatenate([matrix_from_quat(REST).T @ found[:3], found[3:]])
     still = acceleration(BODY, REST, np.zeros(6), np.zeros(6), np.zeros(3))
     held = acceleration(BODY, REST, np.zeros(6), load, mean[25:28])
@@ -38,7 +38,7 @@ def test_its_derivatives_are_those_of_differences():
     R = matrix_from_quat(mean[3:7])
 
     def wrench(at):
-        found = at_rest(believed(PACKED, at), at, REST)
+        found = drag_at_rest(adapted_parameters(PACKED, at), at, REST)
         return np.concatenate([R.T @ found[:3], found[3:]])
 
     expected = np.empty((6, 15))
@@ -47,7 +47,7 @@ def test_its_derivatives_are_those_of_differences():
         more[place] += step
         less[place] -= step
         expected[:, k] = (wrench(more) - wrench(less)) / (2 * step)
-    np.testing.assert_allclose(rest_effects(believed(PACKED, mean), mean, REST), expected, atol=1e-6)
+    np.testing.assert_allclose(drag_at_rest_jacobian(adapted_parameters(PACKED, mean), mean, REST), expected, atol=1e-6)
 
 
 def test_hovering_says_nothing_of_current_and_drag():
@@ -58,7 +58,7 @@ def test_hovering_says_nothing_of_current_and_drag():
         mean[7:13] = 0.0
         mean[13:19] = 0.0
         thrusts = np.zeros(8)
-        F = moved(PACKED, ALLOCATION, mean.copy(), thrusts, mean[3:7], 1e-4, GAINS + 8)
+        F = propagate_mean(PACKED, ALLOCATION, mean.copy(), thrusts, mean[3:7], 1e-4, GAINS + 8)
         by_load = np.abs(F[6:12, 12:18]).max()
         assert by_load > 1e-6
         assert np.abs(F[6:12, CURRENT:INERTIA]).max() < 1e-3 * by_load

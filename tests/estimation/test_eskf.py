@@ -16,7 +16,7 @@ from wakewise.core.geometry import (
 )
 from wakewise.core.interfaces import BodyState, Measurement
 from wakewise.estimation import ErrorStateFilter
-from wakewise.estimation.eskf_kernels import unexplained
+from wakewise.estimation.eskf_kernels import residual_wrench
 from wakewise.estimation.settings import FilterSettings, Priors
 from wakewise.robot.thrusters import thruster_lag
 from wakewise.robot.vehicles import compile_body, load_vehicle, step_rk4
@@ -200,7 +200,9 @@ def test_a_sudden_load_is_noticed_and_found():
     errors, _, state = record(seconds=12.0, load_W_N=pull)
     assert np.linalg.norm(errors[200:, :3], axis=1).max() < 0.06
     assert rms(errors[400:, :3]) < 0.003
-    load_B = unexplained(BODY.packed, np.array(VEHICLE.allocation_matrix), state.mean, state.thrusts_N, state.rest_q)
+    load_B = residual_wrench(
+        BODY.packed, np.array(VEHICLE.allocation_matrix), state.mean, state.thrusts_N, state.rest_q
+    )
     np.testing.assert_allclose(matrix_from_quat(state.mean[3:7]) @ load_B[:3], [3.0, 0.0, 0.0], atol=0.35)
 
 

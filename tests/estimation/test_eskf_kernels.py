@@ -15,8 +15,8 @@ from estimation_helpers import (
 )
 
 from wakewise.core.geometry import matrix_from_quat, quat_from_rotvec, quat_multiply
-from wakewise.estimation.drag_bias import DRAG, at_rest, turn
-from wakewise.estimation.eskf_kernels import felt, turn_between, turned_by, unexplained
+from wakewise.estimation.drag_bias import DRAG, drag_at_rest, turn
+from wakewise.estimation.eskf_kernels import quat_minus, quat_plus, residual_wrench, specific_force
 from wakewise.estimation.prediction import predict
 from wakewise.robot.vehicles import acceleration
 
@@ -39,9 +39,9 @@ def test_turned_by_and_turn_between_are_inverse():
     for size in (1e-14, 1e-6, 0.1, 2.0, 3.1):
         q, v = unit_quaternion(rng), rng.normal(size=3)
         v *= size / np.linalg.norm(v)
-        other = turned_by(q, v)
+        other = quat_plus(q, v)
         np.testing.assert_allclose(other, quat_multiply(q, quat_from_rotvec(v)), atol=1e-12)
-        np.testing.assert_allclose(turn_between(q, -other), v, atol=1e-9)
+        np.testing.assert_allclose(quat_minus(q, -other), v, atol=1e-9)
 
 
 def test_what_an_accelerometer_feels_and_its_jacobian():
@@ -51,16 +51,16 @@ def test_what_an_accelerometer_feels_and_its_jacobian():
 
     def feel(at):
         down = matrix_from_quat(at[3:7]).T @ GRAVITY
-        return felt(PACKED, ALLOCATION, at, thrusts, REST, down, np.empty((3, ERRORS)))
+        return specific_force(PACKED, ALLOCATION, at, thrusts, REST, down, np.empty((3, ERRORS)))
 
     H = np.empty((3, ERRORS))
-    felt(PACKED, ALLOCATION, mean, thrusts, REST, matrix_from_quat(mean[3:7]).T @ GRAVITY, H)
+    specific_force(PACKED, ALLOCATION, mean, thrusts, REST, matrix_from_quat(mean[3:7]).T @ GRAVITY, H)
     expected = jacobian(feel, mean, 1e-4)
     np.testing.assert_allclose(H, expected, atol=1e-4 * np.abs(expected).max())
     plain = mean.copy()
     plain[1 + DRAG :] = 0.0
     # The load is that at rest: with the current's drag and Munk moment there.
-    plain[13:19] -= at_rest(PACKED, plain, REST)
+    plain[13:19] -= drag_at_rest(PACKED, plain, REST)
     wrench = ALLOCATION @ thrusts
     wrench[:3] += matrix_from_quat(mean[3:7]).T @ mean[13:16]
     wrench[3:] += mean[16:19]
@@ -79,7 +79,7 @@ def test_what_the_nominal_vehicle_lacks_is_the_wrench_of_all_unknowns():
     mean, thrusts = random_mean(rng), rng.normal(size=8)
     mean[10:13] = 0.0
     mean[34:40] = 0.0
-    lacking = unexplained(PACKED, ALLOCATION, mean, thrusts, REST)
+    lacking = residual_wrench(PACKED, ALLOCATION, mean, thrusts, REST)
     nominal = acceleration(BODY, mean[3:7], mean[7:13], ALLOCATION @ thrusts + lacking, np.zeros(3))
     out, unused = mean.copy(), np.zeros((ERRORS, ERRORS))
     predict(PACKED, ALLOCATION, out, unused, thrusts, REST, 1e-6, SILENT, *STEADY)

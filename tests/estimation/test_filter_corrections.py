@@ -16,8 +16,8 @@ from estimation_helpers import (
 
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.geometry import matrix_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
-from wakewise.estimation.corrections import NOTHING, correct, take_force, take_pose, take_sum
-from wakewise.estimation.eskf_kernels import GAINS, GYRO, felt
+from wakewise.estimation.corrections import NOTHING, correct, correct_by_force, correct_by_pose, correct_by_sum
+from wakewise.estimation.eskf_kernels import GAINS, GYRO, specific_force
 
 
 def test_correction_is_the_kalman_update():
@@ -64,7 +64,7 @@ def test_a_sum_of_two_errors_is_taken_as_the_textbook_has_it(first, second, size
     measured = rng.normal(size=size)
     entries = np.concatenate([mean[:3], np.zeros(3), mean[7:]])
     expected = updated(mean, P, H, measured - H @ entries, 0.02)
-    distance = take_sum(mean, P, measured, first, second, 0.02, np.inf)
+    distance = correct_by_sum(mean, P, measured, first, second, 0.02, np.inf)
     for one, other in zip((mean, P, distance), expected, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
 
@@ -83,7 +83,7 @@ def test_a_pose_is_taken_as_the_textbook_has_it_and_heeded(slow):
     innovation = residual / np.sqrt(np.diag(H @ P @ H.T) + std**2)
     leant = leaning + (np.clip(innovation, -3.0, 3.0) - leaning) / 15
     louder = 2.0 * np.exp(0.1 * (min((leant**2).max() / (9.0 / 29.0), 10.0) - 1.0))
-    distance, scale = take_pose(mean, P, p_m, q, slow, 0.003, 0.005, np.inf, leaning, 2.0)
+    distance, scale = correct_by_pose(mean, P, p_m, q, slow, 0.003, 0.005, np.inf, leaning, 2.0)
     for one, other in zip((mean, P, distance, leaning, scale), (*expected, leant, louder), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
 
@@ -94,17 +94,17 @@ def test_noise_is_bounded_both_ways():
         mean, P, leaning = np.zeros(ERRORS + 1), 1e-6 * np.eye(ERRORS), np.full(6, far / 3.0)
         mean[3] = 1.0
         p_m, q = np.full(3, far), np.array([1.0, 0.0, 0.0, 0.0])
-        assert take_pose(mean, P, p_m, q, NOTHING, 0.003, 0.005, 1.0, leaning, scale)[1] == bound
+        assert correct_by_pose(mean, P, p_m, q, NOTHING, 0.003, 0.005, 1.0, leaning, scale)[1] == bound
 
 
 def test_an_accelerometer_is_taken_as_the_textbook_has_it():
-    """With the Jacobian and the expectation of `felt`, gravity turned into the body."""
+    """With the Jacobian and the expectation of `specific_force`, gravity turned into the body."""
     rng = np.random.default_rng(0)
     mean, P, thrusts, H = random_mean(rng), random_covariance(rng), rng.normal(size=8), np.empty((3, ERRORS))
     down_B = matrix_from_quat(mean[3:7]).T @ np.array([0.0, 0.0, GRAVITY_M_S2])
     residual = 0.1 * rng.normal(size=3)
-    measured = felt(PACKED, ALLOCATION, mean, thrusts, REST, down_B, H) + residual
+    measured = specific_force(PACKED, ALLOCATION, mean, thrusts, REST, down_B, H) + residual
     expected = updated(mean, P, H, residual, 0.07)
-    distance = take_force(PACKED, ALLOCATION, mean, P, thrusts, REST, measured, 0.07, np.inf)
+    distance = correct_by_force(PACKED, ALLOCATION, mean, P, thrusts, REST, measured, 0.07, np.inf)
     for one, other in zip((mean, P, distance), expected, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-9)

@@ -60,7 +60,7 @@ def test_the_models_white_error_counts_over_the_period_of_the_sensor(
         used.append(float(args[7]))  # type: ignore[arg-type]
         return 0.0
 
-    monkeypatch.setattr(eskf, "take_force", listening)
+    monkeypatch.setattr(eskf, "correct_by_force", listening)
     settings, priors = FilterSettings(), Priors(acceleration_noise_m_s2=0.05, settle_s=0.0)
     filter_ = ErrorStateFilter(VEHICLE, settings, priors=priors)
     state = filter_.init(BodyState(X_WB=Pose(HERE)))

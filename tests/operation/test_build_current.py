@@ -44,7 +44,9 @@ def test_the_water_that_is_checked_is_the_water_that_is_flown(seed, monkeypatch)
     """Background turbulence included: what passed the vehicle in the check is what the tank's own water does there."""
     scenario = load_scenario("quick", None, {"method": "dp", "seed": seed, "tank.current.turbulence_m_s": 0.05})
     passed = []
-    monkeypatch.setattr(preflight, "holding", lambda vehicle, passing, *_: passed.append(np.array(passing)))
+    monkeypatch.setattr(
+        preflight, "station_keeping_demand", lambda vehicle, passing, *_: passed.append(np.array(passing))
+    )
     parts = scenario.parts()
     preflight.check_current(parts)
     ambient = parts.world.tank().ambient

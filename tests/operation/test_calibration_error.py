@@ -8,9 +8,9 @@ from wakewise.operation import Scenario
 from wakewise.operation.calibration_error import (
     CURRENT_DEG,
     CalibrationErrorSettings,
-    found_target,
-    known_calibration,
-    surveyed_current,
+    calibration_with_error,
+    current_with_error,
+    target_with_error,
 )
 from wakewise.simulation.water import AiryWave, AmbientSum, SteadyCurrent
 from wakewise.vision.imaging import calibrate
@@ -36,7 +36,7 @@ def test_its_error_has_the_stated_spread():
     """Over 400 draws 5 mm per axis within 8 %."""
     target, rng = Scenario().parts().target, np.random.default_rng(0)
     moves = np.array(
-        [found_target(target, CalibrationErrorSettings(), rng).centre_W_m - target.centre_W_m for _ in range(400)]
+        [target_with_error(target, CalibrationErrorSettings(), rng).centre_W_m - target.centre_W_m for _ in range(400)]
     )
     assert moves.std(axis=0) == pytest.approx(np.full(3, 0.005), rel=0.1)
 
@@ -62,7 +62,7 @@ def test_mission_and_controller_go_by_what_is_known_and_the_world_by_what_is():
 def test_a_calibration_is_as_far_off_as_stated():
     """Focal length, principal point, k1 to p2: over 400 draws their spreads within 10 %; both focal lengths alike."""
     true, rng, survey = calibrate(Scenario().imaging.camera()), np.random.default_rng(1), CalibrationErrorSettings()
-    off = np.array([known_calibration(true, survey, rng).params - true.params for _ in range(400)])
+    off = np.array([calibration_with_error(true, survey, rng).params - true.params for _ in range(400)])
     stated = [0.002 * true.params[0]] * 2 + [0.0015 * true.width] * 2 + [0.003, 0.006, 0.00075, 0.00075]
     assert off.std(axis=0) == pytest.approx(stated, rel=0.1)
     assert off[:, 0] == pytest.approx(off[:, 1])
@@ -80,7 +80,7 @@ def test_bad_values_do_not_become_settings(bad):
 def test_the_current_is_known_but_for_its_direction():
     """Speed and sink are the water's own; over 400 draws the direction is off by the stated spread within 10 %."""
     water, rng = SteadyCurrent(velocity_W_m_s=np.array([0.06, -0.08, 0.01])), np.random.default_rng(0)
-    known = np.array([surveyed_current(water, np.zeros(3), rng) for _ in range(400)])
+    known = np.array([current_with_error(water, np.zeros(3), rng) for _ in range(400)])
     np.testing.assert_allclose(np.hypot(known[:, 0], known[:, 1]), 0.1)
     np.testing.assert_allclose(known[:, 2], 0.01)
     off = np.degrees(np.arctan2(known[:, 1], known[:, 0]) - np.arctan2(-0.08, 0.06))
@@ -94,7 +94,7 @@ def test_a_swell_is_no_current():
     place = np.array([0.0, 0.0, 1.4])
     swing = max(float(np.linalg.norm(wave.velocity(place[None], t))) for t in np.arange(0.0, 7.0, 0.1))
     rng = np.random.default_rng(1)
-    known = surveyed_current(AmbientSum(parts=(steady, wave)), place, rng)
+    known = current_with_error(AmbientSum(parts=(steady, wave)), place, rng)
     assert np.hypot(known[0], known[1]) == pytest.approx(0.05, abs=0.05 * swing)
 
 

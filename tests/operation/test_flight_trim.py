@@ -8,7 +8,7 @@ import pytest
 
 import wakewise as ww
 from wakewise.core.errors import InputError
-from wakewise.operation.flight_trim import flight_trim, folder_trim, hovering, proposal
+from wakewise.operation.flight_trim import ballast_proposal, flight_trim, folder_trim, hover_mask
 from wakewise.robot.vehicles import compile_body, load_vehicle, restoring_wrench
 from wakewise.robot.vehicles.ballast import BallastBlock, net_buoyancy_N, with_blocks
 
@@ -58,20 +58,20 @@ def still(seconds: float, weight_N: float = 3.0, n: int = 8) -> pl.DataFrame:
 def test_a_hover_is_a_goal_at_rest_and_a_vehicle_that_is() -> None:
     """After four seconds, while goal and vehicle stand."""
     steps = still(8.0)
-    assert hovering(steps).sum() == 200
+    assert hover_mask(steps).sum() == 200
     moves = steps.with_columns(goal_u_m_s=pl.when(pl.col("time_s") > 6.0).then(0.05).otherwise(0.0))
-    assert hovering(moves).sum() == 101
+    assert hover_mask(moves).sum() == 101
     swings = steps.with_columns(est_q_rad_s=pl.when(pl.col("time_s") > 6.0).then(0.1).otherwise(0.0))
-    assert hovering(swings).sum() == 101
+    assert hover_mask(swings).sum() == 101
 
 
 def test_a_flight_says_one_line_where_a_block_is_worth_it() -> None:
     """Three newtons: what, where, how sure. A fifth of a newton: nothing."""
     vehicle = load_vehicle("paper")
-    said = proposal(vehicle, still(8.0))
+    said = ballast_proposal(vehicle, still(8.0))
     assert said is not None and said.startswith("add 3.0 N of float in the middle (it is 3.0 +- 0.0 N heavy")
-    assert proposal(vehicle, still(8.0, 0.2)) is None
-    assert proposal(vehicle, still(5.0)) is None
+    assert ballast_proposal(vehicle, still(8.0, 0.2)) is None
+    assert ballast_proposal(vehicle, still(5.0)) is None
 
 
 def test_what_says_nothing_of_trim_is_refused(tmp_path) -> None:

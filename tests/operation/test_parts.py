@@ -7,7 +7,7 @@ import wakewise as ww
 from wakewise.core.errors import InputError
 from wakewise.operation import PARTS, read_scenario, write_scenario
 from wakewise.operation import parts as module
-from wakewise.operation.trial_folder import as_flown
+from wakewise.operation.trial_folder import resolved_scenario
 
 QUICK = ww.Scenario.preset("quick", **{"target.points": 60})
 
@@ -46,8 +46,8 @@ def test_fields_of_the_scenario_can_be_replaced_beside_parts():
 def test_a_part_that_a_scenario_cannot_name_is_asked_for_again():
     """The scenario that such a trial leaves behind gives all its other parts, and says what it lacks."""
     flown = QUICK.parts().replace(vehicle=ww.load_vehicle("bluerov2-heavy"), method="dp")
-    assert as_flown(flown).vehicle == "bluerov2-heavy"
-    left = as_flown(flown).parts()
+    assert resolved_scenario(flown).vehicle == "bluerov2-heavy"
+    left = resolved_scenario(flown).parts()
     assert left.target.name == flown.target.name
     with pytest.raises(InputError, match=r"vehicle: was given in Python \(bluerov2-heavy .*replace\(vehicle=\.\.\.\)"):
         _ = left.vehicle
@@ -66,7 +66,7 @@ def test_the_record_of_a_controller_of_ones_own_can_be_read(tmp_path):
         def step(self, state, dt_s, estimate, goal):
             return state, ww.Command(thrusts_N=np.zeros(8), wrench_B=np.zeros(6))
 
-    left = as_flown(QUICK.parts().replace(controller=Mine()))
+    left = resolved_scenario(QUICK.parts().replace(controller=Mine()))
     write_scenario(tmp_path / "scenario.yaml", left, {})
     again = read_scenario(tmp_path / "scenario.yaml")
     assert again == left and (again.method, list(again.replaced)) == ("mine", ["controller"])

@@ -76,7 +76,7 @@ def test_compiling_is_told_of_once_where_nobody_shows_progress(monkeypatch, caps
             if work[0]:
                 progress(done, work[0], "compiling")
 
-    monkeypatch.setattr(flying, "warm", warmed)
+    monkeypatch.setattr(flying, "compile_kernels", warmed)
     scenario = ww.Scenario.preset("quick", method="dp")
     ww.fly(scenario, duration_s=0.1)
     said = capsys.readouterr()

@@ -5,7 +5,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.operation import Scenario, load_scenario
-from wakewise.operation.randomization import FieldDistribution, values_of
+from wakewise.operation.randomization import FieldDistribution, sample_fields
 
 TRIM = "tank.mismatch.trim_N"
 
@@ -26,10 +26,10 @@ def test_a_draw_lies_where_it_says():
 
 def test_a_seed_draws_a_field_alike_whatever_else_is_drawn():
     """One more draw leaves the others what they were; another seed does not."""
-    alone = values_of({TRIM: FieldDistribution(between=(0.0, 1.0))}, 3)
-    beside = values_of({"a": FieldDistribution(between=(0.0, 1.0)), TRIM: FieldDistribution(between=(0.0, 1.0))}, 3)
+    alone = sample_fields({TRIM: FieldDistribution(between=(0.0, 1.0))}, 3)
+    beside = sample_fields({"a": FieldDistribution(between=(0.0, 1.0)), TRIM: FieldDistribution(between=(0.0, 1.0))}, 3)
     assert beside[TRIM] == alone[TRIM] != beside["a"]
-    assert values_of({TRIM: FieldDistribution(between=(0.0, 1.0))}, 4) != alone
+    assert sample_fields({TRIM: FieldDistribution(between=(0.0, 1.0))}, 4) != alone
 
 
 @pytest.mark.parametrize(

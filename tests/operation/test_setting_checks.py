@@ -5,12 +5,12 @@ import pytest
 import wakewise as ww
 from wakewise.control import METHODS
 from wakewise.core.errors import InputError
-from wakewise.operation.setting_checks import LEVERED, PLANNING, idle_switches
+from wakewise.operation.setting_checks import MITIGATION_METHODS, PLANNING, ineffective_settings
 
 
 def said(method, **changes):
     scenario = ww.Scenario.preset("quick", world="tank", method=method, **changes)
-    return " | ".join(idle_switches(scenario, scenario.parts().vehicle))
+    return " | ".join(ineffective_settings(scenario, scenario.parts().vehicle))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -64,4 +64,4 @@ def test_a_current_that_could_not_act_is_refused(levers):
 
 def test_methods_of_the_lists_are_methods():
     """A method that is renamed must be renamed here."""
-    assert set(METHODS) >= PLANNING and set(METHODS) >= LEVERED
+    assert set(METHODS) >= PLANNING and set(METHODS) >= MITIGATION_METHODS

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from wakewise.allocation import Weights, compile_layout, gentle_allocation
+from wakewise.allocation import Weights, compile_layout, min_wash_allocation
 from wakewise.control.bow_rule import bow_layout
 from wakewise.core.geometry import Pose
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake import InfluenceModel, RoundJet, wake_model
-from wakewise.wake.disturbance import SCATTER_RAD, astray
+from wakewise.wake.disturbance import SCATTER_RAD, scattered_jet_gram
 
 AREA = np.array([0.0045])
 AHEAD = np.array([[1.0, 0.0, 0.0]])
@@ -37,16 +37,16 @@ def test_it_is_the_mean_over_drawn_directions(name, angle_deg):
     velocity = model.unit_velocity(point, np.zeros((alike, 3)), ways, np.full(alike, AREA[0]))
     mean = float(np.mean(np.sum(velocity[:, 0] ** 2, axis=1)))
     # Force against the jet: slot 0 blows ahead.
-    found = astray(point, np.ones(1), HERE, -AHEAD, AREA, *model.law)
+    found = scattered_jet_gram(point, np.ones(1), HERE, -AHEAD, AREA, *model.law)
     assert found[0] == pytest.approx(mean, rel=1.0 / 7.0)
 
 
 def test_signs_are_opposite_ways_and_weights_count():
     """A thruster turned about has its two slots exchanged; twice the weight is twice the harm."""
     points, weights = np.array([[0.5, 0.1, 0.0], [0.6, -0.2, 0.1]]), np.array([0.4, 0.6])
-    one = astray(points, weights, HERE, AHEAD, AREA, *LAW)
-    np.testing.assert_allclose(astray(points, weights, HERE, -AHEAD, AREA, *LAW), one[::-1])
-    np.testing.assert_allclose(astray(points, 2.0 * weights, HERE, AHEAD, AREA, *LAW), 2.0 * one)
+    one = scattered_jet_gram(points, weights, HERE, AHEAD, AREA, *LAW)
+    np.testing.assert_allclose(scattered_jet_gram(points, weights, HERE, -AHEAD, AREA, *LAW), one[::-1])
+    np.testing.assert_allclose(scattered_jet_gram(points, 2.0 * weights, HERE, AHEAD, AREA, *LAW), 2.0 * one)
     # T > 0 blows south, away from the points.
     assert one[0] < 0.2 * one[1]
 
@@ -61,7 +61,7 @@ def test_its_least_shares_keep_the_bow_rule_without_a_word_of_bows(name):
     ruled = bow_layout(vehicle)
     d = view.astray(Pose(np.zeros(3)))
     for wrench in ([-2.0, 0.0, 0.0], [-1.0, 0.5, 0.0], [-2.0, -0.6, 1.0]):
-        found = gentle_allocation(
+        found = min_wash_allocation(
             layout, np.array([*wrench, 0.0, 0.0, 0.0]), np.diag(d), Weights(disturbance=1e4, effort=1e-3)
         ).thrusts_N
         assert np.all(found <= ruled.upper_N + 0.05)

@@ -12,7 +12,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega
 
-from wakewise_ardusub.link.connection import heard_of
+from wakewise_ardusub.link.connection import receive_kind
 
 
 @dataclass
@@ -55,7 +55,7 @@ class FakeAutopilot:
         return self.waiting.popleft() if self.waiting else None
 
     def hear(self, kinds: Collection[str], timeout_s: float) -> Any:
-        return heard_of(self, kinds, timeout_s)
+        return receive_kind(self, kinds, timeout_s)
 
     def send(self, name: str, **fields: Any) -> None:
         message = getattr(self._companion, f"{name}_encode")(**fields)

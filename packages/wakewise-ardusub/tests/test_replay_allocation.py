@@ -12,7 +12,7 @@ from wakewise.core.errors import InputError
 from wakewise.robot.thrusters.curve_library import library_curve
 from wakewise.robot.vehicles import Vehicle, load_vehicle
 from wakewise.wake import wake_model
-from wakewise_ardusub.logs.replay_allocation import bow_points, hindsight
+from wakewise_ardusub.logs.replay_allocation import bow_points, replay_log
 from wakewise_ardusub.motors import motor_channels
 from wakewise_ardusub.vehicle_summary import VehicleSummary
 
@@ -45,7 +45,7 @@ def test_pulses_become_thrusts_by_curve_voltage_and_direction(vehicle: Vehicle) 
     region, wake = bow_points(vehicle, 0.4), wake_model("jet")
     curve = library_curve("t200")
     for volts in (13.0, 16.0):
-        found = hindsight(_rows(_astern(150.0), volts=volts), PARAMETERS, vehicle, region, wake)
+        found = replay_log(_rows(_astern(150.0), volts=volts), PARAMETERS, vehicle, region, wake)
         signs = np.array(DIRECTIONS) * np.array([1, 1, -1, -1, 0, 0, 0, 0])
         expected = np.array(DIRECTIONS) * curve.thrust_N(1500.0 + 150.0 * signs, volts)
         assert found.thrusts_N["flown"][0] == pytest.approx(expected)
@@ -57,7 +57,7 @@ def test_all_shares_make_the_flown_wrench_and_gentle_is_never_worse(vehicle: Veh
     """Going astern, the bow's jets blow at the points; the rear thrusters can do it alone."""
     rng = np.random.default_rng(0)
     pulses = [_astern(150.0)] + [list(1500.0 + rng.uniform(-150.0, 150.0, 8)) for _ in range(20)]
-    found = hindsight(_rows(*pulses), PARAMETERS, vehicle, bow_points(vehicle, 0.4), wake_model("jet"))
+    found = replay_log(_rows(*pulses), PARAMETERS, vehicle, bow_points(vehicle, 0.4), wake_model("jet"))
     for share in ("least", "gentle"):
         made = found.thrusts_N[share] @ vehicle.allocation_matrix.T
         assert made == pytest.approx(found.wrench_B, abs=1e-6)
@@ -74,7 +74,7 @@ def test_all_shares_make_the_flown_wrench_and_gentle_is_never_worse(vehicle: Veh
 
 def test_what_is_not_known_is_null_and_rest_is_nothing(vehicle: Vehicle) -> None:
     """A row without pulses has no thrusts; pulses in the dead band give none."""
-    found = hindsight(
+    found = replay_log(
         _rows([None] * 8, [1500.0] * 8, _astern(20.0), volts=None),
         PARAMETERS,
         vehicle,
@@ -103,7 +103,7 @@ def test_motors_are_found_on_their_channels(vehicle: Vehicle) -> None:
 def test_a_thruster_without_a_curve_goes_in_proportion(vehicle: Vehicle) -> None:
     """Half of full output is half of the limit, whatever the voltage."""
     plain = dataclasses.replace(vehicle, curve=None)
-    found = hindsight(_rows([1700.0] * 8), {}, plain, bow_points(plain, 0.4), wake_model("jet"))
+    found = replay_log(_rows([1700.0] * 8), {}, plain, bow_points(plain, 0.4), wake_model("jet"))
     assert found.thrusts_N["flown"][0] == pytest.approx(0.5 * plain.thrust_upper_N)
 
 

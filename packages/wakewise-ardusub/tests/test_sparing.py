@@ -14,8 +14,8 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
-from wakewise_ardusub.vehicle_summary import VehicleSummary, craft_json, read_craft
-from wakewise_ardusub.wash_savings import SHARES, WashSavingsCalculator, bow_ball, look, saved_pct
+from wakewise_ardusub.vehicle_summary import VehicleSummary, read_vehicle_summary, vehicle_summary_json
+from wakewise_ardusub.wash_savings import SHARES, WashSavingsCalculator, bow_ball, influence_model, saved_pct
 
 POSES = ((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.3, -0.2, 0.1, 0.2, -0.15, 0.5))
 JUDGE = """
@@ -24,8 +24,8 @@ import numpy as np
 from pathlib import Path
 from wakewise.core.jit.njit import COMPILED
 from wakewise.core.geometry import Pose, quat_from_euler
-from wakewise_ardusub.vehicle_summary import read_craft
-from wakewise_ardusub.wash_savings import SHARES, Sparing, bow_ball, look
+from wakewise_ardusub.vehicle_summary import read_vehicle_summary
+from wakewise_ardusub.wash_savings import SHARES, Sparing, bow_ball, influence_model
 assert not COMPILED
 asked = json.loads(Path(sys.argv[1]).read_text())
 craft = read_craft(Path(sys.argv[2]))
@@ -61,13 +61,13 @@ def test_numpy_alone_judges_as_the_whole_package_does(vehicle: str, model: str, 
     (tmp_path / "asked.json").write_text(
         json.dumps({"directions": directions.tolist(), "rows": rows, "poses": POSES}), encoding="utf-8"
     )
-    (tmp_path / "craft.json").write_text(craft_json(craft), encoding="utf-8")
+    (tmp_path / "craft.json").write_text(vehicle_summary_json(craft), encoding="utf-8")
     told = iter(json.loads(bare(JUDGE, str(tmp_path / "asked.json"), str(tmp_path / "craft.json"))))
     points = bow_ball(craft.bow_m, craft.camera_z_m, 0.4)
     sparing = WashSavingsCalculator(craft, directions)
     largest = 0.0
     for pose in POSES:
-        view = look(craft, points, np.ones(len(points)))
+        view = influence_model(craft, points, np.ones(len(points)))
         gram = view.gram(Pose(np.array(pose[:3]), quat_from_euler(*pose[3:])))
         for pulses, volts in rows:
             spared = sparing.judge(np.array(pulses), sparing.supply_V(volts), gram)
@@ -93,12 +93,12 @@ def test_a_layout_that_needs_solvers_is_refused_by_a_small_computer(tmp_path: Pa
     """RexROV's spare thrusts are in one piece: one line says so, before anything is judged."""
     craft = VehicleSummary.of(load_vehicle("rexrov"), wake_model("jet"))
     assert not WashSavingsCalculator.is_small(craft)
-    (tmp_path / "craft.json").write_text(craft_json(craft), encoding="utf-8")
+    (tmp_path / "craft.json").write_text(vehicle_summary_json(craft), encoding="utf-8")
     code = """
 from pathlib import Path
 import numpy as np
 from wakewise.core.errors import InputError
-from wakewise_ardusub.vehicle_summary import read_craft
+from wakewise_ardusub.vehicle_summary import read_vehicle_summary
 from wakewise_ardusub.wash_savings import Sparing
 craft = read_craft(Path(sys.argv[1]))
 try:
@@ -119,8 +119,8 @@ def test_a_craft_goes_through_its_file(tmp_path: Path) -> None:
     """All numbers as they were; what is no craft file is refused with its name."""
     craft = VehicleSummary.of(load_vehicle("bluerov2"), wake_model("paper-calibrated"))
     path = tmp_path / "craft.json"
-    path.write_text(craft_json(craft), encoding="utf-8")
-    again = read_craft(path)
+    path.write_text(vehicle_summary_json(craft), encoding="utf-8")
+    again = read_vehicle_summary(path)
     for name in ("allocation_matrix", "positions_B_m", "axes_B", "areas_m2", "thrust_lower_N", "thrust_upper_N"):
         assert np.array_equal(getattr(again, name), getattr(craft, name)), name
     assert (again.name, again.thrusters, again.supply_V) == (craft.name, craft.thrusters, craft.supply_V)
@@ -139,4 +139,4 @@ def test_a_craft_goes_through_its_file(tmp_path: Path) -> None:
     ):
         path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=said):
-            read_craft(path)
+            read_vehicle_summary(path)

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 from wakewise.core.interfaces import no_progress
 from wakewise.experiments.campaigns.engines import WorkerPool
-from wakewise.experiments.campaigns.worker import work_on
+from wakewise.experiments.campaigns.worker import run_attempt
 from wakewise.experiments.campaigns.worker_process import AttemptReport
 
 
@@ -20,5 +20,5 @@ class Here:
 
     def submit(self, attempt, ticket, threads):
         future = Future()
-        future.set_result(AttemptReport(key=ticket.trial["key"], **work_on(ticket, no_progress, quiet=False)))
+        future.set_result(AttemptReport(key=ticket.trial["key"], **run_attempt(ticket, no_progress, quiet=False)))
         return future

@@ -19,7 +19,7 @@ def made_up(trial):
 
 def test_flights_are_kept_by_what_was_flown(tmp_path, monkeypatch):
     """The same trial is found again as it was, another is not, and `fresh` finds none; nonsense counts as not flown."""
-    monkeypatch.setattr(flight_batches, "warm", lambda **_: None)
+    monkeypatch.setattr(flight_batches, "compile_kernels", lambda **_: None)
     store = FlightStore(tmp_path / "c")
     trial = WashTrial(scenario="orbit/paper", method="dp", seed=1, control=(("levers.drift", False), ("w", (1.0, 2.0))))
     assert store.load(trial, FLY) is None

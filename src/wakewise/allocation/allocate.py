@@ -1,7 +1,7 @@
 """One wrench to many thrusts: the least thrusts, or the gentlest ones, that make the same wrench.
 
 All thrusts that make a wrench differ by null-space thrusts only: T = T_0 + Z lambda. `pseudo_inverse` takes the
-smallest |T| within limits; `gentle_allocation` takes the T that disturbs the target least. Both give up the same part
+smallest |T| within limits; `min_wash_allocation` takes the T that disturbs the target least. Both give up the same part
 of a wrench that the limits do not allow (`reach`), so that they can be compared at equal wrench.
 """
 
@@ -13,11 +13,17 @@ from functools import cached_property
 
 import numpy as np
 
-from wakewise.allocation.attainable_set import AXES, by_priority, is_all, parse_priority, within_limits
-from wakewise.allocation.branch_and_bound import box_search
+from wakewise.allocation.attainable_set import (
+    AXES,
+    largest_feasible_share,
+    makes_wrench,
+    parse_priority,
+    prioritized_allocation,
+)
+from wakewise.allocation.branch_and_bound import global_minimum
 from wakewise.allocation.convex import convex_allocation
-from wakewise.allocation.coordinate_descent import feasible_starts, start_directions, starts_at_rest, tied_parts
-from wakewise.allocation.cost_bounds import CLOSED
+from wakewise.allocation.coordinate_descent import coupled_directions, feasible_starts, idle_starts, start_directions
+from wakewise.allocation.cost_bounds import RELATIVE_GAP
 from wakewise.allocation.layout import Layout, compile_layout
 from wakewise.allocation.line_search import cost, disjoint_search, split_allocation
 from wakewise.core.arrays import Array, freeze, frozen
@@ -30,8 +36,8 @@ __all__ = [
     "Weights",
     "compile_layout",
     "disturbance_of",
-    "gentle_allocation",
-    "least_thrusts",
+    "min_norm_allocation",
+    "min_wash_allocation",
     "pseudo_inverse",
 ]
 
@@ -145,10 +151,10 @@ def pseudo_inverse(B: Array, wrench_B: Array, lower_N: Array, upper_N: Array) ->
     InputError
         As `compile_layout`, and if the wrench is not six finite numbers.
     """
-    return least_thrusts(compile_layout(B, lower_N, upper_N), wrench_B)
+    return min_norm_allocation(compile_layout(B, lower_N, upper_N), wrench_B)
 
 
-def least_thrusts(
+def min_norm_allocation(
     layout: Layout, wrench_B: Array, gram: Array | None = None, priority: str | None = None
 ) -> Allocation:
     """`pseudo_inverse` for a layout compiled once; with `gram`, shape (2 n, 2 n), also says the disturbance.
@@ -179,9 +185,9 @@ def _share(layout: Layout, thrusts: Array, requested: Array, scale: float) -> fl
 def _start(layout: Layout, requested: Array, priority: str | None) -> tuple[Array, float]:
     """Least thrusts of what can be made of a wrench, and the share that keeps its direction."""
     groups = None if priority is None else parse_priority(priority)
-    thrusts, scale = within_limits(layout, layout.inverse @ requested)
-    if groups is not None and not is_all(layout, thrusts, requested):
-        thrusts = by_priority(layout, requested, groups)
+    thrusts, scale = largest_feasible_share(layout, layout.inverse @ requested)
+    if groups is not None and not makes_wrench(layout, thrusts, requested):
+        thrusts = prioritized_allocation(layout, requested, groups)
     return thrusts, scale
 
 
@@ -191,7 +197,7 @@ def disturbance_of(gram: Array, thrusts_N: Array) -> float:
     return float(cost(gram, thrusts, thrusts, _DISTURBANCE))
 
 
-def gentle_allocation(
+def min_wash_allocation(
     layout: Layout,
     wrench_B: Array,
     gram: Array,
@@ -205,7 +211,7 @@ def gentle_allocation(
     The global minimum, with a proven gap. Where the null space falls apart into lines that share no thruster and no
     Gram entry (vectored layouts of four horizontal and four vertical thrusters do), each line is searched exactly; a
     diagonal Gram matrix makes the problem convex; everything else is left to branch and bound, whose gap is what it
-    reached within its budget. The cost never exceeds that of `least_thrusts`.
+    reached within its budget. The cost never exceeds that of `min_norm_allocation`.
 
     Parameters
     ----------
@@ -217,7 +223,7 @@ def gentle_allocation(
     previous_N : ndarray, shape (n,), optional
         Thrusts of the step before; zeros if not given.
     priority : str, optional
-        As `least_thrusts`.
+        As `min_norm_allocation`.
     budget : int
         Most boxes to look at, where the layout needs branch and bound.
 
@@ -248,7 +254,7 @@ def gentle_allocation(
         method = "lines"
     else:
         done = False
-    if not done or (priority is not None and not is_all(layout, thrusts, requested)):
+    if not done or (priority is not None and not makes_wrench(layout, thrusts, requested)):
         start, scale = _start(layout, requested, priority)
         thrusts, method, gap = _search(layout, start, G, previous, packed, budget)
     value = cost(G, thrusts, previous, packed)
@@ -275,8 +281,8 @@ def _search(
     if method == "boxes" and is_incoherent(G):
         found = convex_allocation(layout.B, start, lower, upper, G, previous, packed)
         # The solver's own tolerance is not always enough; what it leaves open goes the way of all other layouts.
-        exact = found is not None and is_all(layout, found[0], layout.B @ start)
-        if found is not None and exact and found[1] <= CLOSED * cost(G, found[0], previous, packed):
+        exact = found is not None and makes_wrench(layout, found[0], layout.B @ start)
+        if found is not None and exact and found[1] <= RELATIVE_GAP * cost(G, found[0], previous, packed):
             return found[0], "convex", found[1]
     spare = layout.owners.any(axis=0)
     thrusts, gap = start.copy(), 0.0
@@ -290,8 +296,8 @@ def _search(
         else:
             starts = feasible_starts(base, before, group, start_directions(group.shape[1]), lower, upper)
             if group.shape[1] > 2:
-                starts = np.vstack([starts, starts_at_rest(base, before, group, G, packed, lower, upper)])
-            result, part, _ = box_search(G, starts, group, lower, upper, before, packed, budget)
+                starts = np.vstack([starts, idle_starts(base, before, group, G, packed, lower, upper)])
+            result, part, _ = global_minimum(G, starts, group, lower, upper, before, packed, budget)
         if cost(G, result, before, packed) <= cost(G, base, before, packed):
             thrusts[own] = result[own]
         gap += part
@@ -305,7 +311,7 @@ def is_incoherent(G: Array) -> bool:
 
 def _coupled_groups(layout: Layout, G: Array) -> list[Array]:
     """Parts of the null space, those joined that share a Gram entry; orthonormal bases, shape (n, k_g) each."""
-    tied = tied_parts(G, layout.owners, COUPLING_LIMIT)
+    tied = coupled_directions(G, layout.owners, COUPLING_LIMIT)
     groups: list[list[int]] = []
     for new in range(len(tied)):
         joined = [new]

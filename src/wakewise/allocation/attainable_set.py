@@ -21,7 +21,7 @@ AXES = "XYZKMN"
 _EXACT = 1e-10
 
 
-def within_limits(layout: Layout, thrusts: Array) -> tuple[Array, float]:
+def largest_feasible_share(layout: Layout, thrusts: Array) -> tuple[Array, float]:
     """Least-norm thrusts within limits that make the largest possible share of the same wrench, and that share."""
     lower, upper = layout.lower_N, layout.upper_N
     if ((thrusts >= lower) & (thrusts <= upper)).all():
@@ -60,7 +60,7 @@ def parse_priority(text: str) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(AXES.index(letter) for letter in group) for group in [*groups, rest] if group)
 
 
-def by_priority(layout: Layout, wrench_B: Array, groups: tuple[tuple[int, ...], ...]) -> Array:
+def prioritized_allocation(layout: Layout, wrench_B: Array, groups: tuple[tuple[int, ...], ...]) -> Array:
     """Thrusts within limits, shape (n,), that come as near as they can to each group of axes in turn.
 
     What a group has got is not given back for those after it (lexicographic least squares, one quadratic program per
@@ -105,7 +105,7 @@ def by_priority(layout: Layout, wrench_B: Array, groups: tuple[tuple[int, ...], 
     return result
 
 
-def is_all(layout: Layout, thrusts: Array, wrench_B: Array) -> bool:
+def makes_wrench(layout: Layout, thrusts: Array, wrench_B: Array) -> bool:
     """Whether thrusts make a wrench but for rounding."""
     missing = layout.B @ thrusts - wrench_B
     return math.sqrt(missing @ missing) <= _EXACT * (1.0 + math.sqrt(wrench_B @ wrench_B))

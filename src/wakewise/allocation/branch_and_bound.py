@@ -11,8 +11,8 @@ import heapq
 
 import numpy as np
 
-from wakewise.allocation.coordinate_descent import descend, explore
-from wakewise.allocation.cost_bounds import CLOSED, examine
+from wakewise.allocation.coordinate_descent import descend, multistart_descent
+from wakewise.allocation.cost_bounds import RELATIVE_GAP, cell_lower_bound
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import assign, njit
 
@@ -39,7 +39,7 @@ def coordinates(null: Array, thrusts: Array) -> IntArray:
 
 
 @njit
-def box_search(
+def global_minimum(
     G: Array,
     starts: Array,
     null: Array,
@@ -76,7 +76,7 @@ def box_search(
         if found < value:
             best, value = trial, found
     if k > 2:
-        value = explore(G, best, null, lower, upper, previous, weights, 4)
+        value = multistart_descent(G, best, null, lower, upper, previous, weights, 4)
     free = coordinates(null, best)
     rows = np.empty((k, k))
     for c in range(k):
@@ -125,7 +125,7 @@ def box_search(
                     T[r, i] = origin[i]
                     for c in range(k):
                         T[r, i] += along[i, c] * (highs[box, c] if (r >> c) & 1 else lows[box, c])
-            bound, found, corner = examine(G, T, along, widths, lower, upper, previous, weights, trial, value)
+            bound, found, corner = cell_lower_bound(G, T, along, widths, lower, upper, previous, weights, trial, value)
             if found < value * (1.0 - 1e-12):
                 descent = np.empty(n)
                 for i in range(n):
@@ -134,13 +134,13 @@ def box_search(
                 if found < value:
                     best, value = descent, found
             bound = max(bound, parent)
-            if bound >= value - CLOSED * abs(value):
+            if bound >= value - RELATIVE_GAP * abs(value):
                 closed = min(closed, bound)
                 continue
             for c in range(k):
                 targets[box, c] = highs[box, c] if (corner >> c) & 1 else lows[box, c]
             heapq.heappush(queue, (bound, box))
-        if len(queue) == 0 or queue[0][0] >= value - CLOSED * abs(value) or seen + 2 > budget:
+        if len(queue) == 0 or queue[0][0] >= value - RELATIVE_GAP * abs(value) or seen + 2 > budget:
             break
         parent, box = heapq.heappop(queue)
         longest, side = 0.0, 0

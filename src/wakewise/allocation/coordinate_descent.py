@@ -19,7 +19,7 @@ _RESTS, _RESTS_KEPT = 400, 8
 
 
 @njit
-def tied_parts(G: Array, owners: BoolArray, limit: float) -> BoolArray:
+def coupled_directions(G: Array, owners: BoolArray, limit: float) -> BoolArray:
     """Which parts of the null space share a Gram entry, shape (b, b).
 
     `owners`, shape (b, n), are the thrusters of each part; what is below `limit` times the largest entry is none.
@@ -76,14 +76,14 @@ def feasible_starts(start: Array, previous: Array, null: Array, directions: Arra
                     along += null[i, c] * (previous[i] - start[i])
             for i in range(n):
                 step[i] += along * null[i, c]
-        far = share * reach(start, step, lower, upper, np.inf if number >= 0 else 1.0)
+        far = share * step_limit(start, step, lower, upper, np.inf if number >= 0 else 1.0)
         for i in range(n):
             starts[number + 2, i] = min(max(start[i] + far * step[i], lower[i]), upper[i])
     return starts
 
 
 @njit
-def reach(start: Array, step: Array, lower: Array, upper: Array, most: float) -> float:
+def step_limit(start: Array, step: Array, lower: Array, upper: Array, most: float) -> float:
     """Largest t <= most that keeps start + t step within limits."""
     far = most
     for i in range(step.size):
@@ -92,7 +92,7 @@ def reach(start: Array, step: Array, lower: Array, upper: Array, most: float) ->
     return max(far, 0.0)
 
 
-def starts_at_rest(
+def idle_starts(
     start: Array, previous: Array, null: Array, G: Array, packed: Array, lower: Array, upper: Array
 ) -> Array:
     """The cheapest of many points where as many thrusters rest as the null space has dimensions: minima like these."""
@@ -170,7 +170,7 @@ def descend(
 
 
 @njit(apart=True)
-def explore(
+def multistart_descent(
     G: Array, thrusts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, rounds: int
 ) -> float:
     """Leave a minimum by bringing one thruster at a time to rest, or across zero, and descend from there; in place.

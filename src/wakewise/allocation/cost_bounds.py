@@ -15,7 +15,7 @@ from wakewise.allocation.line_search import cost
 from wakewise.core.arrays import Array
 from wakewise.core.jit.njit import assign, njit
 
-CLOSED = 1e-5
+RELATIVE_GAP = 1e-5
 """Relative gap at which a search ends: a tenth of what the thrusters could show."""
 
 _ROUNDING_N = 1e-9
@@ -176,7 +176,7 @@ def _balance(
 
 
 @njit(apart=True)
-def examine(
+def cell_lower_bound(
     G: Array,
     T: Array,
     along: Array,
@@ -251,7 +251,7 @@ def examine(
         constant = _tangent(cross, single, linear, square, at, signs, slope, size_slope) + base
         least, lowest = _least_corner(concave, constant, slope, size_slope, T, count)
         bound = max(bound, least)
-        if bound >= value - CLOSED * abs(value):
+        if bound >= value - RELATIVE_GAP * abs(value):
             break
         if turn == 0:
             corner = lowest

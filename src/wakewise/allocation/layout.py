@@ -10,7 +10,7 @@ import numpy as np
 from wakewise.core.arrays import Array, BoolArray, freeze, frozen
 from wakewise.core.errors import InputError
 
-MOST_SPARE = 8
+MAX_NULL_SPACE_DIM = 8
 """Largest dimension of a null space that is taken: boxes have 2^k corners."""
 
 
@@ -86,8 +86,10 @@ def compile_layout(B: Array, lower_N: Array, upper_N: Array) -> Layout:
         basis = rows[np.count_nonzero(sizes > 1e-9 * sizes[0]) :].T
         null = np.zeros((n, basis.shape[1]))
         null[alive] = basis
-    if null.shape[1] > MOST_SPARE:
-        raise InputError(f"allocation matrix: {null.shape[1]} spare thrusters, at most {MOST_SPARE} can be searched")
+    if null.shape[1] > MAX_NULL_SPACE_DIM:
+        raise InputError(
+            f"allocation matrix: {null.shape[1]} spare thrusters, at most {MAX_NULL_SPACE_DIM} can be searched"
+        )
     blocks = independent_blocks(null)
     alone = all(block.shape[1] == 1 for block in blocks)
     lines = np.array([block[:, 0] for block in blocks]).reshape(-1, n) if alone else np.zeros((0, n))

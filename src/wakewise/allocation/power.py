@@ -83,7 +83,8 @@ def _power_of(rows, forward, reverse, least_forward, least_reverse):  # type: ig
 def _worthiest(  # type: ignore[no-untyped-def]
     least, ways, steps, forward, reverse, least_forward, least_reverse, standing, most_W, calm, G, previous, weights
 ):
-    """Thrusts of the least `worth` on the grid of `steps` along each of `ways`, shape (k, n), within `most_W`.
+    """Thrusts of the least `power_adjusted_cost` on the grid of `steps` along each of `ways`, shape (k, n), within
+    `most_W`.
 
     Those that begin it, `least`, count whatever they need.
     """
@@ -104,12 +105,12 @@ def _worthiest(  # type: ignore[no-untyped-def]
     return best
 
 
-def worth(cost_: float, power_W: float, calm: float) -> float:
+def power_adjusted_cost(cost_: float, power_W: float, calm: float) -> float:
     """What shares are compared by: cost over what is calm times power with what stands beside; less is better."""
     return (cost_ + calm) * power_W
 
 
-def worthiest(
+def best_by_power(
     layout: Layout,
     found: Allocation,
     least_N: Array,

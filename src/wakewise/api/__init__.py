@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.api.models import evaluate, load_target, methods, reconstruct
@@ -31,4 +31,4 @@ __all__ = [
     "velocity",
 ]
 
-lazy_door(__name__)
+lazy_attributes(__name__)

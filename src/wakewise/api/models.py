@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from wakewise.control import MAKERS
 from wakewise.core.arrays import frozen
-from wakewise.core.checks import finite_number, instance_of, path_of, quoted, truth
+from wakewise.core.checks import boolean, finite_number, instance_of, path_of, quoted
 from wakewise.core.errors import InputError
 from wakewise.core.optional_dependencies import need
 from wakewise.core.plugins import names
@@ -127,7 +127,7 @@ def evaluate(
     from wakewise.vision.evaluation import Crop, evaluate_surface
     from wakewise.vision.reconstruction import read_cloud
 
-    icp = truth(icp, "icp")
+    icp = boolean(icp, "icp")
     if isinstance(cloud, (str, os.PathLike)):
         points = read_cloud(path_of(cloud, "cloud")).points_m
     else:

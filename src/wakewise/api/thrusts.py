@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wakewise import wake as wakes
-from wakewise.allocation import Allocation, Layout, Weights, compile_layout, gentle_allocation, least_thrusts
+from wakewise.allocation import Allocation, Layout, Weights, compile_layout, min_norm_allocation, min_wash_allocation
 from wakewise.core.arrays import Array, frozen
-from wakewise.core.checks import able, finite_number, instance_of, quoted, whole_number
+from wakewise.core.checks import finite_number, has_methods, instance_of, quoted, whole_number
 from wakewise.core.defaults import BUDGET, CHANGE_WEIGHT, DISTURBANCE_WEIGHT, EFFORT_WEIGHT
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
@@ -107,7 +107,7 @@ def allocate(
     view = None if region is None else view_of(vehicle, region, wake, superposition)
     X_WB = None if pose is None else pose_of(pose)
     if view is None:
-        return least_thrusts(layout, wrench, None, priority)
+        return min_norm_allocation(layout, wrench, None, priority)
     if X_WB is None:
         raise InputError("pose: is missing, where the region is to be spared the body's pose is needed")
     cost = Weights(
@@ -115,7 +115,7 @@ def allocate(
         effort=weights["w_effort"],
         previous=weights["w_previous"],
     )
-    return gentle_allocation(layout, wrench, _gram(view, X_WB), cost, before, priority, budget)
+    return min_wash_allocation(layout, wrench, _gram(view, X_WB), cost, before, priority, budget)
 
 
 def disturbance(
@@ -254,7 +254,7 @@ def _within(values: Array, name: str) -> Array:
 
 
 def _model(wake: WakeModel | str) -> WakeModel:
-    return wake_model(wake) if isinstance(wake, str) else able(wake, ("unit_velocity",), "wake", "wake model")
+    return wake_model(wake) if isinstance(wake, str) else has_methods(wake, ("unit_velocity",), "wake", "wake model")
 
 
 def _thrusts(vehicle: Vehicle, thrusts_N: ArrayLike) -> Array:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wakewise.core.checks import able, callable_of, path_of, quoted
+from wakewise.core.checks import callable_of, has_methods, path_of, quoted
 from wakewise.core.errors import InputError
-from wakewise.core.files import named
+from wakewise.core.files import child_path
 from wakewise.core.optional_dependencies import need
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def trial(
     from wakewise.ui.reports import PageParts, begin_report, write_report
 
     place, draft = path_of(folder, "folder"), PageParts()
-    watch = SilentProgress() if watch is None else able(watch, ("stage",), "watch", "watch")
+    watch = SilentProgress() if watch is None else has_methods(watch, ("stage",), "watch", "watch")
     if told is not None:
         callable_of(told, "told")
     with_parts = _early(lambda missing: begin_report(place, draft, missing))
@@ -121,8 +121,8 @@ def compare(
     for name in flights:
         if not isinstance(name, str):
             raise InputError(f"flights: {quoted(name)}, must be a name")
-        named(place, name, "compare")
-    watch = SilentProgress() if watch is None else able(watch, ("stage",), "watch", "watch")
+        child_path(place, name, "compare")
+    watch = SilentProgress() if watch is None else has_methods(watch, ("stage",), "watch", "watch")
     drafts = {name: PageParts() for name in flights}
     with_parts = _early(lambda name, lacks: begin_report(place / name, drafts[name], lacks))
     figures = compare_methods(flights, place, watch, with_parts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wakewise.allocation import Allocation, Layout, least_thrusts
+from wakewise.allocation import Allocation, Layout, min_norm_allocation
 from wakewise.control.loop import TrackingController, vehicle_layout
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import make_tracker
@@ -31,7 +31,7 @@ def with_least_thrusts(
     """The tracker with the least thrusts of a layout, which may allow thrusters less than the vehicle's does."""
 
     def allocate(wrench_B: Array, gram: Array | None, _: Array) -> Allocation:
-        return least_thrusts(layout, wrench_B, gram)
+        return min_norm_allocation(layout, wrench_B, gram)
 
     return TrackingController(
         name=name,

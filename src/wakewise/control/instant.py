@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from wakewise.allocation import Allocation, least_thrusts
+from wakewise.allocation import Allocation, min_norm_allocation
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import TrackingController
 from wakewise.control.poised import poised
@@ -38,7 +38,7 @@ def instant_allocator(
 
     def allocate(wrench_B: Array, gram: Array | None, previous_N: Array) -> Allocation:
         if gram is None or weights.disturbance == 0.0:
-            return least_thrusts(layout, wrench_B, gram)
+            return min_norm_allocation(layout, wrench_B, gram)
         return sharer.shares(wrench_B, InfluenceMatrices(gram=gram, sent=gram), weights, view.total_weight, previous_N)
 
     return TrackingController(

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.allocation import Layout, least_thrusts
+from wakewise.allocation import Layout, min_norm_allocation
 from wakewise.control.loop import HOLD_S, vehicle_layout
 from wakewise.control.operator_model import (
     CameraMotion,
@@ -28,7 +28,7 @@ from wakewise.control.operator_model import (
     OperatorModelState,
     StickDeflection,
     begin,
-    draw_person,
+    sample_operator,
     steer,
 )
 from wakewise.control.settings import ControlSettings
@@ -95,7 +95,7 @@ class ManualController:
         person, asked = steer(self.person, state.person, dt_s, now, wish, self._watched(goal))
         state, wrench = self._autopilot(replace(state, person=person), dt_s, estimate, goal, asked)
         gram = self.view.gram(estimate.X_WB)
-        found = least_thrusts(self.layout, wrench, gram if np.isfinite(gram).all() else None)
+        found = min_norm_allocation(self.layout, wrench, gram if np.isfinite(gram).all() else None)
         fallback = None if found.scale >= FULL else f"thrusters saturated: {100.0 * found.scale:.0f} % of the wrench"
         command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=found.disturbance, fallback=fallback)
         return replace(state, thrusts_N=found.thrusts_N, share=found.scale), command
@@ -161,7 +161,7 @@ def manual(
     tracker = make_tracker(vehicle, settings)
     return ManualController(
         name="manual",
-        person=draw_person(settings.person or 0, vehicle_sticks(vehicle, tracker)),
+        person=sample_operator(settings.person or 0, vehicle_sticks(vehicle, tracker)),
         tracker=tracker,
         layout=vehicle_layout(vehicle),
         view=InfluenceModel.of(vehicle, region, wake, settings.superposition),

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.control.operator_population import PEOPLE, OperatorPopulation
+from wakewise.control.operator_population import POPULATION, OperatorPopulation
 from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.geometry import Pose
 
@@ -148,7 +148,7 @@ class OperatorModelState:
     until_s: float
 
 
-def draw_person(seed: int, sticks: StickDeflection, people: OperatorPopulation = PEOPLE) -> OperatorModel:
+def sample_operator(seed: int, sticks: StickDeflection, people: OperatorPopulation = POPULATION) -> OperatorModel:
     """The person that a seed draws from these people, at these sticks."""
     rng = np.random.default_rng(seed)
 

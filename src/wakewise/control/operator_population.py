@@ -96,5 +96,5 @@ class OperatorPopulation:
             raise InputError(f"attended: {self.attended} axes, allowed 1 to 4")
 
 
-PEOPLE = OperatorPopulation()
+POPULATION = OperatorPopulation()
 """Those who are drawn unless others are named."""

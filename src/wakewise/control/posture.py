@@ -24,7 +24,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from wakewise.allocation import Layout, PowerLaw, Weights, compile_layout, gentle_allocation
+from wakewise.allocation import Layout, PowerLaw, Weights, compile_layout, min_wash_allocation
 from wakewise.control import easing
 from wakewise.control.thrift import STANDING_W, power_law
 from wakewise.control.watch import FULL
@@ -248,7 +248,7 @@ class Scale:
         if not np.isfinite(G).all():
             return NOT_TO_BE_HAD
         weights = Weights(disturbance=self.w_disturbance / hold.total_weight, effort=self.w_effort)
-        found = gentle_allocation(self.layout, wrench, G, weights)
+        found = min_wash_allocation(self.layout, wrench, G, weights)
         if found.scale < FULL or found.disturbance is None:
             return NOT_TO_BE_HAD
         T = found.thrusts_N

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from wakewise.allocation import Layout, least_thrusts
+from wakewise.allocation import Layout, min_norm_allocation
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import ControlSettings
 from wakewise.control.wake_aware import planned
@@ -36,7 +36,7 @@ class LeastThrusts:
         state, command = self.inner.step(state, dt_s, estimate, goal)
         if command.fallback is not None:
             return state, command
-        found = least_thrusts(self.layout, command.wrench_B, self.view.gram(estimate.X_WB))
+        found = min_norm_allocation(self.layout, command.wrench_B, self.view.gram(estimate.X_WB))
         return state, replace(command, thrusts_N=found.thrusts_N, disturbance=found.disturbance)
 
 

@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.allocation import Layout, least_thrusts
+from wakewise.allocation import Layout, min_norm_allocation
 from wakewise.control.loop import HOLD_S, vehicle_layout
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
@@ -189,7 +189,7 @@ class Safeguard:
         """The least thrusts of the tracker's wrench; where these cannot be had, the last ones, fading."""
         try:
             tracker, wrench = self.tracker.wrench(state.tracker, dt_s, estimate, goal, saturated=state.share < FULL)
-            found = least_thrusts(self.layout, wrench)
+            found = min_norm_allocation(self.layout, wrench)
             sent = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, fallback=f"{why}; least thrusts")
             return replace(state, tracker=tracker, thrusts_N=found.thrusts_N, share=found.scale), sent
         except Exception as fault:  # as in `_ask`

@@ -26,13 +26,13 @@ from wakewise.allocation import (
     Layout,
     PowerLaw,
     Weights,
+    best_by_power,
     compile_layout,
     disturbance_of,
-    gentle_allocation,
-    worth,
-    worthiest,
+    min_wash_allocation,
+    power_adjusted_cost,
 )
-from wakewise.allocation.attainable_set import within_limits
+from wakewise.allocation.attainable_set import largest_feasible_share
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.core.arrays import Array
 from wakewise.robot.thrusters import electrical_power_W
@@ -91,26 +91,26 @@ class Sharer:
         total_weight: float,
         previous_N: Array | None = None,
     ) -> Allocation:
-        """Thrusts of least cost; arguments as for `gentle_allocation`, `total_weight` that of the points behind D.
+        """Thrusts of least cost; arguments as for `min_wash_allocation`, `total_weight` that of the points behind D.
 
         Shares are chosen by `seen.gram`; the bound asks what the least thrusts do as they are sent.
         """
-        found = gentle_allocation(self.layout, wrench_B, seen.gram, weights, previous_N)
+        found = min_wash_allocation(self.layout, wrench_B, seen.gram, weights, previous_N)
         if self.law is None:
             return found
-        least_N, _ = within_limits(self.layout, self.layout.inverse @ wrench_B)
+        least_N, _ = largest_feasible_share(self.layout, self.layout.inverse @ wrench_B)
         speed_m_s = math.sqrt(max(disturbance_of(seen.sent, least_N), 0.0) / total_weight) / TOO_FAST
         share = allowed(speed_m_s)
         most_W = share * float(self.law.power_W(least_N)) + (share - CALM) * self.law.standing_W
         calm = _calm(weights, total_weight)
-        return worthiest(self.layout, found, least_N, self.law, most_W, calm, seen.gram, weights, previous_N)
+        return best_by_power(self.layout, found, least_N, self.law, most_W, calm, seen.gram, weights, previous_N)
 
     def worth(self, cost: float, thrusts_N: Array, weights: Weights, total_weight: float) -> float:
         """What shares of one wrench, shape (n,), are compared by: less is better; the cost alone if no law is known."""
         if self.law is None:
             return cost
         drawn_W = float(self.law.power_W(thrusts_N)) + self.law.standing_W
-        return worth(cost, drawn_W, _calm(weights, total_weight))
+        return power_adjusted_cost(cost, drawn_W, _calm(weights, total_weight))
 
 
 def _calm(weights: Weights, total_weight: float) -> float:

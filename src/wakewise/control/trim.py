@@ -20,7 +20,7 @@ from itertools import product
 
 import numpy as np
 
-from wakewise.allocation.allocate import Weights, gentle_allocation
+from wakewise.allocation.allocate import Weights, min_wash_allocation
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import ControlSettings
@@ -190,7 +190,7 @@ def _row(
         for X_WB, G in zip(poses, grams, strict=True):
             wrench = -restoring_wrench(body, X_WB.q)
             wrench[:3] -= force_W @ X_WB.R
-            found = gentle_allocation(layout, wrench, G, weights)
+            found = min_wash_allocation(layout, wrench, G, weights)
             T = found.thrusts_N
             jets_W = -np.sign(T)[:, None] * (vehicle.thruster_axes_B @ X_WB.R.T)
             value = 0.0 if found.disturbance is None else found.disturbance

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.allocation import Allocation, Layout, Weights, disturbance_of, least_thrusts
+from wakewise.allocation import Allocation, Layout, Weights, disturbance_of, min_norm_allocation
 from wakewise.control.levers import LeverSettings
 from wakewise.control.thrift import Sharer
 from wakewise.core.arrays import Array
@@ -166,7 +166,7 @@ class Watch:
         where another minimum lies apart. `present_N`, shape (n,), must make the wrench; `present` are their matrices,
         where known from the last search.
         """
-        least = least_thrusts(self.layout, wrench_B)
+        least = min_norm_allocation(self.layout, wrench_B)
         first = self.seen(estimate, present_N) if present is None else present
         there = self.seen(estimate, least.thrusts_N)
         if not (np.isfinite(first.gram).all() and np.isfinite(there.gram).all()):

@@ -125,7 +125,7 @@ def _no_path(text: str, name: str, reason: str) -> NoReturn:
     raise InputError(f"{name}: {quoted(text)}, must be a path ({reason})")
 
 
-def truth(value: object, name: str) -> bool:
+def boolean(value: object, name: str) -> bool:
     """The value as a bool; neither words nor numbers nor arrays are one.
 
     Raises
@@ -164,7 +164,7 @@ def instance_of(value: Any, kind: type[T], name: str) -> T:
     return value
 
 
-def able(value: T, methods: Sequence[str], name: str, kind: str) -> T:
+def has_methods(value: T, methods: Sequence[str], name: str, kind: str) -> T:
     """The value itself, if it has the methods of a kind of part (a Protocol of `wakewise.core.interfaces`).
 
     Raises

@@ -14,7 +14,7 @@ from typing import Any
 
 from wakewise.core.checks import quoted
 from wakewise.core.errors import FULL, FileFailure, InputError, WakewiseError, environment_failure
-from wakewise.core.run_lock import half_done
+from wakewise.core.run_lock import temporary_prefix
 
 _LEAST_BYTES = 65_536
 _LONGEST_NAME = 200
@@ -32,7 +32,7 @@ def whole_file(path: Path, lasting: bool = False) -> Iterator[Path]:
     FileFailure
         If the operating system does not let it be written, whichever library met that; an OSError too.
     """
-    began = half_done(path.stem)
+    began = temporary_prefix(path.stem)
     with _failures_told(path, began):
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=began, suffix=path.suffix, dir=path.parent)
@@ -43,10 +43,10 @@ def whole_file(path: Path, lasting: bool = False) -> Iterator[Path]:
             yield temporary
             temporary.chmod(0o644)
             if lasting:
-                settle(temporary)
+                fsync_path(temporary)
             temporary.replace(path)
             if lasting:
-                settle(path.parent)
+                fsync_path(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -79,7 +79,7 @@ def _has_room(folder: Path) -> bool:
         return True
 
 
-def settle(path: Path) -> None:
+def fsync_path(path: Path) -> None:
     """Wait until a file, or the names in a folder, are on the disk (fsync)."""
     try:
         handle = os.open(path, os.O_RDONLY)
@@ -102,7 +102,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
     FileFailure
         As `whole_file`.
     """
-    began = half_done(path.name)
+    began = temporary_prefix(path.name)
     with _failures_told(path, began):
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(prefix=began, dir=path.parent))
@@ -134,14 +134,14 @@ def write_json(path: Path, value: Any, lasting: bool = False) -> None:
     write_text(path, json.dumps(value, indent=2, allow_nan=False) + "\n", lasting)
 
 
-def not_a_name(name: str) -> str | None:
+def name_fault(name: str) -> str | None:
     """What is wrong with a name that a file or folder is to have in its place; None if nothing is."""
     if not name or name.strip() != name or name.startswith(".") or not name.isprintable() or set(name) & set("/\\"):
         return "no slash, no dot first, no space around it and nothing unprintable"
     return None if len(name.encode()) <= _LONGEST_NAME else f"at most {_LONGEST_NAME} bytes"
 
 
-def named(folder: Path, name: str, what: str) -> Path:
+def child_path(folder: Path, name: str, what: str) -> Path:
     """The place in a folder that a name stands for, and no place elsewhere.
 
     Raises
@@ -149,7 +149,7 @@ def named(folder: Path, name: str, what: str) -> Path:
     InputError
         If it cannot be a name; `what` has it, for the message.
     """
-    fault = not_a_name(name)
+    fault = name_fault(name)
     if fault is not None:
         raise InputError(f"{what}: {quoted(name)} names a folder, so {fault}")
     return folder / name

@@ -1,7 +1,7 @@
 """Doors that open when somebody walks through: a room's names are imported when they are asked for, not before.
 
 A room's `__init__` states what it exports as plain imports in a block `if TYPE_CHECKING:`, which type checkers and the
-import contracts read, and hands itself to `lazy_door`, which reads the same block: nothing is listed twice. So
+import contracts read, and hands itself to `lazy_attributes`, which reads the same block: nothing is listed twice. So
 settings can be read without the room's compiled libraries, and commands that need little start fast.
 """
 
@@ -51,8 +51,8 @@ class _Door(ModuleType):
         return sorted({*self._homes, *(name for name in self.__dict__ if name.startswith("__"))})
 
 
-def lazy_door(name: str, *extras: str) -> None:
-    """Make a package import its exports lazily; called as ``lazy_door(__name__)`` in its `__init__`.
+def lazy_attributes(name: str, *extras: str) -> None:
+    """Make a package import its exports lazily; called as ``lazy_attributes(__name__)`` in its `__init__`.
 
     Parameters
     ----------

@@ -17,13 +17,13 @@ _LEFT = re.compile(r"\..+\.w(\d+)-([0-9a-f]+)\.[a-z0-9_]{8}(\.\w+)?")
 _held: set[tuple[Path, int]] = set()
 
 
-def half_done(stem: str) -> str:
+def temporary_prefix(stem: str) -> str:
     """How the name of a temporary file or folder of this process begins, to which eight random characters are added."""
     return f".{stem}.w{os.getpid()}-{start_of(os.getpid()):x}."
 
 
-def sweep(folder: Path) -> None:
-    """Remove from a folder, and the folders in it, what `half_done` named in processes that have ended since."""
+def remove_stale(folder: Path) -> None:
+    """Remove from a folder, and the folders in it, what `temporary_prefix` named in processes that have ended since."""
     for left in (*folder.glob(".*"), *folder.glob("*/.*")):
         named = _LEFT.fullmatch(left.name)
         if named is None or is_running(int(named[1]), int(named[2], 16)):
@@ -49,7 +49,7 @@ def is_running(pid: int, start: int) -> bool:
 
 
 @contextmanager
-def alone(folder: Path) -> Iterator[None]:
+def exclusive_run(folder: Path) -> Iterator[None]:
     """Keep other runs out of a folder while the block runs; begin by sweeping what killed ones left.
 
     The lock ends with its process, however that ends; the file that stays behind is taken over by the next run. A
@@ -68,7 +68,7 @@ def alone(folder: Path) -> Iterator[None]:
     handle = _take(folder)
     _held.add(mine)
     try:
-        sweep(folder)
+        remove_stale(folder)
         yield
     finally:
         _held.discard(mine)

@@ -14,7 +14,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.jit.njit import assign, njit
 from wakewise.estimation.drag_bias import DRAG, turn
-from wakewise.estimation.eskf_kernels import GAINS, felt, turn_between, turned_by
+from wakewise.estimation.eskf_kernels import GAINS, quat_minus, quat_plus, specific_force
 
 NOTHING = -1
 """In place of where a second error begins, if a measurement tells only one."""
@@ -65,7 +65,7 @@ def _shift(mean: Array, change: Array) -> None:
     """Move the mean in place by an error, shape (E,)."""
     for i in range(3):
         mean[i] += change[i]
-    assign(mean[3:7], turned_by(mean[3:7], change[3:6]))
+    assign(mean[3:7], quat_plus(mean[3:7], change[3:6]))
     for i in range(6, change.shape[0]):
         mean[1 + i] += change[i]
     # No vehicle has a tenth, or ten times, of the drag and inertia that it is believed to have.
@@ -107,7 +107,7 @@ def _rows(P: Array, first: int, second: int, size: int) -> tuple[Array, Array]:
 
 
 @njit
-def take_sum(mean: Array, P: Array, measured: Array, first: int, second: int, std: float, gate: float) -> float:
+def correct_by_sum(mean: Array, P: Array, measured: Array, first: int, second: int, std: float, gate: float) -> float:
     """Correct by what a sensor tells of the mean itself: a place, a depth, a rate, and its own slow error on top.
 
     Parameters
@@ -132,7 +132,7 @@ def take_sum(mean: Array, P: Array, measured: Array, first: int, second: int, st
 
 
 @njit
-def take_pose(
+def correct_by_pose(
     mean: Array,
     P: Array,
     p_m: Array,
@@ -166,10 +166,10 @@ def take_pose(
     if slow != NOTHING:
         for i in range(3):
             expected_p[i] += mean[slow + 1 + i]
-        assign(expected_q, turned_by(expected_q, mean[slow + 4 : slow + 7]))
+        assign(expected_q, quat_plus(expected_q, mean[slow + 4 : slow + 7]))
     for i in range(3):
         residual[i] = p_m[i] - expected_p[i]
-    assign(residual[3:], turn_between(expected_q, q))
+    assign(residual[3:], quat_minus(expected_q, q))
     for i in range(6):
         S[i, i] += std_m**2 if i < 3 else std_rad**2
     scale = _heed(leaning, residual, S, scale)
@@ -189,7 +189,7 @@ def _heed(leaning: Array, residual: Array, S: Array, scale: float) -> float:
 
 
 @njit
-def take_force(
+def correct_by_force(
     packed: Array,
     allocation: Array,
     mean: Array,
@@ -203,5 +203,5 @@ def take_force(
     """Correct by an accelerometer: dv/dt + omega x v - R' g, seen through tilt, the unmodelled force and the bias."""
     H = np.empty((3, P.shape[0]))
     down_B = turn(mean[3:7], np.array([0.0, 0.0, GRAVITY_M_S2]), -1.0)
-    expected = felt(packed, allocation, mean, thrusts_N, rest_q, down_B, H)
+    expected = specific_force(packed, allocation, mean, thrusts_N, rest_q, down_B, H)
     return float(correct(mean, P, H, force_B_m_s2 - expected, std_m_s2, gate))

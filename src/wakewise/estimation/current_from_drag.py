@@ -139,7 +139,7 @@ def _told_current(
     return True
 
 
-def told_current(
+def current_if_known(
     sets: Array | Sequence[Array], rest_q: Array, force_W_N: Array, force_covariance: Array, drag_std: float
 ) -> tuple[Array, Array] | None:
     """Level current and its covariance, shapes (3,) and (3, 3), or None while it is not known to `KNOWN_M_S`.

@@ -38,7 +38,7 @@ def _past_at_rest(mean: Array, rest_q: Array) -> tuple[float, float, float, floa
 
 
 @njit(apart=True)
-def at_rest(own: Array, mean: Array, rest_q: Array) -> Array:
+def drag_at_rest(own: Array, mean: Array, rest_q: Array) -> Array:
     """Drag and Munk moment of the current on the vehicle at rest, as the equations of motion subtract them, shape (6,).
 
     Force in W, moment in B.
@@ -67,8 +67,10 @@ def _momentum(own: Array, v: Three) -> Three:
 
 
 @njit(apart=True)
-def rest_effects(own: Array, mean: Array, rest_q: Array) -> Array:
-    """By what `at_rest`, with its force in B, changes with current (3), drag (6) and inertia (6), shape (6, 15)."""
+def drag_at_rest_jacobian(own: Array, mean: Array, rest_q: Array) -> Array:
+    """By what `drag_at_rest`, with its force in B, changes with current (3), drag (6) and inertia (6), shape (6,
+    15).
+    """
     past = _past_at_rest(mean, rest_q)
     v, drag = (past[0], past[1], past[2]), damping(own, past)
     h = _momentum(own, v)

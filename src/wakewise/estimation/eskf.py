@@ -41,9 +41,9 @@ from scipy.special import chdtri
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Measurement
-from wakewise.estimation.corrections import NOTHING, take_force, take_pose, take_sum
-from wakewise.estimation.current_from_drag import told_current
-from wakewise.estimation.eskf_kernels import CURRENT, FORCE, GYRO, TURNING, unexplained
+from wakewise.estimation.corrections import NOTHING, correct_by_force, correct_by_pose, correct_by_sum
+from wakewise.estimation.current_from_drag import current_if_known
+from wakewise.estimation.eskf_kernels import CURRENT, FORCE, GYRO, TURNING, residual_wrench
 from wakewise.estimation.prediction import TICK_S, advance
 from wakewise.estimation.settings import FilterSettings, Priors
 from wakewise.robot.vehicles import Vehicle, compile_body, with_each_drag
@@ -214,9 +214,9 @@ class ErrorStateFilter:
             self._take(walk, measured)
         self._advance(walk, now_s)
         mean = walk.mean
-        load_B = unexplained(self._packed, self._B, mean, walk.thrusts_N, walk.rest_q)
+        load_B = residual_wrench(self._packed, self._B, mean, walk.thrusts_N, walk.rest_q)
         force_W_N, around = mean[13:16], walk.P[FORCE : FORCE + 3, FORCE : FORCE + 3]
-        water = told_current(self._drags, walk.rest_q, force_W_N, around, self.priors.drag_std)
+        water = current_if_known(self._drags, walk.rest_q, force_W_N, around, self.priors.drag_std)
         current, spread = (None, None) if water is None else water
         return BodyState(
             X_WB=Pose(mean[:3], mean[3:7]),
@@ -265,7 +265,7 @@ class ErrorStateFilter:
         """Camera: where the vehicle is; what poses say together is heeded by the model's noise."""
         if walk.refused_in_a_row >= self.priors.gate_patience:
             walk.P += self._start_covariance
-        distance, walk.noise_scale = take_pose(
+        distance, walk.noise_scale = correct_by_pose(
             walk.mean,
             walk.P,
             seen.p_m,
@@ -284,7 +284,7 @@ class ErrorStateFilter:
         measured = _numbers(told)
         if measured is not None:
             gate = self._gate[len(measured)]
-            walk.count(take_sum(walk.mean, walk.P, measured, first, second, std, gate), gate)
+            walk.count(correct_by_sum(walk.mean, walk.P, measured, first, second, std, gate), gate)
 
     def _take_force(self, walk: _Walk, told: ArrayLike, time_s: float) -> None:
         """Accelerometer: the white error of the modelled acceleration, over one of its periods, counts as noise."""
@@ -297,7 +297,7 @@ class ErrorStateFilter:
             self.settings.accelerometer_std_m_s2, self.priors.acceleration_noise_m_s2 / math.sqrt(period_s)
         )
         gate = self._gate[3]
-        distance = take_force(
+        distance = correct_by_force(
             self._packed, self._B, walk.mean, walk.P, walk.thrusts_N, walk.rest_q, force_B_m_s2, std, gate
         )
         walk.count(distance, gate)

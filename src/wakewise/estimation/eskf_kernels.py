@@ -15,7 +15,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.jit.njit import assign, njit
-from wakewise.estimation.drag_bias import DRAG, at_rest, rest_effects
+from wakewise.estimation.drag_bias import DRAG, drag_at_rest, drag_at_rest_jacobian
 from wakewise.robot.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, Three, damping, rate_kernel, rotate
 from wakewise.robot.vehicles.runge_kutta import rk4_jacobian_kernel
 
@@ -25,7 +25,7 @@ TURNING, MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, INERTIA, GAINS = 9, 12, 12,
 
 
 @njit
-def turned_by(q: Array, rotvec: Array) -> Array:
+def quat_plus(q: Array, rotvec: Array) -> Array:
     """Unit quaternion q exp(rotvec): a further turn, expressed in the body."""
     angle = np.sqrt(rotvec[0] ** 2 + rotvec[1] ** 2 + rotvec[2] ** 2)
     c = np.cos(0.5 * angle)
@@ -43,7 +43,7 @@ def turned_by(q: Array, rotvec: Array) -> Array:
 
 
 @njit
-def turn_between(q: Array, other: Array) -> Array:
+def quat_minus(q: Array, other: Array) -> Array:
     """Rotation vector, shorter way, that turns q into `other`, expressed in the body of q."""
     w = q[0] * other[0] + q[1] * other[1] + q[2] * other[2] + q[3] * other[3]
     x = q[0] * other[1] - q[1] * other[0] - q[2] * other[3] + q[3] * other[2]
@@ -57,7 +57,7 @@ def turn_between(q: Array, other: Array) -> Array:
 
 
 @njit(apart=True)
-def believed(packed: Array, mean: Array) -> Array:
+def adapted_parameters(packed: Array, mean: Array) -> Array:
     """The vehicle's packed numbers with the drag and the inertia that the mean now believes in, shape (20, 6)."""
     own = packed.copy()
     for i in range(6):
@@ -74,9 +74,9 @@ def believed(packed: Array, mean: Array) -> Array:
 
 
 @njit(apart=True)
-def lacking(own: Array, mean: Array, rest_q: Array) -> Array:
+def model_residual(own: Array, mean: Array, rest_q: Array) -> Array:
     """Wrench in B of what the model does not explain, shape (6,)."""
-    wrench, q = at_rest(own, mean, rest_q), mean[3:7]
+    wrench, q = drag_at_rest(own, mean, rest_q), mean[3:7]
     x, y, z = mean[13] + wrench[0], mean[14] + wrench[1], mean[15] + wrench[2]
     wrench[0], wrench[1], wrench[2] = rotate(-q[0], q[1], q[2], q[3], x, y, z)
     for i in range(3):
@@ -101,10 +101,10 @@ def _past(mean: Array) -> tuple[float, float, float, float, float, float]:
 
 
 @njit
-def unexplained(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
+def residual_wrench(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
     """Wrench in B, shape (6,), that the nominal vehicle in still water lacks to move as the mean has it."""
-    vehicle = believed(packed, mean)
-    wrench = lacking(vehicle, mean, rest_q)
+    vehicle = adapted_parameters(packed, mean)
+    wrench = model_residual(vehicle, mean, rest_q)
     _push(wrench, allocation, mean, thrusts_N)
     own = damping(vehicle, _past(mean))
     still = damping(packed, (mean[7], mean[8], mean[9], mean[10], mean[11], mean[12]))
@@ -161,9 +161,9 @@ def _add_current(F: Array, A: Array, mean: Array, dt_s: float) -> None:
         change[0] -= dt_s * (w[1] * seen[2] - w[2] * seen[1])
         change[1] -= dt_s * (w[2] * seen[0] - w[0] * seen[2])
         change[2] -= dt_s * (w[0] * seen[1] - w[1] * seen[0])
-        moved = rotate(q[0], q[1], q[2], q[3], change[0], change[1], change[2])
+        propagate_mean = rotate(q[0], q[1], q[2], q[3], change[0], change[1], change[2])
         for i in range(3):
-            F[i, CURRENT + j] += 0.5 * dt_s * moved[i]
+            F[i, CURRENT + j] += 0.5 * dt_s * propagate_mean[i]
             F[3 + i, CURRENT + j] += 0.5 * dt_s * change[3 + i]
             F[6 + i, CURRENT + j] += change[i]
             F[9 + i, CURRENT + j] += change[3 + i]
@@ -191,7 +191,7 @@ def _wrench_by_error(
         for i in range(3):
             by[i, FORCE + j] = seen[i]
         by[3 + j, MOMENT + j] = 1.0
-    resting = rest_effects(own, mean, rest_q)
+    resting = drag_at_rest_jacobian(own, mean, rest_q)
     for i in range(6):
         for j in range(3):
             by[i, CURRENT + j] = resting[i, j]
@@ -203,15 +203,15 @@ def _wrench_by_error(
 
 
 @njit(apart=True)
-def moved(
+def propagate_mean(
     packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array, dt_s: float, errors: int
 ) -> Array:
     """Advance the mean's motion in place by dt_s, some hundredths at most; return its Jacobian, shape (12, errors).
 
     Drag and inertia enter the Jacobian as they act half-way, the current as it does at the start of the step.
     """
-    own = believed(packed, mean)
-    load_B = lacking(own, mean, rest_q)
+    own = adapted_parameters(packed, mean)
+    load_B = model_residual(own, mean, rest_q)
     by = _wrench_by_error(own, allocation, mean, load_B, thrusts_N, rest_q, errors)
     inputs = np.empty(9)
     assign(inputs[:6], load_B)
@@ -245,7 +245,7 @@ def _halfway(before: Array, after: Array) -> Array:
 
 
 @njit
-def felt(
+def specific_force(
     packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array, down_B: Array, H: Array
 ) -> Array:
     """Specific force at the body origin as an accelerometer tells it, bias included, shape (3,).
@@ -253,7 +253,7 @@ def felt(
     dv/dt + omega x v - down_B, with gravity `down_B` in B; writes its Jacobian to H, shape (3, E).
     """
     after, v, w = mean.copy(), mean[7:10], mean[10:13]
-    F = moved(packed, allocation, after, thrusts_N, rest_q, _INSTANT_S, H.shape[1])
+    F = propagate_mean(packed, allocation, after, thrusts_N, rest_q, _INSTANT_S, H.shape[1])
     force = np.empty(3)
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3

@@ -10,7 +10,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.jit.njit import njit
-from wakewise.estimation.eskf_kernels import CURRENT, FORCE, MOVING, moved
+from wakewise.estimation.eskf_kernels import CURRENT, FORCE, MOVING, propagate_mean
 from wakewise.robot.vehicles.kernels import rotate
 
 TICK_S = 1e-9
@@ -91,7 +91,7 @@ def predict(
     both of shape (E - 24,).
     """
     q = mean[3:7].copy()
-    F = moved(packed, allocation, mean, thrusts_N, rest_q, dt_s, P.shape[0])
+    F = propagate_mean(packed, allocation, mean, thrusts_N, rest_q, dt_s, P.shape[0])
     _carry(P, F)
     _add_noise(P, q, dt_s, noise)
     _fade(mean, P, dt_s, spread, lasts_s)

@@ -18,7 +18,7 @@ parts of `flight_log.py` until it is a trial's folder (`trial_folder.py`, `expos
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.operation.background_renderer import BackgroundRenderer
@@ -60,4 +60,4 @@ __all__ = [
     "write_scenario",
 ]
 
-lazy_door(__name__)
+lazy_attributes(__name__)

@@ -21,7 +21,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING
 
-from wakewise.core.run_lock import sweep
+from wakewise.core.run_lock import remove_stale
 from wakewise.operation.exposures import ExposureRecord, packed, unpacked
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class BackgroundRenderer:
         self._waiting.put(None)  # what waits before it is dropped, now that nobody reads
         if self._feeder is not None:
             self._feeder.join()
-        sweep(self._folder)
+        remove_stale(self._folder)
         self._close()
 
     def ready(self) -> None:
@@ -147,7 +147,7 @@ def _message(pipe: IO[bytes]) -> bytes | None:
     return message if len(message) == size else None
 
 
-def develop(pipe: IO[bytes]) -> None:
+def render_from_pipe(pipe: IO[bytes]) -> None:
     """Render the exposures that come through a pipe until it ends: the other process."""
     from wakewise.operation.photography import take_photograph
 
@@ -164,4 +164,4 @@ def develop(pipe: IO[bytes]) -> None:
 if __name__ == "__main__":
     with suppress(ValueError):
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started this ends it
-    develop(sys.stdin.buffer)
+    render_from_pipe(sys.stdin.buffer)

@@ -46,12 +46,14 @@ class CalibrationErrorSettings(Settings):
     )
 
 
-def found_target(target: Target, survey: CalibrationErrorSettings, rng: np.random.Generator) -> Target:
+def target_with_error(target: Target, survey: CalibrationErrorSettings, rng: np.random.Generator) -> Target:
     """The target where the crew takes it to be; its shape, and the bed, are known."""
     return target.moved(rng.normal(0.0, survey.place_m, 3))
 
 
-def known_calibration(true: OpenCVCamera, survey: CalibrationErrorSettings, rng: np.random.Generator) -> OpenCVCamera:
+def calibration_with_error(
+    true: OpenCVCamera, survey: CalibrationErrorSettings, rng: np.random.Generator
+) -> OpenCVCamera:
     """The calibration that the crew has of a camera; its true one is in camera.json alone."""
     focal, centre = rng.normal(0.0, 0.01 * survey.focal_pct), rng.normal(0.0, 0.01 * survey.centre_pct * true.width, 2)
     bend = survey.distortion * np.array([1.0, 2.0, 0.25, 0.25]) * rng.normal(size=4)
@@ -59,7 +61,7 @@ def known_calibration(true: OpenCVCamera, survey: CalibrationErrorSettings, rng:
     return replace(true, params=params)
 
 
-def surveyed_current(water: Current, place_W_m: Array, rng: np.random.Generator) -> Array:
+def current_with_error(water: Current, place_W_m: Array, rng: np.random.Generator) -> Array:
     """Current at a place, shape (3,), as the crew knows it before the flight: the mean of a minute, turned by an error.
 
     Parameters

@@ -23,7 +23,7 @@ _AT_REST = 1e-3
 _SLOW_M_S, _SLOW_RAD_S = 0.02, 0.05
 
 
-def hovering(steps: pl.DataFrame) -> BoolArray:
+def hover_mask(steps: pl.DataFrame) -> BoolArray:
     """Which steps of a record are a hover: a goal at rest (1 mm/s, 1 mrad/s), a vehicle nearly so, load known."""
     twist = ("u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
     goal, own = (_table(steps, [f"{who}_{name}" for name in twist]) for who in ("goal", "est"))
@@ -53,7 +53,7 @@ def flight_trim(vehicle: Vehicle, steps: pl.DataFrame) -> HoverTrim:
     missing = [name for name in needed if name not in steps.columns]
     if missing:
         raise InputError(f"trim: the flight's record has no column {missing[0]}; fly it again")
-    still = hovering(steps)
+    still = hover_mask(steps)
     time_s = steps["time_s"].to_numpy()
     lasts_s = float(still.sum()) * float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
     if lasts_s < LEAST_S:
@@ -88,7 +88,7 @@ def folder_trim(folder: Path) -> tuple[Parts, HoverTrim]:
     return parts, flight_trim(parts.vehicle, steps)
 
 
-def proposal(vehicle: Vehicle, steps: pl.DataFrame) -> str | None:
+def ballast_proposal(vehicle: Vehicle, steps: pl.DataFrame) -> str | None:
     """What a flight proposes for the ballast of the next one, in one line; None where it proposes nothing."""
     try:
         found = flight_trim(vehicle, steps)

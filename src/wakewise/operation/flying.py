@@ -14,10 +14,10 @@ from typing import Any, TypedDict, cast
 
 import polars as pl
 
-from wakewise.core.checks import callable_of, finite_number, quoted, truth
+from wakewise.core.checks import boolean, callable_of, finite_number, quoted
 from wakewise.core.errors import InputError, StageError, WakewiseError
 from wakewise.core.interfaces import Plant, TruthProvider, no_progress
-from wakewise.core.jit.precompile import warm
+from wakewise.core.jit.precompile import compile_kernels
 from wakewise.core.optional_dependencies import has
 from wakewise.operation.exposures import ExposureRecord
 from wakewise.operation.loop import Step, run_loop
@@ -193,7 +193,7 @@ def fly(
     for name, call in (("watch", watch), ("exposed", exposed)):
         if call is not None:
             callable_of(call, name)
-    checked = truth(checked, "checked")
+    checked = boolean(checked, "checked")
     if not (isinstance(water_every_s, (float, int)) and water_every_s == math.inf):  # never
         finite_number(water_every_s, "water_every_s", above=0.0)
     parts = parts_of(flight)
@@ -202,7 +202,7 @@ def fly(
     lasts_s = route.duration_s if duration_s is None else finite_number(duration_s, "duration_s")
     if round(lasts_s / dt_s) < 1:
         raise InputError(f"duration_s: {lasts_s:g}, must be at least one control step, {dt_s:g} s")
-    warm(FLIGHT_JOBS, _Notice() if progress is no_progress else progress)
+    compile_kernels(FLIGHT_JOBS, _Notice() if progress is no_progress else progress)
     if checked:
         _ = parts.preflight
     else:
@@ -216,7 +216,7 @@ def fly(
         if watch is not None:
             watch(step, witness)
 
-    with blamed(parts, recorder):
+    with name_external_parts(parts, recorder):
         loop_of(parts, plant, witness, record)(duration_s=lasts_s, progress=progress)
     return Flight(parts, recorder)
 
@@ -290,7 +290,7 @@ def loop_of(
 
 
 @contextmanager
-def blamed(parts: Parts, recorder: FlightRecorder) -> Iterator[None]:
+def name_external_parts(parts: Parts, recorder: FlightRecorder) -> Iterator[None]:
     """Name the parts from outside, where there are any, as what may have ended a flight.
 
     Raises

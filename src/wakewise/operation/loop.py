@@ -49,11 +49,11 @@ def never() -> bool:
     return False
 
 
-def at_once(time_s: float) -> None:
+def no_wait(time_s: float) -> None:
     """Wait for nothing: the pace of a simulated flight."""
 
 
-def unheard(time_s: float) -> None:
+def no_listener(time_s: float) -> None:
     """Take no note of when thrusts are sent."""
 
 
@@ -95,8 +95,8 @@ def run_loop(
     tilt_rad: float = 0.0,
     progress: Callable[..., None] = no_progress,
     stop: Callable[[], bool] = never,
-    pace: Callable[[float], None] = at_once,
-    sent: Callable[[float], None] = unheard,
+    pace: Callable[[float], None] = no_wait,
+    sent: Callable[[float], None] = no_listener,
 ) -> None:
     """Run the loop for `duration_s` at a fixed step, without end where that is None, or until `stop` says so.
 

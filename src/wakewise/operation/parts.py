@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, overload
 from wakewise.control import ControlSettings, in_pulses, make_controller
 from wakewise.control.settings import flown_by
 from wakewise.core.arrays import Array
-from wakewise.core.checks import able, instance_of, quoted
+from wakewise.core.checks import has_methods, instance_of, quoted
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
 from wakewise.estimation import ErrorStateFilter
-from wakewise.operation.calibration_error import found_target, surveyed_current
+from wakewise.operation.calibration_error import current_with_error, target_with_error
 from wakewise.operation.known_obstacles import surroundings_of, tank_bounds
 from wakewise.operation.pilot_makers import make_pilot
-from wakewise.operation.plugin_adapter import described, from_outside, guarded
+from wakewise.operation.plugin_adapter import described, external_parts, with_failsafe
 from wakewise.operation.preflight import PreflightResult, preflight
 from wakewise.operation.regions import region_of
 from wakewise.operation.seeds import Seeds
@@ -147,7 +147,7 @@ class Parts:
         if not (hasattr(scenario, "drawn") and hasattr(scenario, "parts")):
             raise InputError(f"scenario: {quoted(scenario)}, must be a Scenario")
         for name in given.keys() & set(PARTS):
-            fits(name, given[name])
+            check_part(name, given[name])
         fields = {name: given.pop(name) for name in list(given) if name not in PARTS}
         if fields:
             scenario = scenario.replace(**fields)
@@ -162,7 +162,7 @@ class Parts:
     @cached_property
     def from_outside(self) -> dict[str, str]:
         """Parts that are not this package's own, by name, in words; scenario, report and comparison name them."""
-        return from_outside(self)
+        return external_parts(self)
 
     @property
     def method(self) -> str:
@@ -190,7 +190,7 @@ class Parts:
     def found_target(self) -> Target:
         """The target where mission, controller and reconstruction take it to be (see `operation.survey`)."""
         place_rng, _ = self.seeds.survey()
-        return found_target(self.target, self.scenario.survey, place_rng)
+        return target_with_error(self.target, self.scenario.survey, place_rng)
 
     @cached_property
     def yielding(self) -> TargetCompliance | None:
@@ -222,7 +222,7 @@ class Parts:
         """The current at the target, shape (3,), as it is known before the flight."""
         water_rng, error_rng = self.seeds.current()
         water = build_ambient(self.scenario.tank, water_rng)
-        return surveyed_current(water, self.found_target.centre_W_m, error_rng)
+        return current_with_error(water, self.found_target.centre_W_m, error_rng)
 
     @part
     def pilot(self) -> Pilot:
@@ -313,7 +313,7 @@ class Parts:
     @cached_property
     def flying(self) -> Controller[Any]:
         """The controller as it is flown: with a guard round each step, small thrusts sent as pulses."""
-        return in_pulses(guarded(self), self.vehicle, self.scenario.control.pulse_s)
+        return in_pulses(with_failsafe(self), self.vehicle, self.scenario.control.pulse_s)
 
     @cached_property
     def camera(self) -> PinholeCamera | LensCamera:
@@ -353,7 +353,7 @@ _METHODS: dict[str, tuple[str, ...]] = {
 """What a part of a kind that is a Protocol must have at least (see `wakewise.core.interfaces`)."""
 
 
-def fits(name: str, given: object) -> None:
+def check_part(name: str, given: object) -> None:
     """Refuse what cannot be the part of that name.
 
     Raises
@@ -364,4 +364,4 @@ def fits(name: str, given: object) -> None:
     if name in _RECORDS:
         instance_of(given, _RECORDS[name], name)
     else:
-        able(given, _METHODS[name], name, name)
+        has_methods(given, _METHODS[name], name, name)

@@ -19,7 +19,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.files import whole_file, write_text
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import no_progress
-from wakewise.operation.calibration_error import known_calibration
+from wakewise.operation.calibration_error import calibration_with_error
 from wakewise.operation.exposures import ExposureRecord, read_exposures
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario
@@ -48,7 +48,7 @@ def photograph_flight(parts: Parts, folder: Path, progress: Callable[..., None] 
     exposures = read_exposures(folder / "exposures.npz")
     calibration = calibrate(parts.camera)
     calibration.write(folder)
-    known = known_calibration(calibration, parts.scenario.survey, parts.seeds.survey()[1])
+    known = calibration_with_error(calibration, parts.scenario.survey, parts.seeds.survey()[1])
     write_text(folder / "cameras.txt", known.cameras_txt("As the crew knows it; the true one is in camera.json"))
     rows = []
     for k, exposure in enumerate(exposures):

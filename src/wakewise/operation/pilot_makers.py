@@ -10,7 +10,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Pilot
 from wakewise.core.plugins import find
 from wakewise.operation.teleop.human_pilot import HumanPilot
-from wakewise.operation.teleop.input.sources import hands_from
+from wakewise.operation.teleop.input.sources import read_input
 from wakewise.scene.missions import RoutePilot
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def operator_pilot(parts: Parts) -> Pilot:
 
     if parts.scenario.controls is None:
         raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or name a record in controls")
-    return assisted_pilot(parts, hands_from(Path(parts.scenario.controls)), OperatorState())
+    return assisted_pilot(parts, read_input(Path(parts.scenario.controls)), OperatorState())
 
 
 def assisted_person(parts: Parts) -> Pilot:

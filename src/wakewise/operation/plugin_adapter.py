@@ -35,14 +35,14 @@ def described(part: Any) -> str:
     return f"{name} ({what})" if isinstance(name, str) and name else what
 
 
-def is_ours(part: Any) -> bool:
+def is_builtin(part: Any) -> bool:
     """Whether a part's class is one of this package."""
     return type(part).__module__.split(".")[0] == "wakewise"
 
 
-def from_outside(parts: Parts) -> dict[str, str]:
+def external_parts(parts: Parts) -> dict[str, str]:
     """Parts of a flight that are not this package's own, in words: given in Python or named in the scenario."""
-    found = {name: described(part) for name, part in parts.given.items() if not is_ours(part)}
+    found = {name: described(part) for name, part in parts.given.items() if not is_builtin(part)}
     for name, (kind, named, own) in _named(parts.scenario).items():
         is_file = Path(named).expanduser().exists()
         if name in parts.given or named in own or is_file or not (named in offered(kind) or ":" in named):
@@ -160,13 +160,13 @@ class PluginController:
         return replace(state, backup=inner), replace(command, fallback=words)
 
 
-def guarded(parts: Parts) -> Controller[Any]:
+def with_failsafe(parts: Parts) -> Controller[Any]:
     """The flight's controller with a guard round each step; the backup of one from outside is `dp`.
 
     The deadline is enforced in a world that says that it does not wait for its controller (see `World`).
     """
     controller, vehicle = parts.controller, parts.vehicle
-    if is_ours(controller):
+    if is_builtin(controller):
         return safeguarded(controller, vehicle, parts.control, enforce=not getattr(parts.world, "waits", True))
 
     def backup() -> Controller[Any]:

@@ -10,11 +10,11 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.operation.known_obstacles import surroundings_of
-from wakewise.operation.setting_checks import idle_switches
+from wakewise.operation.setting_checks import ineffective_settings
 from wakewise.planning import check_start, state_of
 from wakewise.robot.vehicles import possible_drags, with_drag
 from wakewise.scene.missions import check_clearance, check_tilt
-from wakewise.simulation.tank import StationKeepingDemand, holding, tank_ambient
+from wakewise.simulation.tank import StationKeepingDemand, station_keeping_demand, tank_ambient
 from wakewise.simulation.tank.soft_body import check_loose, check_sway
 from wakewise.simulation.tank.station_keeping import check_fit
 
@@ -59,7 +59,7 @@ def preflight(parts: Parts) -> PreflightResult:
     check_fit(scenario.tank, vehicle, [(float(t), route.body(float(t), parts.aim).X_WB) for t in times_s])
     found = check_current(parts)
     check_volume(vehicle)
-    idle = () if "controller" in parts.given else idle_switches(scenario, vehicle)
+    idle = () if "controller" in parts.given else ineffective_settings(scenario, vehicle)
     for words in idle:
         log.warning("%s", words)
     return PreflightResult(clearance_m=clearance_m, holding=found, idle=idle)
@@ -177,7 +177,9 @@ def check_current(parts: Parts, looks: int = 200) -> StationKeepingDemand | None
     trims_N = (-apart.trim_range_N, apart.trim_range_N) if apart.trim_N is None else (apart.trim_N,)
     flows, turns, more = np.array(passing), np.array(attitudes), 0.01 * apart.damping_pct
     drags = [with_drag(vehicle, case) for case in possible_drags(vehicle, apart.drag)]
-    loads = (holding(v, flows, tank.density_kg_m3, trim_N, more, turns) for v in drags for trim_N in trims_N)
+    loads = (
+        station_keeping_demand(v, flows, tank.density_kg_m3, trim_N, more, turns) for v in drags for trim_N in trims_N
+    )
     found = min((load for load in loads if load is not None), key=lambda load: load.share, default=None)
     if found is not None and found.share < 1.0:
         raise InputError(f"tank: {vehicle.name} cannot hold its route, {found.said()}")

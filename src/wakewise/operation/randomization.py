@@ -72,7 +72,7 @@ class FieldDistribution(Settings):
         return "any of " + ", ".join(map(str, self.any_of or ()))
 
 
-def values_of(draws: dict[str, FieldDistribution], seed: int) -> dict[str, Any]:
+def sample_fields(draws: dict[str, FieldDistribution], seed: int) -> dict[str, Any]:
     """What a seed draws, by field."""
     return {
         name: draw.value(np.random.default_rng([seed, _STREAM, zlib.crc32(name.encode())]))

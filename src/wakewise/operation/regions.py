@@ -8,7 +8,7 @@ from threading import Lock
 import numpy as np
 
 from wakewise.operation.seeds import Seeds
-from wakewise.scene.targets import Region, Target, delicacy, sample_region
+from wakewise.scene.targets import Region, Target, find_fragility, sample_region
 
 MOST_KEPT = 16
 """Regions that are kept, the last ones asked for: 300 points are 12 kB."""
@@ -38,7 +38,7 @@ def region_of(target: Target, points: int, seeds: Seeds, delicate_gain: float = 
     with _one_at_a_time:
         found = _kept.pop(key, None)
         if found is None:
-            marks = delicacy(target.mesh) if delicate_gain > 0.0 else None
+            marks = find_fragility(target.mesh) if delicate_gain > 0.0 else None
             found = sample_region(target, points, seeds.region(), marks, delicate_gain)
         _kept[key] = found  # the last one asked for is the last to go
         while len(_kept) > MOST_KEPT:

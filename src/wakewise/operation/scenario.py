@@ -13,14 +13,14 @@ from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_va
 from wakewise.control import MAKERS, ControlSettings
 from wakewise.core.checks import path_of, quoted
 from wakewise.core.errors import InputError
-from wakewise.core.files import not_a_name, write_text
+from wakewise.core.files import name_fault, write_text
 from wakewise.core.plugins import names
 from wakewise.core.safe_yaml import YamlError, read_yaml, text_of
 from wakewise.core.settings import Seed, Settings, describe_faults, guess
 from wakewise.estimation import FilterSettings
 from wakewise.operation.calibration_error import CalibrationErrorSettings
 from wakewise.operation.pilot_makers import PILOTS
-from wakewise.operation.randomization import FieldDistribution, values_of
+from wakewise.operation.randomization import FieldDistribution, sample_fields
 from wakewise.operation.renamed import became
 from wakewise.operation.target_settings import TargetSettings
 from wakewise.operation.worlds.library import load_world, own_file, world_names
@@ -94,7 +94,7 @@ class Scenario(Settings):
     @field_validator("name")
     @classmethod
     def _names_a_folder(cls, value: str) -> str:
-        if fault := not_a_name(value):
+        if fault := name_fault(value):
             raise ValueError(f"names a folder, so {fault}")
         return value
 
@@ -162,7 +162,7 @@ class Scenario(Settings):
         if not self.draws:
             return self
         tree = self.model_dump()
-        for name, value in values_of(self.draws, self.seed).items():
+        for name, value in sample_fields(self.draws, self.seed).items():
             tree = _merged(tree, _with_kinds(_nested(name, value)))
         try:
             return Scenario.model_validate(tree | {"draws": {}})

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 PLANNING = frozenset({"pseudo-inverse", "unaware", "smooth", "linear", "wake-aware"})
 """Our methods that plan."""
-LEVERED = frozenset({"pseudo-inverse", "linear", "instant", "wake-aware"})
+MITIGATION_METHODS = frozenset({"pseudo-inverse", "linear", "instant", "wake-aware"})
 """Our methods that use levers; of these all but `instant` need `spare` for all of them but the bed."""
 _AFTER_SPARE = ("meet", "drift", "doubt", "thrift")
 
 
-def idle_switches(scenario: Scenario, vehicle: Vehicle) -> tuple[str, ...]:
+def ineffective_settings(scenario: Scenario, vehicle: Vehicle) -> tuple[str, ...]:
     """What is set and does nothing, a sentence each, with the field's name; nothing is known of a method from outside.
 
     Levers are on by default, so a method without levers is only told of the one that is not.
@@ -31,13 +31,13 @@ def idle_switches(scenario: Scenario, vehicle: Vehicle) -> tuple[str, ...]:
     control, method, found = scenario.control, scenario.method, []
     if method in METHODS:
         levers = control.levers
-        if method in LEVERED & PLANNING and not levers.spare:
+        if method in MITIGATION_METHODS & PLANNING and not levers.spare:
             on = [name for name in _AFTER_SPARE if getattr(levers, name)]
             if on:
                 found.append(
                     f"control.levers.{', '.join(on)}: nothing without control.levers.spare, which {method} shares by"
                 )
-        if levers.bed and method not in LEVERED:
+        if levers.bed and method not in MITIGATION_METHODS:
             found.append(f"control.levers.bed: nothing for {method}, which has no levers")
         if method not in PLANNING:
             if control.obstacles:

@@ -14,7 +14,7 @@ from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.core.files import write_text
 from wakewise.core.geometry import Pose
 from wakewise.operation.photography import photo_name
-from wakewise.operation.plugin_adapter import is_ours
+from wakewise.operation.plugin_adapter import is_builtin
 from wakewise.operation.scenario import Scenario, differences, read_scenario, write_scenario
 from wakewise.scene.targets import write_mesh
 
@@ -25,7 +25,7 @@ BY_HAND = "operator"
 """The pilot that a scenario names where a person flew."""
 
 
-def as_flown(parts: Parts) -> Scenario:
+def resolved_scenario(parts: Parts) -> Scenario:
     """The scenario that a trial leaves behind: what was given in Python in place of its own parts is named in it."""
     if not parts.given:
         return parts.scenario
@@ -61,7 +61,7 @@ def check_place(folder: Path, scenario: Scenario) -> None:
             )
 
 
-def claim(folder: Path, scenario: Scenario) -> None:
+def write_or_check_scenario(folder: Path, scenario: Scenario) -> None:
     """Write scenario.yaml, or check that the one in the folder is the same trial; raises as `check_place`."""
     check_place(folder, scenario)
     path = folder / "scenario.yaml"
@@ -77,8 +77,10 @@ def flown_by_hand(parts: Parts) -> Scenario:
 
     Pilot and controller that `assisted` put in place come back with the pilot's name; others are named as ever.
     """
-    ours = {name for name in ("pilot", "controller") if name in parts.given and is_ours(parts.given[name])}
-    scenario = as_flown(type(parts)(parts.scenario, {k: part for k, part in parts.given.items() if k not in ours}))
+    ours = {name for name in ("pilot", "controller") if name in parts.given and is_builtin(parts.given[name])}
+    scenario = resolved_scenario(
+        type(parts)(parts.scenario, {k: part for k, part in parts.given.items() if k not in ours})
+    )
     return scenario.model_copy(update={"pilot": BY_HAND}) if "pilot" in ours else scenario
 
 

@@ -8,13 +8,13 @@ from wakewise.planning.kernels import PlanWork
 from wakewise.planning.problem import SMOOTH_N, PlanTerms
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake.finite_difference import NumericWake, thinned
+from wakewise.wake.finite_difference import FiniteDifferenceWake, thinned
 
 
-def numeric_wake(wake: WakeModel, region: Region, vehicle: Vehicle, terms: PlanTerms) -> NumericWake:
+def numeric_wake(wake: WakeModel, region: Region, vehicle: Vehicle, terms: PlanTerms) -> FiniteDifferenceWake:
     """A wake model without kernels, over some of the region's points; weights add up to 1 as in `wake_table`."""
     points, weights = thinned(region.points_W_m, region.weights)
-    return NumericWake(
+    return FiniteDifferenceWake(
         model=wake,
         points_W_m=points,
         weights=weights / float(weights.sum()),
@@ -26,7 +26,7 @@ def numeric_wake(wake: WakeModel, region: Region, vehicle: Vehicle, terms: PlanT
     )
 
 
-def add_numeric(wake: NumericWake, weight: float, majorise: float, work: PlanWork, *, slopes: bool) -> float:
+def add_numeric(wake: FiniteDifferenceWake, weight: float, majorise: float, work: PlanWork, *, slopes: bool) -> float:
     """Add `weight` times D of every stage to the work of `wakewise.planning.kernels.horizon`; returns their sum.
 
     With `slopes` also its derivatives, the block thrust by thrust times `majorise`.

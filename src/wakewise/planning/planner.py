@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.allocation.allocate import Layout, Weights, compile_layout, gentle_allocation
+from wakewise.allocation.allocate import Layout, Weights, compile_layout, min_wash_allocation
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
@@ -40,7 +40,7 @@ from wakewise.planning.surroundings import Surroundings
 from wakewise.robot.vehicles import Vehicle, compile_body
 from wakewise.scene.targets import Region
 from wakewise.wake import PaperJet, gram
-from wakewise.wake.finite_difference import NumericWake
+from wakewise.wake.finite_difference import FiniteDifferenceWake
 from wakewise.wake.packed_model import PackedWakeModel, is_compiled, wake_table, with_smooth_edge
 from wakewise.wake.plan_disturbance import wake_scratch
 
@@ -62,7 +62,7 @@ class PlanModel:
     table: PlanTable
     wake_table: PackedWakeModel
     layout: Layout
-    numeric: NumericWake | None = None
+    numeric: FiniteDifferenceWake | None = None
 
     @property
     def thrusters(self) -> int:
@@ -366,7 +366,7 @@ class Planner:
                 vehicle.disk_areas_m2,
                 model.terms.superposition,
             )
-            best = gentle_allocation(model.layout, vehicle.allocation_matrix @ mean, G, weights, before)
+            best = min_wash_allocation(model.layout, vehicle.allocation_matrix @ mean, G, weights, before)
             before = best.thrusts_N
             shifts[k] = null @ (null.T @ (best.thrusts_N - mean))
         if np.abs(shifts).max() < 0.2 * SMOOTH_N:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.wake.bed_depth import bed_of, free_jet
@@ -64,4 +64,4 @@ __all__ = [
     "wake_model",
 ]
 
-lazy_door(__name__)
+lazy_attributes(__name__)

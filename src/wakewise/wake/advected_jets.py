@@ -81,11 +81,11 @@ class CrossFlow:
     @property
     def guessed(self) -> Array:
         """Size of both thrusts of each thruster, shape (2 m,), in N: as they are, but none far below the mean."""
-        return cast(Array, guesses(self.thrusts_N))
+        return cast(Array, guessed_thrusts(self.thrusts_N))
 
 
 @njit
-def guesses(thrusts: Array) -> Array:
+def guessed_thrusts(thrusts: Array) -> Array:
     """`CrossFlow.guessed` of thrusts, shape (m,)."""
     m = thrusts.size
     mean = 0.0
@@ -142,7 +142,7 @@ def _rates(kind, numbers, own, s, grown, root, e, current, along, current2, near
 
 
 @njit(apart=True)
-def follow(kind, parameters, own, origin, e, thrust, current, unsure, curve):  # type: ignore[no-untyped-def]
+def trace_plume(kind, parameters, own, origin, e, thrust, current, unsure, curve):  # type: ignore[no-untyped-def]
     """Sections of one plume into `curve`, (SECTIONS + 1, 7): X, t, s, speed over still water's at s, and width so.
 
     Parameters
@@ -270,7 +270,7 @@ def plume_speeds(points, origins, directions, areas, kind, parameters, thrusts, 
         ball[3] = max(ball[3], np.sqrt(r2))
     room, hits = np.empty((2, n)), np.empty(n + 1, np.int64)
     for i in range(m):
-        follow(kind, parameters, own[i], origins[i], directions[i], thrusts[i], current, unsure, curves[i])
+        trace_plume(kind, parameters, own[i], origins[i], directions[i], thrusts[i], current, unsure, curves[i])
         fill_plume(across, ball, kind, parameters, own[i], curves[i], ends[i], room, hits, speeds[i])
     return speeds, curves
 

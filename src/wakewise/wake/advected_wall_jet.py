@@ -35,7 +35,7 @@ _TINY = 1e-12
 
 
 @njit
-def strike(curve, bed_z):  # type: ignore[no-untyped-def]
+def bed_intersection(curve, bed_z):  # type: ignore[no-untyped-def]
     """(lands, x, y, s, t) of where a plume, shape (SECTIONS + 1, 7), first meets the bed."""
     for k in range(SECTIONS):
         above, below = bed_z - curve[k, 2], bed_z - curve[k + 1, 2]
@@ -59,7 +59,7 @@ def add_carried_walls(points, curves, directions, areas, floor, thrusts, current
     c = np.sqrt(c2)
     for i in range(curves.shape[0]):
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-        lands, strike_x, strike_y, H, before = strike(curves[i], floor[0])
+        lands, strike_x, strike_y, H, before = bed_intersection(curves[i], floor[0])
         if not lands or dz < LEAST_SINE:
             continue
         far = (H**6 + (ROUND_DECAY * np.sqrt(areas[i])) ** 6) ** (1.0 / 6.0)

@@ -215,7 +215,7 @@ def carried_velocity(
 
 
 @njit
-def astray(points, weights, origins, axes, areas, kind, parameters):  # type: ignore[no-untyped-def]
+def scattered_jet_gram(points, weights, origins, axes, areas, kind, parameters):  # type: ignore[no-untyped-def]
     """Mean of D per newton of each jet if it goes astray, shape (2 m,), in (m/s)^2/N.
 
     Parameters

@@ -32,7 +32,7 @@ from wakewise.core.checks import one_of
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import WakeModel
-from wakewise.wake.finite_difference import NumericWake
+from wakewise.wake.finite_difference import FiniteDifferenceWake
 from wakewise.wake.gram import gram_slope_sum
 from wakewise.wake.input_checks import explain, same_sizes
 from wakewise.wake.jets import AxialJet
@@ -217,8 +217,8 @@ def _numeric(
     areas_m2: Array,
     smooth_N: float,
     superposition: Superposition,
-) -> NumericWake:
-    return NumericWake(
+) -> FiniteDifferenceWake:
+    return FiniteDifferenceWake(
         model=model,
         points_W_m=region_points_W,
         weights=weights,

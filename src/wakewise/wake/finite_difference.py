@@ -26,7 +26,7 @@ MOST_POINTS = 100
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class NumericWake:
+class FiniteDifferenceWake:
     """A wake model over weighted points, seen from a body; nothing in it is compiled.
 
     Parameters

@@ -16,7 +16,7 @@ from wakewise.core.interfaces import WakeModel
 from wakewise.core.jit.njit import njit
 from wakewise.wake.advected_jets import CrossFlow
 from wakewise.wake.bed_depth import free_jet
-from wakewise.wake.disturbance import astray, gram
+from wakewise.wake.disturbance import gram, scattered_jet_gram
 from wakewise.wake.disturbance_derivatives import SUPERPOSITIONS, Superposition
 from wakewise.wake.jets import AxialJet, JetLaw
 
@@ -94,7 +94,9 @@ class InfluenceModel:
         """Mean of D per newton of each jet if it goes astray, shape (2 n,) (see `disturbance`); None without a law."""
         if self._law is None:
             return None
-        return cast(Array, astray(self.points_W_m, self.weights, *self.places(X_WB), self.areas_m2, *self._law))
+        return cast(
+            Array, scattered_jet_gram(self.points_W_m, self.weights, *self.places(X_WB), self.areas_m2, *self._law)
+        )
 
     @cached_property
     def _law(self) -> JetLaw | None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import wakewise
-from wakewise.allocation import Weights, gentle_allocation, least_thrusts
+from wakewise.allocation import Weights, min_norm_allocation, min_wash_allocation
 from wakewise.control.loop import vehicle_layout
 from wakewise.core.jit.cache_dir import is_interpreted
 from wakewise.robot.vehicles import compile_body, load_vehicle, step_rk4
@@ -35,8 +35,8 @@ def answers() -> dict[str, list[float]]:
     place = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.full(6, 0.1))
     moved = step_rk4(compile_body(vehicle), *place, wrench, np.zeros(3), 0.02)
     return {
-        "least": least_thrusts(layout, wrench).thrusts_N.tolist(),
-        "gentle": gentle_allocation(layout, wrench, gram, Weights()).thrusts_N.tolist(),
+        "least": min_norm_allocation(layout, wrench).thrusts_N.tolist(),
+        "gentle": min_wash_allocation(layout, wrench, gram, Weights()).thrusts_N.tolist(),
         "moved": np.concatenate(moved).tolist(),
     }
 
@@ -54,9 +54,10 @@ def trace(frame, event, _):
     return trace
 from test_interpreted import answers
 from wakewise.core.jit.njit import COMPILED
-from wakewise.core.jit.precompile import PrecompileResult, is_warm, warm
+from wakewise.core.jit.precompile import PrecompileResult, is_warm, compile_kernels
 import numpy as np
-from wakewise.simulation.lattice.streaming_stores import copy_line, peek, poke, settle_stores, stream_line
+from wakewise.simulation.lattice.streaming_stores import copy_line, load_element, store_element
+from wakewise.simulation.lattice.streaming_stores import settle_stores, stream_line
 assert not COMPILED and is_warm() and warm().kernels == 0
 a, b = np.zeros(32, np.float32), np.arange(32, dtype=np.float32)
 poke(a, 0, np.float32(7.0)), copy_line(a, 16, b, 8), stream_line(a, 0, b, 16), settle_stores()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from wakewise.core.jit.cache_dir import VARIABLE, can_be_written, keep_kernels, needs_folder, private_folder
+from wakewise.core.jit.cache_dir import VARIABLE, can_be_written, needs_folder, private_folder, select_cache_folder
 
 
 @pytest.fixture
@@ -98,9 +98,9 @@ def test_numba_is_told(package: Path, tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr("wakewise.core.jit.cache_dir.can_be_written", lambda _: False)
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     environment = {"HOME": "/home/me"}
-    folder = keep_kernels(package, environment)
+    folder = select_cache_folder(package, environment)
     assert environment[VARIABLE] == numba.config.CACHE_DIR == str(folder)
-    assert keep_kernels(package, {VARIABLE: "/mine"}) is None
+    assert select_cache_folder(package, {VARIABLE: "/mine"}) is None
 
 
 def test_importing_wakewise_is_quick_and_settles_it_first() -> None:

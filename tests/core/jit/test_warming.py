@@ -10,13 +10,20 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.core.jit import precompile
-from wakewise.core.jit.precompile import JOBS, BackgroundCompilation, KernelEntry, listed, of_jobs, warm
+from wakewise.core.jit.precompile import (
+    JOBS,
+    BackgroundCompilation,
+    KernelEntry,
+    compile_kernels,
+    kernels_of_jobs,
+    listed,
+)
 
 FLIGHT = """
 import gc, json
 import wakewise as ww
 from numba.core.dispatcher import Dispatcher
-from wakewise.core.jit.precompile import warm
+from wakewise.core.jit.precompile import compile_kernels
 warm(("plan", "fly"))
 ww.fly(ww.Scenario.preset("quick"), duration_s=0.2)
 kernels = [kernel for kernel in gc.get_objects() if isinstance(kernel, Dispatcher)]
@@ -51,13 +58,13 @@ def test_what_cannot_be_compiled_is_told_and_holds_nothing_up(monkeypatch: pytes
     monkeypatch.setattr(precompile, "_tried", set())
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     told: list[tuple[float, float, str]] = []
-    made = warm(("more",), lambda *now: told.append(now))
+    made = compile_kernels(("more",), lambda *now: told.append(now))
     assert made.kernels == 0
     assert "AttributeError" in made.amiss[0]
     assert told[0][:2] == (0.0, 1.0)
     monkeypatch.setattr(precompile, "_tried", set())
     assert precompile.is_warm(("more",))
-    assert warm(("more",)) == made
+    assert compile_kernels(("more",)) == made
 
 
 def test_a_killed_process_is_no_verdict_on_a_kernel(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
@@ -70,7 +77,7 @@ def test_a_killed_process_is_no_verdict_on_a_kernel(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(precompile, "_tried", set())
     monkeypatch.setattr(precompile, "_asked", lambda *_: "")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert warm(("more",)).amiss == ("wakewise.robot.vehicles.runge_kutta.normalise: its process ended",)
+    assert compile_kernels(("more",)).amiss == ("wakewise.robot.vehicles.runge_kutta.normalise: its process ended",)
     assert not precompile.is_warm(("more",))
 
 
@@ -84,11 +91,11 @@ def test_a_note_is_taken_when_a_job_is_done(monkeypatch: pytest.MonkeyPatch, tmp
     monkeypatch.setattr(precompile, "_tried", set())
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert not precompile.is_warm(("more",))
-    assert warm(("more",)) == precompile.PrecompileResult(kernels=1)
+    assert compile_kernels(("more",)) == precompile.PrecompileResult(kernels=1)
     assert [note.name for note in tmp_path.glob("*.warm")] == ["wakewise-more-0.warm"]
     assert precompile.is_warm(("more",))
     monkeypatch.setattr(precompile, "_tried", set())
-    assert warm(("more",)) == precompile.PrecompileResult(kernels=0)
+    assert compile_kernels(("more",)) == precompile.PrecompileResult(kernels=0)
 
 
 def test_stopped_it_ends() -> None:
@@ -102,4 +109,4 @@ def test_stopped_it_ends() -> None:
 def test_an_unknown_job_is_refused() -> None:
     """With those that there are."""
     with pytest.raises(InputError, match="job 'flying': no such job, allowed plan, fly"):
-        of_jobs(("flying",))
+        kernels_of_jobs(("flying",))

@@ -29,7 +29,7 @@ def test_an_exception_is_final_and_anew_forgets_it(tmp_path: Path) -> None:
     attempt_log.begin(tmp_path)
     attempt_log.end(tmp_path, "error", "it does not fit", 0.1)
     assert read_attempts(tmp_path).is_failure(100)
-    attempt_log.anew(tmp_path)
+    attempt_log.clear_failures(tmp_path)
     told = read_attempts(tmp_path)
     assert not told.is_failure(0)
     assert told.begun == 1

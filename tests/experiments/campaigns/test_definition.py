@@ -10,7 +10,7 @@ import yaml
 
 from wakewise.core.errors import InputError
 from wakewise.core.settings import Settings
-from wakewise.experiments.campaigns.definition import Campaign, check_campaign, example, load_campaign, planned
+from wakewise.experiments.campaigns.definition import Campaign, check_campaign, example, load_campaign, planned_trials
 from wakewise.experiments.campaigns.flights import scenario_of
 
 _MINE = """
@@ -22,7 +22,7 @@ def make(*arguments, **more):
 
 
 def _planned(**fields: Any) -> list[Any]:
-    return planned(check_campaign({"stages": "fly", "targets": ["branching"]} | fields))
+    return planned_trials(check_campaign({"stages": "fly", "targets": ["branching"]} | fields))
 
 
 def test_every_combination_is_a_trial_seed_by_seed() -> None:
@@ -82,7 +82,7 @@ def test_the_example_is_a_campaign(tmp_path: Path) -> None:
     """As it is printed."""
     path = tmp_path / "campaign.yaml"
     path.write_text(example())
-    assert len(planned(load_campaign(path))) == 3 * 2 * 1 * 2 * 3
+    assert len(planned_trials(load_campaign(path))) == 3 * 2 * 1 * 2 * 3
 
 
 @pytest.mark.parametrize(

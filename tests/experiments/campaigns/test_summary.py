@@ -2,7 +2,7 @@
 
 import pytest
 
-from wakewise.experiments.campaigns.summary import ComparisonMetric, glance, worst_trials
+from wakewise.experiments.campaigns.summary import ComparisonMetric, summarize, worst_trials
 
 RMSE = ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True)
 
@@ -18,7 +18,7 @@ def test_who_won_by_how_much_how_sure_and_at_what_price():
     """The best against the second best, over the seeds that all have."""
     places = [place("a", k, 1.0 + 0.01 * k, 2.0) for k in range(1, 8)]
     places += [place("b", k, 2.0 + 0.01 * k, 1.0) for k in range(1, 7)]
-    found = glance(RMSE, "pump-tank", places)
+    found = summarize(RMSE, "pump-tank", places)
     assert (found.winner, found.rival, found.trials) == ("a", "b", 6)
     assert found.less_pct == pytest.approx(49.2, abs=0.2) and found.energy_ratio == pytest.approx(2.0)
     assert found.sure.startswith("sure") and found.improvement == 1.0
@@ -27,13 +27,13 @@ def test_who_won_by_how_much_how_sure_and_at_what_price():
 def test_a_method_whose_models_fail_does_not_win_by_its_survivors():
     """A failed trial counts 20 mm, and is counted."""
     places = [place("a", 1, 0.5), place("a", 2, None), place("b", 1, 1.0), place("b", 2, 1.0)]
-    found = glance(RMSE, "pump-tank", places)
+    found = summarize(RMSE, "pump-tank", places)
     assert (found.winner, found.failed) == ("b", {"a": 1, "b": 0})
 
 
 def test_one_trial_each_decides_nothing():
     """And says so."""
-    found = glance(RMSE, "pump-tank", [place("a", 1, 1.0), place("b", 1, 2.0)])
+    found = summarize(RMSE, "pump-tank", [place("a", 1, 1.0), place("b", 1, 2.0)])
     assert "nobody knows" in found.sure and found.interval_pct is None
 
 
@@ -47,5 +47,5 @@ def test_the_worst_trial_is_one_that_failed_else_the_one_with_the_largest_error(
 def test_few_pairs_that_agree_are_not_sure():
     """Five heads in a row come once in sixteen throws of a coin, either way up."""
     few = [place(who, k, rmse) for k in range(1, 6) for who, rmse in (("a", 1.0), ("b", 2.0))]
-    found = glance(RMSE, "pump-tank", few)
+    found = summarize(RMSE, "pump-tank", few)
     assert found.sure == "5 pairs are too few to be sure" and found.interval_pct is not None

@@ -22,13 +22,13 @@ def _write(folder: Path, holder: LockHolder) -> None:
 
 def test_a_claim_is_had_once_and_given_back(tmp_path: Path) -> None:
     """Who holds it stands in it; what is given back can be had again."""
-    assert trial_lock.take(tmp_path)
+    assert trial_lock.acquire_lock(tmp_path)
     assert trial_lock.holder_of(tmp_path) == this_process()
-    assert trial_lock.is_mine(tmp_path)
-    assert not trial_lock.take(tmp_path)
-    trial_lock.release(tmp_path)
+    assert trial_lock.owns_lock(tmp_path)
+    assert not trial_lock.acquire_lock(tmp_path)
+    trial_lock.release_lock(tmp_path)
     assert trial_lock.holder_of(tmp_path) is None
-    assert trial_lock.take(tmp_path)
+    assert trial_lock.acquire_lock(tmp_path)
     assert not list(tmp_path.glob(".claim*"))
 
 
@@ -37,7 +37,7 @@ def test_a_claim_of_a_process_that_ended_is_taken_over(tmp_path: Path) -> None:
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
     _write(tmp_path, replace(this_process(), pid=gone.pid, start=1))
-    assert trial_lock.take(tmp_path)
+    assert trial_lock.acquire_lock(tmp_path)
 
 
 def test_a_claim_of_a_process_that_nobody_has_waited_for_is_taken_over(tmp_path: Path) -> None:
@@ -46,11 +46,11 @@ def test_a_claim_of_a_process_that_nobody_has_waited_for_is_taken_over(tmp_path:
     from wakewise.core.run_lock import start_of
 
     _write(tmp_path, replace(this_process(), pid=zombie.pid, start=start_of(zombie.pid)))
-    assert not trial_lock.take(tmp_path)
+    assert not trial_lock.acquire_lock(tmp_path)
     zombie.kill()
     while start_of(zombie.pid) != -1:
         pass
-    assert trial_lock.take(tmp_path)
+    assert trial_lock.acquire_lock(tmp_path)
     zombie.communicate()
 
 
@@ -59,28 +59,28 @@ def test_a_number_given_anew_is_not_taken_for_its_holder(tmp_path: Path, change:
     """A process of the same number that started at another time, or in another run of the computer, is another."""
     _write(tmp_path, replace(this_process(), **change))  # type: ignore[arg-type]
     assert trial_lock.holder_of(tmp_path) is not None
-    assert trial_lock.take(tmp_path)
+    assert trial_lock.acquire_lock(tmp_path)
 
 
 def test_a_holder_on_another_computer_is_gone_when_its_heart_stops(tmp_path: Path) -> None:
     """Of it nothing but the heartbeat is known: only a beat that was seen not to change makes its claim free."""
     _write(tmp_path, LockHolder("elsewhere", "b", 1, 1))
-    assert not trial_lock.take(tmp_path)
-    beat = trial_lock.beat_of(tmp_path)
+    assert not trial_lock.acquire_lock(tmp_path)
+    beat = trial_lock.heartbeat_of(tmp_path)
     assert beat is not None
-    assert not trial_lock.take(tmp_path, beat - 1)
+    assert not trial_lock.acquire_lock(tmp_path, beat - 1)
     os.utime(tmp_path / CLAIM, (2**33, 2**33))  # it lives, and its clock is centuries off
-    assert not trial_lock.take(tmp_path, beat)
-    assert trial_lock.take(tmp_path, trial_lock.beat_of(tmp_path))
+    assert not trial_lock.acquire_lock(tmp_path, beat)
+    assert trial_lock.acquire_lock(tmp_path, trial_lock.heartbeat_of(tmp_path))
 
 
 def test_a_beat_changes_what_is_compared(tmp_path: Path) -> None:
     """Showing that one is alive changes the claim's stamp."""
-    trial_lock.take(tmp_path)
+    trial_lock.acquire_lock(tmp_path)
     os.utime(tmp_path / CLAIM, (5, 5))
-    before = trial_lock.beat_of(tmp_path)
-    trial_lock.beat(tmp_path)
-    assert trial_lock.beat_of(tmp_path) != before
+    before = trial_lock.heartbeat_of(tmp_path)
+    trial_lock.renew_lock(tmp_path)
+    assert trial_lock.heartbeat_of(tmp_path) != before
 
 
 @pytest.mark.parametrize("text", ["", "{", "[1]", '{"host": 1}', "\x00\x01"])
@@ -88,7 +88,7 @@ def test_a_damaged_claim_is_nobodys(tmp_path: Path, text: str) -> None:
     """Claims are written whole, so that one that cannot be read was damaged later."""
     (tmp_path / CLAIM).write_text(text)
     assert trial_lock.holder_of(tmp_path) is None
-    assert trial_lock.take(tmp_path)
+    assert trial_lock.acquire_lock(tmp_path)
 
 
 def test_what_holds_others_off_is_gone_after_a_take_over(tmp_path: Path) -> None:
@@ -97,15 +97,16 @@ def test_what_holds_others_off_is_gone_after_a_take_over(tmp_path: Path) -> None
     trial.mkdir()
     (tmp_path / ".taking-over").touch()
     (trial / trial_lock.CLAIM).write_text("damaged")
-    assert trial_lock.take(trial)
+    assert trial_lock.acquire_lock(trial)
     assert [path.name for path in tmp_path.iterdir()] == ["trial"]
 
 
 def test_of_many_who_take_over_one_succeeds(tmp_path: Path) -> None:
     """However many see the same stale claim at once."""
     code = (
-        "import sys, pathlib; from wakewise.experiments.campaigns import claims\n"
-        "print('ready', flush=True); input(); print(claims.take(pathlib.Path(sys.argv[1])), flush=True); input()"
+        "import sys, pathlib; from wakewise.experiments.campaigns import trial_lock\n"
+        "print('ready', flush=True); input()\n"
+        "print(trial_lock.acquire_lock(pathlib.Path(sys.argv[1])), flush=True); input()"
     )
     for _ in range(3):
         _write(tmp_path, replace(this_process(), start=1))

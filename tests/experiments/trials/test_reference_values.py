@@ -8,10 +8,10 @@ from wakewise.control import vehicle_layout
 from wakewise.core.geometry import Pose, look_at
 from wakewise.experiments.trials.metrics import BETTER, DEFINITIONS, UNITS, MetricsCollector
 from wakewise.experiments.trials.reference_values import (
-    add_yardsticks,
+    add_reference_values,
+    allocation_figures,
     ambient_speed_m_s,
     grain_threshold_Pa,
-    sharing_figures,
 )
 from wakewise.operation import Parts, load_scenario
 
@@ -37,11 +37,11 @@ def test_least_thrusts_are_held_against_themselves_and_spare_ones_are_not(parts:
     """Flown as `dp` would, both figures are one; thrusts that fight each other change what was flown, not the other."""
     layout = vehicle_layout(parts.vehicle)
     least = layout.inverse @ np.array([3.0, -2.0, 4.0, 0.0, 0.0, 0.5])
-    same = sharing_figures(parts, steps_with(parts, least))
+    same = allocation_figures(parts, steps_with(parts, least))
     assert same["disturbance_flown"] == pytest.approx(same["disturbance_least_thrusts"], rel=1e-9)
     assert same["disturbance_flown"] > 0.0
     fight = np.linalg.svd(layout.B)[2][-1]
-    other = sharing_figures(parts, steps_with(parts, least + 2.0 * fight))
+    other = allocation_figures(parts, steps_with(parts, least + 2.0 * fight))
     assert other["disturbance_least_thrusts"] == pytest.approx(same["disturbance_least_thrusts"], rel=1e-6)
     assert abs(other["disturbance_flown"] / same["disturbance_flown"] - 1.0) > 0.01
 
@@ -65,7 +65,7 @@ def test_what_cannot_be_computed_says_why(parts: Parts) -> None:
     """Without commands no sharing, without grains no threshold; the water's own speed is there all the same."""
     clear = load_scenario("quick", None, {"tank.silt.kind": "clear"})
     gathering = MetricsCollector()
-    add_yardsticks(gathering, clear.parts(), pl.DataFrame({"time_s": [0.0, 1.0]}))
+    add_reference_values(gathering, clear.parts(), pl.DataFrame({"time_s": [0.0, 1.0]}))
     result = gathering.finish()
     assert result["ambient_speed_m_s"] > 0.0
     assert "command_1_N" in result["why"]["disturbance_flown"]

@@ -15,7 +15,7 @@ import pytest
 
 from wakewise.control import vehicle_layout
 from wakewise.core.errors import InputError
-from wakewise.core.run_lock import alone
+from wakewise.core.run_lock import exclusive_run
 from wakewise.experiments.trials import run_trial
 from wakewise.operation import Parts, Scenario, fly, load_scenario
 from wakewise.operation.worlds.makers import tank_world, true_start, true_vehicle
@@ -80,7 +80,7 @@ def test_a_folder_that_another_run_is_at_is_let_be(trial: tuple[Path, dict]) -> 
     """A second run into the same folder is refused at once, with the other's number."""
     folder, _ = trial
     refused = pytest.raises(InputError, match=rf"another run is at it \(pid {os.getpid()}\)")
-    with ThreadPoolExecutor(1) as other, alone(folder), refused:
+    with ThreadPoolExecutor(1) as other, exclusive_run(folder), refused:
         other.submit(run_trial, small(), folder).result()
 
 

@@ -9,18 +9,18 @@ from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
 from wakewise.operation.teleop.input import CENTRED, Controls
-from wakewise.operation.teleop.input.controls import shaped
+from wakewise.operation.teleop.input.controls import apply_dead_zone
 
 
 @given(st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=9))
 def test_shaped_axes_are_always_within_full_stick(raw: list[float]) -> None:
     """Whatever a device says, the axes are five numbers from -1 to 1."""
-    Controls(axes=shaped(raw))
+    Controls(axes=apply_dead_zone(raw))
 
 
 def test_dead_zone_is_taken_out_and_the_rest_is_stretched() -> None:
     """Just beyond the dead zone little is asked for, at full stick all; signs are kept."""
-    axes = shaped([0.05, -0.0501, 1.0, -1.0, math.nan])
+    axes = apply_dead_zone([0.05, -0.0501, 1.0, -1.0, math.nan])
     assert axes[0] == 0.0 and -0.001 < axes[1] < 0.0
     np.testing.assert_array_equal(axes[2:], [1.0, -1.0, 0.0])
 

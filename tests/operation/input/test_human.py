@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.control.operator_model import CameraMotion, OperatorModel, StickDeflection, begin, draw_person, steer
+from wakewise.control.operator_model import CameraMotion, OperatorModel, StickDeflection, begin, sample_operator, steer
 from wakewise.control.operator_population import OperatorPopulation
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
@@ -34,7 +34,7 @@ PLAIN = {
 
 
 def person(seed: int = 3, **changes) -> OperatorModel:
-    return draw_person(seed, STICKS, OperatorPopulation(**changes))
+    return sample_operator(seed, STICKS, OperatorPopulation(**changes))
 
 
 def view(place=(0.0, 0.0, 0.0), heading=0.0, velocity=(0.0, 0.0, 0.0), turn=0.0) -> CameraMotion:
@@ -103,7 +103,7 @@ def test_a_vehicle_that_coasts_for_ever_is_steered_with_less_gain():
     """Inertia beyond the lead that can be made costs phase, so the crossover is lower, at the same margin."""
     sticks = StickDeflection(inertia=STICKS.inertia, drag=np.zeros(4), full=STICKS.full, lag_s=STICKS.lag_s)
     plain = {"phase_margin_deg": (30.0, 30.0), "lead_most_s": (4.0, 4.0)}
-    who, coasting = person(1, **plain), draw_person(1, sticks, OperatorPopulation(**plain))
+    who, coasting = person(1, **plain), sample_operator(1, sticks, OperatorPopulation(**plain))
     late_s, omega = coasting.delay_s + coasting.video_s + 0.1, coasting.crossover_rad_s[:2]
     assert np.all(omega < who.crossover_rad_s[:2]) and np.all(omega * 4.0 > 1.0)
     np.testing.assert_allclose(np.degrees(np.arctan(omega * 4.0) - omega * late_s), 30.0, atol=1e-6)

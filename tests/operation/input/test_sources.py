@@ -7,14 +7,14 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.operation.teleop.input.control_log import ControlLog
 from wakewise.operation.teleop.input.script import ScriptedInput
-from wakewise.operation.teleop.input.sources import hands_from
+from wakewise.operation.teleop.input.sources import read_input
 
 
 def test_the_ending_says_how_a_file_is_read(tmp_path):
     """YAML is a script, a table the record of a flight; anything else is refused with what would do."""
     (tmp_path / "sticks.yml").write_text("- {at_s: 0, right: 1}")
     (tmp_path / "sticks.csv").write_text("time_s,forward,right,down,turn,tilt\n0,0,1,0,0,0\n")
-    assert isinstance(hands_from(tmp_path / "sticks.yml"), ScriptedInput)
-    assert isinstance(hands_from(tmp_path / "sticks.csv"), ControlLog)
+    assert isinstance(read_input(tmp_path / "sticks.yml"), ScriptedInput)
+    assert isinstance(read_input(tmp_path / "sticks.csv"), ControlLog)
     with pytest.raises(InputError, match=r"\.yaml, \.yml, \.parquet, \.csv"):
-        hands_from(Path("sticks.txt"))
+        read_input(Path("sticks.txt"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.operation.teleop.arbitration import BRAKING_M_S2, answered
+from wakewise.operation.teleop.arbitration import BRAKING_M_S2, filtered_velocity
 
 DT_S = 0.02
 
@@ -13,7 +13,7 @@ def led(v, wish, until=lambda v: False):
     v, a, speeds, jerk = np.array(v), np.zeros(3), [], 0.0
     while not (np.array_equal(v, wish) or until(v)):
         before = a
-        v, a = answered(v, a, np.array(wish), DT_S)
+        v, a = filtered_velocity(v, a, np.array(wish), DT_S)
         jerk = max(jerk, np.linalg.norm(a - before) / DT_S)
         speeds.append(np.linalg.norm(v))
     return speeds, jerk
@@ -37,6 +37,6 @@ def test_a_chattering_stick_is_nothing_to_run_after():
     """Pushes to and fro of 0.05 m/s, each a fifth of a second, change the velocity by less than 0.1 m/s2 rms."""
     v, a, changes = np.zeros(3), np.zeros(3), []
     for k in range(500):
-        v, a = answered(v, a, np.array([0.05 * (-1.0) ** (k // 10), 0.0, 0.0]), DT_S)
+        v, a = filtered_velocity(v, a, np.array([0.05 * (-1.0) ** (k // 10), 0.0, 0.0]), DT_S)
         changes.append(a[0])
     assert np.sqrt(np.mean(np.square(changes[50:]))) < 0.1

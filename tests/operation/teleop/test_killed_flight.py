@@ -11,7 +11,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.operation import LiveFlight, read_exposures, read_scenario
 from wakewise.operation.flight_log import PARTS
-from wakewise.operation.teleop.live_folder import gather
+from wakewise.operation.teleop.live_folder import collect_flight
 
 pytestmark = pytest.mark.slow
 
@@ -59,8 +59,8 @@ def test_a_killed_flight_keeps_its_photographs(tmp_path: Path) -> None:
     parts = read_scenario(folder / "scenario.yaml").parts()
     with pytest.raises(InputError, match="scan --resume"):
         LiveFlight(parts, folder=folder)
-    assert gather(parts, folder)
+    assert collect_flight(parts, folder)
     steps, exposures = pl.read_parquet(folder / "steps.parquet"), read_exposures(folder / "exposures.npz")
     assert [e.time_s for e in exposures] == pytest.approx([0.12, 0.42]) and steps["time_s"][-1] == pytest.approx(0.42)
     assert int(steps["exposing"].sum()) == 2 and pl.read_csv(folder / "planned.csv").height == 2
-    assert not gather(parts, folder) and not (folder / PARTS).exists()
+    assert not collect_flight(parts, folder) and not (folder / PARTS).exists()

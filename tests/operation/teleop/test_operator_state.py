@@ -11,7 +11,7 @@ from wakewise.operation.teleop.operator_state import (
     OperatorState,
     TrackingWeightMeaning,
     meaning,
-    regime,
+    tracking_regime,
 )
 
 
@@ -60,7 +60,7 @@ def test_buttons_step_the_gain_within_its_range():
 
 def test_regimes_are_the_papers():
     """Above 10 transit, 5 work, below 2 delicate."""
-    assert [regime(x) for x in (0.5, 1.9, 2.0, 5.0, 10.0, 10.1, 50.0)] == [
+    assert [tracking_regime(x) for x in (0.5, 1.9, 2.0, 5.0, 10.0, 10.1, 50.0)] == [
         "delicate",
         "delicate",
         "work",

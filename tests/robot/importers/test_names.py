@@ -7,7 +7,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.robot.importers import import_vehicle
-from wakewise.robot.importers.names import contradictions, vote
+from wakewise.robot.importers.names import compare_names, contradictions
 from wakewise.robot.vehicles import VehicleDraft
 
 PLACES = np.array([[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]])
@@ -122,7 +122,7 @@ def test_names_that_contradict_the_frame_are_questioned(tmp_path: Path, way: str
 def test_words_that_only_look_like_sides_say_nothing() -> None:
     """A left-handed propeller, a support or a serial port is on no side; R beside F is the rear."""
     for names in (["left_handed", "right_handed"], ["support_1", "transport_2"], ["F", "R"], ["thruster1", "T2"]):
-        assert vote(names, PLACES[:2], AXES[:2]).frame == ""
+        assert compare_names(names, PLACES[:2], AXES[:2]).frame == ""
     assert contradictions(["T1", "T2"], PLACES[:2], AXES[:2]) == []
 
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from wakewise.core.errors import InputError
 from wakewise.robot.importers import compare_with, import_vehicle
-from wakewise.robot.importers.wrench_rows import order_in_comment, order_of, told_order
+from wakewise.robot.importers.wrench_rows import order_in_comment, order_of, parse_order
 from wakewise.robot.vehicles import VehicleDraft
 from wakewise.robot.vehicles.draft import ThrusterDraft
 from wakewise.robot.vehicles.mixing import ARDUSUB_VECTORED, ARDUSUB_VECTORED_6DOF, compare_with_ardusub
@@ -128,7 +128,7 @@ def test_a_moment_along_its_own_force_is_refused(tmp_path: Path) -> None:
 def test_rows_that_name_no_six_are_refused(tmp_path: Path, rows: str) -> None:
     with pytest.raises(InputError, match="must name x, y, z, roll, pitch, yaw once each"):
         imported(tmp_path, f"tam: {WRENCH.tolist()}", rows=rows)
-    assert told_order(None) is None and order_of(["a"] * 6) is None
+    assert parse_order(None) is None and order_of(["a"] * 6) is None
 
 
 def test_six_words_in_a_comment_are_an_order() -> None:

@@ -11,7 +11,7 @@ from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import (
     ThrusterDraft,
     VehicleDraft,
-    blanks,
+    blank_fields,
     completed,
     draft_yaml,
     load_draft,
@@ -44,7 +44,7 @@ def _filled_in(line: str) -> str:
 @pytest.mark.parametrize("draft", [BARE, OWN, load_draft("orca"), replace(load_draft("paper"), mass_kg=None)])
 def test_blanks_that_are_filled_in_make_a_whole_vehicle(draft: VehicleDraft) -> None:
     """Whatever is missing has a line; unfilled it is a comment, so the file reads as the draft."""
-    text = draft_yaml(draft, blanks(draft))
+    text = draft_yaml(draft, blank_fields(draft))
     again = parse_vehicle(text, "x.yaml", "x")
     assert again.missing == draft.missing != ()
     whole = parse_vehicle(filled_in(text), "x.yaml", "x")
@@ -54,7 +54,7 @@ def test_blanks_that_are_filled_in_make_a_whole_vehicle(draft: VehicleDraft) -> 
 
 
 def test_a_blank_has_unit_meaning_and_a_range_of_vehicles_of_its_mass() -> None:
-    lines = blanks(OWN)["damping"]
+    lines = blank_fields(OWN)["damping"]
     quadratic = next(line for line in lines if "quadratic_N_s2_m2" in line)
     assert quadratic.startswith(
         "#  quadratic_N_s2_m2: [_, _, _]  # N s2/m2; surge, sway, heave; the library's vehicles"
@@ -64,7 +64,7 @@ def test_a_blank_has_unit_meaning_and_a_range_of_vehicles_of_its_mass() -> None:
 
 
 def test_blanks_that_were_left_blank_are_all_named_at_once() -> None:
-    text = re.sub(r"^#(\w|  \w)", r"\1", draft_yaml(OWN, blanks(OWN)), flags=re.MULTILINE)
+    text = re.sub(r"^#(\w|  \w)", r"\1", draft_yaml(OWN, blank_fields(OWN)), flags=re.MULTILINE)
     with pytest.raises(InputError) as caught:
         parse_vehicle(text, "x.yaml", "x")
     said = str(caught.value)

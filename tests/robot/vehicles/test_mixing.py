@@ -19,7 +19,7 @@ from wakewise.robot.vehicles import (
     load_vehicle,
     mixing_disagreements,
 )
-from wakewise.robot.vehicles.mixing import FLU, about, compare_either_frame
+from wakewise.robot.vehicles.mixing import FLU, compare_either_frame, moments_about
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[4] / "shared" / "data"))
 LEVEL = {"bluerov2-heavy": 0.085, "bluerov2-heavy-gazebo": 0.0, "bluerov2-heavy-wu": 0.0, "paper": 0.050}
@@ -126,7 +126,7 @@ def test_a_reversed_thruster_another_order_and_another_point_are_explained() -> 
     said = " ".join(compare_matrix(heavy, true[:, order], "b").notes)
     assert "in the order 4, 2, 3, 1, 5, 6, 8, 7 only 0 entries disagree" in said
     point = np.array([0.01, -0.02, 0.03])
-    said = " ".join(compare_matrix(heavy, about(true, point), "c").notes)
+    said = " ".join(compare_matrix(heavy, moments_about(true, point), "c").notes)
     assert "moments taken about (0.010, -0.020, 0.030) m only 0 entries disagree" in said
 
 
@@ -142,7 +142,7 @@ def test_moments_about_another_point_follow_the_lever() -> None:
     """Moving the reference point by r takes r x F from every moment."""
     heavy = load_vehicle("bluerov2-heavy")
     point = np.array([0.1, 0.2, -0.3])
-    moved = about(heavy.allocation_matrix, point)
+    moved = moments_about(heavy.allocation_matrix, point)
     for j, t in enumerate(heavy.thrusters):
         assert np.allclose(moved[3:, j], np.cross(t.p_BT_m - point, t.axis_B), atol=1e-15)
 

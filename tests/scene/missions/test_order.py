@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from wakewise.core.geometry import Pose, quat_from_matrix
 from wakewise.scene.missions import MissionSettings, Route, TankBounds, check_clearance, plan_route
 from wakewise.scene.missions.orbit import R_FC, layered_orbits
-from wakewise.scene.missions.order import LEAST_CURRENT_M_S, downstream_first
+from wakewise.scene.missions.order import LEAST_CURRENT_M_S, order_downstream_first
 
 CENTRE = np.array([0.0, 0.0, 1.43])
 PLAIN = MissionSettings()
@@ -51,7 +51,7 @@ def test_settling_approach_and_climbs_lie_downstream(heading: float) -> None:
 def test_the_first_half_of_an_orbit_goes_up_against_the_current(heading: float) -> None:
     """Until it passes upstream, the camera moves against the current on every orbit."""
     flow = current(heading)
-    for orbit in downstream_first(layered_orbits(PLAIN), flow):
+    for orbit in order_downstream_first(layered_orbits(PLAIN), flow):
         bearing = np.mod(orbit.azimuths_rad - heading, 2 * math.pi)
         up = orbit.azimuths_rad[bearing < math.pi - 1e-9]
         along = np.stack([-np.sin(up), np.cos(up)], axis=1)

@@ -11,7 +11,7 @@ from wakewise.core.geometry import Pose
 from wakewise.scene.missions import CameraAim, CandidateViews, TankBounds, patches_of, reachable_views
 from wakewise.scene.missions.clearance import gaps_of
 from wakewise.scene.missions.orbit import camera_pose
-from wakewise.scene.missions.reachability import place_of, way_words
+from wakewise.scene.missions.reachability import direction_words, place_of
 from wakewise.scene.targets import Mesh
 from wakewise.vision.imaging import PinholeCamera
 
@@ -96,11 +96,11 @@ def test_a_place_is_told_back() -> None:
 )
 def test_words_are_those_of_someone_who_looks_at_the_target(to: Pose, words: str) -> None:
     """Left and right are the viewer's; up, down, closer, back and the camera's pitch are said where they matter."""
-    assert way_words(at(0), to, CENTRE) == words
+    assert direction_words(at(0), to, CENTRE) == words
 
 
 def test_left_is_left_in_the_picture() -> None:
     """Who goes where the words say left has moved along the picture's own left."""
     here, there = at(0), at(20)
-    assert "left" in way_words(here, there, CENTRE)
+    assert "left" in direction_words(here, there, CENTRE)
     assert (there.p_m - here.p_m) @ here.R[:, 0] < 0.0

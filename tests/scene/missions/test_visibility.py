@@ -11,7 +11,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.scene.missions import SurfacePatches, VisibilityCriteria, patches_of
 from wakewise.scene.missions.orbit import camera_pose
-from wakewise.scene.missions.visibility import _nearest, well_shown
+from wakewise.scene.missions.visibility import _nearest, well_visible
 from wakewise.scene.targets import Mesh, coral, place_on_bed
 from wakewise.vision.evaluation import SurfaceSamples, count_views
 from wakewise.vision.imaging import PinholeCamera
@@ -45,7 +45,7 @@ def test_rays_see_the_same(azimuth_deg: float, elevation_deg: float) -> None:
     X_WC = at(azimuth_deg, elevation_deg)
     surface = SurfaceSamples(points_m=PATCHES.points_W_m, normals=PATCHES.normals)
     rays = count_views(surface, CORAL.mesh, X_WC.p_m[None], min_cosine=math.cos(NEED.incidence_rad)) > 0
-    shown = well_shown(PATCHES, X_WC, CAMERA, NEED)
+    shown = well_visible(PATCHES, X_WC, CAMERA, NEED)
     assert (shown != rays).mean() < 0.01
     assert rays.sum() > 500
 
@@ -55,7 +55,7 @@ def test_nothing_that_faces_away_is_shown() -> None:
     X_WC = at(30, 30)
     way = X_WC.p_m - PATCHES.points_W_m
     cosine = np.einsum("ij,ij->i", way, PATCHES.normals) / np.linalg.norm(way, axis=1)
-    assert cosine[well_shown(PATCHES, X_WC, CAMERA, NEED)].min() >= math.cos(NEED.incidence_rad)
+    assert cosine[well_visible(PATCHES, X_WC, CAMERA, NEED)].min() >= math.cos(NEED.incidence_rad)
 
 
 def test_what_stands_behind_something_is_not_shown() -> None:
@@ -63,7 +63,7 @@ def test_what_stands_behind_something_is_not_shown() -> None:
     wall, screen = plate(0.6, 0.1), plate(0.4, 0.04)
     both = trimesh.util.concatenate([wall, screen])
     patches = patches_of(Mesh(both.vertices, both.faces), None, 300, 10)
-    shown = well_shown(patches, Pose(np.zeros(3)), CAMERA, NEED)
+    shown = well_visible(patches, Pose(np.zeros(3)), CAMERA, NEED)
     back = patches.points_W_m[:, 2] > 0.5
     # The plate's edge, seen from the camera, falls on the wall at 4 cm times 0.6 / 0.4.
     edge = np.abs(patches.points_W_m[:, :2]).max(axis=1) - 0.06
@@ -77,7 +77,7 @@ def test_only_what_is_in_the_picture_is_shown() -> None:
     wall = plate(0.5, 0.8)
     patches = patches_of(Mesh(wall.vertices, wall.faces), None, 300, 10)
     need = replace(NEED, margin=0.05, incidence_rad=math.radians(80.0))
-    shown = well_shown(patches, Pose(np.zeros(3)), CAMERA, need)
+    shown = well_visible(patches, Pose(np.zeros(3)), CAMERA, need)
     pixels = CAMERA.project(patches.points_W_m)
     inside = ((pixels >= 64) & (pixels <= np.array([1280, 960]) - 64)).all(axis=1)
     assert (shown == inside).all()
@@ -95,16 +95,16 @@ def test_size_does_not_matter_when_the_pixel_grows_with_it() -> None:
         shield_off_m=2 * PATCHES.shield_off_m,
     )
     X_WC = at(75, 35)
-    shown = well_shown(larger, Pose(2 * X_WC.p_m, X_WC.q), CAMERA, replace(NEED, pixel_m=2 * NEED.pixel_m))
-    assert (shown != well_shown(PATCHES, X_WC, CAMERA, NEED)).sum() <= 1
+    shown = well_visible(larger, Pose(2 * X_WC.p_m, X_WC.q), CAMERA, replace(NEED, pixel_m=2 * NEED.pixel_m))
+    assert (shown != well_visible(PATCHES, X_WC, CAMERA, NEED)).sum() <= 1
 
 
 def test_nothing_is_shown_behind_the_camera_or_from_within() -> None:
     """A camera that looks away shows nothing; nor does one from which pixels are too large."""
     X_WC = at(0, 20)
     away = Pose.from_matrix(X_WC.R @ np.diag([-1.0, 1.0, -1.0]), X_WC.p_m)
-    assert not well_shown(PATCHES, away, CAMERA, NEED).any()
-    assert not well_shown(PATCHES, at(0, 20, 1.8), CAMERA, NEED).any()
+    assert not well_visible(PATCHES, away, CAMERA, NEED).any()
+    assert not well_visible(PATCHES, at(0, 20, 1.8), CAMERA, NEED).any()
 
 
 def slow_nearest(shield: np.ndarray, f: float, left: float, top: float, step: float, grid: int) -> np.ndarray:

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from wakewise.core.errors import InputError
-from wakewise.scene.targets import Mesh, coral, delicacy
+from wakewise.scene.targets import Mesh, coral, find_fragility
 from wakewise.scene.targets.fragility import SHARP_PER_M, THIN_M, curvature_per_m, thickness_m
 
 
@@ -69,9 +69,9 @@ def test_a_plate_is_as_thick_as_it_is_at_its_rim_too():
 
 def test_scores_follow_thickness_and_curvature():
     """A thick ball is robust, a tiny one delicate, and the bounds of the module say where between."""
-    assert np.all(delicacy(ball(0.05)).score == 0.0)
-    assert np.all(delicacy(ball(0.001)).score == 1.0)
-    found = delicacy(ball(0.0055))
+    assert np.all(find_fragility(ball(0.05)).score == 0.0)
+    assert np.all(find_fragility(ball(0.001)).score == 1.0)
+    found = find_fragility(ball(0.0055))
     thin = (THIN_M[1] - 0.011) / (THIN_M[1] - THIN_M[0])
     sharp = (1 / 0.0055 - SHARP_PER_M[0]) / (SHARP_PER_M[1] - SHARP_PER_M[0])
     np.testing.assert_allclose(found.score, 1 - (1 - thin) * (1 - sharp), atol=0.03)
@@ -82,20 +82,20 @@ def test_scores_do_not_depend_on_where_and_how_the_target_stands():
     mesh, _ = spun(lambda z: 0.003 + 0.1 * z, 0.05)
     turn = trimesh.transformations.random_rotation_matrix(np.array([0.1, 0.5, 0.8]))[:3, :3]
     moved = Mesh(mesh.vertices_m @ turn.T + [3.0, -2.0, 1.5], mesh.faces)
-    np.testing.assert_allclose(delicacy(moved).score, delicacy(mesh).score, atol=0.02)
+    np.testing.assert_allclose(find_fragility(moved).score, find_fragility(mesh).score, atol=0.02)
 
 
 def test_marks_count_where_they_are_higher():
     """The higher of found and marked."""
     mesh = ball(0.05)
     marked = np.where(mesh.vertices_m[:, 2] > 0.03, 0.7, 0.0)
-    np.testing.assert_array_equal(delicacy(mesh, marked).score, marked)
+    np.testing.assert_array_equal(find_fragility(mesh, marked).score, marked)
 
 
 def test_tips_of_a_branching_coral_are_more_delicate_than_its_trunk():
     """What stands out high and far is; the foot is not; all scores are finite and within 0 and 1."""
     mesh = coral("branching")
-    found = delicacy(mesh)
+    found = find_fragility(mesh)
     z = mesh.vertices_m[:, 2]
     trunk = (z > 0.005) & (z < 0.03)
     assert np.median(found.score[trunk]) < 0.05
@@ -107,10 +107,10 @@ def test_tips_of_a_branching_coral_are_more_delicate_than_its_trunk():
 def test_marks_of_another_mesh_or_out_of_range_are_refused(marked):
     """One finite score from 0 to 1 per vertex."""
     with pytest.raises(InputError, match="from 0 to 1"):
-        delicacy(ball(0.05), marked)
+        find_fragility(ball(0.05), marked)
 
 
 def test_a_mesh_without_area_is_refused():
     """Every corner at one place."""
     with pytest.raises(InputError, match="zero area"):
-        delicacy(Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]])))
+        find_fragility(Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]])))

@@ -7,16 +7,16 @@ import pytest
 
 from wakewise.simulation.tank.grains import friction_table_m_s, friction_velocity_m_s, settling_speed_m_s
 from wakewise.simulation.tank.sediment_motion import (
-    carry,
+    advect_particles,
     cells_to_look_at,
-    due,
-    feel,
-    lift,
+    deposit,
+    entrain,
     mix,
     moved_cells,
-    settle,
+    particles_to_sample,
     shared_among_nodes,
     stirred_cells,
+    update_friction,
 )
 
 LOW, CELL, SHAPE, DEPTH_M = np.array([-0.5, -0.4]), np.array([0.05, 0.05]), (20, 16), 0.6
@@ -47,7 +47,7 @@ def test_carrying_is_its_twin():
     start, rng = cloud()
     u, dt, sinks = 0.2 * rng.normal(size=start.shape), 0.1, 0.004
     found = start.copy()
-    landed = carry(found, u, sinks, dt, LOW, DEPTH_M)
+    landed = advect_particles(found, u, sinks, dt, LOW, DEPTH_M)
     for k, (x, y, z) in enumerate(start):
         height = DEPTH_M - z
         down = u[k, 2]  # z points down
@@ -133,7 +133,7 @@ def test_a_bed_feels_the_water_that_was_looked_at():
     before = star.copy()
     cells = np.argwhere(~kept)[::3]
     u = rng.normal(0.0, 0.2, (len(cells) + 1, 3))
-    feel(star, kept, cells, u, friction_table_m_s(0.01, 20e-6))
+    update_friction(star, kept, cells, u, friction_table_m_s(0.01, 20e-6))
     law = friction_velocity_m_s(np.hypot(u[:, 0], u[:, 1]), 0.01, 20e-6)
     expected = np.where(kept, before, law[0])
     expected[tuple(cells.T)] = law[1:]
@@ -159,7 +159,7 @@ def test_lifting_is_its_twin(firm_kg_m2):
         most = (loose if loose > 1e-9 else before[i, j]) * area_m2
         if particles >= 1.0:
             expected.append((i, j, min(math.floor(particles) * birth_kg, most)))
-    lifted = lift(cells, drawn, birth_kg, area_m2, firm_kg_m2, bed)
+    lifted = entrain(cells, drawn, birth_kg, area_m2, firm_kg_m2, bed)
     assert np.allclose(lifted, expected, rtol=1e-13)
     assert (before - bed).sum() * area_m2 == pytest.approx(lifted[:, 2].sum(), rel=1e-9)
     assert bed.min() >= 0.0
@@ -168,7 +168,7 @@ def test_lifting_is_its_twin(firm_kg_m2):
 def test_particles_are_looked_at_when_they_have_gone_far_or_long():
     """The ages of the others go on, and those found start anew."""
     u, age = np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.02, 0.0]]), np.array([0.1, 0.25, 0.1])
-    assert due(u, age, 0.06, 0.015, 0.3).tolist() == [0, 1]
+    assert particles_to_sample(u, age, 0.06, 0.015, 0.3).tolist() == [0, 1]
     assert age == pytest.approx([0.0, 0.0, 0.16])
 
 
@@ -186,7 +186,7 @@ def test_what_lands_lies_on_the_bed_and_the_rest_closes_ranks():
     for (x, y, _), kg in zip(place[landed], mass[landed], strict=True):
         expected[cell_of(x, y)] += kg / CELL.prod()
     then = [array[~landed] for array in (place, mass, u, age)]
-    left = settle(landed, place, mass, u, age, bed, LOW, CELL)
+    left = deposit(landed, place, mass, u, age, bed, LOW, CELL)
     assert bed == pytest.approx(expected, rel=1e-12)
     for now, kept in zip((place, mass, u, age), then, strict=True):
         assert np.array_equal(now[:left], kept)
@@ -199,7 +199,7 @@ def test_still_water_lets_grains_sink_at_their_speed(grain_m):
     for dt in (0.05, 0.2):
         place = np.array([[0.0, 0.0, 0.05]])
         for _ in range(round(10.0 / dt)):
-            carry(place, np.zeros((1, 3)), sinks, dt, LOW, DEPTH_M)
+            advect_particles(place, np.zeros((1, 3)), sinks, dt, LOW, DEPTH_M)
         assert place[0, 2] - 0.05 == pytest.approx(10.0 * sinks, rel=1e-9)
 
 
@@ -207,7 +207,7 @@ def test_water_alone_carries_no_grain_into_the_bed():
     """However fast it sinks onto the bed, grains without weight come near and never land."""
     place = np.column_stack([np.zeros((5, 2)), np.linspace(0.1, 0.5, 5)])
     for _ in range(4):
-        assert not carry(place, np.tile([0.0, 0.0, 0.3], (5, 1)), 0.0, 0.05, LOW, DEPTH_M).any()
+        assert not advect_particles(place, np.tile([0.0, 0.0, 0.3], (5, 1)), 0.0, 0.05, LOW, DEPTH_M).any()
     assert np.all(place[:, 2] <= DEPTH_M)
 
 
@@ -215,7 +215,7 @@ def test_deposition_is_the_settling_flux():
     """Of an even cloud the share w_s dt / depth lands in a step, within what chance leaves."""
     rng, sinks, dt = np.random.default_rng(5), 0.02, 0.5
     place = rng.uniform([-0.5, -0.4, 0.0], [0.5, 0.4, DEPTH_M], (100000, 3))
-    landed = carry(place, np.zeros_like(place), sinks, dt, LOW, DEPTH_M)
+    landed = advect_particles(place, np.zeros_like(place), sinks, dt, LOW, DEPTH_M)
     assert landed.mean() == pytest.approx(sinks * dt / DEPTH_M, rel=0.03)
 
 

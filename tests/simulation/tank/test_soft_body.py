@@ -15,10 +15,10 @@ from wakewise.simulation.tank.soft_body import (
     UnanchoredTarget,
     check_sway,
     drag_N,
+    integrate_modes,
     slide_m_s,
-    standing_m,
+    static_deflection_m,
     substeps,
-    swing,
 )
 
 WATER = 1000.0
@@ -76,7 +76,7 @@ def test_a_stream_bends_an_even_rod_by_w_l4_over_8_ei(speed):
     flesh = tissue()
     target = rod(R, R, LENGTH)
     sway = BendingModes.of(target, flesh, WATER)
-    tips = standing_m(SurfaceElements.of(target, sway), sway, flesh.drag * WATER, np.array([speed, 0.0, 0.0]))
+    tips = static_deflection_m(SurfaceElements.of(target, sway), sway, flesh.drag * WATER, np.array([speed, 0.0, 0.0]))
     load = 0.5 * WATER * flesh.drag * 2 * R * speed**2
     way = load * LENGTH**4 / (8 * 1e6 * np.pi / 4 * R**4)
     assert way < 0.1 * LENGTH
@@ -179,7 +179,7 @@ def test_the_step_agrees_with_a_fine_runge_kutta():
     )
     found = []
     for before, after in pairwise(water):
-        swing(
+        integrate_modes(
             tips, speeds, force, modes, sway.axes_W, np.zeros((1, 2)), pieces.stem, pieces.areas_m2, pieces.shape,
             pieces.slope, pieces.drop, np.tile(before, (300, 1)), np.tile(after, (300, 1)), WATER * flesh.drag, DT,
             substeps(sway, DT),

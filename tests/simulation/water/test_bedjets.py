@@ -12,9 +12,9 @@ from wakewise.simulation.water.bedjets import (
     WALL_JET_SPEED,
     WALL_JET_SPREAD,
     WallJetRings,
-    coarsened,
     grown,
     layer_speed,
+    merged_rings,
     packed_rings,
     planes_velocity,
     ring_strength,
@@ -40,7 +40,7 @@ def _steady(M=1e-3, seconds=40.0, dt_s=0.05):
     for _ in range(round(seconds / dt_s)):
         rings, _ = grown(rings, np.zeros(3), dt_s)
         new = rings_from_strikes(np.array([[0.0, 0.0, 1.4]]), np.array([[0.0, 0.0, M * dt_s]]), np.array([0.03]))
-        rings = coarsened(rings.joined(new))
+        rings = merged_rings(rings.joined(new))
     return rings
 
 
@@ -138,7 +138,7 @@ def test_merging_keeps_impulse_its_direction_and_the_flow():
         rng.uniform(1, 9, n) * 1e-4,
         rng.uniform(0, 0.5, (n, 2)),
     )
-    fewer = coarsened(rings)
+    fewer = merged_rings(rings)
     assert fewer.count < 0.7 * n
     for kept in (lambda r: r.impulse_m4_s, lambda r: r.impulse_m4_s / r.radius_m):
         assert kept(fewer).sum() == pytest.approx(kept(rings).sum(), rel=1e-12)
@@ -157,7 +157,7 @@ def test_merging_hardly_changes_the_flow():
         rng.uniform(0, 0.3, (n, 2)),
     )
     points = rng.uniform([-0.8, -0.8, 1.2], [0.8, 0.8, 1.5], (2000, 3))
-    before, after = (ring_velocity(points, r, BED_Z_M) for r in (rings, coarsened(rings)))
+    before, after = (ring_velocity(points, r, BED_Z_M) for r in (rings, merged_rings(rings)))
     error = np.linalg.norm(after - before, axis=1)
     assert np.sqrt((error**2).mean()) < 0.1 * np.sqrt((before**2).sum(axis=1).mean())
     assert error.max() < 5e-3
@@ -233,7 +233,7 @@ def test_a_thicker_jet_carries_the_same_momentum(stretch, least_m):
         for _ in range(1600):
             rings, _ = grown(rings, np.zeros(3), dt_s, least, widening)
             new = rings_from_strikes(np.array([[0.0, 0.0, 1.4]]), np.array([[0.0, 0.0, M * dt_s]]), np.array([0.03]))
-            rings = coarsened(rings.joined(new))
+            rings = merged_rings(rings.joined(new))
         packed = packed_rings(rings, least, stretch=widening)
         frame = np.concatenate([np.zeros(3), np.eye(3).ravel(), [BED_Z_M, widening]])
         points = np.column_stack([np.linspace(0.25, 0.45, 21), np.zeros(21), np.full(21, BED_Z_M)])

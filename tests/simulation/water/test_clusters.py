@@ -6,7 +6,7 @@ from wakewise.simulation.water import blocked_sums
 from wakewise.simulation.water.clusters import ImpulseField
 from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.induction import impulse_velocity
-from wakewise.simulation.water.space_order import in_space
+from wakewise.simulation.water.space_order import spatial_order
 
 
 def _jets():
@@ -34,7 +34,7 @@ def test_clusters_are_right_to_one_percent():
     """Against the sum one by one in double precision: the error's rms is within 1 % of the speed's."""
     sources = _jets()
     points = np.random.default_rng(0).uniform([-1, -1, 0.5], [1, 1, 1.5], (2000, 3))
-    points = points[in_space(points)]
+    points = points[spatial_order(points)]
     exact = impulse_velocity(points, *sources, exact=True)
     error = ImpulseField.of(*sources).velocity(points) - exact
     assert ImpulseField.of(*sources).clusters > 20

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.simulation.water.bedjets import WallJetRings
-from wakewise.simulation.water.colliding_jets import turn_aside
+from wakewise.simulation.water.colliding_jets import deflect_colliding
 from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.parcels import Parcels
 from wakewise.simulation.water.walljets import JetPlanes
@@ -27,7 +27,7 @@ def _met(impulses, gap=0.1, sigma=0.05, planes=None, layers=None, rings=0):
     ).with_room(4)
     planes = planes or JetPlanes.of(ROOM)
     layers = layers or WallJetRings(np.zeros((8, 2)), np.ones(8), np.zeros(8), np.zeros((8, 2))).layers()
-    count, rings, taken = turn_aside(jets, 2, 4, planes, len(ROOM.faces), layers, rings)
+    count, rings, taken = deflect_colliding(jets, 2, 4, planes, len(ROOM.faces), layers, rings)
     return Parcels.of(jets, count), layers, rings, taken, planes
 
 

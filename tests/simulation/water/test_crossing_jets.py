@@ -8,7 +8,7 @@ import pytest
 from wakewise.simulation.lattice import find_case, load_mean_field
 from wakewise.simulation.lattice.crossing import crossing_place, load_crossing
 from wakewise.simulation.lattice.meanfield import DATA
-from wakewise.simulation.water.crossing_jets import RAYS, fan_out, ray_azimuths
+from wakewise.simulation.water.crossing_jets import RAYS, ray_azimuths, spread_crossing_jets
 from wakewise.simulation.water.parcels import Parcels
 from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.simulation.water.water import Water
@@ -56,7 +56,7 @@ def test_a_crossing_keeps_momentum(angle_deg, weaker):
     """The impulse of rays and rest is that of the two before, to rounding, however strong and at whatever angle."""
     jets = _pair(angle_deg, (1e-3, weaker))
     before = jets.impulse[:2].sum(axis=0)
-    count, met = fan_out(jets, 2, STREAMS, 5)
+    count, met = spread_crossing_jets(jets, 2, STREAMS, 5)
     assert met == 6 and count == RAYS + (weaker < 1e-3)
     assert jets.impulse[:count].sum(axis=0) == pytest.approx(before, abs=1e-15)
     out_of_plane = jets.impulse[:count, 2]
@@ -68,7 +68,7 @@ def test_rays_run_out_in_the_plane_midway():
     risen = []
     for angle_deg in (30.0, 60.0, 90.0, 115.0):
         jets = _pair(angle_deg)
-        count, _ = fan_out(jets, 2, STREAMS, 0)
+        count, _ = spread_crossing_jets(jets, 2, STREAMS, 0)
         turn = 0.5 * math.radians(angle_deg)
         normal = np.array([math.sin(turn), -math.cos(turn), 0.0])
         assert np.abs(jets.impulse[:count] @ normal).max() < 1e-15
@@ -86,14 +86,14 @@ def test_others_do_not_cross(angle_deg, gap, streams):
     """They go on as they were."""
     jets = _pair(angle_deg, gap=gap, streams=streams)
     kept = jets.impulse[:2].copy()
-    assert fan_out(jets, 2, STREAMS, 0) == (2, 0)
+    assert spread_crossing_jets(jets, 2, STREAMS, 0) == (2, 0)
     assert np.array_equal(jets.impulse[:2], kept)
 
 
 def test_without_room_a_crossing_waits():
     """Where the rays would not fit, the jets are left as they are."""
     jets = _pair(90.0, more=-1)
-    assert fan_out(jets, 2, STREAMS, 0) == (2, 0)
+    assert spread_crossing_jets(jets, 2, STREAMS, 0) == (2, 0)
 
 
 def _crossing(width, points_D, name="crossing"):

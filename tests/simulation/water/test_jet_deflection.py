@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wakewise.simulation.water.blockage import Blockage
-from wakewise.simulation.water.jet_deflection import lead_round, strike_body
+from wakewise.simulation.water.jet_deflection import deflect_velocity, strike_body
 from wakewise.simulation.water.water import Water
 
 SIDE = 0.3
@@ -25,7 +25,7 @@ def wall():
     face = rows._replace(
         points=np.column_stack([0 * y, y, z]), normals=np.tile([-1.0, 0.0, 0.0], (len(y), 1)), piece=1e-4
     )
-    lead_round(face, np.array([-0.03, 0.0, 10.0]), np.ones(3), np.ones(3))  # compiled here, not within an example
+    deflect_velocity(face, np.array([-0.03, 0.0, 10.0]), np.ones(3), np.ones(3))  # compiled here, not within an example
     return face
 
 
@@ -73,7 +73,7 @@ def test_a_parcel_keeps_its_speed_and_turns_by_a_right_angle_at_most(wall, numbe
     x = np.array([-0.03, 0.1 * numbers[0], 10.0 + 0.1 * numbers[1]])
     u, answer = np.array(numbers[3:6]), np.array(numbers[6:9])
     before, free = np.linalg.norm(u), u.copy()
-    lead_round(wall, x, u, answer.copy())
+    deflect_velocity(wall, x, u, answer.copy())
     assert np.linalg.norm(u) == pytest.approx(before, abs=1e-12)
     assert u @ free > -1e-9
     if np.linalg.norm(answer) < 1e-3 * before:
@@ -81,14 +81,14 @@ def test_a_parcel_keeps_its_speed_and_turns_by_a_right_angle_at_most(wall, numbe
     tangent = np.array([0.0, 0.6, 0.8])
     led = tangent.copy()
     # The face looks to -x: an answer that points to +x would draw in.
-    lead_round(wall, x, led, np.array([abs(numbers[6]), 0.0, 0.0]))
+    deflect_velocity(wall, x, led, np.array([abs(numbers[6]), 0.0, 0.0]))
     assert led[0] <= 0.02 * np.linalg.norm(tangent) and led @ tangent > 0.99
 
 
 def test_a_parcel_to_which_the_body_answers_nothing_goes_straight_on(wall):
     """Not even its rounding changes."""
     u = np.array([0.3, -0.2, 0.1])
-    lead_round(wall, np.array([-0.2, 0.0, 10.0]), u, np.zeros(3))
+    deflect_velocity(wall, np.array([-0.2, 0.0, 10.0]), u, np.zeros(3))
     assert np.array_equal(u, [0.3, -0.2, 0.1])
 
 

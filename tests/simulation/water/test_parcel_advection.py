@@ -9,11 +9,11 @@ from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.parcel_advection import (
     EMISSION_SPACING,
     HELD_S,
+    advect_parcels,
     count_sent,
-    drift,
-    due,
+    emit_parcels,
     fade_gusts,
-    send,
+    parcels_to_sample,
     slugs,
 )
 from wakewise.simulation.water.parcels import Parcels
@@ -55,7 +55,7 @@ def _drifted(parcels, u, ambient, dt_s, spreading, room):
     speed = np.empty(parcels.count)
     laws = _laws(spreading, dt_s)
     wake = np.zeros(parcels.count, bool)
-    drift(p.position, p.sigma, p.share, speed, p.diameter, p.disk, u, ambient, p.start, wake, laws, room.walls)
+    advect_parcels(p.position, p.sigma, p.share, speed, p.diameter, p.disk, u, ambient, p.start, wake, laws, room.walls)
     return p.position, p.sigma, p.share, speed
 
 
@@ -109,7 +109,7 @@ def test_young_parcels_are_looked_at_in_every_step_and_slow_ones_now_and_then():
     """What moves by a twentieth of its size is due, so is what was never looked at; nobody waits longer than 0.2 s."""
     flow = np.array([[0.5, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
     held, sigma = np.array([0.0, 0.0, np.inf, 0.0]), np.array([0.03, 0.3, 0.3, 0.005])
-    seen = [due(flow, held, sigma, 0.05).tolist() for _ in range(8)]
+    seen = [parcels_to_sample(flow, held, sigma, 0.05).tolist() for _ in range(8)]
     assert seen[0] == [0, 2, 3]
     assert sum(1 in step for step in seen) == 2 and 1 in seen[round(HELD_S / 0.05) - 1]
     assert all(0 in step for step in seen)
@@ -125,7 +125,7 @@ def test_what_is_sent_lies_where_the_closure_puts_it():
     slug = (np.array([0, 1]), np.array([0, 1]), np.array([0.03, 0.01]), np.array([0.4, 0.3]), np.array([1e-5, 2e-5]))
     jets = Parcels.none().with_room(3)
     noise = np.arange(6.0).reshape(2, 3)
-    assert send(jets, 1, slug, areas, disks, ambient, _laws(PLAIN, dt_s), TankFaces(()).walls, noise) == 3
+    assert emit_parcels(jets, 1, slug, areas, disks, ambient, _laws(PLAIN, dt_s), TankFaces(()).walls, noise) == 3
     D = np.sqrt(4 * areas / math.pi)
     path, sigma = travel(D / math.sqrt(8), D, slug[3], slug[2], PLAIN)
     jet = np.array([[1.0, 0, 0], [0, 0, -1.0]])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.simulation.water.faces import TankFaces
-from wakewise.simulation.water.parcel_advection import drift
+from wakewise.simulation.water.parcel_advection import advect_parcels
 from wakewise.simulation.water.round_jet_closure import (
     CORE_END_D,
     PLAIN,
@@ -119,7 +119,9 @@ def _drifted(parcels, life, wake):
     still, u = np.zeros((n, 3)), np.column_stack([speed, np.zeros((n, 2))])
     laws = np.array([PLAIN.core_spread, PLAIN.spread, 0.17, 0.05, life])
     out = np.empty(n), np.full(n, wake)
-    drift(still.copy(), sigma, np.zeros(n), out[0], D, still, u, still.copy(), start, out[1], laws, TankFaces(()).walls)
+    advect_parcels(
+        still.copy(), sigma, np.zeros(n), out[0], D, still, u, still.copy(), start, out[1], laws, TankFaces(()).walls
+    )
     return sigma
 
 

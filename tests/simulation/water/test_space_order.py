@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.simulation.water.space_order import curve, in_space, sorted_keys
+from wakewise.simulation.water.space_order import curve, sorted_keys, spatial_order
 
 
 def test_the_curve_visits_neighbours():
@@ -24,7 +24,7 @@ def test_keys_are_sorted_and_like_ones_stay():
 def test_the_order_in_space_is_an_order():
     """Every point comes once, and steps between neighbours in the list are short."""
     points = np.random.default_rng(4).uniform(0, 1, (4000, 3))
-    order = in_space(points)
+    order = spatial_order(points)
     assert np.array_equal(np.sort(order), np.arange(4000))
     steps = np.linalg.norm(np.diff(points[order], axis=0), axis=1)
     assert steps.mean() < 0.3 * np.linalg.norm(np.diff(points, axis=0), axis=1).mean()

@@ -81,9 +81,9 @@ def test_photos_that_are_none_are_refused(content: dict[str, bytes], words: list
 def test_a_folder_that_holds_another_trial_is_left_alone(capsys: Capsys) -> None:
     """Running another scenario into the same folder is refused, with the field that differs."""
     from wakewise.operation import load_scenario
-    from wakewise.operation.trial_folder import claim
+    from wakewise.operation.trial_folder import write_or_check_scenario
 
-    claim(Path("result"), load_scenario("quick", None, {}))
+    write_or_check_scenario(Path("result"), load_scenario("quick", None, {}))
     before = Path("result/scenario.yaml").read_bytes()
     line = said(capsys, "scan", "--out", "result", "--seed", "9")
     assert "another trial" in line

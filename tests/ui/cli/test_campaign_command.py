@@ -37,7 +37,7 @@ def cheap_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setitem(definition._WORK, "fly", "pretend:fly")
-    monkeypatch.setattr("wakewise.core.jit.precompile.warm", lambda *_, **__: None)
+    monkeypatch.setattr("wakewise.core.jit.precompile.compile_kernels", lambda *_, **__: None)
     (tmp_path / "small.yaml").write_text(FILE)
     return tmp_path
 
@@ -103,7 +103,7 @@ def test_no_cell_of_a_csv_is_a_formula(cheap_work: Path, capsys: pytest.CaptureF
     Path("small.yaml").write_text(f"{FILE}variations: {{{told}}}\n")
     campaign = definition.load_campaign(Path("small.yaml"))
     open_store(Path("runs/small"))
-    keep_plan(Path("runs/small"), campaign, definition.planned(campaign))
+    keep_plan(Path("runs/small"), campaign, definition.planned_trials(campaign))
     for suffix in ("csv", "parquet"):
         assert command(["campaign", "table", "small.yaml", "--write", f"all.{suffix}", "--json"]) == 0
     capsys.readouterr()

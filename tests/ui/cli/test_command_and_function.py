@@ -122,7 +122,7 @@ def test_a_flight_and_a_single_wrench_have_the_same_weights() -> None:
 
 def test_what_is_printed_at_home_is_what_a_flight_would_do() -> None:
     """A flight's own weights at a pose of its mission give the thrusts of `ww.allocate` with nothing said."""
-    from wakewise.allocation import gentle_allocation
+    from wakewise.allocation import min_wash_allocation
     from wakewise.control import vehicle_layout
     from wakewise.control.thrift import weights_of
     from wakewise.wake import InfluenceModel
@@ -131,7 +131,7 @@ def test_what_is_printed_at_home_is_what_a_flight_would_do() -> None:
     view = InfluenceModel.of(parts.vehicle, parts.region, parts.wake)
     weights = weights_of(parts.control, view.total_weight)
     gram, before = view.gram(parts.start.X_WB), np.zeros(8)
-    flown = gentle_allocation(vehicle_layout(parts.vehicle), np.array(WRENCH), gram, weights, before)
+    flown = min_wash_allocation(vehicle_layout(parts.vehicle), np.array(WRENCH), gram, weights, before)
     asked = ww.allocate(
         parts.vehicle,
         WRENCH,

@@ -2,17 +2,17 @@
 
 import pytest
 
-from wakewise.ui.cli.console import print_json, reasons_once
+from wakewise.ui.cli.console import print_json, unique_reasons
 
 
 def test_figures_that_fail_together_share_a_line() -> None:
     """One reason, one line, figures in the order of the table; a figure that is not asked for stays out."""
     why = {"f_score": "no model", "rmse_mm": "no model", "energy_kJ": "no power on record", "wall_s": "no model"}
-    assert reasons_once(why, ("rmse_mm", "f_score", "energy_kJ")) == [
+    assert unique_reasons(why, ("rmse_mm", "f_score", "energy_kJ")) == [
         "rmse_mm, f_score: no model",
         "energy_kJ: no power on record",
     ]
-    assert reasons_once({}, ("rmse_mm",)) == []
+    assert unique_reasons({}, ("rmse_mm",)) == []
 
 
 def test_what_json_cannot_say_is_not_half_printed(capsys):

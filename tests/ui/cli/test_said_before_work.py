@@ -17,7 +17,7 @@ Capsys = pytest.CaptureFixture[str]
 def nothing_is_compiled(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Work of minutes is a failure here."""
     monkeypatch.setattr(stages, "is_warm", lambda *_: False)
-    monkeypatch.setattr(stages, "warm", lambda *_: pytest.fail("kernels were compiled first"))
+    monkeypatch.setattr(stages, "compile_kernels", lambda *_: pytest.fail("kernels were compiled first"))
     monkeypatch.chdir(tmp_path)
 
 

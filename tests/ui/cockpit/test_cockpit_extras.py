@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from rehearsal import Rehearsal
 
-from wakewise.ui.cockpit.ground_station_listing import OFFER, page_files
+from wakewise.ui.cockpit.ground_station_listing import SERVICE, page_files
 from wakewise.ui.cockpit.server import CockpitServer
 
 # Required and optional keys of each object, as Cockpit's "External Integrations" lists them.
@@ -24,7 +24,7 @@ WIDGET = (
      "useExtensionPathAsBaseUrl": bool},
 )  # fmt: skip
 # BlueOS' ServiceMetadata: what has no default there must be there.
-SERVICE = (
+SERVICE_KEYS = (
     {"name": str, "description": str, "icon": str, "company": str, "version": str, "webpage": str, "api": str},
     {"route": str, "new_page": bool, "extra_query": str, "avoid_iframes": bool, "sanitized_name": str,
      "works_in_relative_paths": bool, "extras": dict},
@@ -40,7 +40,7 @@ def fits(told: dict[str, Any], schema: tuple[dict[str, type], dict[str, type]]) 
 
 def test_the_extras_are_what_cockpit_reads() -> None:
     """One widget with an icon; no action, since what is sent to a bare address has no helm."""
-    told = OFFER.cockpit_extras()
+    told = SERVICE.cockpit_extras()
     fits(told, EXTRAS)
     assert told["targetSystem"] == "Cockpit"
     assert told["actions"] == []
@@ -51,8 +51,8 @@ def test_the_extras_are_what_cockpit_reads() -> None:
 
 def test_the_service_is_what_blueos_reads() -> None:
     """Registered with its extras, at paths that also hold behind BlueOS' own proxy."""
-    told = OFFER.register_service()
-    fits(told, SERVICE)
+    told = SERVICE.register_service()
+    fits(told, SERVICE_KEYS)
     assert told["extras"] == {"cockpit": "/cockpit_extras.json"}
     assert told["works_in_relative_paths"]
 
@@ -60,12 +60,12 @@ def test_the_service_is_what_blueos_reads() -> None:
 def test_every_address_that_is_named_is_served() -> None:
     """Widget, icon and both JSON files."""
     files = page_files()
-    widget = OFFER.cockpit_extras()["widgets"][0]
-    for address in (widget["iframeUrl"], widget["iframeIcon"], OFFER.register_service()["icon"]):
+    widget = SERVICE.cockpit_extras()["widgets"][0]
+    for address in (widget["iframeUrl"], widget["iframeIcon"], SERVICE.register_service()["icon"]):
         assert files.at(address) is not None, address
-    found = files.at(OFFER.register_service()["extras"]["cockpit"])
+    found = files.at(SERVICE.register_service()["extras"]["cockpit"])
     assert found is not None
-    assert json.loads(found.body) == OFFER.cockpit_extras()
+    assert json.loads(found.body) == SERVICE.cockpit_extras()
 
 
 def test_another_sites_page_reads_the_extras_and_nothing_else() -> None:
@@ -76,7 +76,7 @@ def test_another_sites_page_reads_the_extras_and_nothing_else() -> None:
     try:
         answer = ask(server, "/cockpit_extras.json", Origin="http://blueos.local")
         assert answer.headers["Access-Control-Allow-Origin"] == "*"
-        assert json.loads(answer.read()) == OFFER.cockpit_extras()
+        assert json.loads(answer.read()) == SERVICE.cockpit_extras()
         answer.close()
         for path, headers in (
             ("/", {"Origin": "http://blueos.local"}),

@@ -7,7 +7,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from wakewise.ui.cockpit.control_lease import FORGET_S, LAPSE_S, STALE_S, ControlLease
+from wakewise.ui.cockpit.control_lease import FORGET_S, INPUT_TIMEOUT_S, LEASE_TIMEOUT_S, ControlLease
 
 FULL = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
 CLIENTS = st.sampled_from(["a", "b", "c"])
@@ -43,7 +43,7 @@ def test_a_second_one_must_be_agreed_to() -> None:
 
 def test_a_lapsed_helm_may_be_taken() -> None:
     """After a second without sticks it is anybody's, and its holder's own again if nobody came."""
-    late = LAPSE_S + 0.01
+    late = LEASE_TIMEOUT_S + 0.01
     assert not held_by("a").held(late)
     taken, _ = held_by("a").ask("b", late, "M")
     assert taken.holder == "b"
@@ -85,7 +85,7 @@ def test_sticks_that_were_long_on_their_way_are_zero() -> None:
 
 def test_after_a_pause_sticks_count_once_they_were_let_go() -> None:
     """A page that froze, a laptop that slept, a link that was gone: what is held when it is back was not meant."""
-    for pause_s in (STALE_S + 0.01, LAPSE_S + 0.5, FORGET_S - 0.1):
+    for pause_s in (INPUT_TIMEOUT_S + 0.01, LEASE_TIMEOUT_S + 0.5, FORGET_S - 0.1):
         helm, _ = held_by("a").moved("a", "L", 1, 0.0, FULL, 0.0)
         assert helm.axes(0.0).any()
         for k in range(5):
@@ -99,8 +99,8 @@ def test_after_a_pause_sticks_count_once_they_were_let_go() -> None:
         helm, _ = helm.moved("a", "L", 8, 1e3 * now_s + 40.0, FULL, now_s + 0.04)
         np.testing.assert_array_equal(helm.axes(now_s + 0.04), FULL)
     helm, _ = held_by("a").moved("a", "L", 1, 0.0, FULL, 0.0)
-    helm, _ = helm.moved("a", "L", 2, 290.0, FULL, STALE_S - 0.01)
-    assert helm.axes(STALE_S - 0.01).any(), "a hiccup within what is fresh is none"
+    helm, _ = helm.moved("a", "L", 2, 290.0, FULL, INPUT_TIMEOUT_S - 0.01)
+    assert helm.axes(INPUT_TIMEOUT_S - 0.01).any(), "a hiccup within what is fresh is none"
 
 
 def test_a_clock_that_stood_still_is_believed_again() -> None:
@@ -196,7 +196,7 @@ class AnyHelm(RuleBasedStateMachine):
             assert number > before.hands.seq
             self.quickest = min(self.quickest, late_s)
             self.sent = {0: (client, sent_s)}
-            if before.hands.seq >= 0 and self.now_s - before.renewed_s > STALE_S:
+            if before.hands.seq >= 0 and self.now_s - before.renewed_s > INPUT_TIMEOUT_S:
                 assert not self.helm.axes(self.now_s).any()
         else:
             np.testing.assert_array_equal(self.helm.axes(self.now_s), before.axes(self.now_s))
@@ -214,7 +214,7 @@ class AnyHelm(RuleBasedStateMachine):
             client, sent_s = self.sent[0]
             assert client == self.helm.holder
             assert self.helm.held(self.now_s)
-            assert self.now_s - sent_s - self.quickest <= STALE_S + 1e-6
+            assert self.now_s - sent_s - self.quickest <= INPUT_TIMEOUT_S + 1e-6
 
     @invariant()
     def there_is_one_holder_and_one_lease(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wakewise.allocation import least_thrusts
+from wakewise.allocation import min_norm_allocation
 from wakewise.operation import Parts, Scenario
 from wakewise.simulation.tank.water_truth import STILL_M_S
 from wakewise.ui.cockpit.state import StateEncoder
@@ -25,7 +25,7 @@ def gauges(parts: Parts) -> WakeReadout:
 def test_direct_thrusts_save_nothing(parts: Parts, gauges: WakeReadout) -> None:
     """Held against themselves the least thrusts of a wrench differ by nothing."""
     layout = gauges.watch.layout
-    thrusts = least_thrusts(layout, np.array([5.0, 2.0, -3.0, 0.0, 0.1, 0.2])).thrusts_N
+    thrusts = min_norm_allocation(layout, np.array([5.0, 2.0, -3.0, 0.0, 0.1, 0.2])).thrusts_N
     flown, direct = gauges.disturbances(parts.start, thrusts)
     assert flown == pytest.approx(direct, rel=1e-6)
 

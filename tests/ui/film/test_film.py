@@ -29,9 +29,9 @@ from wakewise.simulation.water import Water
 from wakewise.ui.film import compared_trials, make, write_film, write_rows
 from wakewise.ui.film.encode import film_writer
 from wakewise.ui.film.external_view import FASTEST_M_S, speed_colours
-from wakewise.ui.film.layout import FilmFrame, FilmOverview, FrameComposer, cover
+from wakewise.ui.film.layout import FilmFrame, FilmOverview, FrameComposer, fill_frame
 from wakewise.ui.film.make import silt_at
-from wakewise.ui.film.viewpoint import vantage
+from wakewise.ui.film.viewpoint import choose_viewpoint
 from wakewise.ui.film.wash import STEP_S, TRAIL, RecordedMotion, replay, wash_of
 from wakewise.ui.reports.vehicle.hull import corner_normals, hull_of
 from wakewise.vision.imaging import PinholeCamera
@@ -161,7 +161,7 @@ def test_all_that_was_flown_is_in_the_picture() -> None:
     camera = PinholeCamera(400, 250, np.radians(40.0))
     angle = np.linspace(0, 2 * np.pi, 80)
     path = np.column_stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), np.full(80, 1.0)])
-    X_WC = vantage(camera, np.array([0.0, 0.0, 1.4]), path, 0.25)
+    X_WC = choose_viewpoint(camera, np.array([0.0, 0.0, 1.4]), path, 0.25)
     for shift in 0.25 * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]):
         pixels = camera.project(X_WC.inverse().apply(path + shift))
         assert np.all((pixels > 0) & (pixels < [400, 250]))
@@ -323,7 +323,7 @@ def test_a_page_without_any_record_still_draws() -> None:
     )  # fmt: skip
     for view in ("both", "outside", "camera"):
         assert FrameComposer(story, view).frame(moment).shape == (720, 1280, 3)
-    assert cover(np.zeros((30, 40, 3), np.uint8), 64, 64).shape == (64, 64, 3)
+    assert fill_frame(np.zeros((30, 40, 3), np.uint8), 64, 64).shape == (64, 64, 3)
 
 
 @pytest.mark.slow

@@ -11,11 +11,11 @@ from wakewise.core.geometry import Pose
 from wakewise.ui.reports.photo_model import write_model_report
 from wakewise.ui.reports.photo_model.page import match_figure, model_page
 from wakewise.ui.reports.photo_model.scene import model_scene, model_up
-from wakewise.vision.reconstruction.photo_facts import ModelFacts, PhotoFact
+from wakewise.vision.reconstruction.photo_facts import ModelStatistics, PhotoStatistics
 
 
 def fact(name, placed=True):
-    return PhotoFact(
+    return PhotoStatistics(
         name=name,
         R_WC=np.diag([1.0, -1.0, -1.0]) if placed else None,
         p_WC=np.array([0.1 * len(name), 0.0, 1.0]) if placed else None,
@@ -28,7 +28,7 @@ def fact(name, placed=True):
     )
 
 
-FACTS = ModelFacts(
+FACTS = ModelStatistics(
     photos=(fact("a.jpg"), fact("bb.jpg"), fact("<c>.jpg", placed=False)),
     matches=np.array([[0, 90, 0], [90, 0, 7], [0, 7, 0]]),
     points=np.random.default_rng(0).normal(size=(50, 3)) * 0.1,
@@ -72,9 +72,9 @@ def test_up_is_where_pictures_or_backs_of_cameras_point():
         np.array([[np.cos(a), 0, np.sin(a)], [-np.sin(a), 0, np.cos(a)], [0, -1, 0]]) for a in (0.0, 1.6, 3.1, 4.7)
     ]
     level = [Pose.from_matrix(R, np.zeros(3)) for R in turns]
-    turned = ModelFacts(
+    turned = ModelStatistics(
         photos=tuple(
-            PhotoFact(**{**vars(fact("a")), "R_WC": pose.R}) for pose in level
+            PhotoStatistics(**{**vars(fact("a")), "R_WC": pose.R}) for pose in level
         ), matches=FACTS.matches, points=FACTS.points, colours=FACTS.colours
     )  # fmt: skip
     assert abs(model_up(turned)[2]) == pytest.approx(1.0, abs=1e-6)

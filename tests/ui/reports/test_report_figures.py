@@ -20,7 +20,7 @@ from wakewise.ui.reports.figures import (
     water_over_time,
 )
 from wakewise.ui.reports.photos import embedded_width, extremes
-from wakewise.ui.reports.svg_style import dress, inline_svg, new_figure, thinned
+from wakewise.ui.reports.svg_style import inline_svg, new_figure, style_axes, thinned
 from wakewise.ui.reports.trial import read_trial
 
 
@@ -38,7 +38,7 @@ def test_an_inline_svg_follows_the_page() -> None:
     """Colours become CSS variables, size is left to the page, nothing names a host."""
     figure = new_figure(3, 2)
     axes = figure.subplots()
-    dress(axes, x="time (s)")
+    style_axes(axes, x="time (s)")
     axes.plot([0, 1], [0, 1])
     svg = inline_svg(figure, "a line")
     assert "var(--muted)" in svg

@@ -14,7 +14,7 @@ from wakewise.ui.reports import media, write_comparison
 from wakewise.ui.reports.media import coloured_model, colours_html, film_html
 from wakewise.ui.reports.report import report_page
 from wakewise.ui.reports.trial import read_trial
-from wakewise.vision.texturing.textured import standing
+from wakewise.vision.texturing.textured import y_up_vertices
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def test_the_coloured_model_is_where_the_model_is(own: Path) -> None:
     trial = read_trial(own)
     assert coloured_model(trial) is None
     mesh = trimesh.load(own / "mesh.ply", process=False)
-    there = trimesh.Trimesh(standing(np.asarray(mesh.vertices), trial.bed_z_m), mesh.faces, process=False)
+    there = trimesh.Trimesh(y_up_vertices(np.asarray(mesh.vertices), trial.bed_z_m), mesh.faces, process=False)
     there.visual = trimesh.visual.TextureVisuals(material=trimesh.visual.material.PBRMaterial())
     there.visual.vertex_attributes["color"] = np.tile(np.array([100, 50, 25, 255], np.uint8), (len(there.vertices), 1))
     (own / "mesh.glb").write_bytes(trimesh.Scene({"model": there}).export(file_type="glb", include_normals=True))

@@ -14,9 +14,9 @@ import yaml
 
 from wakewise.core.geometry import matrix_from_quat
 from wakewise.ui.reports.errors import ModelErrors, model_errors
-from wakewise.ui.reports.scene3d import Q_UW, R_UW, lightened, scene_html, upright
+from wakewise.ui.reports.scene3d import Q_UW, R_UW, decimated, scene_html, upright
 from wakewise.ui.reports.trial import Trial, TrialMesh, read_trial
-from wakewise.vision.texturing.textured import standing
+from wakewise.vision.texturing.textured import y_up_vertices
 
 
 def test_the_scene_is_east_north_up() -> None:
@@ -49,7 +49,7 @@ def with_colours(made_up: Path, tmp_path: Path) -> Trial:
     shutil.copytree(made_up, folder, ignore=shutil.ignore_patterns("*.html", "images"))
     trial = read_trial(folder)
     assert trial.model is not None
-    mesh = trimesh.Trimesh(standing(trial.model.vertices_m, trial.bed_z_m), trial.model.faces, process=False)
+    mesh = trimesh.Trimesh(y_up_vertices(trial.model.vertices_m, trial.bed_z_m), trial.model.faces, process=False)
     mesh.visual = trimesh.visual.TextureVisuals(material=trimesh.visual.material.PBRMaterial())
     mesh.visual.vertex_attributes["color"] = np.tile(np.array([100, 50, 25, 255], np.uint8), (len(mesh.vertices), 1))
     (folder / "mesh.glb").write_bytes(trimesh.Scene({"model": mesh}).export(file_type="glb", include_normals=True))
@@ -131,9 +131,9 @@ def test_a_heavy_mesh_becomes_light_and_keeps_its_shape() -> None:
     """Fewer triangles than allowed, every vertex one of the old ones, hardly less volume; a light mesh is kept."""
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.1)
     heavy = TrialMesh(vertices_m=np.asarray(ball.vertices), faces=np.asarray(ball.faces, np.int64))
-    light, chosen = lightened(heavy, max_faces=6000)
+    light, chosen = decimated(heavy, max_faces=6000)
     assert 2000 < len(light.faces) <= 6000
     np.testing.assert_array_equal(light.vertices_m, heavy.vertices_m[chosen])
     volume = trimesh.Trimesh(light.vertices_m, light.faces, process=False).volume
     assert 0.95 * ball.volume < volume < 1.05 * ball.volume
-    assert len(lightened(heavy)[0].faces) == len(heavy.faces)
+    assert len(decimated(heavy)[0].faces) == len(heavy.faces)

@@ -10,7 +10,13 @@ import polars as pl
 import pytest
 import yaml
 
-from wakewise.ui.reports.references import against_dp, against_grains, against_water, yardstick_html, yardsticks
+from wakewise.ui.reports.references import (
+    against_dp,
+    against_grains,
+    against_water,
+    reference_comparisons,
+    yardstick_html,
+)
 from wakewise.ui.reports.report import report_page
 from wakewise.ui.reports.trial import read_trial
 
@@ -104,7 +110,7 @@ def test_the_bed_is_judged_by_its_grains_and_by_the_record(made_up: Path, tmp_pa
 def test_a_trial_without_these_figures_has_fewer_yardsticks_and_no_gap(made_up: Path, tmp_path: Path) -> None:
     """A folder of an earlier version keeps what it can say; with no speed at all the section goes."""
     old = dict.fromkeys(FIGURES) | {"target_speed_mean_m_s": 0.005}
-    assert len(yardsticks(read_trial(judged(made_up, tmp_path / "a", **old)))) == 1
+    assert len(reference_comparisons(read_trial(judged(made_up, tmp_path / "a", **old)))) == 1
     assert yardstick_html(read_trial(judged(made_up, tmp_path / "b", **dict.fromkeys(FIGURES)))) == ""
 
 

@@ -7,10 +7,10 @@ from importlib import resources
 import pytest
 from test_campaign_page import campaign
 
-from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, glance
+from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, summarize
 from wakewise.ui.reports.campaign import campaign_page
-from wakewise.ui.reports.methods_compared import price, won
-from wakewise.ui.reports.page import chip, missing, prose, scene_box
+from wakewise.ui.reports.methods_compared import cost_text, winner_text
+from wakewise.ui.reports.page import legend_entry, missing, prose, scene_box
 from wakewise.ui.reports.text import duration, percent
 from wakewise_paper.reports.reproduction import sentences
 
@@ -27,7 +27,7 @@ def judged(low=5.0, high=15.0, trials=12, less=10.0, ours=0.9, theirs=1.0, rival
 
 def test_best_is_who_is_surely_better():
     """With enough pairs and an interval that holds no zero."""
-    assert won(judged()) == (
+    assert winner_text(judged()) == (
         "wake-aware is best with 0.900 mm RMSE, 10 % (5 to 15) better than smooth; "
         "sure, the interval does not hold zero."
     )
@@ -44,14 +44,14 @@ def test_best_is_who_is_surely_better():
 )
 def test_no_difference_is_shown_where_it_may_be_chance(one, why):
     """Both figures stand there, and nobody is called best."""
-    said = won(one)
+    said = winner_text(one)
     assert said.startswith("no difference shown: wake-aware 0.900, smooth 1 mm RMSE") and said.endswith(f"{why}.")
     assert "best" not in said
 
 
 def test_few_pairs_that_agree_are_told_as_what_came_out():
     """An interval without zero of a few pairs: who came out better, and that it is not sure."""
-    assert won(judged(trials=3)) == (
+    assert winner_text(judged(trials=3)) == (
         "wake-aware came out better: wake-aware 0.900, smooth 1 mm RMSE, 10 % (5 to 15) apart; "
         "3 pairs are too few to be sure."
     )
@@ -59,17 +59,17 @@ def test_few_pairs_that_agree_are_told_as_what_came_out():
 
 def test_the_price_of_less_wash_counts_silt():
     """Silt between camera and target stands beside energy; what is alike, or was not measured, is left out."""
-    assert price(replace(judged(), silt_ratio=1.81)) == (
+    assert cost_text(replace(judged(), silt_ratio=1.81)) == (
         "It takes as much energy as smooth. Silt between camera and target: 1.81 times that of smooth. No trial failed."
     )
-    assert "Silt" not in price(judged()) + price(replace(judged(), silt_ratio=1.0))
+    assert "Silt" not in cost_text(judged()) + cost_text(replace(judged(), silt_ratio=1.0))
     places = [
         {"world": "mud", "method": method, "target": "brain", "seed": seed, "reason": None}
         | {"figures": {"rmse_mm": rmse, "energy_kJ": 2.0, "ray_optical_depth": silt * seed}}
         for seed in (1, 2)
         for method, rmse, silt in (("dp", 1.0, 0.1), ("wake-aware", 0.9, 0.3))
     ]
-    found = glance(ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True), "mud", places)
+    found = summarize(ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True), "mud", places)
     assert found is not None and found.silt_ratio == pytest.approx(3.0) and found.energy_ratio == pytest.approx(1.0)
 
 
@@ -100,9 +100,9 @@ def test_rows_of_the_papers_tables_tell_ratios_so():
     """In tables and in sentences; rows of another kind keep their unit."""
     row = {"reading": "less_pct", "ours": -11990.0, "low": -363079.0, "high": -3492.0, "unit": "%", "world": "field",
            "target": None, "n": 21, "figure": "silt", "method": "wake-aware"}  # fmt: skip
-    assert sentences.ours(row) == "121 times as much" and sentences.interval(row) == "35.9 to 3632 times"
+    assert sentences.our_value(row) == "121 times as much" and sentences.interval(row) == "35.9 to 3632 times"
     assert sentences._place(row) == "field: 121 times as much (35.9 to 3632 times), n = 21"
-    assert sentences.ours(row | {"reading": "mean", "ours": 4.0, "unit": "mm"}) == "4 mm"
+    assert sentences.our_value(row | {"reading": "mean", "ours": 4.0, "unit": "mm"}) == "4 mm"
 
 
 def row(world, met, figure="wash", paper=60.0):
@@ -144,6 +144,6 @@ def test_a_chip_has_its_colour_wherever_it_stands_and_scenes_follow_the_page(tmp
     """The style does not ask in what it stands; a 3D scene is dark where the page is."""
     style = resources.files("wakewise.ui.reports").joinpath("page.css").read_text(encoding="utf-8")
     assert re.search(r"^\.chip i \{", style, re.MULTILINE) and ".legend .chip" not in style
-    assert '<i style="background:#123456">' in chip("#123456", "seen well")
+    assert '<i style="background:#123456">' in legend_entry("#123456", "seen well")
     config = "window.__VISER_EMBED_CONFIG__={darkMode:false}"
     assert "prefers-color-scheme: dark" in scene_box(f"<html>{config}</html>", "")

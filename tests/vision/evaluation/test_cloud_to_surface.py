@@ -20,7 +20,7 @@ from wakewise.vision.evaluation import (
     evaluate_surface,
     sample_surface,
     suspicious_scale,
-    thin,
+    voxel_downsample,
 )
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[4] / "shared" / "data"))
@@ -129,9 +129,9 @@ def test_something_between_hides_the_surface():
 
 def test_thinning_keeps_one_mean_per_cell():
     """Two points of a cell become their mean; an empty cloud stays empty."""
-    out = thin(np.array([[0.1, 0.1, 0.1], [0.3, 0.1, 0.1], [5.0, 0, 0]]), 1.0)
+    out = voxel_downsample(np.array([[0.1, 0.1, 0.1], [0.3, 0.1, 0.1], [5.0, 0, 0]]), 1.0)
     assert np.allclose(sorted(out.tolist()), [[0.2, 0.1, 0.1], [5, 0, 0]])
-    assert len(thin(np.zeros((0, 3)), 1.0)) == 0
+    assert len(voxel_downsample(np.zeros((0, 3)), 1.0)) == 0
 
 
 def test_what_cannot_be_scored_is_refused():

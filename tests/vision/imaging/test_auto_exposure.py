@@ -11,10 +11,10 @@ from wakewise.vision.imaging.auto_exposure import (
     LUMINANCE,
     MOST_AMPLIFIED,
     TARGET,
-    automatic,
+    automatic_exposure,
     brightness,
-    divided,
-    settled,
+    converged_gain,
+    split_gain,
 )
 from wakewise.vision.imaging.settings import LONGEST_S
 
@@ -53,14 +53,16 @@ def test_dim_water_makes_long_exposures():
     bright, dim = take(AUTO), take(DIM)
     assert bright.exposure_s < dim.exposure_s <= LONGEST_S
     dark = AUTO.model_copy(update={"ambient": 0.0, "panels": 0.0, "lamp": 0.01})
-    chosen = divided(settled([brightness(coral_scene()[0], place(), None, dark, SiltOptics(), np.ones(3))]), dark)
+    chosen = split_gain(
+        converged_gain([brightness(coral_scene()[0], place(), None, dark, SiltOptics(), np.ones(3))]), dark
+    )
     assert chosen.exposure_s == LONGEST_S and chosen.amplification > 1.0
 
 
 @pytest.mark.parametrize("gain", [0.01, 0.3, 0.75, 3.0, 30.0, 3000.0])
 def test_gain_is_exposure_times_amplification(gain):
     """What is chosen multiplies up to the gain asked for, unless it is beyond both bounds."""
-    chosen = divided(gain, AUTO)
+    chosen = split_gain(gain, AUTO)
     most = AUTO.gain * LONGEST_S / AUTO.exposure_s * MOST_AMPLIFIED
     assert chosen.gain == pytest.approx(min(gain, most))
     assert 1.0 <= chosen.amplification <= MOST_AMPLIFIED
@@ -70,7 +72,7 @@ def test_gain_is_exposure_times_amplification(gain):
 def test_exposure_lags_behind_what_is_seen():
     """After a step of light the gain goes half of the way in the three frames of a tenth of a second."""
     before, after = 0.1, 0.4
-    gains = [settled([before] * 3 + [after] * k) for k in range(4)]
+    gains = [converged_gain([before] * 3 + [after] * k) for k in range(4)]
     assert gains[0] == pytest.approx(TARGET / before)
     way = [math.log(gain * before / TARGET) / math.log(before / after) for gain in gains]
     np.testing.assert_allclose(way, [1.0 - 0.8 ** (3 * k) for k in range(4)])
@@ -82,7 +84,7 @@ def test_what_was_seen_before_decides_the_exposure():
     up, down = place(75.0), place(8.0)
 
     def gain(*before):
-        return automatic(scene, before, None, AUTO, SiltOptics(), np.ones(3)).gain
+        return automatic_exposure(scene, before, None, AUTO, SiltOptics(), np.ones(3)).gain
 
     assert gain(up, up) != pytest.approx(gain(down, down), rel=0.01)
     low, high = sorted((gain(up, up), gain(down, down)))

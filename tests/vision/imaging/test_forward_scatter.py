@@ -8,7 +8,7 @@ from scipy.special import j0, j1
 
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid
-from wakewise.vision.imaging import SiltOptics, haze_between, through_water, water_optics
+from wakewise.vision.imaging import SiltOptics, attenuate, haze_between, water_optics
 from wakewise.vision.imaging.camera import PinholeCamera
 from wakewise.vision.imaging.forward_scatter import (
     FORWARD_SHARE,
@@ -116,9 +116,9 @@ def test_a_photograph_of_a_wall_loses_half_of_what_the_beam_does():
     silt = ScalarGrid(origin_W_m=np.full(3, -8.0), spacing_m=8.0, values=np.full((3, 3, 3), 0.02))
     haze = haze_between(camera, Pose(np.zeros(3)), water, grains, silt, lights)
     clear = haze_between(camera, Pose(np.zeros(3)), water, grains, None, lights)
-    without = through_water(wall, camera, clear, water, 0.0, grains)[0][60, 80]
-    lost = through_water(wall, camera, haze, water, 0.0)[0][60, 80]
-    kept = through_water(wall, camera, haze, water, 0.0, grains)[0][60, 80]
+    without = attenuate(wall, camera, clear, water, 0.0, grains)[0][60, 80]
+    lost = attenuate(wall, camera, haze, water, 0.0)[0][60, 80]
+    kept = attenuate(wall, camera, haze, water, 0.0, grains)[0][60, 80]
     tau = 0.02 * grains.attenuation_m2_kg * 0.5
     assert lost / without == pytest.approx(np.full(3, math.exp(-tau)), rel=0.01)
     assert kept / without == pytest.approx(np.full(3, math.exp(-(1 - FORWARD_SHARE) * tau)), rel=0.01)
@@ -137,7 +137,7 @@ def test_clear_water_is_as_it_was():
     )
     water = water_optics("II")
     haze = haze_between(camera, Pose(np.zeros(3)), water, SiltOptics(), None, lights)
-    known, unknown = (through_water(view, camera, haze, water, 1.0, g)[0] for g in (SiltOptics(), None))
+    known, unknown = (attenuate(view, camera, haze, water, 1.0, g)[0] for g in (SiltOptics(), None))
     assert known.tobytes() == unknown.tobytes()
 
 

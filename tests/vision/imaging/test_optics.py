@@ -13,9 +13,9 @@ from scipy.interpolate import RegularGridInterpolator
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid
-from wakewise.vision.imaging import Lights, PinholeCamera, Render, SiltOptics, haze_between, through_water, water_optics
+from wakewise.vision.imaging import Lights, PinholeCamera, Render, SiltOptics, attenuate, haze_between, water_optics
 from wakewise.vision.imaging.grids import sample_grid
-from wakewise.vision.imaging.optics import BACKSCATTER_RATIO, decayed, water_types
+from wakewise.vision.imaging.optics import BACKSCATTER_RATIO, exp_minus, water_types
 
 DATA = pathlib.Path(os.environ.get("WAKEWISE_DATA", pathlib.Path(__file__).parents[4] / "shared" / "data"))
 CAMERA = PinholeCamera(64, 48, np.deg2rad(80))
@@ -48,9 +48,7 @@ def uniform_silt(kg_m3):
 def test_clear_water_follows_the_image_formation_model(water_type):
     """J exp(-beta_D r) + B (1 - exp(-beta_B r)) at every pixel of a flat wall, within 0.2 % of the veil."""
     water = water_optics(water_type)
-    seen, silt = through_water(
-        wall(0.7), CAMERA, haze_between(CAMERA, Pose(np.zeros(3)), water, SILT, None, DARK), water
-    )
+    seen, silt = attenuate(wall(0.7), CAMERA, haze_between(CAMERA, Pose(np.zeros(3)), water, SILT, None, DARK), water)
     r = ray_lengths(0.7)[..., None]
     expected = 0.4 * np.exp(-water.signal_per_m * r) + water.veil * (1 - np.exp(-water.veil_per_m * r))
     assert np.abs(seen - expected).max() < 2e-3 * (1e-3 + water.veil.max())
@@ -61,9 +59,9 @@ def test_open_water_ends_in_the_veil():
     """Where nothing is hit the picture is B_inf; a wall 30 m away, beyond the integration's reach, is not brighter."""
     water = water_optics("II")
     haze = haze_between(CAMERA, Pose(np.zeros(3)), water, SILT, None, DARK)
-    nothing, _ = through_water(wall(np.inf, 0.0), CAMERA, haze, water)
+    nothing, _ = attenuate(wall(np.inf, 0.0), CAMERA, haze, water)
     assert np.allclose(nothing, water.veil, rtol=1e-3)
-    far, _ = through_water(wall(30.0, 0.0), CAMERA, haze, water)
+    far, _ = attenuate(wall(30.0, 0.0), CAMERA, haze, water)
     r = ray_lengths(30.0)[..., None]
     assert np.allclose(far, water.veil * (1 - np.exp(-water.veil_per_m * r)), rtol=1e-3)
 
@@ -73,7 +71,7 @@ def test_uniform_silt_attenuates_and_veils_exponentially():
     water, C = water_optics("IB"), 0.05
     c = SILT.attenuation_m2_kg * C
     haze = haze_between(CAMERA, Pose(np.zeros(3)), water, SILT, uniform_silt(C), DARK)
-    seen, silt = through_water(wall(0.5), CAMERA, haze, water)
+    seen, silt = attenuate(wall(0.5), CAMERA, haze, water)
     r = ray_lengths(0.5)[..., None]
     both = water.veil_per_m + c
     veil = (water.veil_per_m * water.veil + c * SILT.veil) / both
@@ -92,8 +90,8 @@ def test_lamps_light_fades_both_ways():
     """The part of the wall's radiance that came from the lamps is attenuated twice."""
     water = water_optics("III")
     haze = haze_between(CAMERA, Pose(np.zeros(3)), water, SILT, None, DARK)
-    with_lamp, _ = through_water(wall(0.6, 0.0, 0.5), CAMERA, haze, water)
-    without, _ = through_water(wall(0.6, 0.0, 0.0), CAMERA, haze, water)
+    with_lamp, _ = attenuate(wall(0.6, 0.0, 0.5), CAMERA, haze, water)
+    without, _ = attenuate(wall(0.6, 0.0, 0.0), CAMERA, haze, water)
     expected = 0.5 * np.exp(-2 * water.signal_per_m * ray_lengths(0.6)[..., None])
     assert np.allclose(with_lamp - without, expected, rtol=1e-4)
 
@@ -133,7 +131,7 @@ def test_grid_sampling_is_trilinear_and_zero_outside():
 def test_the_fast_exponential_is_one():
     """What an optical depth leaves is exp(-tau) within 1e-9, falls steadily, and is nothing for endless ones."""
     tau = np.concatenate([np.linspace(0.0, 30.0, 3001), [60.0, 1e3, 1e9]])
-    left = np.array([decayed(t) for t in tau])
+    left = np.array([exp_minus(t) for t in tau])
     assert np.abs(left - np.exp(-tau)).max() < 1e-9
     assert np.abs(left * np.exp(np.minimum(tau, 3.0)) - 1.0)[tau <= 3.0].max() < 1e-8
     assert (np.diff(left) <= 0.0).all()

@@ -9,7 +9,7 @@ from imaging_helpers import BED_Z, box, box_scene, coral_scene, view
 
 from wakewise.core.errors import InputError
 from wakewise.vision.imaging import FlatPort, LensCamera, Lights, PinholeCamera, render, texture
-from wakewise.vision.imaging.shading import needs_more
+from wakewise.vision.imaging.shading import needs_supersampling
 
 LIGHTS = Lights(lamps_C_m=np.array([[-0.2, -0.1, 0.0], [0.2, -0.1, 0.0]]))
 CAMERA = PinholeCamera(480, 360, np.deg2rad(90))
@@ -224,7 +224,7 @@ def test_needs_more_agrees_with_looking_at_each_neighbour():
     depth = rng.uniform(0.9, 0.95, (40, 50)).astype(np.float32)
     depth[kind < 0] = np.inf
     found = np.empty((40, 50), bool)
-    needs_more(kind, depth, 0, 40, found)
+    needs_supersampling(kind, depth, 0, 40, found)
     for y, x in np.ndindex(40, 50):
         around = np.s_[max(0, y - 1) : y + 2, max(0, x - 1) : x + 2]
         own, d = kind[y, x], depth[y, x]
@@ -245,7 +245,7 @@ def test_where_one_ray_is_not_enough():
     expected[:, 4:6] = True
     found = np.ones((5, 7), bool)
     for first, last in ((0, 2), (2, 5)):  # bands look across their borders
-        needs_more(kind, depth, first, last, found)
+        needs_supersampling(kind, depth, first, last, found)
     assert np.array_equal(found, expected)
 
 

@@ -8,7 +8,7 @@ from wakewise.core.errors import InputError
 from wakewise.scene.targets import Mesh
 from wakewise.vision.imaging import Scene
 from wakewise.vision.imaging.daylight import sky_radiance
-from wakewise.vision.imaging.scene import _icosphere, facing_out, vertex_normals
+from wakewise.vision.imaging.scene import _icosphere, outward_oriented, vertex_normals
 from wakewise.vision.imaging.texture import bake_bed
 
 
@@ -36,7 +36,7 @@ def test_normals_point_out_whatever_the_winding():
     scene, target = box_scene(), box()
     away = scene.vertices_F_m[:8] + scene.foot_W_m - target.centre_W_m
     assert (np.sum(scene.normals[:8] * away, axis=1) > 0).all()
-    turned = facing_out(Mesh(target.mesh.vertices_m, target.mesh.faces[:, ::-1]))
+    turned = outward_oriented(Mesh(target.mesh.vertices_m, target.mesh.faces[:, ::-1]))
     assert np.allclose(vertex_normals(turned.vertices_m, turned.faces), scene.normals[:8], atol=1e-6)
     bed = slice(8, int(scene.faces[scene.first_face[1] : scene.first_face[2]].max()) + 1)
     assert (scene.normals[bed, 2] < -0.5).all()

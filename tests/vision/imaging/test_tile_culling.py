@@ -5,7 +5,7 @@ import pytest
 from imaging_helpers import coral_scene, view
 
 from wakewise.vision.imaging import FlatPort, LensCamera, PinholeCamera
-from wakewise.vision.imaging.tile_culling import TILE_PX, BoundingSpheres, may_meet
+from wakewise.vision.imaging.tile_culling import TILE_PX, BoundingSpheres, tile_sphere_overlap
 
 
 def test_spheres_hold_all_faces():
@@ -51,7 +51,7 @@ def test_every_ray_that_meets_a_solid_is_in_a_tile(camera, elevation):
     origin = X_WC.p_m - scene.foot_W_m
     tiles = np.empty((-(-243 // TILE_PX), -(-322 // TILE_PX)), np.bool_)
     spheres_C = np.column_stack([(scene.spheres_F_m[:, :3] - origin) @ X_WC.R, scene.spheres_F_m[:, 3]])
-    may_meet(camera.row, 322, 243, spheres_C, tiles)
+    tile_sphere_overlap(camera.row, 322, 243, spheres_C, tiles)
     half = np.stack(np.meshgrid(np.arange(0.01, 322, 0.499), np.arange(0.01, 243, 0.499)), axis=-1).reshape(-1, 2)
     near, far = (camera.unproject(half, np.full(len(half), d)) for d in (0.03, 1.03))
     hit = scene.solids.run(

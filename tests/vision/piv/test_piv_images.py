@@ -9,7 +9,7 @@ import pytest
 
 from wakewise.vision.piv import (
     CameraSettings,
-    Sheet,
+    LightSheet,
     TracerSettings,
     carried,
     photograph_pair,
@@ -19,7 +19,7 @@ from wakewise.vision.piv import (
 )
 from wakewise_paper.wake_piv import ShearFlow
 
-SHEET = Sheet(
+SHEET = LightSheet(
     centre_W_m=np.array([0.1, 0.2, 0.3]),
     right_W=np.array([0.0, 1.0, 0.0]),
     down_W=np.array([0.0, 0.0, 1.0]),

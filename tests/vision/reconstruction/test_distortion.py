@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from wakewise.core.interfaces import no_progress
 from wakewise.vision.evaluation import umeyama
 from wakewise.vision.reconstruction import Lens, ReconstructionSettings, read_cloud, reconstruct
-from wakewise.vision.reconstruction.distortion import WIDEST, bent, straight
+from wakewise.vision.reconstruction.distortion import WIDEST, distort, undistort
 
 FISHEYE = np.array([150.0, 150.0, 160.0, 120.0, 0.03, -0.01, 0.004, -0.001])
 
@@ -25,9 +25,9 @@ def test_what_is_bent_is_made_straight(seed, most):
     turn = rng.uniform(0, 2 * np.pi, 100)
     angle = rng.uniform(0.0, np.radians(88.0), 100)
     wide = np.tan(angle)[:, None] * np.stack([np.cos(turn), np.sin(turn)], 1)
-    assert np.allclose(straight(bent(wide, params, fisheye=True), params, fisheye=True), wide, rtol=1e-6, atol=1e-9)
+    assert np.allclose(undistort(distort(wide, params, fisheye=True), params, fisheye=True), wide, rtol=1e-6, atol=1e-9)
     near = wide[angle < 0.7]
-    assert np.allclose(straight(bent(near, params, fisheye=False), params, fisheye=False), near, atol=1e-9)
+    assert np.allclose(undistort(distort(near, params, fisheye=False), params, fisheye=False), near, atol=1e-9)
 
 
 def test_a_fisheye_bends_as_colmap_has_it():
@@ -36,13 +36,13 @@ def test_a_fisheye_bends_as_colmap_has_it():
     points = np.column_stack([rng.uniform(-2.0, 2.0, (300, 2)), rng.uniform(0.3, 1.0, 300)])
     points[0] = 0.0, 0.0, 1.0
     camera = pycolmap.Camera(model="OPENCV_FISHEYE", width=320, height=240, params=FISHEYE)
-    ours = bent(points[:, :2] / points[:, 2:], FISHEYE[4:], fisheye=True) * FISHEYE[:2] + FISHEYE[2:4]
+    ours = distort(points[:, :2] / points[:, 2:], FISHEYE[4:], fisheye=True) * FISHEYE[:2] + FISHEYE[2:4]
     assert np.allclose(ours, camera.img_from_cam(points), atol=1e-9)
 
 
 def test_sideways_there_are_no_slopes_but_numbers():
     """An image beyond the widest angle is given the widest: far off, finite."""
-    far = straight(np.array([[1.7, 0.0], [0.0, 40.0]]), np.zeros(4), fisheye=True)
+    far = undistort(np.array([[1.7, 0.0], [0.0, 40.0]]), np.zeros(4), fisheye=True)
     assert np.isfinite(far).all() and np.allclose(np.linalg.norm(far, axis=1), np.tan(WIDEST))
 
 
@@ -58,7 +58,7 @@ def wide_photos(tmp_path_factory):
     paint = gaussian_filter(np.random.default_rng(0).normal(size=(160, 160, 160)), 1.2)
     paint = (paint - paint.min()) / np.ptp(paint)
     uv = np.stack(np.meshgrid(np.arange(320) + 0.5, np.arange(240) + 0.5), -1).reshape(-1, 2)
-    rays = np.c_[straight((uv - FISHEYE[2:4]) / FISHEYE[:2], FISHEYE[4:], fisheye=True), np.ones(len(uv))]
+    rays = np.c_[undistort((uv - FISHEYE[2:4]) / FISHEYE[:2], FISHEYE[4:], fisheye=True), np.ones(len(uv))]
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     truth = {}
     for k in range(8):

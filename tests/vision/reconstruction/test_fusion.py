@@ -5,7 +5,7 @@ import pytest
 from relief import CENTRE, FOCAL, HEIGHT, WIDTH, height, photo, poses, texture
 
 from wakewise.core.geometry import Pose, look_at
-from wakewise.vision.reconstruction.fusion import facing_normals, fuse, lonely
+from wakewise.vision.reconstruction.fusion import facing_normals, fuse, outlier_mask
 from wakewise.vision.reconstruction.registered_photos import RegionOfInterest, RegisteredPhoto, rank_partners
 from wakewise.vision.reconstruction.stereo import DepthMap, pair_depth, rectifiable, rectify_axes
 
@@ -160,7 +160,7 @@ def test_lonely_points_are_found():
     """A stray point is lonely, points of an even sheet are not."""
     x, y = np.meshgrid(np.arange(30.0), np.arange(30.0))
     sheet = np.stack([x.ravel(), y.ravel(), np.zeros(900)], axis=1)
-    flags = lonely(np.concatenate([sheet, [[15.0, 15.0, 40.0]]]))
+    flags = outlier_mask(np.concatenate([sheet, [[15.0, 15.0, 40.0]]]))
     assert flags[-1] and flags[:-1].mean() < 0.05
 
 

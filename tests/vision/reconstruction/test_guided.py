@@ -17,7 +17,7 @@ from wakewise.vision.reconstruction.guided import (
     RelativePose,
     match_by_poses,
     match_pair,
-    trusted,
+    pose_supported,
     verify,
 )
 from wakewise.vision.reconstruction.pairs import choose_pairs
@@ -100,7 +100,7 @@ def test_verifying_finds_the_right_pose_and_the_wrong_matches():
     assert np.degrees(np.arccos(np.clip(fitted.t_2 @ pose.t_2, -1, 1))) < 1.5
     assert right[np.setdiff1d(np.arange(300), wrong)].all()
     assert right[wrong].mean() < 0.2
-    assert trusted(right, known, fitted)
+    assert pose_supported(right, known, fitted)
 
 
 def test_matches_by_chance_are_not_trusted():
@@ -111,7 +111,7 @@ def test_matches_by_chance_are_not_trusted():
 
     def believed(first, second, known):
         fitted, right = verify(first, second, known, 480.0)
-        return trusted(right, known, fitted)
+        return pose_supported(right, known, fitted)
 
     assert believed(one, two, pose)
     assert not believed(one, rng.permutation(two), pose)

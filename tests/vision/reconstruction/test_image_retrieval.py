@@ -6,7 +6,7 @@ from relief import FOCAL
 from wakewise.core.interfaces import no_progress
 from wakewise.vision.reconstruction import ReconstructionSettings, read_photos
 from wakewise.vision.reconstruction.features import match_photos
-from wakewise.vision.reconstruction.image_retrieval import ImageDescriptors, describe, learn_words, like_pairs
+from wakewise.vision.reconstruction.image_retrieval import ImageDescriptors, describe, learn_words, retrieve_pairs
 from wakewise.vision.reconstruction.mapping import map_photos
 
 
@@ -21,7 +21,7 @@ def test_photos_of_one_thing_are_nearer_than_of_another():
     words = learn_words(np.concatenate(seen), rng)
     looks = ImageDescriptors(names=tuple("abcdefghi"), vectors=np.array([describe(one, words) for one in seen]))
     np.testing.assert_allclose(np.linalg.norm(looks.vectors, axis=1), 1.0, atol=1e-5)
-    found = like_pairs(looks, 2)
+    found = retrieve_pairs(looks, 2)
     assert found == [(a, b) for a, b in found if a < b] and len(found) == 9
     assert all(("abcdefghi".index(a) - "abcdefghi".index(b)) % 3 == 0 for a, b in found)
 

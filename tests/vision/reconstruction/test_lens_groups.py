@@ -11,7 +11,7 @@ from wakewise.core.errors import InputError
 from wakewise.vision.reconstruction.exif import exif_words
 from wakewise.vision.reconstruction.lens_groups import group_photos
 from wakewise.vision.reconstruction.lenses import Lens
-from wakewise.vision.reconstruction.photos import Photo, passed_over, read_photos
+from wakewise.vision.reconstruction.photos import Photo, read_photos, unsupported_files
 
 
 def photo(name, camera="", size=(640, 480)):
@@ -88,4 +88,4 @@ def test_folders_of_a_rig_are_read_and_films_are_named(tmp_path):
     assert [p.name for p in read_photos(tmp_path)] == ["left/0.png", "left/1.png", "right/0.png", "right/1.png"]
     for name in ("a.MP4", "b.heic", "c.orf", "d.cr2", "notes.txt"):
         (tmp_path / name).write_bytes(b"x")
-    assert passed_over(tmp_path) == {"video": 1, "HEIC": 1, "RAW": 2}
+    assert unsupported_files(tmp_path) == {"video": 1, "HEIC": 1, "RAW": 2}

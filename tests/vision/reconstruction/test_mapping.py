@@ -163,7 +163,7 @@ def test_a_disk_that_fills_ends_the_call_before_colmap_ends_the_process(tmp_path
     with pytest.raises(EnvironmentFailure, match=r"matching: the disk of .* is full"):
         colmap.call(work, "matching", disk=tmp_path)
     assert cancelled == [True]
-    with colmap.workroom(tmp_path / "database.db", 1e3) as room:
+    with colmap.database_folder(tmp_path / "database.db", 1e3) as room:
         assert room.parent == tmp_path  # memory has no such reserve either
     assert not room.exists()
 
@@ -174,11 +174,11 @@ def test_a_killed_processs_room_in_memory_is_swept(tmp_path, monkeypatch):
     mine, dead = tmp_path / "memory" / f".wakewise-{os.getpid()}-a", tmp_path / "memory" / ".wakewise-999999999-b"
     mine.mkdir(parents=True)
     dead.mkdir()
-    with colmap.workroom(tmp_path / "database.db", 1e3) as room:
+    with colmap.database_folder(tmp_path / "database.db", 1e3) as room:
         assert room.parent == tmp_path / "memory" and mine.exists() and not dead.exists()
     dead = tmp_path / ".wakewise-999999999-c"
     dead.mkdir()
-    with colmap.workroom(tmp_path / "database.db", 1e12) as room:
+    with colmap.database_folder(tmp_path / "database.db", 1e12) as room:
         assert room.parent == tmp_path and not dead.exists()
 
 

@@ -7,7 +7,7 @@ import trimesh
 from wakewise.core.errors import EnvironmentFailure
 from wakewise.vision.reconstruction import ReconstructionSettings, stages
 from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud
-from wakewise.vision.reconstruction.meshing import mesh_points, near_subject, octree_depth, without_crumbs
+from wakewise.vision.reconstruction.meshing import drop_small_components, mesh_points, near_subject, octree_depth
 
 
 def test_crumbs_go_and_everything_worth_showing_stays():
@@ -17,7 +17,7 @@ def test_crumbs_go_and_everything_worth_showing_stays():
     balls = np.concatenate([large.faces, small.faces + len(large.vertices)])
     vertices = len(large.vertices) + len(small.vertices) + 4
     faces = np.concatenate([balls, crumb + vertices - 4])
-    kept = without_crumbs(faces, vertices)
+    kept = drop_small_components(faces, vertices)
     assert np.array_equal(kept, balls)
 
 

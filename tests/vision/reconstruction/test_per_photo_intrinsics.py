@@ -14,7 +14,7 @@ from wakewise.vision.reconstruction.colmap import pycolmap
 from wakewise.vision.reconstruction.features import match_photos
 from wakewise.vision.reconstruction.mapping import map_photos
 from wakewise.vision.reconstruction.pairs import choose_pairs
-from wakewise.vision.reconstruction.per_photo_intrinsics import PhotoIntrinsics, heaps
+from wakewise.vision.reconstruction.per_photo_intrinsics import PhotoIntrinsics, focal_clusters
 
 SETTINGS = ReconstructionSettings(detector="opencv", max_features=1500)
 
@@ -30,8 +30,8 @@ def test_one_lens_is_hardly_ever_taken_for_two(n, spread):
     rng = np.random.default_rng(n)
     even = [600.0 * np.exp(rng.uniform(-spread, spread, n)) for _ in range(200)]
     about = [600.0 * np.exp(rng.normal(0.0, 0.5 * spread, n)) for _ in range(200)]
-    assert sum(len(heaps(own(focals))) > 1 for focals in even) <= 4
-    assert sum(len(heaps(own(focals))) > 1 for focals in about) <= 2
+    assert sum(len(focal_clusters(own(focals))) > 1 for focals in even) <= 4
+    assert sum(len(focal_clusters(own(focals))) > 1 for focals in about) <= 2
 
 
 @given(st.integers(0, 10_000), st.integers(8, 20), st.floats(1.12, 2.0))
@@ -41,7 +41,7 @@ def test_two_lenses_a_tenth_apart_are_told(seed, n, ratio):
     rng = np.random.default_rng(seed)
     lens = rng.permutation(np.arange(2 * n) % 2)
     focals = 600.0 * ratio**lens * np.exp(rng.normal(0.0, 0.008, 2 * n).clip(-0.02, 0.02))
-    found = heaps(own(focals) | {"few": PhotoIntrinsics(focal_px=610.0, points=3)})
+    found = focal_clusters(own(focals) | {"few": PhotoIntrinsics(focal_px=610.0, points=3)})
     wanted = {tuple(f"{k:03d}" for k in range(2 * n) if lens[k] == side) for side in (0, 1)}
     assert {tuple(name for name in group if name != "few") for group in found} == wanted
     assert next(group for group in found if "few" in group)[0] == f"{int(np.argmin(lens)):03d}"

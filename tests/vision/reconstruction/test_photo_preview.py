@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wakewise.ui.reports.photo_preview import look_page
-from wakewise.vision.reconstruction.photo_preview import look_at, matches, which_pairs
+from wakewise.vision.reconstruction.photo_preview import matches, preview_photos, which_pairs
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.sift import photo_features
 
@@ -24,7 +24,7 @@ def looked(relief_photos, tmp_path_factory):
     noise = np.random.default_rng(0).integers(0, 255, (240, 320, 3), dtype=np.uint8)
     cv2.imwrite(str(folder / "99.png"), cv2.GaussianBlur(noise, (0, 0), 1.0))
     (folder / "dive.mp4").write_bytes(b"a film beside them")
-    return look_at(folder)
+    return preview_photos(folder)
 
 
 def test_each_fault_is_told_of_its_photo(looked):

@@ -7,7 +7,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.vision.imaging.sensor import srgb_encode
-from wakewise.vision.texturing.colour import balanced, fit_water, srgb_decode, without_water
+from wakewise.vision.texturing.colour import fit_water, remove_water, srgb_decode, white_balanced
 
 SIGNAL, RATE, VEIL = np.array([0.9, 0.5, 0.4]), np.array([0.8, 0.7, 0.6]), np.array([0.02, 0.06, 0.09])
 
@@ -42,7 +42,7 @@ def test_the_water_is_found() -> None:
 def test_the_scene_comes_back() -> None:
     """Up to one factor and a third of the cast, far patches get the brightness and the grey that near ones have."""
     image, range_m, truth = _scene()
-    restored = srgb_decode(without_water(image, range_m, fit_water([(image, range_m)])))
+    restored = srgb_decode(remove_water(image, range_m, fit_water([(image, range_m)])))
     before = srgb_decode(image)
     bright = truth[..., 0] > 0.15
 
@@ -67,7 +67,7 @@ def test_unknown_ranges_are_taken_for_far() -> None:
     holes[:10] = np.inf
     holes[10:20] = np.nan
     filled = np.where(np.isfinite(holes), np.minimum(holes, fit.reach_m), np.float32(fit.reach_m)).astype(np.float32)
-    assert np.array_equal(without_water(image, holes, fit), without_water(image, filled, fit))
+    assert np.array_equal(remove_water(image, holes, fit), remove_water(image, filled, fit))
 
 
 def test_too_little_is_refused() -> None:
@@ -78,7 +78,7 @@ def test_too_little_is_refused() -> None:
     with pytest.raises(InputError, match="alike"):
         fit_water([(image, range_m[:-1])])
     with pytest.raises(InputError, match="alike"):
-        without_water(image, range_m[:-1], fit_water([(image, range_m)]))
+        remove_water(image, range_m[:-1], fit_water([(image, range_m)]))
 
 
 def test_balance_takes_the_cast_away() -> None:
@@ -86,6 +86,6 @@ def test_balance_takes_the_cast_away() -> None:
     rng = np.random.default_rng(0)
     grey = rng.uniform(0.05, 0.6, (90, 120))[..., None] * np.array([0.25, 0.7, 0.8])
     image = np.round(255 * srgb_encode(grey)).astype(np.uint8)
-    before, after = srgb_decode(image).mean(axis=(0, 1)), srgb_decode(balanced(image)).mean(axis=(0, 1))
+    before, after = srgb_decode(image).mean(axis=(0, 1)), srgb_decode(white_balanced(image)).mean(axis=(0, 1))
     assert np.ptp(after) / after.mean() < 0.5 * np.ptp(before) / before.mean()
-    assert balanced(np.zeros((40, 40, 3), np.uint8)).max() < 40
+    assert white_balanced(np.zeros((40, 40, 3), np.uint8)).max() < 40

@@ -16,7 +16,13 @@ from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
 from wakewise.vision.texturing import textured
 from wakewise.vision.texturing.colour import srgb_decode
 from wakewise.vision.texturing.photo_colours import RangeMaps, correct_photos, project, rays
-from wakewise.vision.texturing.textured import filled, read_textured, standing, vertex_colours, write_textured
+from wakewise.vision.texturing.textured import (
+    fill_unseen_colours,
+    read_textured,
+    vertex_colours,
+    write_textured,
+    y_up_vertices,
+)
 
 R_BODY_CAMERA = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
@@ -66,7 +72,7 @@ def test_gaps_take_their_neighbours_colour() -> None:
     """An unseen vertex gets the mean of its neighbours, once for each face they share; seen ones keep theirs."""
     faces = np.array([[0, 1, 2], [1, 3, 2]])
     colours = np.array([[1.0, 0, 0], [0.0, 1, 0], [0, 0, 0], [9, 9, 9]])
-    out = filled(colours, np.array([True, True, False, False]), faces)
+    out = fill_unseen_colours(colours, np.array([True, True, False, False]), faces)
     assert np.allclose(out[0], [1, 0, 0])
     assert np.allclose(out[2], [1 / 3, 2 / 3, 0])
     assert np.allclose(out[3], [0, 1, 0])
@@ -86,7 +92,7 @@ def test_the_file_is_standard_and_comes_back(
     tree = json.loads(data[20 : 20 + struct.unpack("<I", data[12:16])[0]])
     assert set(tree["meshes"][0]["primitives"][0]["attributes"]) == {"POSITION", "NORMAL", "COLOR_0"}
     vertices, faces, colours = read_textured(folder / "mesh.glb")
-    assert np.allclose(vertices, standing(np.asarray(mesh.vertices), 1.5), atol=1e-6)
+    assert np.allclose(vertices, y_up_vertices(np.asarray(mesh.vertices), 1.5), atol=1e-6)
     assert np.array_equal(faces, mesh.faces)
     assert colours.max() <= 1.0
     north = vertices[:, 2] < -0.1
@@ -98,8 +104,8 @@ def test_the_file_is_standard_and_comes_back(
 
 def test_standing_turns_down_into_up() -> None:
     """A point 0.3 m above the bed, 1 m north and 2 m east is at x = 2, y = 0.3, z = -1; handedness is kept."""
-    assert np.allclose(standing(np.array([[1.0, 2.0, 1.2]]), 1.5), [[2.0, 0.3, -1.0]])
-    axes = standing(np.eye(3), 0.0)
+    assert np.allclose(y_up_vertices(np.array([[1.0, 2.0, 1.2]]), 1.5), [[2.0, 0.3, -1.0]])
+    axes = y_up_vertices(np.eye(3), 0.0)
     assert np.isclose(np.linalg.det(axes), 1.0)
 
 

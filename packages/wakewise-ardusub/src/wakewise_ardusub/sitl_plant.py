@@ -16,7 +16,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState, Plant, TruthProvider
-from wakewise.core.jit.precompile import warm
+from wakewise.core.jit.precompile import compile_kernels
 from wakewise_ardusub.physics.datagrams import PhysicsState
 from wakewise_ardusub.physics.lowered_start import LoweringBody
 from wakewise_ardusub.physics.physics import SimulatedBody
@@ -107,7 +107,7 @@ class SitlPlant:
 
     def ready(self, progress: Callable[..., None]) -> str:
         """Compile what a flight in it needs and move it once; what people should know of it, in words."""
-        warm(("fly",), progress)
+        compile_kernels(("fly",), progress)
         plant, witness = self.parts.world.begin()
         if witness is not None:
             PlantBody(plant, witness).step(np.zeros(len(self.parts.vehicle.thrusters)), 0.0025)

@@ -1,7 +1,7 @@
 """What the judging of pulses needs to know of a vehicle, as plain numbers: its thrusters, their curve, its wake model.
 
-A small computer on a vehicle reads it from one JSON file that a larger one wrote (`VehicleSummary.of`, `craft_json`):
-vehicle files, thrust tables and wake models have readers there that need more than NumPy.
+A small computer on a vehicle reads it from one JSON file that a larger one wrote (`VehicleSummary.of`,
+`vehicle_summary_json`): vehicle files, thrust tables and wake models have readers there that need more than NumPy.
 """
 
 from __future__ import annotations
@@ -129,8 +129,8 @@ class VehicleSummary:
         return len(self.thrusters)
 
 
-def craft_json(craft: VehicleSummary) -> str:
-    """The craft as JSON that `read_craft` reads.
+def vehicle_summary_json(craft: VehicleSummary) -> str:
+    """The craft as JSON that `read_vehicle_summary` reads.
 
     Raises
     ------
@@ -159,8 +159,8 @@ def _plain_curve(curve: ThrustCurve) -> dict[str, Any]:
 _SMALL = ("paper", "paper-calibrated", "fitted", "linear", "jet", "jet-fitted")
 
 
-def read_craft(path: Path) -> VehicleSummary:
-    """Read a craft that was written by `craft_json`.
+def read_vehicle_summary(path: Path) -> VehicleSummary:
+    """Read a craft that was written by `vehicle_summary_json`.
 
     Raises
     ------

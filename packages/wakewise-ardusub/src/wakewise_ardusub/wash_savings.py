@@ -14,7 +14,14 @@ from typing import Literal
 
 import numpy as np
 
-from wakewise.allocation import Layout, Weights, compile_layout, disturbance_of, gentle_allocation, least_thrusts
+from wakewise.allocation import (
+    Layout,
+    Weights,
+    compile_layout,
+    disturbance_of,
+    min_norm_allocation,
+    min_wash_allocation,
+)
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.jit.njit import COMPILED
@@ -91,8 +98,8 @@ class WashSavingsCalculator:
             return WashSavings(thrusts_N=dict.fromkeys(SHARES, flown), disturbance=dict.fromkeys(SHARES, 0.0))
         layout = self._layout(supply_V)
         wrench = self.craft.allocation_matrix @ flown
-        least = least_thrusts(layout, wrench, gram)
-        gentle = gentle_allocation(layout, wrench, gram, Weights(disturbance=1.0, effort=EFFORT), budget=BOXES)
+        least = min_norm_allocation(layout, wrench, gram)
+        gentle = min_wash_allocation(layout, wrench, gram, Weights(disturbance=1.0, effort=EFFORT), budget=BOXES)
         return WashSavings(
             thrusts_N={"flown": flown, "least": least.thrusts_N, "gentle": gentle.thrusts_N},
             disturbance={
@@ -110,7 +117,7 @@ class WashSavingsCalculator:
         return self._layouts[supply_V]
 
 
-def look(craft: VehicleSummary, points_m: Array, weights: Array) -> InfluenceModel:
+def influence_model(craft: VehicleSummary, points_m: Array, weights: Array) -> InfluenceModel:
     """A craft's jets before points, shape (n, 3), with weights, shape (n,)."""
     return InfluenceModel(
         wake=craft.wake,

@@ -17,7 +17,7 @@ from bare import bare
 from wakewise import __version__
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
-from wakewise_ardusub.vehicle_summary import VehicleSummary, read_craft
+from wakewise_ardusub.vehicle_summary import VehicleSummary, read_vehicle_summary
 from wakewise_ardusub.wash_meter.settings import MeterSettings
 from wakewise_ardusub.wash_savings import WashSavingsCalculator
 
@@ -171,7 +171,10 @@ def test_what_is_installed_is_what_the_meter_imports(instructions: list[tuple[st
 @pytest.mark.parametrize("name", ["bluerov2", "bluerov2-heavy"])
 def test_its_craft_files_are_the_librarys_vehicles(name: str) -> None:
     """Number for number (`tools/write_blueos.py` writes them), and light enough for a small computer."""
-    kept, now = read_craft(FOLDER / "craft" / f"{name}.json"), VehicleSummary.of(load_vehicle(name), wake_model("jet"))
+    kept, now = (
+        read_vehicle_summary(FOLDER / "craft" / f"{name}.json"),
+        VehicleSummary.of(load_vehicle(name), wake_model("jet")),
+    )
     assert (kept.name, kept.thrusters) == (now.name, now.thrusters)
     for field in ("allocation_matrix", "positions_B_m", "axes_B", "areas_m2", "thrust_lower_N", "thrust_upper_N"):
         assert getattr(kept, field) == pytest.approx(getattr(now, field), rel=1e-12), field

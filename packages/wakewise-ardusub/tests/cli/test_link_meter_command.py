@@ -16,7 +16,7 @@ pytest.importorskip("pymavlink", reason="the extra `links` is not installed")
 import made_logs
 from loopback_vehicle import Vehicle, free_ends
 from wakewise.ui.cli.main import run
-from wakewise_ardusub.vehicle_summary import read_craft
+from wakewise_ardusub.vehicle_summary import read_vehicle_summary
 
 Capture = pytest.CaptureFixture[str]
 
@@ -55,7 +55,7 @@ def test_a_craft_file_is_written_for_a_small_computer(capsys: Capture, tmp_path:
     path = tmp_path / "six.json"
     assert run(["link", "meter", "--vehicle", "bluerov2", "--wake-model", "fitted", "--write", str(path)]) == 0
     assert "written to" in capsys.readouterr().err
-    craft = read_craft(path)
+    craft = read_vehicle_summary(path)
     assert (craft.name, craft.wake.name, craft.count) == ("bluerov2", "fitted", 6)
 
 

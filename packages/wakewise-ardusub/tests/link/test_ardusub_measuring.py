@@ -18,7 +18,13 @@ from wakewise.core.geometry import (
     quat_multiply,
 )
 from wakewise_ardusub.link.message_state import MavlinkMessage
-from wakewise_ardusub.link.telemetry_adapter import SETTLED, SenderClock, TelemetryAdapter, measured, odometry_pose
+from wakewise_ardusub.link.telemetry_adapter import (
+    SETTLED,
+    SenderClock,
+    TelemetryAdapter,
+    odometry_pose,
+    to_measurements,
+)
 
 STILL = {"rollspeed": 0.0, "pitchspeed": 0.0, "yawspeed": 0.0}
 UNIT = st.tuples(*(st.floats(-1.0, 1.0) for _ in range(4))).filter(lambda q: np.linalg.norm(q) > 0.1)
@@ -55,11 +61,11 @@ def test_a_clock_that_jumps_is_told_and_refused_for_a_while(by_s):
     """By how much it jumped is said once; then nothing is measured until it has gone on evenly."""
     telemetry, found = TelemetryAdapter(), ()
     for k in range(20):
-        telemetry, found = measured(telemetry, attitude(5000.0 + 0.02 * k), 1000.0 + 0.02 * k, 1)
+        telemetry, found = to_measurements(telemetry, attitude(5000.0 + 0.02 * k), 1000.0 + 0.02 * k, 1)
     assert len(found) == 1
     answers = []
     for k in range(20, 40):
-        telemetry, found = measured(telemetry, attitude(5000.0 + by_s + 0.02 * k), 1000.0 + 0.02 * k, 1)
+        telemetry, found = to_measurements(telemetry, attitude(5000.0 + by_s + 0.02 * k), 1000.0 + 0.02 * k, 1)
         answers.append(len(found))
     assert telemetry.jump == f"the clock of component 1 of system 1 jumped by {by_s:+.2f} s"
     assert answers == [0] * (SETTLED + 1) + [1] * (19 - SETTLED)
@@ -67,9 +73,9 @@ def test_a_clock_that_jumps_is_told_and_refused_for_a_while(by_s):
 
 def test_a_position_gets_the_attitude_of_its_own_instant():
     """The attitude of 40 ms before, carried on by the rates that it came with."""
-    telemetry, gyro = measured(TelemetryAdapter(), attitude(10.0, yaw=0.5, yawspeed=1.0), 100.0, 1)
+    telemetry, gyro = to_measurements(TelemetryAdapter(), attitude(10.0, yaw=0.5, yawspeed=1.0), 100.0, 1)
     assert gyro[0].omega_B_rad_s == pytest.approx([0.0, 0.0, 1.0])
-    telemetry, found = measured(telemetry, place(10.04), 100.04, 1)
+    telemetry, found = to_measurements(telemetry, place(10.04), 100.04, 1)
     X_WB = found[0].X_WB
     assert X_WB.p_m == pytest.approx([1.0, 2.0, 3.0])
     assert pytest.approx(matrix_from_quat(quat_from_euler(0.0, 0.0, 0.54)), abs=1e-6) == X_WB.R
@@ -77,9 +83,9 @@ def test_a_position_gets_the_attitude_of_its_own_instant():
 
 def test_a_position_without_a_fresh_attitude_is_no_pose():
     """None was heard, or the last is too old to be carried on."""
-    assert measured(TelemetryAdapter(), place(10.0), 100.0, 1)[1] == ()
-    telemetry, _ = measured(TelemetryAdapter(), attitude(10.0), 100.0, 1)
-    assert measured(telemetry, place(10.5), 100.5, 1)[1] == ()
+    assert to_measurements(TelemetryAdapter(), place(10.0), 100.0, 1)[1] == ()
+    telemetry, _ = to_measurements(TelemetryAdapter(), attitude(10.0), 100.0, 1)
+    assert to_measurements(telemetry, place(10.5), 100.5, 1)[1] == ()
 
 
 def test_other_vehicles_measure_nothing():
@@ -87,23 +93,23 @@ def test_other_vehicles_measure_nothing():
     message = attitude(10.0)
     for system, component in ((2, 1), (1, 154)):
         said = MavlinkMessage(system, component, message.name, message.fields)
-        assert measured(TelemetryAdapter(), said, 100.0, 1)[1] == ()
+        assert to_measurements(TelemetryAdapter(), said, 100.0, 1)[1] == ()
 
 
 def test_specific_force_at_rest_points_up():
     """RAW_IMU says -1000 mG along z at rest."""
     said = MavlinkMessage(1, 1, "RAW_IMU", {"time_usec": 10_000_000, "xacc": 0, "yacc": 0, "zacc": -1000})
-    found = measured(TelemetryAdapter(), said, 100.0, 1)[1]
+    found = to_measurements(TelemetryAdapter(), said, 100.0, 1)[1]
     assert found[0].force_B_m_s2 == pytest.approx([0.0, 0.0, -9.81], abs=0.01)
 
 
 def test_a_cameras_pose_puts_the_autopilots_estimate_aside():
     """VISION_POSITION_ESTIMATE is a pose; while it comes LOCAL_POSITION_NED is none."""
-    telemetry, _ = measured(TelemetryAdapter(), attitude(10.0), 100.0, 1)
+    telemetry, _ = to_measurements(TelemetryAdapter(), attitude(10.0), 100.0, 1)
     seen = {"usec": 7_000_000, "x": 1.0, "y": 2.0, "z": 3.0, "roll": 0.1, "pitch": 0.2, "yaw": 0.3}
-    telemetry, found = measured(telemetry, MavlinkMessage(1, 197, "VISION_POSITION_ESTIMATE", seen), 100.0, 1)
+    telemetry, found = to_measurements(telemetry, MavlinkMessage(1, 197, "VISION_POSITION_ESTIMATE", seen), 100.0, 1)
     assert found[0].X_WB.q == pytest.approx(quat_from_euler(0.1, 0.2, 0.3))
-    assert measured(telemetry, place(10.02), 100.02, 1)[1] == ()
+    assert to_measurements(telemetry, place(10.02), 100.02, 1)[1] == ()
 
 
 @given(p=PLACE, q=UNIT)
@@ -128,4 +134,4 @@ def test_odometry_that_is_none_measures_nothing(fields):
     """A global frame, an unknown one, no quaternion, no number: nothing is measured and nothing raised."""
     whole = {"time_usec": 1, "frame_id": 1, "child_frame_id": 12, "x": 0.0, "y": 0.0, "z": 0.0, "q": [1.0, 0, 0, 0]}
     said = MavlinkMessage(1, 197, "ODOMETRY", {**whole, **fields})
-    assert measured(TelemetryAdapter(), said, 100.0, 1)[1] == ()
+    assert to_measurements(TelemetryAdapter(), said, 100.0, 1)[1] == ()

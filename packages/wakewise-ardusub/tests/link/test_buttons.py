@@ -14,7 +14,7 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.cli.link_ardusub import _buttons
-from wakewise_ardusub.link.buttons import BUTTONS, buttons_amiss, conflict, free_buttons
+from wakewise_ardusub.link.buttons import BUTTONS, button_faults, conflict, free_buttons
 from wakewise_ardusub.link.checks import CheckInputs, check, verdict
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 from wakewise_ardusub.sitl.own_parameters import own_parameters
@@ -51,7 +51,7 @@ def test_a_button_at_which_the_autopilot_acts_is_refused(button: int) -> None:
             flight.buttons = 1 << button | shift
             flight.run(0.3)
             changed |= (flight.stand_in.armed, flight.stand_in.mode) != before
-    words = buttons_amiss({"engage": button}, FRESH)
+    words = button_faults({"engage": button}, FRESH)
     assert not changed or words
     assert bool(words) == (button not in {0, 15})
     if words:
@@ -67,7 +67,7 @@ def test_without_a_button_that_disarms_arduSub_does_not_arm() -> None:
     assert not flight.stand_in.armed
     assert "Must assign a disarm or arm_toggle button" in " ".join(flight.texts())
     full = {name: 32.0 if name.startswith("BTN") else value for name, value in FRESH.items()}
-    assert "not those of disarm" in buttons_amiss({"engage": 4}, full)
+    assert "not those of disarm" in button_faults({"engage": 4}, full)
 
 
 def test_a_photograph_may_trigger_the_autopilots_camera() -> None:
@@ -112,4 +112,4 @@ def test_every_button_that_a_page_names_is_free_on_a_fresh_autopilot() -> None:
     found = [(path, given) for path in pages for given in GIVEN.findall(path.read_text(encoding="utf-8"))]
     assert any(path.name == "ardusub.md" for path, _ in found)
     for path, given in found:
-        assert not buttons_amiss(_buttons(given), FRESH), f"{path.name}: {given}"
+        assert not button_faults(_buttons(given), FRESH), f"{path.name}: {given}"

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
-from wakewise_ardusub.link.mavlink_relay import MavlinkRelay, stilled
+from wakewise_ardusub.link.mavlink_relay import MavlinkRelay, neutralize_sticks
 
 PILOT = (255, 190)
 
@@ -41,7 +41,7 @@ def test_sticks_are_let_go_and_all_else_of_them_stays(x, y, z, r, s, t, buttons,
     mav.seq = seq
     more = {"enabled_extensions": 3, "s": s, "t": t, "buttons2": 9} if extended else {}
     sent = mav.manual_control_encode(1, x, y, z, r, buttons, **more)
-    (found,) = read(stilled(bytes(sent.pack(mav, force_mavlink1=not second))))
+    (found,) = read(neutralize_sticks(bytes(sent.pack(mav, force_mavlink1=not second))))
     assert found.get_type() == "MANUAL_CONTROL"
     assert (found.get_srcSystem(), found.get_srcComponent(), found.get_seq()) == (*PILOT, seq)
     assert (found.x, found.y, found.z, found.r) == (0, 0, 500, 0)
@@ -56,7 +56,7 @@ def test_sticks_are_let_go_and_all_else_of_them_stays(x, y, z, r, s, t, buttons,
 def test_what_is_no_packet_stays_as_it_is(noise):
     """Any bytes that hold no whole MANUAL_CONTROL come out as they went in."""
     if not any(message.get_type() == "MANUAL_CONTROL" for message in read(noise)):
-        assert stilled(noise) == noise
+        assert neutralize_sticks(noise) == noise
 
 
 @given(before=st.binary(max_size=40), after=st.binary(max_size=40))
@@ -65,7 +65,7 @@ def test_sticks_are_found_between_noise(before, after):
     """Noise before and after in one datagram stays, and hides no sticks unless it passes for a whole packet itself."""
     mav = pilot()
     packet = bytes(mav.manual_control_encode(1, 700, 0, 900, 0, 0).pack(mav))
-    out = stilled(before + packet + after)
+    out = neutralize_sticks(before + packet + after)
     assert packet not in out
     assert out.startswith(before)
 
@@ -75,7 +75,7 @@ def test_a_signed_packet_is_left_out():
     mav = pilot()
     mav.signing.secret_key, mav.signing.sign_outgoing, mav.signing.timestamp = bytes(32), True, 1
     packet = bytes(mav.manual_control_encode(1, 700, 0, 900, 0, 0).pack(mav))
-    assert stilled(packet) == b""
+    assert neutralize_sticks(packet) == b""
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
-from wakewise_ardusub.link.message_state import LinkState, MavlinkMessage, heard, stick_axes, tilt_of
+from wakewise_ardusub.link.message_state import LinkState, MavlinkMessage, stick_axes, tilt_of, update_link_state
 
 STICKS = {"target": 1, "x": 0, "y": 0, "z": 500, "r": 0, "buttons": 0}
 
@@ -19,7 +19,7 @@ def after(*said: MavlinkMessage, known: LinkState | None = None) -> LinkState:
     """What is known after messages, a second apart."""
     known = known or LinkState(session=7)
     for k, one in enumerate(said):
-        known = heard(known, one, 100.0 + k)
+        known = update_link_state(known, one, 100.0 + k)
     return known
 
 
@@ -79,9 +79,9 @@ def test_sticks_for_another_vehicle_are_not_ours():
 def test_two_ground_stations_at_once_are_a_takeover():
     """Sticks of two systems within a second; a station that comes back after a while is none."""
     one, two = (MavlinkMessage(system, 190, "MANUAL_CONTROL", STICKS) for system in (255, 254))
-    known = heard(heard(LinkState(), one, 0.0), two, 0.5)
+    known = update_link_state(update_link_state(LinkState(), one, 0.0), two, 0.5)
     assert known.takeover == "sticks from two ground stations, 255 and 254"
-    assert heard(heard(LinkState(), one, 0.0), two, 1.5).takeover == ""
+    assert update_link_state(update_link_state(LinkState(), one, 0.0), two, 1.5).takeover == ""
 
 
 @pytest.mark.parametrize(
@@ -136,9 +136,9 @@ def test_a_sensors_own_pose_is_preferred():
     """While a camera's pose comes, the autopilot's estimate, which is made of it, does not stand for it."""
     camera = MavlinkMessage(1, 197, "VISION_POSITION_ESTIMATE", {"x": 1.0, "y": 2.0, "z": 3.0})
     own = MavlinkMessage(1, 1, "LOCAL_POSITION_NED", {"x": 9.0, "y": 9.0, "z": 9.0, "vx": 0.0, "vy": 0.0, "vz": 0.0})
-    known = heard(heard(LinkState(), camera, 0.0), own, 0.5)
+    known = update_link_state(update_link_state(LinkState(), camera, 0.0), own, 0.5)
     assert known.place_W_m == pytest.approx([1.0, 2.0, 3.0])
-    assert heard(known, own, 1.5).place_W_m == pytest.approx([9.0, 9.0, 9.0])
+    assert update_link_state(known, own, 1.5).place_W_m == pytest.approx([9.0, 9.0, 9.0])
 
 
 def test_depth_is_positive_down():
@@ -164,7 +164,7 @@ def test_fields_of_a_real_message():
     known, unwanted = LinkState(), None
     for message in reader.parse_buffer(packed):
         unwanted = MavlinkMessage.of(message)
-        known = heard(known, unwanted, 3.0)
+        known = update_link_state(known, unwanted, 3.0)
     assert dict(known.parameters) == {"MOT_1_DIRECTION": -1.0}
     assert known.named_value("WKW_ENG", 3.5) == (1.0, 0.5)
     assert unwanted is not None
@@ -180,5 +180,5 @@ def test_any_bytes_leave_what_is_known_sound(data):
     known = LinkState()
     for message in reader.parse_buffer(data) or []:
         if message.get_type() != "BAD_DATA":
-            known = heard(known, MavlinkMessage.of(message), 1.0)
+            known = update_link_state(known, MavlinkMessage.of(message), 1.0)
     assert known.place_W_m is None or np.isfinite(known.place_W_m).all()

@@ -14,7 +14,7 @@ from wakewise.core.errors import EnvironmentFailure
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link import protocol
 from wakewise_ardusub.link.checks import check, verdict
-from wakewise_ardusub.link.connection import heard_of, send_command
+from wakewise_ardusub.link.connection import receive_kind, send_command
 from wakewise_ardusub.link.output import motor_output
 from wakewise_ardusub.link.parameters import read_all_parameters, read_parameters, set_parameter
 from wakewise_ardusub.link.script import script_text
@@ -74,7 +74,7 @@ class Wire:
         return self._waiting.popleft() if self._waiting else None
 
     def hear(self, kinds: Collection[str], timeout_s: float) -> Any:
-        return heard_of(self, kinds, timeout_s)
+        return receive_kind(self, kinds, timeout_s)
 
     def pilot(self) -> None:
         """The ground station's heartbeat and sticks let go."""

@@ -52,8 +52,8 @@ def test_a_killed_program_leaves_every_line_that_it_wrote(tmp_path):
     """Killed by -9 in the middle of writing: each line is whole, and as many are there as were said to be written."""
     path = tmp_path / "journal.jsonl"
     code = (
-        "import sys\nfrom pathlib import Path\nfrom wakewise_ardusub.link.session_log import Journal\n"
-        "journal = Journal(Path(sys.argv[1]))\n"
+        "import sys\nfrom pathlib import Path\nfrom wakewise_ardusub.link.session_log import SessionLog\n"
+        "journal = SessionLog(Path(sys.argv[1]))\n"
         "k = 0\nwhile True:\n    journal.write('line', k=k)\n    print(k, flush=True)\n    k += 1\n"
     )
     said = 0

@@ -14,7 +14,7 @@ from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import Measurement
 from wakewise.ui.cli.main import run
 from wakewise_ardusub.link.message_state import MavlinkMessage
-from wakewise_ardusub.link.telemetry_adapter import TelemetryAdapter, measured
+from wakewise_ardusub.link.telemetry_adapter import TelemetryAdapter, to_measurements
 from wakewise_ardusub.sensors import PoseForwarder, PoseSample, UdpSocket, vision_position_estimate
 
 common = pytest.importorskip("pymavlink.dialects.v20.common")
@@ -47,7 +47,7 @@ def test_a_pose_goes_through_the_air_and_is_the_same_pose() -> None:
         assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 197)
         fields = MappingProxyType(message.to_dict())
         said = MavlinkMessage(name=message.get_type(), system=1, component=197, fields=fields)
-        known, (taken,) = measured(known, said, 100.0 + k, 1)
+        known, (taken,) = to_measurements(known, said, 100.0 + k, 1)
         assert taken.time_s == pytest.approx(100.0 + k)
         np.testing.assert_allclose(taken.X_WB.p_m, P + k, rtol=1e-6)
         assert abs(float(taken.X_WB.q @ Q)) == pytest.approx(1.0, abs=1e-6)

@@ -18,10 +18,10 @@ from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.message_state import attitude_of
 from wakewise_ardusub.link.protocol import ALT_HOLD, STABILIZE
 from wakewise_ardusub.link.session_log import SessionLog, read_journal
-from wakewise_ardusub.session.link_join import SEA, at_sea
+from wakewise_ardusub.session.link_join import SEA, join_vehicle
 from wakewise_ardusub.session.protected_region import ProtectedRegion, ball, ball_points
 from wakewise_ardusub.session.session import VehicleSession
-from wakewise_ardusub.session.warm_up import rehearse
+from wakewise_ardusub.session.warm_up import run_warm_up
 from wakewise_ardusub.sitl.companion_harness import CompanionHarness
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 
@@ -61,7 +61,7 @@ def afloat(companion: CompanionHarness, method: str = "dp"):
     middle = start.X_WB.apply(np.array([0.9, 0.0, 0.0]))
     scenario = Scenario(vehicle="bluerov2-heavy", method=method).replace(**SEA, **MISSION)
     photographs: list[float] = []
-    sea = at_sea(
+    sea = join_vehicle(
         scenario,
         companion.warden,
         start=start,
@@ -84,7 +84,7 @@ def test_arm_engage_fly_an_orbit_capture_release_disarm(tmp_path):
     companion = aboard(journal)
     companion.flight.run(1.0)
     sea, photographs = afloat(companion)
-    assert rehearse(sea) < 5.0
+    assert run_warm_up(sea) < 5.0
     shutter = PhotoTrigger(sea.parts)
     steps, goals = [], []
 
@@ -156,7 +156,7 @@ def test_depth_is_held_while_engaged_in_alt_hold_and_after_hand_back():
     flight.set("WKW_ENABLE", 1.0)
     flight.run(3.0)
     sea, _ = afloat(companion)
-    rehearse(sea)
+    run_warm_up(sea)
     depths: dict[str, list[float]] = {"held": [], "after": []}
     at = {"engaged": 0.0, "released": 0.0}
 

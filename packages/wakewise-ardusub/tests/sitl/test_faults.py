@@ -12,7 +12,7 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.protocol import ENABLE_PARAMETER, LOOP_MS, NEUTRAL_WITHIN_S, STABILIZE
-from wakewise_ardusub.sitl.inprocess_session import FAULTS, THRUSTS, InProcessSession, MavlinkSender, noise, suffer
+from wakewise_ardusub.sitl.inprocess_session import FAULTS, THRUSTS, InProcessSession, MavlinkSender, noise, run_fault
 
 HEAVY = load_vehicle("bluerov2-heavy")
 ACTING = tuple(int(1500 + 400 * value + 0.5) for value in THRUSTS)
@@ -28,7 +28,7 @@ def test_engaged_the_companions_thrusts_are_on_the_motors() -> None:
 @pytest.mark.parametrize("fault", FAULTS)
 def test_after_a_fault_the_outputs_are_the_autopilots_within_300_ms(fault: str) -> None:
     """Each of them, by the script's time-out or at once."""
-    after = suffer(HEAVY, FAULTS[fault])
+    after = run_fault(HEAVY, FAULTS[fault])
     assert after.neutral_ms <= 1e3 * NEUTRAL_WITHIN_S
     assert after.disarmed_thrusts == 0
 

@@ -24,7 +24,7 @@ from bare import command, environment
 from loopback_vehicle import Vehicle, free_ends
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
-from wakewise_ardusub.vehicle_summary import VehicleSummary, craft_json
+from wakewise_ardusub.vehicle_summary import VehicleSummary, vehicle_summary_json
 from wakewise_ardusub.wash_meter.embedded import main
 from wakewise_ardusub.wash_savings import WashSavingsCalculator
 
@@ -37,7 +37,7 @@ ASK = urllib.request.build_opener(urllib.request.ProxyHandler({})).open
 def craft_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("craft") / "heavy.json"
     craft = VehicleSummary.of(load_vehicle("bluerov2-heavy"), wake_model("jet"))
-    path.write_text(craft_json(craft), encoding="utf-8")
+    path.write_text(vehicle_summary_json(craft), encoding="utf-8")
     return path
 
 

@@ -20,7 +20,7 @@ from wakewise.wake import wake_model
 from wakewise_ardusub.logs import mavlink, tlog
 from wakewise_ardusub.logs.clock import LogClock
 from wakewise_ardusub.logs.read import read_log
-from wakewise_ardusub.logs.replay_allocation import ReplayedAllocation, bow_points, hindsight
+from wakewise_ardusub.logs.replay_allocation import ReplayedAllocation, bow_points, replay_log
 from wakewise_ardusub.logs.table import LogTable, tabulate
 from wakewise_ardusub.vehicle_summary import VehicleSummary
 from wakewise_ardusub.wash_meter.meter import MINUTE_S, MeterReading, WashMeter
@@ -49,9 +49,9 @@ def tape(file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Message]:
     def keep(gather: Any, stamp_s: float, system: int, component: int, name: str, fields: dict[str, Any]) -> None:
         boot = fields.get("time_boot_ms") if component == mavlink.AUTOPILOT and name in mavlink.WANTED else None
         found.append((clock.at(stamp_s, None if boot is None else 1e-3 * boot), system, component, name, fields))
-        mavlink.take(gather, stamp_s, system, component, name, fields)
+        mavlink.record_message(gather, stamp_s, system, component, name, fields)
 
-    monkeypatch.setattr(tlog, "take", keep)
+    monkeypatch.setattr(tlog, "record_message", keep)
     read_log(file)
     monkeypatch.undo()
     return found
@@ -72,7 +72,7 @@ def judged(file: Path) -> tuple[LogTable, ReplayedAllocation]:
     vehicle = load_vehicle("bluerov2-heavy")
     log = read_log(file)
     table = tabulate(log)
-    return table, hindsight(table.rows, log.parameters, vehicle, bow_points(vehicle, 0.4), wake_model("jet"))
+    return table, replay_log(table.rows, log.parameters, vehicle, bow_points(vehicle, 0.4), wake_model("jet"))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import typer
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.commands import PHOTOGRAPHS, Command
-from wakewise.ui.cli.console import ProgressBars, print_json, print_table, shown
+from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table
 from wakewise.ui.cli.options import Json, seed_option
 
 Model = Annotated[
@@ -106,7 +106,7 @@ def nerf(
     table.add_column("value", justify="right")
     for key, value in figures.items():
         if isinstance(value, (int, float, str)) or value is None:
-            table.add_row(key, shown(value))
+            table.add_row(key, format_value(value))
     print_table(table)
     typer.echo(f"field: {folder}")
 

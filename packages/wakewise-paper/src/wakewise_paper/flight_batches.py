@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from wakewise.core.jit.precompile import warm
+from wakewise.core.jit.precompile import compile_kernels
 from wakewise.experiments.campaigns import ProcessExecutor, TrialExecutor, run
 from wakewise.experiments.campaigns.store import open_store
 from wakewise.experiments.trials.timing import BenchOptions
@@ -57,7 +57,7 @@ def fly_all(
         for task in tasks.values():
             here.forget(task.key)
     if any(here.figures(task.key) is None for task in tasks.values()):
-        warm(progress=options.progress)  # else each of the processes would
+        compile_kernels(progress=options.progress)  # else each of the processes would
     outcomes = run(list(tasks.values()), store.folder, engine(options.workers), progress=options.progress, again=True)
     rows: dict[Key, Row] = {}
     failures: list[FlightFailure] = []

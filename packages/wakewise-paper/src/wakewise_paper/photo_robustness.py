@@ -21,7 +21,7 @@ import numpy as np
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_json, write_text
 from wakewise.core.interfaces import ScalarGrid
-from wakewise.core.run_lock import alone
+from wakewise.core.run_lock import exclusive_run
 from wakewise.experiments.trials.stages import ProgressListener, SilentProgress, of_the_computer
 from wakewise.operation import Scenario
 from wakewise.scene.targets import Target
@@ -112,7 +112,7 @@ def degrade(
     watch = watch or SilentProgress()
     wanted = _checked({name: factor.levels for name, factor in FACTORS.items()} if levels is None else levels)
     _claim(folder, scenario)
-    with alone(folder):
+    with exclusive_run(folder):
         return _study(scenario, folder, wanted, watch)
 
 

@@ -11,12 +11,12 @@ from wakewise.core.arrays import Array
 from wakewise.vision.piv.folder import PivFolder, read_pairs, samples_of_vectors
 from wakewise.vision.piv.images import CameraSettings, photograph_pair
 from wakewise.vision.piv.processing import Engine, displacements, has_openpiv
-from wakewise.vision.piv.tracers import Sheet, TracerSettings
+from wakewise.vision.piv.tracers import LightSheet, TracerSettings
 from wakewise.vision.piv.vectors import averaged
 from wakewise.wake.samples import JetSamples, joined
 from wakewise_paper.flows import JetFlow, exit_speed_m_s
 
-SHEET = Sheet(
+SHEET = LightSheet(
     centre_W_m=np.array([0.32, 0.0, 0.0]),
     right_W=np.array([1.0, 0.0, 0.0]),
     down_W=np.array([0.0, 1.0, 0.0]),
@@ -80,7 +80,7 @@ class RoundTrip:
 def round_trip(flow: ShearFlow, engine: Engine, rng: np.random.Generator, size_px: int = 768) -> RoundTrip:
     """Photograph a known field at 1 mm per pixel and 120 frames per second, process it and compare."""
     camera = CameraSettings(width_px=size_px, height_px=size_px, m_per_px=1e-3)
-    sheet = Sheet(
+    sheet = LightSheet(
         centre_W_m=np.zeros(3),
         right_W=np.array([1.0, 0.0, 0.0]),
         down_W=np.array([0.0, 1.0, 0.0]),

@@ -32,7 +32,7 @@ def made(monkeypatch, tmp_path):
         ]  # fmt: skip
 
     monkeypatch.setattr(module, "run_campaign", campaign)
-    monkeypatch.setattr(module, "warm", lambda **_: None)
+    monkeypatch.setattr(module, "compile_kernels", lambda **_: None)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

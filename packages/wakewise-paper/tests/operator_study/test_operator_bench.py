@@ -10,7 +10,7 @@ from wakewise.experiments.trials import BenchOptions
 from wakewise_paper.cli.bench_operator import show_operator
 from wakewise_paper.operator_study import bench, paper
 from wakewise_paper.operator_study.flight import FIGURES, OperatorTrial
-from wakewise_paper.operator_study.plan import planned_trials, wished_w_tracks, wished_worlds
+from wakewise_paper.operator_study.plan import planned_trials, selected_w_tracks, selected_worlds
 
 SPEED, DEVIATION = "target_speed_mean_m_s", "velocity_deviation_pct"
 
@@ -102,11 +102,11 @@ def test_a_run_that_was_stopped_goes_on(made_up, monkeypatch):
 def test_worlds_and_w_tracks_that_cannot_be_are_refused():
     """In one line with what would be right."""
     with pytest.raises(InputError, match="worlds: 'mars' is not known, allowed: "):
-        wished_worlds(("mars",))
+        selected_worlds(("mars",))
     for value in (0.0, -1.0, float("nan"), 51.0):
         with pytest.raises(InputError, match=r"w_tracks: .*must be from 0.5 to 50"):
-            wished_w_tracks((value,))
-    assert wished_w_tracks((20.0, 5.0, 5.0)) == (5.0, 20.0)
+            selected_w_tracks((value,))
+    assert selected_w_tracks((20.0, 5.0, 5.0)) == (5.0, 20.0)
 
 
 def test_a_trial_is_plain():

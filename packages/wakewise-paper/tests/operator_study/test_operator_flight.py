@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.control.receding import PlanState
-from wakewise_paper.operator_study.controller_probe import ControllerProbe, within
+from wakewise_paper.operator_study.controller_probe import ControllerProbe, find_record
 from wakewise_paper.operator_study.flight import (
     DEVIATIONS,
     FIGURES,
@@ -42,8 +42,8 @@ def test_the_same_seed_is_the_same_water_for_every_method_and_pilot():
 def test_a_plan_is_found_however_deep_it_lies():
     """The state of a method that shares a plan's wrench out anew has the plan's in it; that of one without has none."""
     deep, flat = (parts_of(OperatorTrial(world="mud", pilot="script", method=m, seed=1)) for m in ("wake-aware", "dp"))
-    assert isinstance(within(deep.controller.init(), PlanState), PlanState)
-    assert within(flat.controller.init(), PlanState) is None
+    assert isinstance(find_record(deep.controller.init(), PlanState), PlanState)
+    assert find_record(flat.controller.init(), PlanState) is None
 
 
 def test_one_flight_gives_the_figures_of_the_table():

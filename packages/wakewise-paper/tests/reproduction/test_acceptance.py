@@ -1,6 +1,6 @@
 """What the paper's tables are judged by, and what of them is met."""
 
-from wakewise_paper.reproduction.acceptance import glances, tally
+from wakewise_paper.reproduction.acceptance import count_met, glances
 
 
 def place(method, seed, rmse, energy=1.0, target="brain", world="pump-tank"):
@@ -26,4 +26,4 @@ def test_a_figure_counts_once_and_not_for_being_met_in_the_papers_own_water():
     rows = [row("mud", False), row("reef", True), row("paper", True)]
     rows += [row("paper", True, "g"), row("mud", False, "g"), row("mud", True, "h", paper=None)]
     counted = {"quoted": 2, "met": 1, "surely": 1, "circular": 1, "own": 0, "own_judged": 0, "worlds": 2}
-    assert tally({"t": rows}) == counted
+    assert count_met({"t": rows}) == counted

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.scene.targets import coral, place_on_bed
-from wakewise.vision.piv.tracers import Sheet
+from wakewise.vision.piv.tracers import LightSheet
 from wakewise_paper.reproduction.piv_flights import FIGURES, NEAR_M, PivRecorder
 
 
@@ -36,7 +36,7 @@ class Witness:
 def watch(times=(1.0,)):
     """Over a brain coral on the bed."""
     target = place_on_bed("brain", coral("brain", 0), 1.5)
-    sheet = Sheet(
+    sheet = LightSheet(
         centre_W_m=target.centre_W_m,
         right_W=np.array([1.0, 0.0, 0.0]),
         down_W=np.array([0.0, 0.0, 1.0]),

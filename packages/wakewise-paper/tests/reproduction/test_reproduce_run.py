@@ -27,7 +27,7 @@ def campaign(monkeypatch):
         return outcomes
 
     monkeypatch.setattr(module, "run_campaign", run)
-    monkeypatch.setattr(module, "warm", lambda **_: None)
+    monkeypatch.setattr(module, "compile_kernels", lambda **_: None)
     monkeypatch.setattr(module.time, "monotonic", lambda: clock["now"])
     return calls
 

@@ -12,7 +12,14 @@ from wakewise.experiments.trials import BenchOptions
 from wakewise_paper.cli.bench_wash import show_gentle
 from wakewise_paper.reports.wash_bench_plot import draw_gentle
 from wakewise_paper.wash_reduction import bench as gentle
-from wakewise_paper.wash_reduction.ablations import LEVERS, NONE, alone, left_out, lever_settings, wished_levers
+from wakewise_paper.wash_reduction.ablations import (
+    MECHANISMS,
+    NONE,
+    lever_settings,
+    only_name,
+    selected_mechanisms,
+    without_name,
+)
 from wakewise_paper.wash_reduction.figures import SPEED
 from wakewise_paper.wash_reduction.flight import FIGURES, parts_of
 from wakewise_paper.wash_reduction.paper import FIGURES as PAPER_FIGURES
@@ -62,7 +69,7 @@ def test_the_answer_has_the_keys_that_were_promised(here, tmp_path, capsys):
     for key in ("exceedance_1cm_s_pct", "exceedance_ambient_pct", "attitude_rmse_deg", "camera_rmse_mm"):
         assert row[key] == 1.0
     assert row["rmse_mm"] is None and "bench worlds" in row["why"]["rmse_mm"]
-    for name in LEVERS:
+    for name in MECHANISMS:
         assert scenario["levers"][name]["left_out_pct"] == pytest.approx(50.0)
         assert scenario["levers"][name]["alone_pct"] > 0.0
     trouble = found["headline"]["trouble"]
@@ -122,13 +129,17 @@ def test_a_method_that_is_not_made_is_left_out_with_a_reason():
 
 def test_each_lever_is_left_out_once_and_flown_alone_once():
     """All levers' settings are accepted, none is without effect, and left out and alone differ."""
-    table = lever_settings(tuple(LEVERS))
-    assert set(table) == {NONE, *(left_out(n) for n in LEVERS), *(alone(n) for n in LEVERS)}
+    table = lever_settings(tuple(MECHANISMS))
+    assert set(table) == {NONE, *(without_name(n) for n in MECHANISMS), *(only_name(n) for n in MECHANISMS)}
     usual = ControlSettings()
     for settings in table.values():
         control = parts_of(lever_trial("calm/paper", settings, 1)).scenario.control
         assert control != usual
-    assert wished_levers(None) == () and wished_levers(("all",)) == tuple(LEVERS) and lever_settings(()) == {}
+    assert (
+        selected_mechanisms(None) == ()
+        and selected_mechanisms(("all",)) == tuple(MECHANISMS)
+        and lever_settings(()) == {}
+    )
 
 
 def test_wrong_currents_are_flown_where_water_runs():

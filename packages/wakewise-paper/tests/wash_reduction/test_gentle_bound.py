@@ -16,14 +16,14 @@ from wakewise.robot.vehicles import load_vehicle
 from wakewise_paper.cli.bench_wash import show_gentle
 from wakewise_paper.wash_reduction import bench as gentle
 from wakewise_paper.wash_reduction import energy_optimum
-from wakewise_paper.wash_reduction.allocations import sharings, split
-from wakewise_paper.wash_reduction.energy_bound import chosen, sum_of
+from wakewise_paper.wash_reduction.allocations import candidate_allocations, split
+from wakewise_paper.wash_reduction.energy_bound import choose_under_budget, sum_of
 from wakewise_paper.wash_reduction.energy_optimum import (
     ENERGIES,
     FRESH_GUSTS,
     AllocationJudge,
     BoundTrial,
-    attained,
+    attained_reductions,
     candidates,
     fly_bound,
     fly_dp,
@@ -51,7 +51,7 @@ class MadeUp:
 def judged(speed, least_N):
     """A flight of given least thrusts, shape (k, n), without settling, in a made-up water."""
     flown = SimpleNamespace(led=MadeUp(speed, len(least_N) - 1), vehicle=VEHICLE, judged_s=0.0)
-    return AllocationJudge.of(flown, sharings(LAYOUT, least_N))
+    return AllocationJudge.of(flown, candidate_allocations(LAYOUT, least_N))
 
 
 def heavy_flight(seconds):
@@ -69,11 +69,13 @@ def of_thruster(number):
 def test_two_stretches_spend_the_power_where_it_buys_more():
     """One bound on the sum, and only one of two stretches can be spared for it: the one with more wash."""
     wash, energy = np.array([[5.0, 1.0], [9.0, 2.0]]), np.array([[0.5, 0.7], [0.5, 0.8]])
-    assert chosen(wash, energy, 1.35).tolist() == [0, 1]
-    assert chosen(wash, energy, 1.25).tolist() == [1, 0]
-    assert chosen(wash, energy, 1.05).tolist() == [0, 0]
-    assert chosen(wash, energy, 1.51).tolist() == chosen(wash, energy, np.inf).tolist() == [1, 1]
-    assert chosen(wash, energy, 0.9).tolist() == [0, 0]
+    assert choose_under_budget(wash, energy, 1.35).tolist() == [0, 1]
+    assert choose_under_budget(wash, energy, 1.25).tolist() == [1, 0]
+    assert choose_under_budget(wash, energy, 1.05).tolist() == [0, 0]
+    assert (
+        choose_under_budget(wash, energy, 1.51).tolist() == choose_under_budget(wash, energy, np.inf).tolist() == [1, 1]
+    )
+    assert choose_under_budget(wash, energy, 0.9).tolist() == [0, 0]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -83,7 +85,7 @@ def test_a_choice_is_the_best_of_all_within_the_bound_and_more_energy_never_harm
     wash, energy = rng.uniform(size=(4, 5)), 0.25 * rng.uniform(1.0, 2.0, size=(4, 5))
     before = np.inf
     for most in (1.1, 1.3, 1.6, np.inf):
-        picks = chosen(wash, energy, most)
+        picks = choose_under_budget(wash, energy, most)
         own = sum_of(wash, picks)
         every = [np.array(each) for each in product(range(5), repeat=4)]
         within = [each for each in every if sum_of(energy, each) <= 0.998 * most]
@@ -97,7 +99,7 @@ def test_a_choice_is_the_best_of_all_within_the_bound_and_more_energy_never_harm
 def test_sharings_make_the_same_wrench_within_limits_and_begin_with_the_least():
     """The first is the least thrusts; in others a thruster rests at every step; none is there twice."""
     least = heavy_flight(2.0)
-    every = sharings(LAYOUT, least)
+    every = candidate_allocations(LAYOUT, least)
     assert np.array_equal(every[0], least)
     assert np.abs((every - least) @ LAYOUT.B.T).max() < 1e-9
     assert (every >= LAYOUT.lower_N - 1e-9).all() and (every <= LAYOUT.upper_N + 1e-9).all()
@@ -113,14 +115,14 @@ def test_spare_thrusts_that_share_thrusters_are_refused():
     B = np.zeros((6, 4))
     B[0] = 1.0
     with pytest.raises(InputError, match="lines"):
-        sharings(compile_layout(B, -np.ones(4), np.ones(4)), np.zeros((3, 4)))
+        candidate_allocations(compile_layout(B, -np.ones(4), np.ones(4)), np.zeros((3, 4)))
 
 
 def test_the_front_falls_with_energy_and_without_a_bound_the_jet_that_does_it_rests():
     """A thruster that alone stirs the target is at rest where power does not matter, and pushes less for little."""
     least = heavy_flight(20.0)
     judge = judged(of_thruster(0), least)
-    found = attained(judge)
+    found = attained_reductions(judge)
     bounds = [found[f"bound_{name}_m_s"] for name in ENERGIES]
     assert all(more <= less + 1e-12 for less, more in pairwise(bounds))
     assert bounds[0] < judge.wash_m_s(0) and bounds[-1] < 0.05 * bounds[0]
@@ -134,7 +136,7 @@ def test_the_front_falls_with_energy_and_without_a_bound_the_jet_that_does_it_re
 def test_where_no_jet_reaches_the_target_nothing_is_to_be_gained():
     """Water that is the same whatever the thrusts: the bound is the least thrusts' own wash, at their energy."""
     judge = judged(lambda T: 0.004, heavy_flight(10.0))
-    found = attained(judge)
+    found = attained_reductions(judge)
     for name in ENERGIES:
         assert found[f"bound_{name}_m_s"] == pytest.approx(judge.wash_m_s(0))
         assert found[f"attained_{name}_m_s"] == pytest.approx(0.0055)
@@ -147,7 +149,9 @@ def test_a_flight_of_dp_is_judged_with_the_rule_and_the_belief_among_the_choices
     """
     trial = BoundTrial(scenario="orbit/paper", seed=1, duration_s=12.0)
     flown = fly_dp(trial)
-    monkeypatch.setattr(energy_optimum, "sharings", lambda layout, least_N: sharings(layout, least_N)[:3])
+    monkeypatch.setattr(
+        energy_optimum, "candidate_allocations", lambda layout, least_N: candidate_allocations(layout, least_N)[:3]
+    )
     grid, named = candidates(flown)
     assert np.abs((grid - grid[0]) @ flown.layout.B.T).max() < 1e-6
     rule = bow_layout(flown.vehicle)

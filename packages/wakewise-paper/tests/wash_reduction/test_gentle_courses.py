@@ -101,9 +101,9 @@ def test_a_cable_pulls_down_the_current_as_hard_as_drawn():
     """The tank's own law of a cable gives the pull that the seed drew, along the current, at the start."""
     from wakewise.simulation.tank.tether import Tether
     from wakewise.simulation.water import SteadyCurrent
-    from wakewise_paper.wash_reduction.scenario_files import drawn
+    from wakewise_paper.wash_reduction.scenario_files import sample_conditions
 
-    parts, what = parts_of(WashTrial(scenario="tether/paper", method="dp", seed=2)), drawn("tether", 2)
+    parts, what = parts_of(WashTrial(scenario="tether/paper", method="dp", seed=2)), sample_conditions("tether", 2)
     current = np.array(what.current_W_m_s)
     force = Tether.of(parts.scenario.tank).force_W_N(
         parts.start.X_WB, np.zeros(6), SteadyCurrent(velocity_W_m_s=current), 0.0

@@ -8,10 +8,10 @@ from wakewise_paper.wash_reduction.plan import METHODS
 from wakewise_paper.wash_reduction.scenario_files import (
     SCENARIOS,
     VEHICLES,
-    drawn,
     fields_of,
     load_scenario_file,
     names_of,
+    sample_conditions,
 )
 
 
@@ -30,12 +30,12 @@ def test_what_a_seed_draws_lies_within_its_stratum(name):
     """Trim and current's speed are where the file has them; no two scenarios share a seed."""
     file = load_scenario_file(name)
     for seed in range(1, 10):
-        found = drawn(name, seed)
+        found = sample_conditions(name, seed)
         low, high = file.trims_N[found.trim]
         assert low <= found.trim_N <= high
         north, east, _ = found.current_W_m_s
         assert file.current_m_s[0] - 1e-4 <= (north**2 + east**2) ** 0.5 <= file.current_m_s[1] + 1e-4
-    assert len({drawn(other, 1).seed for other in SCENARIOS}) == len(SCENARIOS)
+    assert len({sample_conditions(other, 1).seed for other in SCENARIOS}) == len(SCENARIOS)
 
 
 def test_methods_and_levers_of_one_seed_meet_the_same_world():

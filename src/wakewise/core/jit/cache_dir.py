@@ -22,7 +22,7 @@ def is_interpreted(environment: Mapping[str, str] = os.environ) -> bool:
     return environment.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0")
 
 
-def keep_kernels(
+def select_cache_folder(
     package: Path = Path(__file__).parents[2], environment: MutableMapping[str, str] = os.environ
 ) -> Path | None:
     """Give Numba a folder under the system's one for temporary files if it would find none; returns that folder."""
@@ -86,5 +86,5 @@ def user_cache(environment: MutableMapping[str, str]) -> Path:
     return Path(environment.get("XDG_CACHE_HOME") or home / ".cache") / "numba"
 
 
-CHOSEN = keep_kernels()
+CHOSEN = select_cache_folder()
 """The folder that was chosen when `wakewise` was imported; None where Numba finds a place of its own."""

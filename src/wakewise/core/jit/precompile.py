@@ -70,7 +70,7 @@ def listed() -> tuple[KernelEntry, ...]:
     return tuple(KernelEntry(name=r["name"], types=tuple(r["types"]), job=r["job"], cost_s=r["cost_s"]) for r in rows)
 
 
-def of_jobs(jobs: Iterable[str]) -> tuple[KernelEntry, ...]:
+def kernels_of_jobs(jobs: Iterable[str]) -> tuple[KernelEntry, ...]:
     """Kernels of some jobs, those of the earliest job first.
 
     Raises
@@ -87,7 +87,7 @@ def of_jobs(jobs: Iterable[str]) -> tuple[KernelEntry, ...]:
 
 def is_warm(jobs: Sequence[str] = JOBS) -> bool:
     """Whether the jobs were done with the sources, and the Numba, that are here now; nothing is to be done without."""
-    return is_interpreted() or all(_note(job).exists() for job in jobs if of_jobs([job]))
+    return is_interpreted() or all(_note(job).exists() for job in jobs if kernels_of_jobs([job]))
 
 
 _tried: set[str] = set()
@@ -110,8 +110,8 @@ class BackgroundCompilation:
         cold = [job for job in JOBS if job in jobs and job not in _tried and not is_warm([job])]
         _tried.update(cold)
         self._waiting: queue.SimpleQueue[KernelEntry] = queue.SimpleQueue()
-        self._left = {job: len(of_jobs([job])) for job in cold}
-        self._cost = {job: sum(kernel.cost_s for kernel in of_jobs([job])) for job in cold}
+        self._left = {job: len(kernels_of_jobs([job])) for job in cold}
+        self._cost = {job: sum(kernel.cost_s for kernel in kernels_of_jobs([job])) for job in cold}
         self._spent = dict.fromkeys(cold, 0.0)
         self._total = sum(self._left.values())
         self._amiss: dict[str, list[str]] = {job: [] for job in cold}
@@ -119,7 +119,7 @@ class BackgroundCompilation:
         self._fault = ""
         self._workers: list[subprocess.Popen[str]] = []
         for job in cold:
-            for kernel in sorted(of_jobs([job]), key=lambda kernel: -kernel.cost_s):
+            for kernel in sorted(kernels_of_jobs([job]), key=lambda kernel: -kernel.cost_s):
                 self._waiting.put(kernel)
         count = min(processes or min(_cores(), 4), self._total)
         self._running = count
@@ -193,7 +193,7 @@ class BackgroundCompilation:
             self._change.notify_all()
 
 
-def warm(
+def compile_kernels(
     jobs: Sequence[str] = JOBS, progress: Callable[..., None] | None = None, processes: int | None = None
 ) -> PrecompileResult:
     """Compile all kernels of some jobs, unless they are there; returns when that is done.
@@ -203,7 +203,7 @@ def warm(
     InputError
         If there is no job of that name.
     """
-    of_jobs(jobs)
+    kernels_of_jobs(jobs)
     return BackgroundCompilation(jobs, processes).wait(jobs, progress)
 
 
@@ -270,9 +270,9 @@ def _made_from(job: str) -> str:
 
     root = Path(__file__).resolve().parents[2]
     whole = sha256(f"{numba.__version__} {sys.version_info[:2]} {llvm.get_host_cpu_name()}".encode())
-    for kernel in of_jobs([job]):
+    for kernel in kernels_of_jobs([job]):
         whole.update(f"{kernel.name} {kernel.types}".encode())
-    for module in sorted({kernel.name.rpartition(".")[0] for kernel in of_jobs([job])}):
+    for module in sorted({kernel.name.rpartition(".")[0] for kernel in kernels_of_jobs([job])}):
         whole.update(digest(root.joinpath(*module.split(".")[1:]).with_suffix(".py")))
     return whole.hexdigest()[:16]
 

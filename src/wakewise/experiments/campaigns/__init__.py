@@ -12,10 +12,10 @@ what figures of many trials say.
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
-    from wakewise.experiments.campaigns.definition import Campaign, load_campaign, planned
+    from wakewise.experiments.campaigns.definition import Campaign, load_campaign, planned_trials
     from wakewise.experiments.campaigns.engines import ProcessExecutor, TrialExecutor
     from wakewise.experiments.campaigns.run import run
     from wakewise.experiments.campaigns.task import Task, TrialOutcome
@@ -30,8 +30,8 @@ __all__ = [
     "TrialExecutor",
     "TrialOutcome",
     "load_campaign",
-    "planned",
+    "planned_trials",
     "run",
 ]
 
-lazy_door(__name__)
+lazy_attributes(__name__)

@@ -19,7 +19,7 @@ How = Literal["done", "error", "computer", "died", "late", "memory", "stopped"]
 died; it took too long; it took more memory than it was allowed; the user stopped the run."""
 FINAL: tuple[How, ...] = ("error",)
 """Ends that would be the same the next time: the same configuration and seed give the same exception."""
-TRIED: tuple[How, ...] = ("died", "late", "memory")
+RETRIED: tuple[How, ...] = ("died", "late", "memory")
 """Ends after which a trial is tried again, a few times. A failure of the computer is none of the trial's: every run
 tries it again."""
 
@@ -30,7 +30,7 @@ class Attempts:
 
     begun: int = 0
     failed: int = 0
-    """Attempts that ended in one of `TRIED`, since the trial was last told to be tried anew."""
+    """Attempts that ended in one of `RETRIED`, since the trial was last told to be tried anew."""
     how: How | None = None
     """How the last one ended; None if none has, or if it is tried anew."""
     reason: str | None = None
@@ -38,7 +38,7 @@ class Attempts:
 
     def is_failure(self, retries: int) -> bool:
         """Whether there is nothing more to try."""
-        return self.how in FINAL or (self.how in TRIED and self.failed > retries)
+        return self.how in FINAL or (self.how in RETRIED and self.failed > retries)
 
 
 def begin(folder: Path, **facts: Any) -> None:
@@ -51,7 +51,7 @@ def end(folder: Path, how: How, reason: str | None, took_s: float) -> None:
     _add(folder, {"event": "ended", "how": how, "reason": reason, "took_s": round(took_s, 3)})
 
 
-def anew(folder: Path) -> None:
+def clear_failures(folder: Path) -> None:
     """Forget earlier failures: the trial is tried again."""
     _add(folder, {"event": "anew"})
 
@@ -81,16 +81,16 @@ def gather_attempts(text: bytes) -> Attempts:
             begun += 1
         elif event == "anew":
             failed, how, reason = 0, None, None
-        elif event == "ended" and how_of(told.get("how")) is not None:
-            how = how_of(told["how"])
+        elif event == "ended" and parse_outcome(told.get("how")) is not None:
+            how = parse_outcome(told["how"])
             reason = str(told["reason"]) if told.get("reason") else None
             took = told.get("took_s")
             took_s = float(took) if isinstance(took, (int, float)) else 0.0
-            failed += how in TRIED
+            failed += how in RETRIED
     return Attempts(begun, failed, how, reason, took_s)
 
 
-def how_of(word: object) -> How | None:
+def parse_outcome(word: object) -> How | None:
     """The end that a word of a file names; None if it names none."""
     return next((how for how in get_args(How) if how == word), None)
 

@@ -6,8 +6,8 @@ from typing import Any
 
 from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns.definition import FACTORS
-from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place, glance
-from wakewise.experiments.campaigns.table import Results, varied
+from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place, summarize
+from wakewise.experiments.campaigns.table import Results, varying_factors
 
 MEASURES = (
     ComparisonMetric("success", "% of models good", 100.0, False),
@@ -24,11 +24,11 @@ _LEADING = ("rmse_mm", "target_speed_mean_m_s")
 
 def comparable(found: Results) -> tuple[str, ...]:
     """Factors of which trials have several, methods first; `method` alone where they differ in nothing but seeds."""
-    return varied(found.plan)
+    return varying_factors(found.plan)
 
 
-def places(found: Results, compare: str = "") -> list[Place]:
-    """Trials that have ended, as `glance` compares them: `method` is the compared factor, `world` what else differs.
+def paired_groups(found: Results, compare: str = "") -> list[Place]:
+    """Trials that have ended, as `summarize` compares them: `method` is the compared factor, `world` what else differs.
 
     Raises
     ------
@@ -70,8 +70,8 @@ def measures(found: list[Place]) -> list[ComparisonMetric]:
     return sorted(there, key=lambda measure: measure.figure != leading)
 
 
-def contest(found: list[Place]) -> list[tuple[ComparisonMetric, MethodSummary]]:
+def method_contrasts(found: list[Place]) -> list[tuple[ComparisonMetric, MethodSummary]]:
     """Each measure in each world, over the trials that all of the compared have ended."""
     worlds = dict.fromkeys(place["world"] for place in found)
-    pairs = ((measure, glance(measure, world, found)) for measure in measures(found) for world in worlds)
+    pairs = ((measure, summarize(measure, world, found)) for measure in measures(found) for world in worlds)
     return [(measure, one) for measure, one in pairs if one is not None]

@@ -15,10 +15,10 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError, field_validator
 
 from wakewise.core.errors import InputError
-from wakewise.core.files import not_a_name
+from wakewise.core.files import name_fault
 from wakewise.core.safe_yaml import yaml_file
 from wakewise.core.settings import Seed, Settings
-from wakewise.experiments.campaigns.provenance import check_there, outside_of
+from wakewise.experiments.campaigns.provenance import check_loadable, external_parts
 from wakewise.experiments.campaigns.task import Task
 from wakewise.experiments.campaigns.versions import FLIES, PHOTOGRAPHS
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
@@ -92,7 +92,7 @@ class Campaign(Settings):
     @field_validator("name")
     @classmethod
     def _names_a_folder(cls, value: str) -> str:
-        if fault := not_a_name(value):
+        if fault := name_fault(value):
             raise ValueError(f"names a folder, so {fault}")
         return value
 
@@ -132,7 +132,7 @@ def check_campaign(tree: Mapping[str, Any], source: str = "campaign") -> Campaig
         raise InputError(f"{source}: {describe_fault(fault, Campaign)}") from None
 
 
-def planned(campaign: Campaign, source: str = "campaign") -> list[PlannedTrial]:
+def planned_trials(campaign: Campaign, source: str = "campaign") -> list[PlannedTrial]:
     """All trials of a campaign, seed by seed, so that one that is stopped has whole seeds of everything.
 
     Raises
@@ -190,9 +190,9 @@ def _resolved(
         scenario = load_scenario(campaign.preset, None, dict(cell.fields) | {"seed": seed})
         loaded = f"{scenario.vehicle} {scenario.ballast} {scenario.target}"
         if loaded not in there:
-            check_there(scenario)
+            check_loadable(scenario)
             there.add(loaded)
-        return scenario, outside_of(scenario)
+        return scenario, external_parts(scenario)
     except InputError as fault:
         raise InputError(f"{source}: {where}: {fault}") from None
 
@@ -243,7 +243,7 @@ retries: 2                        # tries after a process that died or was ended
 """
 
 
-def close_to(name: str, known: list[str]) -> str:
+def nearest_name_hint(name: str, known: list[str]) -> str:
     """A hint at the nearest of some names, for messages."""
     close = difflib.get_close_matches(name, known, 1)
     return f"did you mean {close[0]}? " if close else ""

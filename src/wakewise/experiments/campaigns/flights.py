@@ -18,7 +18,7 @@ import polars as pl
 from wakewise.core.files import whole_file
 from wakewise.experiments.campaigns.task import Figures, WorkProgress
 from wakewise.experiments.trials.metrics import UNITS, MetricsCollector
-from wakewise.experiments.trials.reference_values import add_yardsticks
+from wakewise.experiments.trials.reference_values import add_reference_values
 from wakewise.operation import Scenario, fly
 from wakewise.operation.flight_log import timings_of
 from wakewise.operation.scenario import check_scenario
@@ -38,7 +38,7 @@ def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress)
     judged = flight.steps.filter(pl.col("leg") != SETTLING)
     gathering = MetricsCollector()
     gathering.add(flight_figures(judged))
-    add_yardsticks(gathering, flight.parts, judged)
+    add_reference_values(gathering, flight.parts, judged)
     solve_ms = timings_of(flight.recorder.log.frame().lazy())["solve_ms"].to_numpy()
     solve_ms = solve_ms[min(_LOADING, len(solve_ms) // 2) :]
     gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})

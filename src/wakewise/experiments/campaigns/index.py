@@ -112,7 +112,7 @@ def _listed_of(row: dict[str, object]) -> IndexEntry:
     told = Attempts(
         begun=int(str(row["begun"])),
         failed=int(str(row["failed"])),
-        how=attempt_log.how_of(how),
+        how=attempt_log.parse_outcome(how),
         reason=None if row["reason"] is None else str(row["reason"]),
     )
     return IndexEntry(

@@ -17,7 +17,7 @@ from wakewise.operation.scenario import Scenario
 _LARGEST = 2**20  # bytes that are read at once
 
 
-def outside_of(scenario: Scenario) -> dict[str, str]:
+def external_parts(scenario: Scenario) -> dict[str, str]:
     """Parts that come from elsewhere, each with what says its version.
 
     Raises
@@ -48,7 +48,7 @@ def outside_of(scenario: Scenario) -> dict[str, str]:
     return found
 
 
-def check_there(scenario: Scenario) -> None:
+def check_loadable(scenario: Scenario) -> None:
     """Load vehicle and target, which takes a moment; raises InputError if there is none of that name or file."""
     parts = scenario.parts()
     _ = parts.vehicle, parts.target

@@ -23,7 +23,7 @@ from wakewise.core.interfaces import Progress, no_progress
 from wakewise.experiments.campaigns import attempt_log, trial_lock
 from wakewise.experiments.campaigns.engines import TrialExecutor, WorkerPool
 from wakewise.experiments.campaigns.index import listing
-from wakewise.experiments.campaigns.store import CampaignStore, open_store, told_if_full
+from wakewise.experiments.campaigns.store import CampaignStore, open_store, report_full_disk
 from wakewise.experiments.campaigns.task import Task, TrialOutcome
 from wakewise.experiments.campaigns.versions import source_version
 from wakewise.experiments.campaigns.worker import AttemptRequest
@@ -94,7 +94,7 @@ def run(
         If the disk is full; what was finished is kept, and the same call goes on.
     """
     check_bounds(timeout_s, memory_MB, retries)
-    with told_if_full(folder):
+    with report_full_disk(folder):
         store = open_store(folder)
         driver = _Driver(store, tasks, timeout_s, memory_MB, retries, progress, until, again)
         if driver.pending:
@@ -148,7 +148,7 @@ class _Driver:
         for key, task in unique.items():
             kept = listed.get(key)
             if kept is not None and kept.figures is None and kept.attempts.is_failure(retries) and again:
-                attempt_log.anew(store.place(key))
+                attempt_log.clear_failures(store.place(key))
                 kept = None
             if kept is None or not (kept.figures is not None or kept.attempts.is_failure(retries)):
                 self.pending.append(task)
@@ -193,7 +193,7 @@ class _Driver:
         key, place = task.key, self._store.place(task.key)
         if self._is_settled(task):
             return
-        holder, beat = trial_lock.holder_of(place), trial_lock.beat_of(place)
+        holder, beat = trial_lock.holder_of(place), trial_lock.heartbeat_of(place)
         left = self._abandoned.pop(key, None)
         if holder is not None and not holder.is_gone and (left is None or left != beat):
             self._held[key] = _Held(task, beat, time.monotonic())
@@ -226,7 +226,7 @@ class _Driver:
         self._met[key] += report.how == "computer"
         if report.how == "held":
             place = self._store.place(key)
-            self._held[key] = _Held(task, trial_lock.beat_of(place), time.monotonic())
+            self._held[key] = _Held(task, trial_lock.heartbeat_of(place), time.monotonic())
             return
         if self._is_settled(task):
             if report.how == "done":
@@ -250,7 +250,7 @@ class _Driver:
         """Take up again what another process has given back, or whose holder is gone."""
         for key, held in list(self._held.items()):
             place = self._store.place(key)
-            holder, beat = trial_lock.holder_of(place), trial_lock.beat_of(place)
+            holder, beat = trial_lock.holder_of(place), trial_lock.heartbeat_of(place)
             now = time.monotonic()
             if holder is not None and not holder.is_gone:
                 if beat != held.beat:
@@ -281,7 +281,7 @@ def _driver_file(folder: Path) -> Iterator[Path]:
     """A file that is there as long as this driver is; those of drivers that are gone are removed."""
     place = (folder / DRIVERS).resolve()
     place.mkdir(exist_ok=True)
-    living_drivers(folder)
+    active_drivers(folder)
     path = place / f"{os.getpid()}-{os.urandom(4).hex()}.json"
     try:
         path.write_text(json.dumps(asdict(trial_lock.this_process())), encoding="utf-8")
@@ -291,7 +291,7 @@ def _driver_file(folder: Path) -> Iterator[Path]:
             path.unlink(missing_ok=True)
 
 
-def living_drivers(folder: Path) -> list[trial_lock.LockHolder]:
+def active_drivers(folder: Path) -> list[trial_lock.LockHolder]:
     """Drivers that are at a campaign; files of those that are gone are removed."""
     found = []
     for path in sorted((folder / DRIVERS).glob("*.json")):

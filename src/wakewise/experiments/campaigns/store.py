@@ -26,7 +26,7 @@ from wakewise.experiments.campaigns.task import Figure, Task, TrialOutcome
 FORMAT = 1
 """Of the folder; another one is refused."""
 FIGURES, TRIAL, LOG, WORK = "figures.json", "trial.json", "log.txt", "work"
-GO_ON = "what was finished is kept, run the same command again to go on"
+RESUME_HINT = "what was finished is kept, run the same command again to go on"
 _STORE, _TRIALS = "store.json", "trials"
 
 
@@ -112,7 +112,7 @@ def read_store(folder: Path) -> CampaignStore:
 
 
 @contextmanager
-def told_if_full(folder: Path) -> Iterator[None]:
+def report_full_disk(folder: Path) -> Iterator[None]:
     """Tell of a disk that is full, whoever met it, in a line that says what to do.
 
     Raises
@@ -124,7 +124,7 @@ def told_if_full(folder: Path) -> Iterator[None]:
     except Exception as fault:
         if not is_full(fault):
             raise
-        raise EnvironmentFailure(f"{folder}: {FULL}; {GO_ON}") from None
+        raise EnvironmentFailure(f"{folder}: {FULL}; {RESUME_HINT}") from None
 
 
 def read_figures(place: Path) -> tuple[dict[str, Figure], float] | None:

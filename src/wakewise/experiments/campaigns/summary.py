@@ -76,7 +76,7 @@ class MethodSummary:
         return "sure, the interval does not hold zero"
 
 
-def glance(measure: ComparisonMetric, world: str, places: Sequence[Place]) -> MethodSummary | None:
+def summarize(measure: ComparisonMetric, world: str, places: Sequence[Place]) -> MethodSummary | None:
     """Methods in one world; None where no seed was flown by all."""
     figure, words, scale, less = measure
     here = [place for place in places if place["world"] == world]

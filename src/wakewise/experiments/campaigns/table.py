@@ -14,11 +14,11 @@ import polars as pl
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
 from wakewise.experiments.campaigns import trial_lock
-from wakewise.experiments.campaigns.attempt_log import FINAL, TRIED, Attempts
+from wakewise.experiments.campaigns.attempt_log import FINAL, RETRIED, Attempts
 from wakewise.experiments.campaigns.definition import FACTORS
 from wakewise.experiments.campaigns.index import listing
 from wakewise.experiments.campaigns.plan import CampaignPlan, PlanEntry, read_plan
-from wakewise.experiments.campaigns.run import living_drivers
+from wakewise.experiments.campaigns.run import active_drivers
 from wakewise.experiments.campaigns.statistics import stratified_bootstrap, wilson
 from wakewise.experiments.campaigns.store import CampaignStore, read_store
 from wakewise.experiments.campaigns.task import Figure
@@ -89,7 +89,7 @@ def results(folder: Path) -> Results:
         )
     keys = {entry.key for entry in plan.trials}
     return Results(
-        plan=plan, made=tuple(made), drivers=len(living_drivers(folder)), others=sum(key not in keys for key in listed)
+        plan=plan, made=tuple(made), drivers=len(active_drivers(folder)), others=sum(key not in keys for key in listed)
     )
 
 
@@ -123,7 +123,7 @@ def failures(found: Results) -> list[dict[str, Any]]:
     ]
 
 
-def varied(plan: CampaignPlan) -> tuple[str, ...]:
+def varying_factors(plan: CampaignPlan) -> tuple[str, ...]:
     """Factors that differ in a campaign, seeds aside: what its table is grouped by if not told otherwise."""
     return tuple(
         factor
@@ -143,7 +143,7 @@ def group_table(found: Results, by: Sequence[str] = (), figures: Sequence[str] =
     InputError
         If a factor or a figure is not there.
     """
-    by = tuple(by) or varied(found.plan)
+    by = tuple(by) or varying_factors(found.plan)
     for name in by:
         if name not in FACTORS:
             raise InputError(f"--by: '{name}' is no factor, allowed: {', '.join(FACTORS)}")
@@ -203,7 +203,7 @@ def _state(store: CampaignStore, key: str, told: Attempts) -> State:
     holder = trial_lock.holder_of(store.place(key)) if told.begun else None
     if holder is not None and not holder.is_gone:
         return "running"
-    return "failed" if told.how in (*FINAL, *TRIED) else "waiting"
+    return "failed" if told.how in (*FINAL, *RETRIED) else "waiting"
 
 
 def _mean(name: str, members: Sequence[TrialRecord], by: Sequence[str]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
 
-from wakewise.core.run_lock import boot_id, half_done, is_running, start_of
+from wakewise.core.run_lock import boot_id, is_running, start_of, temporary_prefix
 
 CLAIM = "claim.json"
 _TAKING_OVER = ".taking-over"
@@ -55,7 +55,7 @@ def holder_of(folder: Path) -> LockHolder | None:
         return None
 
 
-def beat_of(folder: Path) -> int | None:
+def heartbeat_of(folder: Path) -> int | None:
     """Time stamp of the claim's last heartbeat, for comparing with itself only; None without a claim."""
     try:
         return (folder / CLAIM).stat().st_mtime_ns
@@ -63,13 +63,13 @@ def beat_of(folder: Path) -> int | None:
         return None
 
 
-def beat(folder: Path) -> None:
+def renew_lock(folder: Path) -> None:
     """Show that the holder of a claim is alive."""
     with suppress(OSError):
         os.utime(folder / CLAIM)
 
 
-def take(folder: Path, abandoned_beat: int | None = None) -> bool:
+def acquire_lock(folder: Path, abandoned_beat: int | None = None) -> bool:
     """Claim a trial's folder for this process; False if another has it.
 
     Parameters
@@ -79,7 +79,7 @@ def take(folder: Path, abandoned_beat: int | None = None) -> bool:
     abandoned_beat : int or None
         Heartbeat that was seen not to change for so long that its holder on another computer counts as gone.
     """
-    mine = folder / (half_done(CLAIM) + os.urandom(4).hex() + ".json")
+    mine = folder / (temporary_prefix(CLAIM) + os.urandom(4).hex() + ".json")
     mine.write_text(json.dumps(asdict(this_process())), encoding="utf-8")
     try:
         try:
@@ -100,14 +100,14 @@ def take(folder: Path, abandoned_beat: int | None = None) -> bool:
         mine.unlink(missing_ok=True)
 
 
-def is_mine(folder: Path) -> bool:
+def owns_lock(folder: Path) -> bool:
     """Whether this process holds the claim still."""
     return holder_of(folder) == this_process()
 
 
-def release(folder: Path) -> None:
+def release_lock(folder: Path) -> None:
     """Give the claim back, if this process holds it."""
-    if is_mine(folder):
+    if owns_lock(folder):
         (folder / CLAIM).unlink(missing_ok=True)
 
 
@@ -118,7 +118,7 @@ def _is_left(folder: Path, abandoned_beat: int | None) -> bool:
     holder = holder_of(folder)
     if holder is None or holder.is_gone:  # nobody writes half a claim: an unreadable one is a damaged file
         return True
-    return not holder.is_here and abandoned_beat is not None and beat_of(folder) == abandoned_beat
+    return not holder.is_here and abandoned_beat is not None and heartbeat_of(folder) == abandoned_beat
 
 
 @contextmanager

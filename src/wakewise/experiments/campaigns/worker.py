@@ -66,7 +66,7 @@ class AttemptRequest:
     cwd: str = ""
 
 
-def work_on(
+def run_attempt(
     ticket: AttemptRequest, send: WorkProgress, quiet: bool = True, begun: Callable[[], None] = lambda: None
 ) -> dict[str, Any]:
     """Make one attempt in this process, and say how it ended: `how` (or "held", "known"), `reason`, `took_s`.
@@ -79,7 +79,7 @@ def work_on(
     held = False
     try:
         place.mkdir(parents=True, exist_ok=True)
-        held = trial_lock.take(place, ticket.abandoned_beat)
+        held = trial_lock.acquire_lock(place, ticket.abandoned_beat)
         if not held:
             return {"how": "held", "reason": None, "took_s": 0.0}
         if (place / FIGURES).exists():  # another driver was faster
@@ -100,7 +100,7 @@ def work_on(
     finally:
         if held:
             with suppress(OSError):
-                trial_lock.release(place)
+                trial_lock.release_lock(place)
 
 
 def _tried(ticket: AttemptRequest, place: Path, send: WorkProgress, quiet: bool) -> dict[str, Any]:
@@ -113,7 +113,7 @@ def _tried(ticket: AttemptRequest, place: Path, send: WorkProgress, quiet: bool)
             _check_version(ticket)
             work: Work = function_named(ticket.trial["work"])
             figures = work(ticket.trial["settings"], folder, send)
-            if not trial_lock.is_mine(place):
+            if not trial_lock.owns_lock(place):
                 raise EnvironmentFailure("another computer took the trial over: this one was not heard of for too long")
             write_figures(place, figures, time.monotonic() - began)
     except Exception as fault:  # whatever the work raises is the trial's outcome, unless the computer is at fault
@@ -208,7 +208,7 @@ def _main() -> None:
     threading.Thread(target=listen, daemon=True).start()
     while True:
         ticket = AttemptRequest(**json.loads(tickets.get()))
-        tell({"report": work_on(ticket, send, begun=lambda: tell({"begun": True}))})
+        tell({"report": run_attempt(ticket, send, begun=lambda: tell({"begun": True}))})
 
 
 if __name__ == "__main__":

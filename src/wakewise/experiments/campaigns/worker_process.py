@@ -101,7 +101,7 @@ class TrialProcess:
                     return ended("stopped")
             if now - beaten > _BEAT_S:
                 beaten = now
-                trial_lock.beat(place)
+                trial_lock.renew_lock(place)
 
     def close(self) -> None:
         """End the process; an attempt that is under way is told of as stopped."""

@@ -7,7 +7,7 @@ per format: `tum.py`, `nerfstudio.py`, `colmap.py` (with `colmap_points.py`), `r
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.experiments.exports.auv_controllers import tam_yaml
@@ -34,4 +34,4 @@ __all__ = [
     "write_tum",
 ]
 
-lazy_door(__name__, "ros")
+lazy_attributes(__name__, "ros")

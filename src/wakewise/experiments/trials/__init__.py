@@ -11,7 +11,7 @@ of a report that fails, `export.py` hands a trial on to other tools, `dataset/` 
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.experiments.trials.metrics import DEFINITIONS, UNITS
@@ -29,4 +29,4 @@ __all__ = [
     "run_trial",
 ]
 
-lazy_door(__name__)
+lazy_attributes(__name__)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 
-from wakewise.allocation import disturbance_of, least_thrusts
+from wakewise.allocation import disturbance_of, min_norm_allocation
 from wakewise.control import vehicle_layout
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
@@ -22,13 +22,13 @@ LOOKS = 200
 """Instants at which the water's own motion is looked at."""
 
 
-def add_yardsticks(gathering: MetricsCollector, parts: Parts, steps: pl.DataFrame) -> None:
+def add_reference_values(gathering: MetricsCollector, parts: Parts, steps: pl.DataFrame) -> None:
     """Add disturbance_flown, disturbance_least_thrusts, ambient_speed_m_s and grain_threshold_Pa, or why there is none.
 
     `steps` is the table of steps.parquet from the first leg on.
     """
     try:
-        gathering.add(sharing_figures(parts, steps))
+        gathering.add(allocation_figures(parts, steps))
     except InputError as fault:
         gathering.missing(("disturbance_flown", "disturbance_least_thrusts"), str(fault))
     gathering.add({"ambient_speed_m_s": ambient_speed_m_s(parts, steps["time_s"].to_numpy())})
@@ -38,7 +38,7 @@ def add_yardsticks(gathering: MetricsCollector, parts: Parts, steps: pl.DataFram
         gathering.missing(("grain_threshold_Pa",), "neither bed nor water holds loose grains (tank.silt)")
 
 
-def sharing_figures(parts: Parts, steps: pl.DataFrame, instants: int = INSTANTS) -> Figures:
+def allocation_figures(parts: Parts, steps: pl.DataFrame, instants: int = INSTANTS) -> Figures:
     """Mean D of the thrusts commanded, and of the least thrusts that make the same wrenches from the same poses.
 
     Both by the wake model of `scenario.control.wake` over the target's own points, at the estimated poses.
@@ -65,7 +65,7 @@ def sharing_figures(parts: Parts, steps: pl.DataFrame, instants: int = INSTANTS)
     flown, least = [], []
     for T, place, turn in zip(thrusts[known], p[known], q[known], strict=True):
         G = view.gram(Pose(place, turn))
-        shared = least_thrusts(layout, layout.B @ T).thrusts_N
+        shared = min_norm_allocation(layout, layout.B @ T).thrusts_N
         flown.append(disturbance_of(G, T))
         least.append(disturbance_of(G, shared))
     return {"disturbance_flown": float(np.mean(flown)), "disturbance_least_thrusts": float(np.mean(least))}

@@ -22,7 +22,7 @@ from typing import IO, Any
 
 from wakewise.core.errors import StageError, WakewiseError
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.core.run_lock import sweep
+from wakewise.core.run_lock import remove_stale
 from wakewise.experiments.trials.stages import ProgressListener
 from wakewise.vision.reconstruction import ReconstructionSettings, mesh_model
 from wakewise.vision.texturing.textured import write_textured
@@ -55,7 +55,7 @@ class SurfaceMaker:
             return
         process.kill()
         _close(process)
-        sweep(self._folder)
+        remove_stale(self._folder)
 
     @property
     def _wanted(self) -> bool:
@@ -147,7 +147,7 @@ class SurfaceMaker:
                 raise content
         self._process = None
         _warn(f"its process ended with status {_close(process)}")
-        sweep(self._folder)
+        remove_stale(self._folder)
         return False
 
 

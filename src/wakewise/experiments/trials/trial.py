@@ -14,14 +14,14 @@ import polars as pl
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError, StageError
-from wakewise.core.files import named, write_json
+from wakewise.core.files import child_path, write_json
 from wakewise.core.geometry import matrix_from_quat
-from wakewise.core.jit.precompile import is_warm, warm
+from wakewise.core.jit.precompile import compile_kernels, is_warm
 from wakewise.core.optional_dependencies import need
-from wakewise.core.run_lock import alone
+from wakewise.core.run_lock import exclusive_run
 from wakewise.experiments.trials.coverage import FROM_MODEL, coverage_figures
 from wakewise.experiments.trials.metrics import Figures, MetricsCollector, comparison
-from wakewise.experiments.trials.reference_values import add_yardsticks
+from wakewise.experiments.trials.reference_values import add_reference_values
 from wakewise.experiments.trials.size import SIZE_FIGURES, size_figures
 from wakewise.experiments.trials.stages import ProgressListener, SilentProgress, StageCosts, of_the_computer
 from wakewise.experiments.trials.surface import SurfaceMaker
@@ -35,9 +35,9 @@ from wakewise.operation import (
 )
 from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS, parts_of
-from wakewise.operation.teleop.live_folder import gather
-from wakewise.operation.teleop.replay import fly_hands
-from wakewise.operation.trial_folder import BY_HAND, as_flown, check_place, claim, write_plan
+from wakewise.operation.teleop.live_folder import collect_flight
+from wakewise.operation.teleop.replay import replay_input
+from wakewise.operation.trial_folder import BY_HAND, check_place, resolved_scenario, write_or_check_scenario, write_plan
 from wakewise.scene.missions import SETTLING
 from wakewise.scene.targets import Mesh, MeshDistance, coral_kinds
 from wakewise.vision.evaluation import SWAY_FIGURES, Crop, compare_surface, evaluate_surface, flight_figures
@@ -105,7 +105,7 @@ def run_trial(
     need("a trial", "photos", "logs")
     watch = watch or SilentProgress()
     parts = parts_of(flight)
-    scenario = as_flown(parts)
+    scenario = resolved_scenario(parts)
     check_place(folder, scenario)
     _ = parts.from_outside  # a name that leads nowhere is refused before a kernel is compiled or a folder made
     if not is_warm(JOBS):
@@ -113,14 +113,14 @@ def run_trial(
         if scenario.target.kind not in coral_kinds():
             _ = parts.target
         with watch.stage("compile") as progress:
-            warm(JOBS, progress)
+            compile_kernels(JOBS, progress)
     with BackgroundRenderer(parts, folder) as darkroom:
         if not _is_flown(folder):
             if not _by_hand(parts):
                 darkroom.ready()  # loads and makes its scene while this process looks through the parts
             _ = parts.pilot, parts.preflight
-        claim(folder, scenario)
-        with alone(folder), SurfaceMaker(folder, scenario.reconstruction, parts.target.bed_z_m) as surface:
+        write_or_check_scenario(folder, scenario)
+        with exclusive_run(folder), SurfaceMaker(folder, scenario.reconstruction, parts.target.bed_z_m) as surface:
             modelled = surface.begin if meanwhile is not None else lambda: None
             result = _figures(parts, scenario, folder, watch, darkroom, modelled)
             if told is not None:
@@ -176,10 +176,10 @@ def _by_hand(parts: Parts) -> bool:
 
 def _fly(parts: Parts, folder: Path, darkroom: BackgroundRenderer, progress: Callable[..., None]) -> None:
     """Fly, or put together what a flight by hand left that was cut off."""
-    if gather(parts, folder):
+    if collect_flight(parts, folder):
         return
     if _by_hand(parts):
-        fly_hands(parts, folder)
+        replay_input(parts, folder)
     else:
         darkroom.ready()
         fly_trial(parts, folder, progress, darkroom.take)
@@ -210,7 +210,7 @@ def compare_methods(
         {
             name: run_trial(
                 flight,
-                named(folder, name, "compare"),
+                child_path(folder, name, "compare"),
                 watch,
                 None,
                 None if meanwhile is None else partial(meanwhile, name),
@@ -276,7 +276,7 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     flown = steps.filter(pl.col("leg") != SETTLING)
     gathering.add(flight_figures(flown))
     gathering.missing(("exceedance_ambient_pct",), "the water is still without the vehicle")
-    add_yardsticks(gathering, parts, flown)
+    add_reference_values(gathering, parts, flown)
     solve_ms = pl.read_parquet(folder / "timings.parquet")["solve_ms"].to_numpy()
     solve_ms = solve_ms[min(50, len(solve_ms) // 2) :]  # the first ones load what later ones find loaded
     gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})

@@ -15,16 +15,16 @@ import numpy as np
 from wakewise.control.intent import FULL_M_S, FULL_RAD_S, HIGHEST_RAD, moved_on, shaped, slewed
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState
-from wakewise.operation.teleop.assist_modes import elevation_rad, level_frame, sphere_frame, watching
+from wakewise.operation.teleop.assist_modes import camera_on_target, elevation_rad, level_frame, sphere_frame
 from wakewise.operation.teleop.collision_limiter import CollisionLimiter
 from wakewise.operation.teleop.motion import (
     STEEPEST_RAD,
     AttitudeReference,
     MotionReference,
-    followed,
-    tilted,
-    tilting,
-    turning,
+    step_angle,
+    step_rate,
+    step_tilt,
+    turn_tilt_joint,
 )
 from wakewise.operation.teleop.operator_state import OperatorSettings
 from wakewise.scene.missions import CameraAim
@@ -73,7 +73,7 @@ class StickFrame:
     blocked_by: str | None = None
 
 
-def turned(
+def steer_attitude(
     motion: MotionReference, state: OperatorSettings, axes: Array, target_W_m: Array, aim: CameraAim, dt_s: float
 ) -> MotionReference:
     """The motion with attitude and tilt a step on: by the sticks where they are held, else by the assist, else level.
@@ -92,21 +92,21 @@ def turned(
     yaw = float(motion.angles_rad[2])
     wished = AttitudeReference(angles_rad=np.array([0.0, 0.0, yaw]), rates_rad_s=np.zeros(3), tilt_rad=motion.tilt_rad)
     if state.watch_target:
-        wished = watching(place, motion.velocity_W_m_s, yaw, target_W_m, aim, dt_s)
-    new = followed(motion, 0, wished, dt_s)
+        wished = camera_on_target(place, motion.velocity_W_m_s, yaw, target_W_m, aim, dt_s)
+    new = step_angle(motion, 0, wished, dt_s)
     by_hand = turn != 0.0 or not state.watch_target
-    new = turning(new, 2, turn * FULL_RAD_S * state.share, dt_s) if by_hand else followed(new, 2, wished, dt_s)
+    new = step_rate(new, 2, turn * FULL_RAD_S * state.share, dt_s) if by_hand else step_angle(new, 2, wished, dt_s)
     if rise == 0.0 and state.watch_target:
-        return tilted(followed(new, 1, wished, dt_s), wished, dt_s, aim)
+        return step_tilt(step_angle(new, 1, wished, dt_s), wished, dt_s, aim)
     rate = rise * TILT_RAD_S * state.gain
     if aim.joint is not None:
         level = replace(wished, angles_rad=np.zeros(3), rates_rad_s=np.zeros(3))
-        return tilting(followed(new, 1, level, dt_s), rate, dt_s, aim)
+        return turn_tilt_joint(step_angle(new, 1, level, dt_s), rate, dt_s, aim)
     pitch = float(motion.angles_rad[1])
-    return turning(new, 1, 0.0 if abs(pitch) >= STEEPEST_RAD and rate * pitch > 0.0 else rate, dt_s)
+    return step_rate(new, 1, 0.0 if abs(pitch) >= STEEPEST_RAD and rate * pitch > 0.0 else rate, dt_s)
 
 
-def steered(
+def steer_position(
     motion: MotionReference,
     sphere: StickFrame,
     state: OperatorSettings,
@@ -134,7 +134,7 @@ def steered(
     range_m = None
     if state.orbit:
         wish[0], range_m = _at_range(wish[0], now[0], sphere.range_m, float(np.linalg.norm(eye - target_W_m)))
-    answer, change = answered(now, sphere.change_m_s2, wish, dt_s)
+    answer, change = filtered_velocity(now, sphere.change_m_s2, wish, dt_s)
     velocity = frame @ answer - swing
     blocked_by = None
     if keep_off is not None:
@@ -146,14 +146,14 @@ def steered(
             _, blocked_by = keep_off.allowed(motion.X_WB, frame @ wish - swing, motion.omega_B_rad_s)
     # Near the zenith the frame turns faster than a velocity may.
     velocity = slewed(motion.velocity_W_m_s, velocity, dt_s, HARDEST_M_S2)
-    place = led(motion.place_W_m, 0.5 * (motion.velocity_W_m_s + velocity), estimate, dt_s)
+    place = limit_lead(motion.place_W_m, 0.5 * (motion.velocity_W_m_s + velocity), estimate, dt_s)
     moved = replace(motion, place_W_m=place, velocity_W_m_s=velocity)
     return moved, StickFrame(
         frame=frame, change_m_s2=change, orbits=state.orbit, range_m=range_m, blocked_by=blocked_by
     )
 
 
-def answered(now_m_s: Array, change_m_s2: Array, wish_m_s: Array, dt_s: float) -> tuple[Array, Array]:
+def filtered_velocity(now_m_s: Array, change_m_s2: Array, wish_m_s: Array, dt_s: float) -> tuple[Array, Array]:
     """What sticks lead a commanded velocity to, and how fast that changes, a step on; shape (3,) each, in their frame.
 
     A change that comes as fast as a hand moves no vehicle can make, and what it misses it makes up for with thrust.
@@ -170,7 +170,7 @@ def _at_range(wish: float, now: float, kept_m: float | None, range_m: float) -> 
     return min(max(RANGE_PER_S * (range_m - kept_m), -RANGE_M_S), RANGE_M_S), kept_m
 
 
-def led(place_W_m: Array, velocity_W_m_s: Array, estimate: BodyState, dt_s: float) -> Array:
+def limit_lead(place_W_m: Array, velocity_W_m_s: Array, estimate: BodyState, dt_s: float) -> Array:
     """A place moved on, shape (3,), on its leash while it moves; at rest it is held wherever the vehicle is carried."""
     known = bool(np.isfinite(estimate.X_WB.p_m).all())
     if not velocity_W_m_s.any() or not known:

@@ -26,7 +26,7 @@ OVER_M = 0.15
 _ROUNDS = 3
 
 
-def watching(
+def camera_on_target(
     place_W_m: Array, velocity_W_m_s: Array, yaw_rad: float, target_W_m: Array, aim: CameraAim, dt_s: float
 ) -> AttitudeReference:
     """Attitude and tilt with which a body at a place keeps its camera on a target: tilt first, pitch beyond its stops.

@@ -22,7 +22,7 @@ from wakewise.control.intent import PAPER_W_TRACK
 from wakewise.control.switching import Switched
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Controller, Goal
-from wakewise.operation.teleop.arbitration import BRAKING_M_S2, StickFrame, steered, turned
+from wakewise.operation.teleop.arbitration import BRAKING_M_S2, StickFrame, steer_attitude, steer_position
 from wakewise.operation.teleop.collision_limiter import CollisionLimiter
 from wakewise.operation.teleop.input import CENTRED, Controls, ControlSource
 from wakewise.operation.teleop.input.control_log import ControlLogWriter
@@ -233,9 +233,9 @@ class AssistedPilot:
     def _move(self, state: OperatorSettings, controls: Controls, time_s: float, estimate: BodyState) -> None:
         if self._mode != "scan":
             axes = controls.axes if self._mode == "operator" else CENTRED.axes
-            motion = turned(self.motion, state, axes, self.target_W_m, self.aim, self.dt_s)
+            motion = steer_attitude(self.motion, state, axes, self.target_W_m, self.aim, self.dt_s)
             free = self._sphere.blocked_by is None
-            self.motion, self._sphere = steered(
+            self.motion, self._sphere = steer_position(
                 motion, self._sphere, state, axes, self.target_W_m, self.aim, estimate, self.dt_s, self.keep_off
             )
             blocks = self._sphere.blocked_by
@@ -283,7 +283,7 @@ def assisted(parts: Parts, source: ControlSource, desk: OperatorState, begin: Op
     """
     pilot = assisted_pilot(parts, source, desk, begin)
     flown = parts.replace(pilot=pilot)
-    return flown.replace(controller=heeding(flown, lambda: pilot.state.method))
+    return flown.replace(controller=switched_controller(flown, lambda: pilot.state.method))
 
 
 def assisted_pilot(
@@ -310,7 +310,7 @@ def assisted_pilot(
     )
 
 
-def heeding(parts: Parts, wanted: Callable[[], str]) -> Controller[Any]:
+def switched_controller(parts: Parts, wanted: Callable[[], str]) -> Controller[Any]:
     """A controller that is `wake-aware` or direct (`dp`), as is wanted at each step."""
     gentle = parts.scenario.method if parts.scenario.method not in ("dp", "manual", "ardusub") else WAYS[0]
     made: dict[str, Controller[Any]] = {

@@ -20,13 +20,13 @@ from wakewise.control.operator_model import (
     OperatorModelState,
     StickDeflection,
     begin,
-    draw_person,
+    sample_operator,
     steer,
 )
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, euler_from_quat, matrix_from_quat, quat_from_euler
 from wakewise.core.interfaces import BodyState, Goal, Pilot
-from wakewise.operation.teleop.arbitration import answered, led
+from wakewise.operation.teleop.arbitration import filtered_velocity, limit_lead
 from wakewise.operation.teleop.assist_modes import level_frame
 from wakewise.operation.teleop.motion import TURN_RAD_S2
 
@@ -72,7 +72,7 @@ class HumanPilot:
     _turn_rad_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self.person = draw_person(self.seed, STICKS)
+        self.person = sample_operator(self.seed, STICKS)
         self._begin(np.zeros(3), 0.0)
 
     def _begin(self, place_W_m: Array, heading_rad: float) -> None:
@@ -88,17 +88,17 @@ class HumanPilot:
         view = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
         wish = CameraMotion.of(wished.X_WB, wished.nu_B, self.X_BC)
         self._state, asked = steer(
-            self.person, self._state, self.dt_s, view, wish, watched(wished, self.X_BC, self.target_W_m)
+            self.person, self._state, self.dt_s, view, wish, viewed_point(wished, self.X_BC, self.target_W_m)
         )
         before_m_s, before_rad_s = self._velocity_m_s, self._turn_rad_s
-        self._velocity_m_s, self._change_m_s2 = answered(before_m_s, self._change_m_s2, asked[:3], self.dt_s)
+        self._velocity_m_s, self._change_m_s2 = filtered_velocity(before_m_s, self._change_m_s2, asked[:3], self.dt_s)
         self._turn_rad_s = slewed_rate(before_rad_s, float(asked[3]), self.dt_s, TURN_RAD_S2)
         self._heading_rad += 0.5 * (before_rad_s + self._turn_rad_s) * self.dt_s
         # In the frame of the goal's heading: the estimate's own would steer with its noise.
         frame = level_frame(self._heading_rad)
         velocity_W = frame @ self._velocity_m_s
         way_W = frame @ (0.5 * (before_m_s + self._velocity_m_s))
-        self._place_W_m = led(self._place_W_m, way_W, estimate, self.dt_s)
+        self._place_W_m = limit_lead(self._place_W_m, way_W, estimate, self.dt_s)
         q = quat_from_euler(roll_rad, pitch_rad, self._heading_rad)
         R_BW = matrix_from_quat(q).T
         turn_W = np.array([0.0, 0.0, self._turn_rad_s])
@@ -108,7 +108,7 @@ class HumanPilot:
         )
 
 
-def watched(wished: Goal, X_BC: Pose, target_W_m: Array) -> Array:
+def viewed_point(wished: Goal, X_BC: Pose, target_W_m: Array) -> Array:
     """What the wished picture has in its middle, shape (3,), as far off as the target is."""
     X_WC = wished.X_WB @ X_BC
     axis_W = X_WC.R[:, 2]

@@ -19,18 +19,18 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import ScalarGrid, TruthProvider
-from wakewise.core.jit.precompile import warm
-from wakewise.core.run_lock import alone
+from wakewise.core.jit.precompile import compile_kernels
+from wakewise.core.run_lock import exclusive_run
 from wakewise.operation.exposures import ExposureRecord
 from wakewise.operation.flight_log import PARTS, FlightLog, hands_part, has_parts
-from wakewise.operation.flying import FLIGHT_JOBS, WATER_EVERY_S, blamed, loop_of, recorder_of
+from wakewise.operation.flying import FLIGHT_JOBS, WATER_EVERY_S, loop_of, name_external_parts, recorder_of
 from wakewise.operation.loop import Step
 from wakewise.operation.parts import Parts
 from wakewise.operation.teleop.input.control_log import ControlLogWriter
-from wakewise.operation.teleop.live_folder import gather
+from wakewise.operation.teleop.live_folder import collect_flight
 from wakewise.operation.teleop.photo_trigger import PhotoTrigger
 from wakewise.operation.teleop.realtime_pacer import RealTimePacer
-from wakewise.operation.trial_folder import claim, flown_by_hand, write_truth
+from wakewise.operation.trial_folder import flown_by_hand, write_or_check_scenario, write_truth
 
 SWITCH_S = 2e-4
 """How long another thread may keep the interpreter when the flying one wants it back."""
@@ -140,19 +140,19 @@ class LiveFlight:
         try:
             with ExitStack() as stack:
                 if self.folder is not None:
-                    stack.enter_context(alone(self.folder))
+                    stack.enter_context(exclusive_run(self.folder))
                 self._fly()
         except BaseException as fault:  # the thread's end is told of by `fault`, whatever it is
             self.fault = fault
 
     def _fly(self) -> None:
         parts, folder = self.parts, self.folder
-        warm(FLIGHT_JOBS, self._prepare)
+        compile_kernels(FLIGHT_JOBS, self._prepare)
         if self._checked:
             self._prepare(0, 1, "holds parts and water against each other")
             _ = parts.preflight
         if folder is not None:
-            claim(folder, flown_by_hand(parts))
+            write_or_check_scenario(folder, flown_by_hand(parts))
             write_truth(parts, folder)
         self._prepare(0, 1, "fills the water")
         plant, witness = parts.world.begin()
@@ -175,14 +175,14 @@ class LiveFlight:
 
         self.preparing = None
         try:
-            with blamed(parts, recorder), _undisturbed():
+            with name_external_parts(parts, recorder), _undisturbed():
                 loop_of(parts, plant, witness, record)(
                     duration_s=None, stop=self._is_over, pace=self.pace.pace, sent=sent
                 )
         finally:  # a flight that a fault ended is kept too
             log.flush()
             if folder is not None:
-                gather(parts, folder)
+                collect_flight(parts, folder)
 
     def _keep_hands(self, part: int) -> None:
         """Put away what the hands did until now, of a pilot who has any."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _SEEN = ("time_s", *(f"goal_{axis}_m" for axis in "xyz"), *(f"goal_q{axis}" for axis in "wxyz"), "goal_tilt_deg")
 
 
-def gather(parts: Parts, folder: Path) -> bool:
+def collect_flight(parts: Parts, folder: Path) -> bool:
     """Make of a flight's parts what a trial's flight leaves; False where there are none, or the flight is whole.
 
     Of planned.csv: a flight by hand has no plan, so it says where the camera was wished to be at each photograph. Rows

@@ -83,14 +83,14 @@ class AttitudeReference:
     tilt_rad_s: float = 0.0
 
 
-def turned_to(motion: MotionReference, wished: AttitudeReference, dt_s: float, aim: CameraAim) -> MotionReference:
+def step_attitude(motion: MotionReference, wished: AttitudeReference, dt_s: float, aim: CameraAim) -> MotionReference:
     """The motion with its attitude a step nearer to a wished one that moves; the tilt at its joint's rate."""
     for k in range(3):
-        motion = followed(motion, k, wished, dt_s)
-    return tilted(motion, wished, dt_s, aim)
+        motion = step_angle(motion, k, wished, dt_s)
+    return step_tilt(motion, wished, dt_s, aim)
 
 
-def followed(motion: MotionReference, k: int, wished: AttitudeReference, dt_s: float) -> MotionReference:
+def step_angle(motion: MotionReference, k: int, wished: AttitudeReference, dt_s: float) -> MotionReference:
     """The motion with angle number k a step nearer to a wished one that moves."""
     angle, rate = eased_after(
         float(motion.angles_rad[k]),
@@ -104,7 +104,7 @@ def followed(motion: MotionReference, k: int, wished: AttitudeReference, dt_s: f
     return _with_angle(motion, k, angle, rate)
 
 
-def tilted(motion: MotionReference, wished: AttitudeReference, dt_s: float, aim: CameraAim) -> MotionReference:
+def step_tilt(motion: MotionReference, wished: AttitudeReference, dt_s: float, aim: CameraAim) -> MotionReference:
     """The motion with its camera's joint a step nearer to a wished tilt that moves."""
     if aim.joint is None:
         return motion
@@ -114,7 +114,7 @@ def tilted(motion: MotionReference, wished: AttitudeReference, dt_s: float, aim:
     return replace(motion, tilt_rad=aim.joint.within(tilt), tilt_rad_s=rate)
 
 
-def tilting(motion: MotionReference, wished_rad_s: float, dt_s: float, aim: CameraAim) -> MotionReference:
+def turn_tilt_joint(motion: MotionReference, wished_rad_s: float, dt_s: float, aim: CameraAim) -> MotionReference:
     """The motion with its camera's joint turned at a wished rate, as far as its stops."""
     if aim.joint is None:
         return motion
@@ -125,7 +125,7 @@ def tilting(motion: MotionReference, wished_rad_s: float, dt_s: float, aim: Came
     return replace(motion, tilt_rad=tilt, tilt_rad_s=rate if tilt == asked else 0.0)
 
 
-def turning(motion: MotionReference, k: int, wished_rad_s: float, dt_s: float) -> MotionReference:
+def step_rate(motion: MotionReference, k: int, wished_rad_s: float, dt_s: float) -> MotionReference:
     """The motion with angle number k turned at a wished rate, which is reached at `TURN_RAD_S2`."""
     before = float(motion.rates_rad_s[k])
     rate = slewed_rate(before, wished_rad_s, dt_s, TURN_RAD_S2)

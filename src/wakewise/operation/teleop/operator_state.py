@@ -119,11 +119,11 @@ class OperatorState:
     def press(self, action: str) -> OperatorSettings:
         """What a button does to what is set; one that does nothing to it changes nothing."""
         with self._lock:
-            self._state = pressed(self._state, action)
+            self._state = apply_button(self._state, action)
             return self._state
 
 
-def pressed(state: OperatorSettings, action: str) -> OperatorSettings:
+def apply_button(state: OperatorSettings, action: str) -> OperatorSettings:
     """What is set after a button (see `wakewise.operation.teleop.input.ACTIONS`)."""
     if action in MODES:
         return replace(state, mode=action)
@@ -136,7 +136,7 @@ def pressed(state: OperatorSettings, action: str) -> OperatorSettings:
     return state
 
 
-def regime(w_track: float) -> str:
+def tracking_regime(w_track: float) -> str:
     """What a `w_track` is for, in the paper's words: transit above 10, delicate below 2, work between."""
     return "transit" if w_track > TRANSIT else "delicate" if w_track < DELICATE else "work"
 
@@ -164,8 +164,8 @@ def meaning(w_track: float, measured: Mapping[float, tuple[float, float]] | None
         interpolated over the logarithm, beyond they stay as at the end.
     """
     if not measured:
-        return TrackingWeightMeaning(regime=regime(w_track))
+        return TrackingWeightMeaning(regime=tracking_regime(w_track))
     at = sorted(measured)
     where = np.log(at)
     deviation, saved = (float(np.interp(math.log(w_track), where, [measured[w][k] for w in at])) for k in (0, 1))
-    return TrackingWeightMeaning(regime=regime(w_track), deviation_pct=deviation, saved_pct=saved)
+    return TrackingWeightMeaning(regime=tracking_regime(w_track), deviation_pct=deviation, saved_pct=saved)

@@ -13,7 +13,7 @@ from wakewise.operation.scenario import Scenario, read_scenario
 from wakewise.operation.teleop.assisted import assisted
 from wakewise.operation.teleop.input.control_log import TRACE_FILE, ControlLog, read_trace
 from wakewise.operation.teleop.input.script import ScriptedInput
-from wakewise.operation.teleop.input.sources import hands_from
+from wakewise.operation.teleop.input.sources import read_input
 from wakewise.operation.teleop.live import LiveFlight
 from wakewise.operation.teleop.operator_state import OperatorState
 from wakewise.operation.teleop.photo_trigger import PhotoTrigger
@@ -59,7 +59,7 @@ class TimedPhotoTrigger(PhotoTrigger):
         self.over |= self.time_s >= self._end_s - 1e-9
 
 
-def fly_hands(parts: Parts, folder: Path) -> None:
+def replay_input(parts: Parts, folder: Path) -> None:
     """Fly the hands that a scenario of the pilot `operator` names, as fast as it goes, into the folder of a trial.
 
     A record ends with its flight, a script `AFTER_S` after its last entry, unless "stop" is pressed before.
@@ -72,7 +72,7 @@ def fly_hands(parts: Parts, folder: Path) -> None:
     if parts.scenario.controls is None:
         _ = parts.pilot  # which says so
         return
-    hands = hands_from(Path(parts.scenario.controls))
+    hands = read_input(Path(parts.scenario.controls))
     end_s = hands.end_s if isinstance(hands, ControlLog) else 0.0
     if isinstance(hands, ScriptedInput):
         end_s = hands.moments[-1].at_s + AFTER_S

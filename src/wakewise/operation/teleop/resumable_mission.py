@@ -18,7 +18,14 @@ from wakewise.control.easing import near_turn
 from wakewise.control.intent import slewed
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, euler_from_quat, quat_conjugate, quat_multiply
-from wakewise.operation.teleop.motion import AttitudeReference, MotionReference, rates_of, tilting, turned_to, turning
+from wakewise.operation.teleop.motion import (
+    AttitudeReference,
+    MotionReference,
+    rates_of,
+    step_attitude,
+    step_rate,
+    turn_tilt_joint,
+)
 from wakewise.scene.missions import CameraAim, Leg, Route
 from wakewise.scene.missions.orbit import camera_pose, camera_twist
 from wakewise.scene.missions.route import rest_to_rest
@@ -104,7 +111,7 @@ class ResumableMission:
             angles_rad=angles, rates_rad_s=rates_of(angles, omega_B), tilt_rad=tilt, tilt_rad_s=tilt_rate
         )
         if dt_s > 0.0:
-            motion = turned_to(motion, wished, dt_s, self.aim)
+            motion = step_attitude(motion, wished, dt_s, self.aim)
         else:
             motion = replace(
                 motion, angles_rad=angles, rates_rad_s=wished.rates_rad_s, tilt_rad=tilt, tilt_rad_s=tilt_rate
@@ -129,7 +136,7 @@ def stopped(motion: MotionReference, dt_s: float, braking_m_s2: float, aim: Came
     """The motion a step nearer to rest, which it comes to ahead of where it is."""
     velocity = slewed(motion.velocity_W_m_s, np.zeros(3), dt_s, braking_m_s2)
     place = motion.place_W_m + 0.5 * dt_s * (motion.velocity_W_m_s + velocity)
-    motion = tilting(replace(motion, place_W_m=place, velocity_W_m_s=velocity), 0.0, dt_s, aim)
+    motion = turn_tilt_joint(replace(motion, place_W_m=place, velocity_W_m_s=velocity), 0.0, dt_s, aim)
     for k in range(3):
-        motion = turning(motion, k, 0.0, dt_s)
+        motion = step_rate(motion, k, 0.0, dt_s)
     return motion

@@ -9,11 +9,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wakewise.control.intent import FULL_M_S, FULL_RAD_S
-from wakewise.control.operator_model import CameraMotion, OperatorModel, OperatorModelState, begin, draw_person, steer
+from wakewise.control.operator_model import (
+    CameraMotion,
+    OperatorModel,
+    OperatorModelState,
+    begin,
+    sample_operator,
+    steer,
+)
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Pilot
-from wakewise.operation.teleop.human_pilot import STICKS, watched
+from wakewise.operation.teleop.human_pilot import STICKS, viewed_point
 from wakewise.operation.teleop.input import CENTRED, Controls
 
 
@@ -48,7 +55,7 @@ class SimulatedOperatorInput:
     _controls: Controls = CENTRED
 
     def __post_init__(self) -> None:
-        self.person = draw_person(self.seed, STICKS)
+        self.person = sample_operator(self.seed, STICKS)
         self._state = begin(self.person)
 
     def look(self, time_s: float, estimate: BodyState, share: float) -> None:
@@ -58,7 +65,7 @@ class SimulatedOperatorInput:
         wished = self.wish.goal(time_s, estimate)
         view = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
         wish = CameraMotion.of(wished.X_WB, wished.nu_B, self.X_BC)
-        seen = watched(wished, self.X_BC, self.target_W_m)
+        seen = viewed_point(wished, self.X_BC, self.target_W_m)
         self._state, asked = steer(self.person, self._state, self.dt_s, view, wish, seen)
         full = share * np.array([FULL_M_S, FULL_M_S, FULL_M_S, FULL_RAD_S])
         pushed = np.clip(asked / full, -1.0, 1.0)

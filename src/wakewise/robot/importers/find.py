@@ -19,7 +19,7 @@ from wakewise.robot.importers.wrench_rows import (
     MOMENTS_FIRST,
     is_signs,
     nearest,
-    told_order,
+    parse_order,
 )
 from wakewise.robot.vehicles.check import AnyVehicle
 from wakewise.robot.vehicles.draft import VehicleDraft
@@ -145,7 +145,7 @@ def compare_with(vehicle: AnyVehicle, matrix: str, rows: str | None = None) -> M
         stated, notes = read_matrix(path, geometry=geometry, rows=rows)
     else:
         stated, signs_only = read_number_matrix(path)
-        notes, told = [], told_order(rows)
+        notes, told = [], parse_order(rows)
         if not signs_only:
             orders = [FORCES_FIRST, MOMENTS_FIRST, ARDUSUB] if told is None else [told]
             best, words = nearest([stated], geometry, orders, ["FRD", "FLU"])

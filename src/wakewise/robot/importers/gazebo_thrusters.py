@@ -71,7 +71,7 @@ def read_thrusters(bodies: RobotDescription, found: ParsedVehicle) -> None:
         _question_undriven(bodies, found)
         turning = {short(name) for name in moving_parts(bodies)}
         carried = {short(joint.child): short(joint.parent) for joint in bodies.joints.values()}
-        question_steered([t.name for t in found.thrusters if carried.get(t.name) in turning], found)
+        note_movable_thrusters([t.name for t in found.thrusters if carried.get(t.name) in turning], found)
     elif not _freefloating(bodies, found):
         _by_name(bodies, unknown, found)
     tags = dict.fromkeys(child.tag for plugin in known for child in plugin.children if child.tag not in _READ)
@@ -108,7 +108,7 @@ def _question_undriven(bodies: RobotDescription, found: ParsedVehicle) -> None:
         )
 
 
-def question_steered(names: list[str], found: ParsedVehicle) -> None:
+def note_movable_thrusters(names: list[str], found: ParsedVehicle) -> None:
     """Say which thrusters sit beyond a joint that moves: they are read as they point with the joint at zero."""
     if names:
         found.notes.append(

@@ -9,19 +9,19 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.robot.importers.layouts import listed_names, read_geometry
-from wakewise.robot.importers.names import vote
+from wakewise.robot.importers.names import compare_names
 from wakewise.robot.importers.parsed_vehicle import QUESTION, Frame, ParsedVehicle
 from wakewise.robot.importers.safe_yaml_nodes import YamlNode
 from wakewise.robot.importers.thruster_checks import claims_in, require_count, require_same_count
 from wakewise.robot.importers.thruster_lists import LOOKS_LIKE_THRUSTERS
-from wakewise.robot.importers.unused_keys import not_read, title, words_in
+from wakewise.robot.importers.unused_keys import list_unused_keys, title, words_in
 from wakewise.robot.importers.wrench_rows import (
     WrenchOrder,
     component_in_comment,
     order_in_comment,
     order_of,
     order_of_one,
-    settle,
+    resolve_order,
 )
 from wakewise.robot.importers.xml import PlacedError
 from wakewise.robot.importers.yaml_parameters import Entries, read_parameters
@@ -77,7 +77,7 @@ def read_yaml(root: YamlNode, name: str, found: ParsedVehicle, rows: WrenchOrder
     found.frame, found.frame_why = _frame(root, entries, found, geometry=geometry)
     if geometry and not found.thrust_rule:
         found.thrust_rule = "positive thrust pushes along the directions that the file lists"
-    found.notes += not_read(root)
+    found.notes += list_unused_keys(root)
 
 
 def read_matrix_only(root: YamlNode, found: ParsedVehicle, rows: WrenchOrder | None = None) -> None:
@@ -125,7 +125,7 @@ def _frame(root: YamlNode, entries: Entries, found: ParsedVehicle, *, geometry: 
     }
     names = [t.name for t in found.thrusters] or listed_names(entries, found.matrix) or found.column_names
     placed = _geometry(found)
-    votes = vote(names, *placed) if names and len(names) == len(placed[0]) else None
+    votes = compare_names(names, *placed) if names and len(names) == len(placed[0]) else None
     if votes is not None and votes.frame:
         if spoken and votes.frame not in spoken:
             found.notes.append(f"{QUESTION}a comment speaks of {next(iter(spoken))}, the names of the thrusters do not")
@@ -231,7 +231,7 @@ def _matrix(root: YamlNode, entries: Entries, found: ParsedVehicle, rows: Wrench
         n = raw.size // 6
         require_count(n, f"{item.place}: {key}: ")
         order = rows or order or _stated_order(root, path, item, entries)
-        found.matrix, stated = settle(raw, order, key, item.place if flown else None, found.notes)
+        found.matrix, stated = resolve_order(raw, order, key, item.place if flown else None, found.notes)
         found.matrix_name, found.matrix_line, found.raw_matrix = key, item.place.line, None if stated else raw
         if order is not None and order.throttle:
             how = "inferred" if order.why.startswith("inferred") else "detected"

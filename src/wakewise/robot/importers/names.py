@@ -55,7 +55,7 @@ class AxisVotes:
         return f"by the names {_some([*self.up[0], *self.up[1]])} {'up' if self.up[0] else 'down'} is along +z"
 
 
-def vote(names: Sequence[str], places: Array, axes: Array) -> AxisVotes:
+def compare_names(names: Sequence[str], places: Array, axes: Array) -> AxisVotes:
     """Hold names against places, shape (n, 3), and axes of positive thrust, shape (n, 3), of one frame.
 
     Left and port, right and starboard speak of y; front and bow, back and stern of x; top and bottom of z, compared
@@ -84,7 +84,7 @@ def vote(names: Sequence[str], places: Array, axes: Array) -> AxisVotes:
 
 def contradictions(names: Sequence[str], places: Array, axes: Array) -> list[str]:
     """Where names contradict places, shape (n, 3), and axes, shape (n, 3), in x forward, y right, z down."""
-    votes, said = vote(names, places, axes), []
+    votes, said = compare_names(names, places, axes), []
     for (_, against), wrong, words in (
         (votes.port[::-1], "y", "port and starboard lie on the other sides"),
         (votes.ahead, "x", "bow and stern lie at the other ends"),
@@ -95,7 +95,7 @@ def contradictions(names: Sequence[str], places: Array, axes: Array) -> list[str
     return said
 
 
-def lying(names: Sequence[str], axes: Array) -> list[str]:
+def mislabelled_vertical(names: Sequence[str], axes: Array) -> list[str]:
     """Where thrusters that are called vertical push along the horizon, axes of shape (n, 3)."""
     wrong = [n for n, a in zip(names, axes, strict=True) if _says_vertical(n) and abs(a[2]) < 0.5]
     return [f"by the names {_some(wrong)} push up or down, by their axes they do not"] if wrong else []

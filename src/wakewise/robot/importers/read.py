@@ -42,9 +42,9 @@ from wakewise.robot.importers.wrench_rows import (
     FORCES_FIRST,
     MOMENTS_FIRST,
     WrenchOrder,
-    agreeing,
+    matching_entries,
     nearest,
-    told_order,
+    parse_order,
 )
 from wakewise.robot.importers.xacro import XacroExpander
 from wakewise.robot.importers.xml import Element, PlacedError, parse_xml, read_text
@@ -103,7 +103,7 @@ def import_vehicle(
     try:
         # Overflow in numbers of absurd size shows as an infinity, which the record refuses; it needs no warning.
         with np.errstate(all="ignore"):
-            order = told_order(rows)
+            order = parse_order(rows)
             found = _read(path, packages or {}, arguments or {}, order, skip_missing=skip_missing)
             require_count(len(found.thrusters), f"{path}: ")
             question_inertia(found)
@@ -257,7 +257,7 @@ def read_matrix(
         If the file holds none or it has the wrong shape.
     """
     found = ParsedVehicle(path.stem, "YAML", path, "FLU", "")
-    read_matrix_only(parse_yaml(read_text(path), path), found, told_order(rows))
+    read_matrix_only(parse_yaml(read_text(path), path), found, parse_order(rows))
     if found.matrix is None:
         raise InputError(f"{path}: holds no allocation matrix")
     frame, why = found.frame, found.frame_why
@@ -269,7 +269,7 @@ def read_matrix(
         raws = [found.matrix] if found.raw_matrix is None else [found.raw_matrix]
         orders = [FORCES_FIRST] if found.raw_matrix is None else [FORCES_FIRST, MOMENTS_FIRST, ARDUSUB]
         best, words = nearest(raws, geometry, orders, [frame] if known else ["FLU", "FRD"])
-        if agreeing(best, geometry) > agreeing(stated, geometry) or not known:
+        if matching_entries(best, geometry) > matching_entries(stated, geometry) or not known:
             doubts = [note for note in found.notes if note.startswith(QUESTION)]
             found.notes = [note for note in found.notes if note not in doubts]
             return best, [*found.notes, f"matrix read as {words}"]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from wakewise.robot.importers.gazebo_thruster_models import disk_area_m2, short
-from wakewise.robot.importers.gazebo_thrusters import question_steered
+from wakewise.robot.importers.gazebo_thrusters import note_movable_thrusters
 from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle
 from wakewise.robot.importers.robot_description import RobotDescription, moving_parts
 from wakewise.robot.importers.urdf import origin
@@ -64,7 +64,7 @@ def read_thrusters(robot: Element, bodies: RobotDescription, density: float | No
         link = actuator.first("link")
         if link is not None and short(link.attributes.get("name", "")) in {short(name) for name in turning}:
             steered.append(found.thrusters[-1].name)
-    question_steered(steered, found)
+    note_movable_thrusters(steered, found)
     old = sum(
         actuator.first("thrust_model") is None and specs is not None and "max_rpm" in specs.attributes
         for actuator in robot.all("actuator")

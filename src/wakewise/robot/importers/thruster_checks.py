@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.robot.importers.names import contradictions, lying
+from wakewise.robot.importers.names import contradictions, mislabelled_vertical
 from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedVehicle
 from wakewise.robot.importers.safe_yaml_nodes import YamlNode
 from wakewise.robot.importers.xml import PlacedError, SourceLocation
@@ -209,7 +209,7 @@ def question_names(found: ParsedVehicle, draft: VehicleDraft, *, told: bool) -> 
     places = np.array([t.p_BT_m for t in draft.thrusters])
     axes = np.array([t.axis_B for t in draft.thrusters])
     names = [t.name for t in draft.thrusters]
-    against = lying(names, axes)
+    against = mislabelled_vertical(names, axes)
     n, rank = len(axes), directions(draft.allocation_matrix).rank
     if found.guessed and not told:
         if n >= 3 and bool((np.abs(axes[:, 2]) > 0.99).all()):

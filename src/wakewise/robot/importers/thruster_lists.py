@@ -15,7 +15,7 @@ from wakewise.robot.importers.robot_description import pose_of
 from wakewise.robot.importers.safe_yaml_nodes import YamlNode
 from wakewise.robot.importers.thruster_checks import is_unit, require_count
 from wakewise.robot.importers.xml import PlacedError
-from wakewise.robot.importers.yaml_parameters import Entries, three
+from wakewise.robot.importers.yaml_parameters import Entries, vector3
 
 _BARE = re.compile(r"^thrusters?(_list)?$", re.IGNORECASE)
 _NUMBERED = re.compile(r"^thruster_?\d+$", re.IGNORECASE)
@@ -201,7 +201,7 @@ def _placed(name: str, member: YamlNode) -> _Placed | None:
         return _with_direction(_Placed(name, member, values[:3], angles=values[3:], key=pose_key), member)
     item = member.get(*_POSITION_KEYS)
     if item is not None:
-        place = three(item, "position")
+        place = vector3(item, "position")
     elif all(key in member.table() for key in "xyz"):
         place = np.array([member.table()[key].scalar(key) for key in "xyz"])
     else:
@@ -212,7 +212,7 @@ def _placed(name: str, member: YamlNode) -> _Placed | None:
 def _with_direction(placed: _Placed, member: YamlNode) -> _Placed:
     item = member.get(*_DIRECTION_KEYS)
     if item is not None:
-        placed.axis, placed.angles, placed.key = three(item, "direction"), None, ""
+        placed.axis, placed.angles, placed.key = vector3(item, "direction"), None, ""
         return placed
     for key, value in member.table().items():
         if _ANGLE_KEY.match(key):
@@ -225,7 +225,7 @@ def _with_direction(placed: _Placed, member: YamlNode) -> _Placed:
                     f"{{x: ., y: ., z: ., w: .}}"
                 )
             else:
-                placed.angles, placed.key = three(value, "angles"), key
+                placed.angles, placed.key = vector3(value, "angles"), key
             return placed
     scalars = [key for key in member.table() if _SCALAR_ANGLE.match(key)]
     if scalars and placed.angles is None:

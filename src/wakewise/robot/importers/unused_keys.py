@@ -37,7 +37,7 @@ def words_in(text: str) -> frozenset[str]:
     return frozenset(word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", text))
 
 
-def not_read(root: YamlNode) -> list[str]:
+def list_unused_keys(root: YamlNode) -> list[str]:
     """Keys that no reader took, each once; those that may turn or stop a thrust, or name a unit, are questioned."""
     parents = {path[:-1] for path, item in root.walk() if item.seen or any(below.seen for _, below in item.walk_all())}
     plain: dict[str, list[tuple[str, ...]]] = {}

@@ -69,7 +69,7 @@ def order_of_one(label: str) -> bool:
     return re.sub(r"[^a-z]", "", label.lower()) in _COMPONENT
 
 
-def told_order(rows: str | None) -> WrenchOrder | None:
+def parse_order(rows: str | None) -> WrenchOrder | None:
     """Order of the option `--rows`.
 
     Raises
@@ -101,7 +101,7 @@ def component_in_comment(text: str) -> str:
     return words[0] if len(kinds) == 1 else ""
 
 
-def ways(matrix: Array) -> list[tuple[Array, str]]:
+def candidate_layouts(matrix: Array) -> list[tuple[Array, str]]:
     """Every way of reading numbers as six rows of n: as rows, as a row per thruster; a flat list reads both ways."""
     if matrix.ndim == 1:
         return [(matrix.reshape(6, -1), "six rows"), (matrix.reshape(-1, 6).T, "a row of 6 per thruster")]
@@ -115,7 +115,7 @@ def is_signs(matrix: Array) -> bool:
     return signs and not bool(is_unit(np.linalg.norm(matrix[:3], axis=0)).all())
 
 
-def settle(
+def resolve_order(
     raw: Array, order: WrenchOrder | None, what: str, place: SourceLocation | None, notes: list[str]
 ) -> tuple[Array, bool]:
     """Wrench per thruster, shape (6, n), in the file's axes, and whether its order was stated.
@@ -141,7 +141,7 @@ def settle(
         If no way of reading makes a thruster's wrench of every column, and no geometry is at hand.
     """
     orders = [FORCES_FIRST, MOMENTS_FIRST] if order is None else [order]
-    read = [(one.wrench(m), f"{way}, {one.words}", one) for one in orders for m, way in ways(raw)]
+    read = [(one.wrench(m), f"{way}, {one.words}", one) for one in orders for m, way in candidate_layouts(raw)]
     unit = [r for r in read if bool(is_unit(np.linalg.norm(r[0][:3], axis=0)).all())]
     fits = [r for r in unit if not _along(r[0])]
     if order is not None:
@@ -209,13 +209,13 @@ def nearest(
     """
     found: list[tuple[int, Array, str]] = []
     for raw in raws:
-        for way, words in ways(raw):
+        for way, words in candidate_layouts(raw):
             for order in orders:
                 for frame in ("FRD",) if order.throttle else frames:
                     wrench = order.wrench(way)
                     wrench = wrench_rows_to_frd(wrench) if frame == "FLU" else wrench
                     if wrench.shape == geometry.shape:
-                        agree = agreeing(wrench, geometry)
+                        agree = matching_entries(wrench, geometry)
                         found.append((agree, wrench, f"{words}, {order.words}, {frame}"))
     if not found:
         return np.zeros((6, 0)), ""
@@ -223,7 +223,7 @@ def nearest(
     return best[1], f"{best[2]}: {best[0]} of {geometry.size} entries agree so, {found[0][0]} as {found[0][2]}"
 
 
-def agreeing(stated: Array, geometry: Array) -> int:
+def matching_entries(stated: Array, geometry: Array) -> int:
     """How many entries agree: in value, or in sign where the matrix holds signs only."""
     largest = np.maximum(np.abs(geometry).max(axis=1, keepdims=True), 1e-12)
     if is_signs(stated):

@@ -28,7 +28,7 @@ def find(entries: Entries, keys: Sequence[str], inside: str = "") -> YamlNode | 
     return None
 
 
-def three(item: YamlNode, what: str) -> Array:
+def vector3(item: YamlNode, what: str) -> Array:
     """Three numbers, from a list or from a table of x, y, z (or roll, pitch, yaw)."""
     if item.table():
         keys = next((k for k in (("x", "y", "z"), ("roll", "pitch", "yaw")) if all(i in item.table() for i in k)), None)
@@ -66,7 +66,7 @@ def read_parameters(entries: Entries, found: ParsedVehicle) -> bool:
     ):
         point = find(entries, keys)
         if point is not None:
-            setattr(found, attribute, three(point, keys[0]))
+            setattr(found, attribute, vector3(point, keys[0]))
             found.derived["buoyancy"] = where
     volume = _number(entries, ("volume", "displaced_volume", "displacement_m3", "volume_m3"))
     if volume is not None and volume[0] > 0.0:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.robot.thrusters.actuators import electrical_power_W, saturate, scale_to_limits, thruster_lag
@@ -29,4 +29,4 @@ __all__ = [
     "thruster_lag",
 ]
 
-lazy_door(__name__)
+lazy_attributes(__name__)

@@ -21,7 +21,7 @@ from wakewise.robot.vehicles.check import (
     failures,
     null_space_names,
 )
-from wakewise.robot.vehicles.completion import blanks, completed, plausible, unit_of
+from wakewise.robot.vehicles.completion import blank_fields, completed, plausible, unit_of
 from wakewise.robot.vehicles.describe import check_report, describe, summary_line
 from wakewise.robot.vehicles.draft import ThrusterDraft, VehicleDraft
 from wakewise.robot.vehicles.drag import drag_coefficients, possible_drags, with_drag, with_each_drag
@@ -67,7 +67,7 @@ __all__ = [
     "achievable_wrench",
     "actuation",
     "allocation_rank",
-    "blanks",
+    "blank_fields",
     "check_report",
     "compare_matrix",
     "compare_with_ardusub",

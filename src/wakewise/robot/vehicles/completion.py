@@ -120,7 +120,7 @@ def _short(value: float) -> str:
     return f"{float(f'{value:.3g}'):g}"
 
 
-def blanks(draft: VehicleDraft) -> dict[str, list[str]]:
+def blank_fields(draft: VehicleDraft) -> dict[str, list[str]]:
     """Comment lines for the fields that a flight needs and the draft does not hold, by group, for `draft_yaml`.
 
     Each is a line of the file as it should be, with `_` in place of numbers, its unit, meaning and plausible range.

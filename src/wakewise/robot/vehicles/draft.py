@@ -21,7 +21,7 @@ from wakewise.robot.vehicles.hydrodynamics import (
     require_linear_damping,
     require_quadratic_damping,
 )
-from wakewise.robot.vehicles.needs import THRUSTER_FIELDS, THRUSTER_WORDS, VEHICLE_WORDS, stated
+from wakewise.robot.vehicles.needs import THRUSTER_FIELDS, THRUSTER_WORDS, VEHICLE_WORDS, required
 from wakewise.robot.vehicles.tilt import TiltJoint
 from wakewise.robot.vehicles.vehicle import (
     CurveChoice,
@@ -361,24 +361,24 @@ class VehicleDraft:
             title=self.title,
             source=self.source,
             does_not_claim=self.does_not_claim,
-            size_m=stated(self.size_m),
-            mass_kg=stated(self.mass_kg),
-            inertia_kg_m2=stated(self.inertia_kg_m2),
-            displaced_volume_m3=stated(self.displaced_volume_m3),
-            p_BG_m=stated(self.p_BG_m),
-            p_BB_m=stated(self.p_BB_m),
+            size_m=required(self.size_m),
+            mass_kg=required(self.mass_kg),
+            inertia_kg_m2=required(self.inertia_kg_m2),
+            displaced_volume_m3=required(self.displaced_volume_m3),
+            p_BG_m=required(self.p_BG_m),
+            p_BB_m=required(self.p_BB_m),
             hydrodynamics=Hydrodynamics(
-                added_mass=stated(self.added_mass),
-                linear_damping=stated(self.linear_damping),
-                quadratic_damping=stated(self.quadratic_damping),
+                added_mass=required(self.added_mass),
+                linear_damping=required(self.linear_damping),
+                quadratic_damping=required(self.quadratic_damping),
             ),
             thrusters=tuple(_whole(t) for t in self.thrusters),
-            X_BC=stated(self.X_BC),
+            X_BC=required(self.X_BC),
             tilt=self.tilt,
             curve=self.curve,
             least_thrust=self.least_thrust,
             drag_cases=self.drag_cases,
-            camera_fov_rad=stated(self.camera_fov_rad),
+            camera_fov_rad=required(self.camera_fov_rad),
             provenance=self.provenance,
         )
 
@@ -388,8 +388,8 @@ def _whole(draft: ThrusterDraft) -> Thruster:
         name=draft.name,
         p_BT_m=draft.p_BT_m,
         axis_B=draft.axis_B,
-        max_forward_N=stated(draft.max_forward_N),
-        max_reverse_N=stated(draft.max_reverse_N),
-        disk_area_m2=stated(draft.disk_area_m2),
-        time_constant_s=stated(draft.time_constant_s),
+        max_forward_N=required(draft.max_forward_N),
+        max_reverse_N=required(draft.max_reverse_N),
+        disk_area_m2=required(draft.disk_area_m2),
+        time_constant_s=required(draft.time_constant_s),
     )

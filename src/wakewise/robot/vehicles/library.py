@@ -13,7 +13,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import YamlError, read_yaml, text_of
 from wakewise.core.settings import describe_faults, guess
 from wakewise.robot.vehicles.draft import VehicleDraft
-from wakewise.robot.vehicles.needs import BLANK, NEEDED_FIELDS
+from wakewise.robot.vehicles.needs import NEEDED_FIELDS, PLACEHOLDER
 from wakewise.robot.vehicles.vehicle import Vehicle
 from wakewise.robot.vehicles.vehicle_file import VehicleFile
 
@@ -98,7 +98,9 @@ def parse_vehicle(text: str, where: str, name: str) -> VehicleDraft:
     try:
         return VehicleFile.model_validate(value).draft(name)
     except ValidationError as error:
-        told = describe_faults(error, VehicleFile, "file", lambda _, found: "not filled in" if found == BLANK else None)
+        told = describe_faults(
+            error, VehicleFile, "file", lambda _, found: "not filled in" if found == PLACEHOLDER else None
+        )
         raise InputError(f"vehicle file {where}: {told}{_lacks(value, told)}") from error
     except InputError as error:
         raise InputError(f"vehicle file {where}: {error}{_lacks(value, str(error))}") from error

@@ -210,7 +210,7 @@ def command_effects(vehicle: AnyVehicle, thrusts: Array) -> tuple[str, ...]:
     centre, where = vehicle.p_BG_m, "the centre of gravity"
     if centre is None:
         centre, where = np.zeros(3), "the origin, as the centre of gravity is not known"
-    made = about(vehicle.allocation_matrix, centre) @ thrusts
+    made = moments_about(vehicle.allocation_matrix, centre) @ thrusts
     lines = []
     for i, axis in enumerate(WRENCH_AXES):
         if abs(made[i, i]) < 1e-9:
@@ -237,7 +237,7 @@ def compare_either_frame(vehicle: AnyVehicle, stated: Array, stated_by: str) -> 
     return replace(turned, notes=(note, *turned.notes))
 
 
-def about(matrix: Array, point_B_m: Array) -> Array:
+def moments_about(matrix: Array, point_B_m: Array) -> Array:
     """Allocation matrix with moments taken about another point of the body, shape (6, n)."""
     moved = matrix.copy()
     moved[3:] -= np.cross(point_B_m, matrix[:3].T).T
@@ -252,7 +252,7 @@ def _require_shape(vehicle: AnyVehicle, stated: Array, stated_by: str) -> None:
 
 def _signs(vehicle: AnyVehicle, height_m: float) -> Array:
     """Signs of the geometry's matrix with moments about the point at z = `height_m`, zero where it is rounding."""
-    matrix = about(vehicle.allocation_matrix, np.array([0.0, 0.0, height_m]))
+    matrix = moments_about(vehicle.allocation_matrix, np.array([0.0, 0.0, height_m]))
     return np.where(np.abs(matrix) > _tolerance(matrix, matrix), np.sign(matrix), 0.0)
 
 
@@ -310,7 +310,7 @@ def _explanations(stated: Array, geometry: Array, found: list[MatrixDisagreement
         said = ", ".join(str(int(i) + 1) for i in order)
         notes.append(f"with the file's columns in the order {said} only {left} entries disagree")
     point = _best_point(stated, geometry)
-    left = _count(stated, about(geometry, point), tolerance)
+    left = _count(stated, moments_about(geometry, point), tolerance)
     if left < len(found):
         place = ", ".join(f"{value:.3f}" for value in point + 0.0)
         notes.append(f"with moments taken about ({place}) m only {left} entries disagree")

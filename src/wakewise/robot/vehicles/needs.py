@@ -8,7 +8,7 @@ from wakewise.core.errors import InputError
 
 T = TypeVar("T")
 
-BLANK = "_"
+PLACEHOLDER = "_"
 """What a vehicle file has in place of a number that is to be filled in."""
 
 VEHICLE_WORDS = {
@@ -47,7 +47,7 @@ THRUSTER_WORDS = {
 }
 
 
-def stated(value: T | None) -> T:
+def required(value: T | None) -> T:
     """A value that was found to be there."""
     if value is None:
         raise InputError("vehicle: is not whole")

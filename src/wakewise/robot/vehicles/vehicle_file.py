@@ -14,7 +14,7 @@ from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.core.settings import Faults, Settings
 from wakewise.robot.vehicles.draft import ThrusterDraft, VehicleDraft
 from wakewise.robot.vehicles.hydrodynamics import DragCase
-from wakewise.robot.vehicles.needs import stated
+from wakewise.robot.vehicles.needs import required
 from wakewise.robot.vehicles.tilt import TiltJoint
 from wakewise.robot.vehicles.vehicle import CurveChoice, LeastThrust, Provenance
 
@@ -42,14 +42,14 @@ Row = Annotated[list[float], Field(min_length=1)]
 ThreeRows = Annotated[list[Row], Field(min_length=3, max_length=3)]
 
 
-class Group(Settings):
+class ParameterGroup(Settings):
     """Any group of numbers: where they come from, and whether they are an estimate."""
 
     source: Text = Field(description="where the numbers come from")
     estimate: bool = Field(default=False, description="true if nobody published or measured these numbers")
 
 
-class BodyGroup(Group):
+class BodyGroup(ParameterGroup):
     """Size and mass of the vehicle."""
 
     size_m: PositiveThree | None = Field(
@@ -58,14 +58,14 @@ class BodyGroup(Group):
     mass_kg: Positive | None = Field(default=None, description="mass in air, flooded parts filled")
 
 
-class Inertia(Group):
+class Inertia(ParameterGroup):
     """Moments and products of inertia about the centre of gravity."""
 
     moments_kg_m2: PositiveThree = Field(description="Ixx, Iyy, Izz")
     products_kg_m2: Three = Field(default=[0.0, 0.0, 0.0], description="elements xy, xz, yz of the matrix")
 
 
-class Buoyancy(Group):
+class Buoyancy(ParameterGroup):
     """Displaced volume and the two centres."""
 
     displaced_volume_m3: Positive | None = Field(
@@ -77,7 +77,7 @@ class Buoyancy(Group):
     )
 
 
-class AddedMass(Group):
+class AddedMass(ParameterGroup):
     """Added mass in blocks, each three numbers of a diagonal or three rows of three."""
 
     translation_kg: DiagonalOrFull = Field(description="surge, sway, heave")
@@ -94,7 +94,7 @@ class AddedMass(Group):
         return blocks(square(self.translation_kg), upper, lower, square(self.rotation_kg_m2))
 
 
-class Damping(Group):
+class Damping(ParameterGroup):
     """Damping as positive magnitudes; zeros for a kind that the vehicle is taken not to have."""
 
     linear_N_s_m: DiagonalOrFull | None = Field(default=None, description="force by surge, sway, heave")
@@ -140,33 +140,33 @@ class DragCaseGroup(Damping):
             raise InputError(f"drag_cases.{name}: {error}") from error
 
 
-class ThrusterLimits(Group):
+class ThrusterLimits(ParameterGroup):
     """What the thrusters of the vehicle can do, unless a mount says otherwise."""
 
     max_forward_N: Positive = Field(description="largest thrust along the axis of the mount")
     max_reverse_N: NotNegative = Field(description="largest thrust against it, as a positive magnitude")
 
 
-class ThrusterDisk(Group):
+class ThrusterDisk(ParameterGroup):
     """The propeller's disk, unless a mount says otherwise."""
 
     diameter_m: Positive = Field(description="of the area that the propeller sweeps")
 
 
-class ThrusterLag(Group):
+class ThrusterLag(ParameterGroup):
     """How fast thrust follows its command, unless a mount says otherwise."""
 
     time_constant_s: NotNegative = Field(description="first-order lag from commanded to delivered thrust; 0: at once")
 
 
-class ThrusterCurve(Group):
+class ThrusterCurve(ParameterGroup):
     """Which table turns pulse width into thrust."""
 
     table: Text = Field(description="name of a table that comes with the package")
     supply_V: Positive = Field(description="supply voltage at which to read it")
 
 
-class ThrusterLeast(Group):
+class ThrusterLeast(ParameterGroup):
     """Thrusts below which the thrusters give none, where no table of theirs says so."""
 
     forward_N: NotNegative = Field(description="least thrust along the axis of the mount")
@@ -185,13 +185,13 @@ class Mount(Settings):
     time_constant_s: NotNegative | None = Field(default=None, description="in place of thruster_lag.time_constant_s")
 
 
-class LayoutGroup(Group):
+class LayoutGroup(ParameterGroup):
     """Where the thrusters are."""
 
     mounts: Annotated[list[Mount], Field(min_length=1)] = Field(description="one for each thruster, in their order")
 
 
-class ShippedMatrix(Group):
+class ShippedMatrix(ParameterGroup):
     """An allocation matrix that the source states, turned to FRD, to be held against the geometry."""
 
     force_N_per_N: ThreeRows = Field(description="rows surge, sway, heave; a column per thruster")
@@ -205,14 +205,14 @@ class ShippedMatrix(Group):
         return np.array(rows)
 
 
-class CameraMount(Group):
+class CameraMount(ParameterGroup):
     """Where the camera sits and looks."""
 
     position_m: Three = Field(description="centre of projection from the body origin, FRD")
     roll_pitch_yaw_deg: Three = Field(description="turn of the camera; zeros look along the body's x axis, upright")
 
 
-class CameraTilt(Group):
+class CameraTilt(ParameterGroup):
     """The joint that tilts the camera about its own right axis; left out where the camera is fixed."""
 
     range_deg: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
@@ -230,7 +230,7 @@ class CameraTilt(Group):
         return TiltJoint(low_rad=low, high_rad=high, rate_rad_s=rate, p_BJ_m=pivot)
 
 
-class CameraLens(Group):
+class CameraLens(ParameterGroup):
     """What the camera sees."""
 
     horizontal_fov_deg: Annotated[float, Field(gt=1.0, lt=170.0)] = Field(description="field of view in water")
@@ -311,12 +311,12 @@ class VehicleFile(Settings):
                 provenance=tuple(
                     Provenance(group=field, source=group.source, estimate=group.estimate)
                     for field, group in groups
-                    if isinstance(group, Group)
+                    if isinstance(group, ParameterGroup)
                 ),
                 notes=tuple(self.notes),
             )
         faults.tell()
-        return stated(draft)
+        return required(draft)
 
     def _thruster(self, mount: Mount) -> ThrusterDraft:
         limits, disk, lag = self.thruster_limits, self.thruster_disk, self.thruster_lag

@@ -10,7 +10,7 @@ to go next (`reachability.py`), `coverage_gaps.py` why a part was not seen.
 from wakewise.scene.missions.aim import CameraAim, aim_of
 from wakewise.scene.missions.clearance import TankBounds, check_clearance, check_tilt
 from wakewise.scene.missions.coverage import Coverage
-from wakewise.scene.missions.coverage_gaps import CoverageGaps, missed
+from wakewise.scene.missions.coverage_gaps import CoverageGaps, find_coverage_gaps
 from wakewise.scene.missions.orbit import Orbit, layered_orbits
 from wakewise.scene.missions.reachability import CandidateViews, reachable_views
 from wakewise.scene.missions.route import SETTLING, Leg, Route, RoutePilot, open_route, plan_route
@@ -35,8 +35,8 @@ __all__ = [
     "aim_of",
     "check_clearance",
     "check_tilt",
+    "find_coverage_gaps",
     "layered_orbits",
-    "missed",
     "open_route",
     "patches_of",
     "plan_route",

@@ -19,9 +19,9 @@ from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.jit.njit import njit
-from wakewise.scene.missions.reachability import CandidateViews, way_words
+from wakewise.scene.missions.reachability import CandidateViews, direction_words
 from wakewise.scene.missions.surface_patches import SurfacePatches
-from wakewise.scene.missions.visibility import CameraIntrinsics, VisibilityCriteria, well_shown
+from wakewise.scene.missions.visibility import CameraIntrinsics, VisibilityCriteria, well_visible
 
 Counts = NDArray[np.uint8]
 
@@ -112,7 +112,7 @@ class Coverage:
             raise InputError(f"sharpness: {sharpness!r}, allowed 0 or more, or None where it is not known")
         if sharpness is not None and sharpness < self.need.sharp * self.sharpest:
             return replace(self, photos=self.photos + 1, blurred=self.blurred + 1)
-        shown = well_shown(self.patches, X_WC, camera, self.need)
+        shown = well_visible(self.patches, X_WC, camera, self.need)
         if not shown.any():
             return replace(self, photos=self.photos + 1)
         level, partners, own = _with_one_more(
@@ -201,7 +201,7 @@ class Coverage:
         view = self.next_view(X_WC)
         if view is None:
             return f"{100.0 * self.share:.0f} % is seen well, nothing within reach adds to it"
-        return way_words(X_WC, view, self.views.centre_W_m)
+        return direction_words(X_WC, view, self.views.centre_W_m)
 
 
 @njit

@@ -10,7 +10,7 @@ import numpy as np
 
 from wakewise.core.geometry import Pose
 from wakewise.scene.missions.coverage import Coverage
-from wakewise.scene.missions.visibility import CameraIntrinsics, well_shown
+from wakewise.scene.missions.visibility import CameraIntrinsics, well_visible
 
 GRAZING_RAD = math.radians(87.0)
 
@@ -34,7 +34,7 @@ class CoverageGaps:
     seldom: float
 
 
-def missed(coverage: Coverage, taken_from: Iterable[Pose], lens: CameraIntrinsics) -> CoverageGaps:
+def find_coverage_gaps(coverage: Coverage, taken_from: Iterable[Pose], lens: CameraIntrinsics) -> CoverageGaps:
     """Sort what is not seen well by why.
 
     Parameters
@@ -49,7 +49,7 @@ def missed(coverage: Coverage, taken_from: Iterable[Pose], lens: CameraIntrinsic
     lenient = replace(coverage.need, incidence_rad=GRAZING_RAD, pixel_m=math.inf)
     glimpsed = np.zeros(len(patches.points_W_m), dtype=np.bool_)
     for X_WC in taken_from:
-        glimpsed |= well_shown(patches, X_WC, lens, lenient)
+        glimpsed |= well_visible(patches, X_WC, lens, lenient)
     shown, left = coverage.level > 0, ~coverage.covered
     glimpsed |= shown
     return CoverageGaps(

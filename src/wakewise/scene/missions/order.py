@@ -21,7 +21,7 @@ LEAST_CURRENT_M_S = 0.01
 is felt."""
 
 
-def downstream_first(orbits: tuple[Orbit, ...], current_W_m_s: Array) -> tuple[Orbit, ...]:
+def order_downstream_first(orbits: tuple[Orbit, ...], current_W_m_s: Array) -> tuple[Orbit, ...]:
     """The same orbits, each begun at the first of its views from downstream on, in the direction in which it is listed.
 
     Parameters

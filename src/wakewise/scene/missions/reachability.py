@@ -14,7 +14,7 @@ from wakewise.scene.missions.aim import CameraAim
 from wakewise.scene.missions.clearance import TankBounds, gaps_of
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise.scene.missions.surface_patches import SurfacePatches
-from wakewise.scene.missions.visibility import CameraIntrinsics, VisibilityCriteria, well_shown
+from wakewise.scene.missions.visibility import CameraIntrinsics, VisibilityCriteria, well_visible
 
 AZIMUTHS = 24
 ELEVATIONS_DEG = (10.0, 25.0, 40.0, 55.0, 70.0)
@@ -84,7 +84,7 @@ def place_of(p_W_m: Array, centre_W_m: Array) -> Array:
     return np.array([math.atan2(east, north), math.atan2(-down, level), math.hypot(level, down)])
 
 
-def way_words(X_WC: Pose, view: Pose, centre_W_m: Array) -> str:
+def direction_words(X_WC: Pose, view: Pose, centre_W_m: Array) -> str:
     """How to get from a camera's pose to a view, for a person who faces the target: round it, up or down, nearer.
 
     What is below `LEAST_WAY_M` or `LEAST_TURN_DEG` is left out. Left and right are those of someone who looks at the
@@ -162,7 +162,7 @@ def reachable_views(
                 X_WB = X_WC @ aim.mount(aim.tilt(-elevation)[0]).inverse()
                 if min(gaps_of(X_WB, size_m, bounds, target_W_m).values()) >= clearance_m:
                     places.append((float(azimuth), elevation, range_m))
-                    shows.append(well_shown(patches, X_WC, camera, need))
+                    shows.append(well_visible(patches, X_WC, camera, need))
     if not places:
         return CandidateViews.none(patches)
     return CandidateViews(centre_W_m=centre_W_m, places=np.array(places), shows=np.array(shows))

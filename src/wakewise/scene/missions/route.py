@@ -14,7 +14,7 @@ from wakewise.core.geometry import Pose, matrix_from_quat, quat_conjugate, quat_
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.scene.missions.aim import CameraAim
 from wakewise.scene.missions.orbit import camera_pose, camera_twist, layered_orbits
-from wakewise.scene.missions.order import downstream_first
+from wakewise.scene.missions.order import order_downstream_first
 from wakewise.scene.missions.settings import MissionSettings
 
 SETTLING = "settle"
@@ -189,7 +189,7 @@ def plan_route(centre_W_m: Array, settings: MissionSettings, current_W_m_s: Arra
     """
     orbits = layered_orbits(settings)
     if settings.order == "current" and current_W_m_s is not None:
-        orbits = downstream_first(orbits, current_W_m_s)
+        orbits = order_downstream_first(orbits, current_W_m_s)
     far, near = settings.standoff_m + settings.approach_m, settings.standoff_m
     here = np.array([orbits[0].azimuths_rad[0], orbits[0].elevation_rad, far])
     legs: list[Leg] = []

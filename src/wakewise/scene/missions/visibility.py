@@ -80,7 +80,7 @@ class VisibilityCriteria:
             )
 
 
-def well_shown(patches: SurfacePatches, X_WC: Pose, lens: CameraIntrinsics, need: VisibilityCriteria) -> BoolArray:
+def well_visible(patches: SurfacePatches, X_WC: Pose, lens: CameraIntrinsics, need: VisibilityCriteria) -> BoolArray:
     """Which samples a sharp photograph shows well enough, shape (n,).
 
     Parameters

@@ -12,7 +12,7 @@ from wakewise.scene.targets.corals import coral, coral_kinds, soft_kinds, stony_
 from wakewise.scene.targets.distance import MeshDistance
 from wakewise.scene.targets.elasticity import BendingModes, TissueProperties, turned_normals
 from wakewise.scene.targets.find import find_mesh, find_target, is_mesh_file
-from wakewise.scene.targets.fragility import Fragility, delicacy
+from wakewise.scene.targets.fragility import Fragility, find_fragility
 from wakewise.scene.targets.fragility_marks import FragilityMarks, read_marks, read_vertex_scores
 from wakewise.scene.targets.mesh import Mesh, load_mesh, read_mesh, write_mesh
 from wakewise.scene.targets.region import DenseQuadrature, Region, region_measure, sample_region
@@ -33,7 +33,7 @@ __all__ = [
     "TissueProperties",
     "coral",
     "coral_kinds",
-    "delicacy",
+    "find_fragility",
     "find_mesh",
     "find_target",
     "is_mesh_file",

@@ -9,7 +9,8 @@ the tissue and of the water that moves along.
 
 Bending keeps the length of the axis: what moves aside comes down, and the stiffness grows with the slope, to the third
 order (M. R. M. Crespo da Silva and C. C. Glynn 1978, J. Struct. Mech. 6, 437). Sections stay level. That holds while a
-tip moves by about half of the height, `BENDS_TO`; higher modes, torsion, and branches that swing apart are left out.
+tip moves by about half of the height, `MAX_DEFLECTION_SHARE`; higher modes, torsion, and branches that swing apart are
+left out.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from wakewise.core.errors import InputError
 from wakewise.scene.targets.sections import sections
 from wakewise.scene.targets.target import Target
 
-BENDS_TO = 0.5
+MAX_DEFLECTION_SHARE = 0.5
 """Share of a stem's height by which its tip may move for the theory to hold."""
 NODES = 48
 """Heights at which a stem is cut."""

@@ -30,7 +30,7 @@ SHARP_PER_M = (100.0, 300.0)
 """Mean curvature up to which nothing is sharp (a ball of 10 mm radius, a rod of 5), and from which on all is (3.3)."""
 SMOOTHED_OVER_M = 0.003
 MOST_STEPS = 1000
-DELICATE_FROM = 0.5
+FRAGILE_FROM = 0.5
 """Score from which on a place is called delicate when shares of the surface are told."""
 ROUGH_RAD = np.deg2rad(60.0)
 SHRINKS = 20
@@ -62,12 +62,12 @@ class Fragility:
             raise InputError(f"delicacy: scores {self.score.min():g} to {self.score.max():g}, allowed 0 to 1")
 
     def share(self, mesh: Mesh) -> float:
-        """Share of a mesh's area, from 0 to 1, whose score is at least `DELICATE_FROM`."""
+        """Share of a mesh's area, from 0 to 1, whose score is at least `FRAGILE_FROM`."""
         area = mesh.face_areas_m2
-        return float(area @ np.mean(self.score[mesh.faces] >= DELICATE_FROM, axis=1) / area.sum())
+        return float(area @ np.mean(self.score[mesh.faces] >= FRAGILE_FROM, axis=1) / area.sum())
 
 
-def delicacy(mesh: Mesh, marked: Array | None = None) -> Fragility:
+def find_fragility(mesh: Mesh, marked: Array | None = None) -> Fragility:
     """Find the delicate features of a mesh.
 
     Parameters

@@ -15,14 +15,14 @@ import numpy as np
 from numba import cuda, float32, float64
 
 from wakewise.simulation.lattice.collision import collide, collide_forced
-from wakewise.simulation.lattice.faces import pull_beyond
+from wakewise.simulation.lattice.faces import pull_outside_domain
 from wakewise.simulation.lattice.stencil import VELOCITIES
 
 WARP = 32
 
 _collide = cuda.jit(device=True, fastmath=True)(collide)
 _forced = cuda.jit(device=True)(collide_forced)
-_beyond = cuda.jit(device=True, fastmath=True)(getattr(pull_beyond, "py_func", pull_beyond))
+_beyond = cuda.jit(device=True, fastmath=True)(getattr(pull_outside_domain, "py_func", pull_outside_domain))
 
 
 def pitch(nz: int) -> int:

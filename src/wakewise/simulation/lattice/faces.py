@@ -33,9 +33,9 @@ from wakewise.simulation.lattice.stencil import (
     Lattice,
     origin,
 )
-from wakewise.simulation.lattice.streaming_stores import peek, poke
+from wakewise.simulation.lattice.streaming_stores import load_element, store_element
 
-BEYOND = np.array(
+OUTSIDE = np.array(
     [
         [next(i for i in range(1, 19) if np.array_equal(VELOCITIES[i], c)) for c in inwards]
         for axis in range(3)
@@ -52,7 +52,7 @@ _0, _W1, _W2 = float32(0.0), float32(1 / 18), float32(1 / 36)
 
 @njit(fastmath=True, inline="always")
 def beyond_open(own: Populations, axis: int, side: int) -> tuple[float, float, float, float, float]:
-    """What a cell with these populations pulls from beyond its one open face, in the order of `BEYOND`.
+    """What a cell with these populations pulls from beyond its one open face, in the order of `OUTSIDE`.
 
     `side` is +1 where the face is the low one.
     """
@@ -76,7 +76,7 @@ def beyond_open(own: Populations, axis: int, side: int) -> tuple[float, float, f
 
 
 @njit(fastmath=True)
-def pull_beyond(
+def pull_outside_domain(
     own: Lattice, at: tuple[int, int, int], cells: tuple[int, int, int], faces: IntArray, pulled: Lattice
 ) -> None:
     """Replace what one cell pulls from beyond all its faces, edges and corners; the rest of `pulled`, (19,), stays.
@@ -158,34 +158,34 @@ def _open_row(src: Lattice, x: int, first: int, end: int, face: int, mz: int, ma
     for p in range(first, end):
         n = p - first
         own = (
-            peek(r0, p),
-            peek(r1, p),
-            peek(r2, p),
-            peek(r3, p),
-            peek(r4, p),
-            peek(r5, p),
-            peek(r6, p),
-            peek(r7, p),
-            peek(r8, p),
-            peek(r9, p),
-            peek(r10, p),
-            peek(r11, p),
-            peek(r12, p),
-            peek(r13, p),
-            peek(r14, p),
-            peek(r15, p),
-            peek(r16, p),
-            peek(r17, p),
-            peek(r18, p),
+            load_element(r0, p),
+            load_element(r1, p),
+            load_element(r2, p),
+            load_element(r3, p),
+            load_element(r4, p),
+            load_element(r5, p),
+            load_element(r6, p),
+            load_element(r7, p),
+            load_element(r8, p),
+            load_element(r9, p),
+            load_element(r10, p),
+            load_element(r11, p),
+            load_element(r12, p),
+            load_element(r13, p),
+            load_element(r14, p),
+            load_element(r15, p),
+            load_element(r16, p),
+            load_element(r17, p),
+            load_element(r18, p),
         )
         straight, on_v, against_v, on_w, against_w = beyond_open(own, axis, side)
-        poke(made, n, straight)
-        poke(made, PIECE + n, on_v)
-        poke(made, 2 * PIECE + n, against_v)
-        poke(made, 3 * PIECE + n, on_w)
-        poke(made, 4 * PIECE + n, against_w)
+        store_element(made, n, straight)
+        store_element(made, PIECE + n, on_v)
+        store_element(made, 2 * PIECE + n, against_v)
+        store_element(made, 3 * PIECE + n, on_w)
+        store_element(made, 4 * PIECE + n, against_w)
     for k in range(5):
-        i = BEYOND[face, k]
+        i = OUTSIDE[face, k]
         slots = src[i, x - VELOCITIES[i, 0]]
         back = VELOCITIES[i, 1] * mz + VELOCITIES[i, 2]
         for p in range(first, end):
@@ -196,7 +196,7 @@ def _open_row(src: Lattice, x: int, first: int, end: int, face: int, mz: int, ma
 def _wall_row(src: Lattice, x: int, first: int, end: int, face: int, mz: int) -> None:
     """Fill the slots of the cells first to end - 1 of plane x, all beside one wall."""
     for k in range(5):
-        i = BEYOND[face, k]
+        i = OUTSIDE[face, k]
         slots, left = src[i, x - VELOCITIES[i, 0]], src[OPPOSITE[i], x]
         back = VELOCITIES[i, 1] * mz + VELOCITIES[i, 2]
         for p in range(first, end):
@@ -238,7 +238,7 @@ def _open_end(src: Lattice, x: int, at: int, face: int, mz: int) -> None:
     )
     made = beyond_open(own, 2, 1 - 2 * (face % 2))
     for k in range(5):
-        i = BEYOND[face, k]
+        i = OUTSIDE[face, k]
         src[i, x - VELOCITIES[i, 0], at - VELOCITIES[i, 1] * mz - VELOCITIES[i, 2]] = made[k]
 
 
@@ -250,7 +250,7 @@ def _any_cell(src: Lattice, x: int, y: int, z: int, ny: int, nz: int, faces: Int
     for i in range(19):
         own[i] = src[i, x, at]
         pulled[i] = src[i, x - VELOCITIES[i, 0], at - VELOCITIES[i, 1] * mz - VELOCITIES[i, 2]]
-    pull_beyond(own, (x, y, z), (src.shape[1] - 2, ny, nz), faces, pulled)
+    pull_outside_domain(own, (x, y, z), (src.shape[1] - 2, ny, nz), faces, pulled)
     for i in range(19):
         a, b, c = x - VELOCITIES[i, 0], y - VELOCITIES[i, 1], z - VELOCITIES[i, 2]
         if not (1 <= a <= src.shape[1] - 2 and 1 <= b <= ny and 1 <= c <= nz):

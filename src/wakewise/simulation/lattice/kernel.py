@@ -15,7 +15,14 @@ from wakewise.core.jit.njit import njit, prange
 from wakewise.simulation.lattice.collision import collide, collide_forced
 from wakewise.simulation.lattice.faces import fill_slots
 from wakewise.simulation.lattice.stencil import PERIODIC, PIECE, VELOCITIES, Lattice, box, origin
-from wakewise.simulation.lattice.streaming_stores import LINE, copy_line, peek, poke, settle_stores, stream_line
+from wakewise.simulation.lattice.streaming_stores import (
+    LINE,
+    copy_line,
+    load_element,
+    settle_stores,
+    store_element,
+    stream_line,
+)
 
 _CACHED = 2**20
 """Populations of a lattice that a core's second-level cache holds for the next step."""
@@ -50,46 +57,46 @@ def _collide(src: Lattice, starts: IntArray, tau_x: float, tau_yz: Lattice, p: i
     )
     for n in range(PIECE):
         came = (
-            peek(src, s0 + n),
-            peek(src, s1 + n),
-            peek(src, s2 + n),
-            peek(src, s3 + n),
-            peek(src, s4 + n),
-            peek(src, s5 + n),
-            peek(src, s6 + n),
-            peek(src, s7 + n),
-            peek(src, s8 + n),
-            peek(src, s9 + n),
-            peek(src, s10 + n),
-            peek(src, s11 + n),
-            peek(src, s12 + n),
-            peek(src, s13 + n),
-            peek(src, s14 + n),
-            peek(src, s15 + n),
-            peek(src, s16 + n),
-            peek(src, s17 + n),
-            peek(src, s18 + n),
+            load_element(src, s0 + n),
+            load_element(src, s1 + n),
+            load_element(src, s2 + n),
+            load_element(src, s3 + n),
+            load_element(src, s4 + n),
+            load_element(src, s5 + n),
+            load_element(src, s6 + n),
+            load_element(src, s7 + n),
+            load_element(src, s8 + n),
+            load_element(src, s9 + n),
+            load_element(src, s10 + n),
+            load_element(src, s11 + n),
+            load_element(src, s12 + n),
+            load_element(src, s13 + n),
+            load_element(src, s14 + n),
+            load_element(src, s15 + n),
+            load_element(src, s16 + n),
+            load_element(src, s17 + n),
+            load_element(src, s18 + n),
         )
-        went = _cell(came, tau_x + peek(tau_yz, p + n), eddies)
-        poke(f, n, went[0])
-        poke(f, PIECE + n, went[1])
-        poke(f, 2 * PIECE + n, went[2])
-        poke(f, 3 * PIECE + n, went[3])
-        poke(f, 4 * PIECE + n, went[4])
-        poke(f, 5 * PIECE + n, went[5])
-        poke(f, 6 * PIECE + n, went[6])
-        poke(f, 7 * PIECE + n, went[7])
-        poke(f, 8 * PIECE + n, went[8])
-        poke(f, 9 * PIECE + n, went[9])
-        poke(f, 10 * PIECE + n, went[10])
-        poke(f, 11 * PIECE + n, went[11])
-        poke(f, 12 * PIECE + n, went[12])
-        poke(f, 13 * PIECE + n, went[13])
-        poke(f, 14 * PIECE + n, went[14])
-        poke(f, 15 * PIECE + n, went[15])
-        poke(f, 16 * PIECE + n, went[16])
-        poke(f, 17 * PIECE + n, went[17])
-        poke(f, 18 * PIECE + n, went[18])
+        went = _cell(came, tau_x + load_element(tau_yz, p + n), eddies)
+        store_element(f, n, went[0])
+        store_element(f, PIECE + n, went[1])
+        store_element(f, 2 * PIECE + n, went[2])
+        store_element(f, 3 * PIECE + n, went[3])
+        store_element(f, 4 * PIECE + n, went[4])
+        store_element(f, 5 * PIECE + n, went[5])
+        store_element(f, 6 * PIECE + n, went[6])
+        store_element(f, 7 * PIECE + n, went[7])
+        store_element(f, 8 * PIECE + n, went[8])
+        store_element(f, 9 * PIECE + n, went[9])
+        store_element(f, 10 * PIECE + n, went[10])
+        store_element(f, 11 * PIECE + n, went[11])
+        store_element(f, 12 * PIECE + n, went[12])
+        store_element(f, 13 * PIECE + n, went[13])
+        store_element(f, 14 * PIECE + n, went[14])
+        store_element(f, 15 * PIECE + n, went[15])
+        store_element(f, 16 * PIECE + n, went[16])
+        store_element(f, 17 * PIECE + n, went[17])
+        store_element(f, 18 * PIECE + n, went[18])
 
 
 @njit(parallel=True, fastmath=True)

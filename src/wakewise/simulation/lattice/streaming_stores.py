@@ -2,8 +2,8 @@
 
 A loop that reads nineteen rows and writes others is worked on several cells at a time only if the compiler knows that
 no write falls on a row still to be read. Rows whose places are known when the program runs leave it hundreds of pairs
-to prove and it gives up, or tests them all before each short row. `peek` and `poke` promise it (LLVM's scoped
-`noalias`): *what is peeked in a function is not poked there*.
+to prove and it gives up, or tests them all before each short row. `load_element` and `store_element` promise it (LLVM's
+scoped `noalias`): *what is peeked in a function is not poked there*.
 
 An ordinary store first fetches the line of cache that it will overwrite, a third of the lattice's traffic;
 `stream_line` passes the caches by. A processor without such stores stores as always.
@@ -44,7 +44,7 @@ def _peeked(module: ir.Module) -> Any:
 
 
 @_word(lambda array, at: array[at])
-def peek(_: Any, array: Any, at: Any) -> _Intrinsic:
+def load_element(_: Any, array: Any, at: Any) -> _Intrinsic:
     """array[at], float32 in one dimension, `at` not negative; nothing in the function pokes it."""
 
     def generate(context: Any, builder: ir.IRBuilder, signature: Signature, arguments: Any) -> Any:
@@ -56,7 +56,7 @@ def peek(_: Any, array: Any, at: Any) -> _Intrinsic:
 
 
 @_word(lambda array, at, value: array.__setitem__(at, value))
-def poke(_: Any, array: Any, at: Any, _value: Any) -> _Intrinsic:
+def store_element(_: Any, array: Any, at: Any, _value: Any) -> _Intrinsic:
     """array[at] = value; nothing in the function peeks it."""
 
     def generate(context: Any, builder: ir.IRBuilder, signature: Signature, arguments: Any) -> Any:

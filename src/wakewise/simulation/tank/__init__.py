@@ -18,7 +18,7 @@ from wakewise.simulation.tank.grains import beam_attenuation_per_m
 from wakewise.simulation.tank.plant import VehiclePlant
 from wakewise.simulation.tank.sensors import Sensors
 from wakewise.simulation.tank.settings import TankSettings, ThrusterFailure
-from wakewise.simulation.tank.station_keeping import StationKeepingDemand, holding
+from wakewise.simulation.tank.station_keeping import StationKeepingDemand, station_keeping_demand
 from wakewise.simulation.tank.tank import Tank, tank_ambient
 from wakewise.simulation.tank.tether import Tether
 from wakewise.simulation.tank.world import TankWorld
@@ -34,6 +34,6 @@ __all__ = [
     "VehiclePlant",
     "beam_attenuation_per_m",
     "build_ambient",
-    "holding",
+    "station_keeping_demand",
     "tank_ambient",
 ]

@@ -40,7 +40,7 @@ class CollisionGeometry:
         ball = float(np.linalg.norm(self._half)) + 2 * _TOUCH_M
         room = (size_m[0] / 2, size_m[1] / 2, size_m[2])
         self.packed: Array = np.array([*self._half, *room, *self._middle, self._radius, ball])
-        """What `clear` must know."""
+        """What `surely_clear` must know."""
 
     def touches(self, p_W_m: Array, R_WB: Array) -> str:
         """Name what the hull is in or on: the floor, a wall, the target, or nothing (an empty string)."""
@@ -89,7 +89,7 @@ class CollisionGeometry:
 
 
 @njit
-def clear(around: Array, p_W_m: Array, R_WB: Array) -> bool:
+def surely_clear(around: Array, p_W_m: Array, R_WB: Array) -> bool:
     """Whether a hull, by a quick look, surely touches nothing.
 
     `around` is `CollisionGeometry.packed`; `p_W_m` is the hull's place (the first three numbers), `R_WB` its attitude.

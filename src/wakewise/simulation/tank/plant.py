@@ -16,7 +16,7 @@ from wakewise.robot.thrusters import saturate, thruster_lag
 from wakewise.robot.vehicles import Vehicle, compile_body
 from wakewise.robot.vehicles.kernels import rotate
 from wakewise.robot.vehicles.runge_kutta import rk4_kernel
-from wakewise.simulation.tank.contact import CollisionGeometry, clear
+from wakewise.simulation.tank.contact import CollisionGeometry, surely_clear
 from wakewise.simulation.tank.settings import PLANT_STEP_S, ThrusterFailure
 from wakewise.simulation.tank.tether import Tether
 from wakewise.simulation.tank.thrust_losses import FailingThrusters, inflow_factors
@@ -191,7 +191,7 @@ class VehiclePlant:
     def _hold(self) -> None:
         """Set the hull back out of what it is in, and note the specific force of the last step."""
         self.contact = ""
-        if not clear(self._surroundings.packed, self._state, self._R):
+        if not surely_clear(self._surroundings.packed, self._state, self._R):
             p, nu, self.contact = self._surroundings.held(self._state[:3].copy(), self._R, self._state[7:].copy())
             self._state[:3], self._state[7:] = p, nu
         dt_s = self._last[3]
@@ -243,7 +243,7 @@ class VehiclePlant:
 
     def touches(self) -> str:
         """Name what the hull, taken as a box, is in or on: the floor, a wall, the target, or nothing."""
-        if clear(self._surroundings.packed, self._state, self._R):
+        if surely_clear(self._surroundings.packed, self._state, self._R):
             return ""
         return self._surroundings.touches(self._state[:3], self._R)
 
@@ -371,7 +371,7 @@ def _steps_in_free_water(
             R,
         )
         time_s += dt_s
-        last[4] = 1.0 if clear(around, state, R) else 0.0
+        last[4] = 1.0 if surely_clear(around, state, R) else 0.0
         if last[4] == 0.0:
             return time_s
     if last[3] == 0.0:

@@ -29,16 +29,16 @@ from wakewise.simulation.tank.grains import (
 )
 from wakewise.simulation.tank.sediment_motion import (
     LEAST_LOOSE_KG_M2,
-    carry,
+    advect_particles,
     cells_to_look_at,
-    due,
-    feel,
-    lift,
+    deposit,
+    entrain,
     mix,
     moved_cells,
-    settle,
+    particles_to_sample,
     shared_among_nodes,
     stirred_cells,
+    update_friction,
 )
 from wakewise.simulation.tank.swell import Swell
 
@@ -281,7 +281,7 @@ class Silt:
         # Away from the jets the water moves as it does in the farthest corner.
         u = flow.velocity(places)
         if self._swell is None:
-            feel(self._star_m_s, kept, cells, u, self._friction)
+            update_friction(self._star_m_s, kept, cells, u, self._friction)
             return
         if self._stream_m_s is self._star_m_s:
             self._stream_m_s = self._star_m_s.copy()
@@ -289,7 +289,7 @@ class Silt:
             self._middles = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
         time_s = float(getattr(flow, "time_s", 0.0))
         u[:, :2] -= self._swell.speed_m_s(places[:, :2], time_s)[:, None] * self._swell.ahead
-        feel(self._stream_m_s, kept, cells, u, self._friction)
+        update_friction(self._stream_m_s, kept, cells, u, self._friction)
         swell = self._swell.stress_Pa(self._middles, time_s).reshape(self._shape) / self.laws.water_density_kg_m3
         # Stream and swell cross at any angle: the root of the sum of squares is right in the mean over a wave.
         self._star_m_s = np.hypot(self._stream_m_s**2, swell) ** 0.5
@@ -304,7 +304,7 @@ class Silt:
             return
         rates = laws.lifted_kg_m2_s(laws.water_density_kg_m3 * star**2, load)
         drawn = rates * area * dt_s / self._birth_kg + self._rng.uniform(size=len(cells))
-        lifted = lift(cells, drawn, self._birth_kg, area, laws.firm_kg_m2, self.bed_kg_m2)
+        lifted = entrain(cells, drawn, self._birth_kg, area, laws.firm_kg_m2, self.bed_kg_m2)
         new, mass = len(lifted), lifted[:, 2]
         self.lifted_kg += math.fsum(mass)
         place = self._rng.uniform(size=(new, 3))
@@ -322,11 +322,11 @@ class Silt:
         if len(self._age_s) != len(position):
             self._u_m_s, self._age_s = np.zeros_like(position), np.full(len(position), _NEVER_S)
         u, age, depth = self._u_m_s, self._age_s, float(self._size[2])
-        look = due(u, age, dt_s, _HELD_M, _HELD_S)
+        look = particles_to_sample(u, age, dt_s, _HELD_M, _HELD_S)
         if len(look):
             u[look] = flow.velocity(position[look])
-        landed = carry(position, u, self.laws.settling_m_s, dt_s, self._low, depth)
-        left = settle(landed, position, mass, u, age, self.bed_kg_m2, self._low, self._cell)
+        landed = advect_particles(position, u, self.laws.settling_m_s, dt_s, self._low, depth)
+        left = deposit(landed, position, mass, u, age, self.bed_kg_m2, self._low, self._cell)
         self.position_m, self.mass_kg, self._u_m_s, self._age_s = position[:left], mass[:left], u[:left], age[:left]
 
     def _mix(self, dt_s: float) -> None:

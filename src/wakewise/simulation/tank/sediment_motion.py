@@ -63,7 +63,7 @@ def cells_to_look_at(
 
 
 @njit(nogil=True)
-def feel(star: Array, kept: np.ndarray, cells: IntArray, u: Array, table: Array) -> None:
+def update_friction(star: Array, kept: np.ndarray, cells: IntArray, u: Array, table: Array) -> None:
     """Renew the friction velocities of cells, shape (nx, ny), from the water's velocities `u` at `cells_to_look_at`."""
     away = friction_from(table, math.sqrt(u[0, 0] ** 2 + u[0, 1] ** 2))
     for i in range(star.shape[0]):
@@ -89,7 +89,7 @@ def moved_cells(star: Array, bed: Array, least: float) -> tuple[IntArray, Array,
 
 
 @njit(nogil=True)
-def lift(cells: IntArray, particles: Array, birth_kg: float, area_m2: float, firm_kg_m2: float, bed: Array) -> Array:
+def entrain(cells: IntArray, particles: Array, birth_kg: float, area_m2: float, firm_kg_m2: float, bed: Array) -> Array:
     """Take whole particles of a mass from cells of the bed, shape (m, 2): as many as `particles`, shape (m,), holds.
 
     What is loose goes first: the firm layer below it gives up its first grain in the step after. Returns the particles
@@ -109,7 +109,7 @@ def lift(cells: IntArray, particles: Array, birth_kg: float, area_m2: float, fir
 
 
 @njit(nogil=True)
-def due(u: Array, age: Array, dt_s: float, held_m: float, held_s: float) -> IntArray:
+def particles_to_sample(u: Array, age: Array, dt_s: float, held_m: float, held_s: float) -> IntArray:
     """Particles at which the water must be looked at before a step; the ages of what the others know go on."""
     found, count = np.empty(age.shape[0], np.int64), 0
     for k in range(age.shape[0]):
@@ -123,7 +123,7 @@ def due(u: Array, age: Array, dt_s: float, held_m: float, held_s: float) -> IntA
 
 
 @njit(nogil=True)
-def settle(
+def deposit(
     landed: np.ndarray, position: Array, mass: Array, u: Array, age: Array, bed: Array, low: Array, cell: Array
 ) -> int:
     """Put particles that have landed onto the bed, shape (nx, ny) in kg/m2, and close the ranks; how many are left."""
@@ -142,7 +142,9 @@ def settle(
 
 
 @njit(nogil=True)
-def carry(position: Array, u: Array, settling_m_s: float, dt_s: float, low: Array, depth: float) -> np.ndarray:
+def advect_particles(
+    position: Array, u: Array, settling_m_s: float, dt_s: float, low: Array, depth: float
+) -> np.ndarray:
     """Move particles, shape (n, 3), in place with the water and down; return which of them reached the bed.
 
     Downward flow vanishes at the bed in proportion to the height, so water alone never carries silt into it.

@@ -27,7 +27,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Current, TargetDeformation
 from wakewise.core.jit.njit import njit
 from wakewise.scene.targets import BendingModes, Target
-from wakewise.scene.targets.elasticity import BENDS_TO, ways_m
+from wakewise.scene.targets.elasticity import MAX_DEFLECTION_SHARE, ways_m
 from wakewise.simulation.tank.probes import surface_samples
 from wakewise.simulation.water.water_snapshot import WaterSnapshot
 
@@ -131,7 +131,7 @@ class TargetMotion:
         self._middles_W_m = np.array([pieces.points_W_m[pieces.stem == k].mean(axis=0) for k in range(stems)])
         if self.sway is not None:  # it has stood in its current long before the flight
             water = self.ambient.velocity(pieces.points_W_m, 0.0)
-            self.tips_m = standing_m(pieces, self.sway, self.drag_kg_m3, water)
+            self.tips_m = static_deflection_m(pieces, self.sway, self.drag_kg_m3, water)
         self.alone_m, self._alone_m_s = self.tips_m, self.speeds_m_s
 
     def step(self, now: WaterSnapshot, dt_s: float) -> None:
@@ -163,7 +163,7 @@ class TargetMotion:
         """Tips and their speeds after a step through water, shape (n, 3) each, and the drag on the whole, (3,)."""
         pieces, force = self._pieces, np.zeros(3)
         tips, speeds = tips.copy(), speeds.copy()
-        swing(
+        integrate_modes(
             tips, speeds, force, self._modes, sway.axes_W, load, pieces.stem, pieces.areas_m2,
             pieces.shape, pieces.slope, pieces.drop, np.ascontiguousarray(before), np.ascontiguousarray(water),
             self.drag_kg_m3, dt_s, substeps(sway, dt_s),
@@ -242,12 +242,13 @@ def check_sway(
             f"target.sway: {target.name} swings at {slowest:.3g} Hz or more, but water known each {1e3 * step_s:g} ms "
             f"moves what swings below {known:g} Hz; too stiff: let target.sway be none, or target.stiffness_Pa less"
         )
-    tips = standing_m(SurfaceElements.of(target, sway), sway, drag * density_kg_m3, water_m_s)
+    tips = static_deflection_m(SurfaceElements.of(target, sway), sway, drag * density_kg_m3, water_m_s)
     share = float((np.linalg.norm(tips, axis=1) / sway.height_m).max())
-    if share > BENDS_TO:
+    if share > MAX_DEFLECTION_SHARE:
         raise InputError(
             f"target.sway: a current of {np.linalg.norm(water_m_s):.2g} m/s bends {target.name} by {share:.2g} of its "
-            f"height, the theory of its bending holds to {BENDS_TO:g}; too soft: let target.stiffness_Pa be more"
+            f"height, the theory of its bending holds to {MAX_DEFLECTION_SHARE:g}; too soft: "
+            f"let target.stiffness_Pa be more"
         )
 
 
@@ -271,7 +272,7 @@ def check_loose(target: Target, yielding: TargetCompliance, water_m_s: Array, de
         )
 
 
-def standing_m(pieces: SurfaceElements, sway: BendingModes, drag_kg_m3: float, water_m_s: Array) -> Array:
+def static_deflection_m(pieces: SurfaceElements, sway: BendingModes, drag_kg_m3: float, water_m_s: Array) -> Array:
     """Ways of the tips, shape (k, 2), in which a stream of even velocity, (3,), or (n, 3) at the pieces, holds them."""
     tips, speeds = np.zeros((len(sway.height_m), 2)), np.zeros((len(sway.height_m), 2))
     modes, none, force = _modes(sway), np.zeros((len(sway.height_m), 2)), np.zeros(3)
@@ -279,7 +280,7 @@ def standing_m(pieces: SurfaceElements, sway: BendingModes, drag_kg_m3: float, w
     modes[:, :, 3] = 4.0 * np.sqrt(modes[:, :, 0] * modes[:, :, 1])
     water = np.ascontiguousarray(np.broadcast_to(water_m_s, pieces.points_W_m.shape))
     lasts = 8.0 / float(sway.frequency_Hz.min())
-    swing(
+    integrate_modes(
         tips, speeds, force, modes, sway.axes_W, none, pieces.stem, pieces.areas_m2, pieces.shape, pieces.slope,
         pieces.drop, water, water, drag_kg_m3, lasts, 400,
     )  # fmt: skip
@@ -314,7 +315,7 @@ def _modes(sway: BendingModes | None) -> Array:
 
 
 @njit
-def swing(
+def integrate_modes(
     tips: Array, speeds: Array, force: Array, modes: Array, axes: Array, load: Array, stem: IntArray, areas: Array,
     shape: Array, slope: Array, drop: Array, before: Array, after: Array, drag: float, dt: float, steps: int,
 ) -> None:  # fmt: skip

@@ -78,7 +78,7 @@ class StationKeepingDemand:
         return f"{', '.join(loads)}, the thrusters hold {able} (margin {self.margin_pct:+.0f} %)"
 
 
-def holding(
+def station_keeping_demand(
     vehicle: Vehicle,
     passing_B_m_s: Array,
     density_kg_m3: float,

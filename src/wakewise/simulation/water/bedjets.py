@@ -239,7 +239,7 @@ def grown(
     return WallJetRings.of(layers, rings.count, 0), speed
 
 
-def coarsened(rings: WallJetRings) -> WallJetRings:
+def merged_rings(rings: WallJetRings) -> WallJetRings:
     """Rings of one plane that are near each other made one; see `merge_layers`."""
     layers = rings.layers()
     return WallJetRings.of(layers, merge_layers(layers, rings.count), 0)

@@ -21,7 +21,7 @@ from wakewise.core.jit.njit import assign, njit
 from wakewise.scene.targets import Target
 from wakewise.simulation.water.blocked_sums import over_points
 from wakewise.simulation.water.induction import SINGLE, FixedSources, smooth_share, sum_sources
-from wakewise.simulation.water.space_order import in_space
+from wakewise.simulation.water.space_order import spatial_order
 
 _POINTS = 480
 _SOURCES = 160
@@ -109,7 +109,7 @@ class Blockage:
     def of(cls, target: Target) -> Blockage:
         """For a target on its bed; the same target always gives the same sources."""
         points, normals, area = _surface(target, _POINTS, np.random.default_rng(0))
-        order = in_space(points)  # which suits the sums over jets there
+        order = spatial_order(points)  # which suits the sums over jets there
         points, normals = points[order], normals[order]
         inner, inward, _ = _surface(target, _SOURCES, np.random.default_rng(1))
         size = math.sqrt(area / _SOURCES)

@@ -31,7 +31,7 @@ _MOST_SHEETS = 8  # that are remembered, so that the rings of one meeting add up
 
 
 @njit(apart=True, nogil=True)
-def turn_aside(
+def deflect_colliding(
     jets: ParcelBuffers, count: int, streams: int, planes: JetPlanes, faces: int, layers: RingBuffers, rings: int
 ) -> tuple[int, int, float]:
     """Take from the first `count` parcels what meets head-on, and start its rings behind the first `rings`.

@@ -63,7 +63,7 @@ def ray_azimuths(lean: float, phase: float, out: Array) -> None:
 
 
 @njit(nogil=True)
-def fan_out(jets: ParcelBuffers, count: int, streams: int, met: int) -> tuple[int, int]:
+def spread_crossing_jets(jets: ParcelBuffers, count: int, streams: int, met: int) -> tuple[int, int]:
     """Turn what crosses among the first `count` parcels into rays behind them; parcels and meetings there are then.
 
     Streams below `streams` are the thrusters' own; only those meet. `met` is how many meetings there were before.

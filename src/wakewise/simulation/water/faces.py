@@ -131,7 +131,7 @@ def mirrored(X: Array, m: Array, sigma: Array, walls: Array) -> tuple[Array, Arr
             at, side, least = walls[f, 1], walls[f, 2], walls[f, 3]
             if count + first > room:
                 room = 2 * (count + first)
-                places, impulses = longer(places, room), longer(impulses, room)
+                places, impulses = with_capacity(places, room), with_capacity(impulses, room)
                 short, sizes = sizes, np.empty(room)
                 assign(sizes[:count], short[:count])
             for j in range(first):
@@ -149,7 +149,7 @@ def mirrored(X: Array, m: Array, sigma: Array, walls: Array) -> tuple[Array, Arr
 
 
 @njit(nogil=True)
-def longer(rows: Array, room: int) -> Array:
+def with_capacity(rows: Array, room: int) -> Array:
     """A copy of rows, shape (n, k), with room for so many; what is new is not set."""
     out = np.empty((room, rows.shape[1]))
     assign_rows(out[: rows.shape[0]], rows)

@@ -37,7 +37,7 @@ _LEAST_LEFT = 0.05  # of the slipstream: what is left of it can still strike
 
 
 @njit(nogil=True)
-def lead_round(body: PackedBlockage, x: Array, u: Array, answer: Array) -> None:
+def deflect_velocity(body: PackedBlockage, x: Array, u: Array, answer: Array) -> None:
     """Turn the velocity u of the jets' own water at a parcel, in place, the way that the body's answer there says.
 
     All shape (3,); `answer` is changed as well.

@@ -23,7 +23,7 @@ _HELD_SIGMA, HELD_S = 0.05, 0.2
 
 
 @njit(apart=True, nogil=True)
-def due(flow: Array, held_s: Array, sigma: Array, dt_s: float) -> IntArray:
+def parcels_to_sample(flow: Array, held_s: Array, sigma: Array, dt_s: float) -> IntArray:
     """Parcels at which the water must be looked at before a step of dt_s; the times of the others go on."""
     found = np.empty(sigma.shape[0], np.int64)
     count = 0
@@ -38,7 +38,7 @@ def due(flow: Array, held_s: Array, sigma: Array, dt_s: float) -> IntArray:
 
 
 @njit(apart=True, nogil=True)
-def drift(
+def advect_parcels(
     X: Array,
     sigma: Array,
     share: Array,
@@ -195,7 +195,7 @@ def count_sent(impulses_m4_s: Array, dt_s: float, areas_m2: Array, spacing_m: Ar
 
 
 @njit(apart=True, nogil=True)
-def send(
+def emit_parcels(
     jets: ParcelBuffers,
     count: int,
     slugs: tuple[IntArray, IntArray, Array, Array, Array],
@@ -220,7 +220,7 @@ def send(
     ambient : ndarray, shape (t, 3)
         Velocity of the ambient water at the disks.
     laws, walls : ndarray
-        As in `drift`.
+        As in `advect_parcels`.
     noise : ndarray, shape (k, 3)
         Standard normal, for their turbulence.
     """

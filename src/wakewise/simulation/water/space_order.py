@@ -19,7 +19,7 @@ _BITS = 5
 _SIDE = 2**_BITS  # cells along each side of the cube
 
 
-def in_space(points_W_m: Array) -> IntArray:
+def spatial_order(points_W_m: Array) -> IntArray:
     """Order, shape (n,), in which points, shape (n, 3), that follow each other are mostly neighbours in space."""
     if len(points_W_m) < FEW_POINTS:
         return np.arange(len(points_W_m))

@@ -17,14 +17,20 @@ from wakewise.simulation.water.bedjets import STRIKE_HEIGHT, RingBuffers
 from wakewise.simulation.water.bedjets_sums import sum_planes
 from wakewise.simulation.water.blockage import PackedBlockage, add_body, answer
 from wakewise.simulation.water.clusters import clustered, sum_field
-from wakewise.simulation.water.colliding_jets import turn_aside
-from wakewise.simulation.water.crossing_jets import fan_out
+from wakewise.simulation.water.colliding_jets import deflect_colliding
+from wakewise.simulation.water.crossing_jets import spread_crossing_jets
 from wakewise.simulation.water.faces import mirrored
-from wakewise.simulation.water.jet_deflection import lead_round, strike_body
-from wakewise.simulation.water.parcel_advection import drift, due, fade_gusts, send, slugs
+from wakewise.simulation.water.jet_deflection import deflect_velocity, strike_body
+from wakewise.simulation.water.parcel_advection import (
+    advect_parcels,
+    emit_parcels,
+    fade_gusts,
+    parcels_to_sample,
+    slugs,
+)
 from wakewise.simulation.water.parcels import MERGE_SPACING, ParcelBuffers, kept_only, merge_across, merge_rows
 from wakewise.simulation.water.space_order import ordered
-from wakewise.simulation.water.walljets import JetPlanes, grow, ring_places, start_ring, thin, wall_rows
+from wakewise.simulation.water.walljets import JetPlanes, grow_rings, ring_places, start_ring, thin_rings, wall_rows
 
 _MANY = 800  # parcels; with more, old ones of different jets merge over distances that grow in proportion
 # Steps after which different jets and rings are looked through for what may become one, and after which the body's
@@ -39,7 +45,7 @@ class WaterConstants(NamedTuple):
     Parameters
     ----------
     drift : ndarray, shape (5,)
-        As in `drift.drift`; the fourth is the time step in s.
+        As in `advect_parcels.drift`; the fourth is the time step in s.
     wake_stream : int
         Of the hull's wake: one more than the jets' own.
     rest_speed : float
@@ -161,7 +167,7 @@ def advance(
     body_to_ambient : ndarray, shape (s,)
         The body's answer to the ambient water.
     disks : ndarray, shape (3, t, 3)
-        As in `drift.send`.
+        As in `advect_parcels.send`.
     impulses_m4_s : ndarray, shape (t, 2)
         Forward and reverse, over the water's density.
     noise : ndarray, shape (n + k, 3)
@@ -174,14 +180,14 @@ def advance(
     count = _drift(jets, n, layers, r, planes, body, laws, tally, ambient, noise) if n else 0
     rings = 0
     if r:
-        rings = grow(layers, r, planes, places[n : n + r], ambient[n : n + r], dt_s, laws.rest_speed)
+        rings = grow_rings(layers, r, planes, places[n : n + r], ambient[n : n + r], dt_s, laws.rest_speed)
     sent = slugs(
         impulses_m4_s, dt_s, thrusters.areas, thrusters.spacing, thrusters.waiting_impulse, thrusters.waiting_slug
     )
     if sent[2].shape[0]:
-        count = send(jets, count, sent, thrusters.areas, disks, ambient[n + r :], laws.drift, walls, noise[n:])
-    count, tally.steps[2] = fan_out(jets, count, laws.wake_stream, tally.steps[2])
-    count, rings, met = turn_aside(jets, count, laws.wake_stream, planes, walls.shape[0], layers, rings)
+        count = emit_parcels(jets, count, sent, thrusters.areas, disks, ambient[n + r :], laws.drift, walls, noise[n:])
+    count, tally.steps[2] = spread_crossing_jets(jets, count, laws.wake_stream, tally.steps[2])
+    count, rings, met = deflect_colliding(jets, count, laws.wake_stream, planes, walls.shape[0], layers, rings)
     tally.gone[2] += met
     for face in range(walls.shape[0]):
         count, rings, struck = _strike(jets, count, planes, face, layers, rings)
@@ -189,7 +195,7 @@ def advance(
     count = merge_rows(jets, count, MERGE_SPACING)
     if tally.steps[0] % _EVERY == 0:
         count = merge_across(jets, count, MERGE_SPACING * max(1.0, count / _MANY))
-        rings = thin(layers, rings)
+        rings = thin_rings(layers, rings)
     tally.rows[0], tally.rows[1] = count, rings
     tally.steps[0] += 1
 
@@ -209,7 +215,7 @@ def _drift(
 ) -> int:
     """Carry parcels, let them grow, and retire what has come to rest; how many are left."""
     sigma, impulse, dt_s = jets.sigma[:n], jets.impulse[:n], laws.drift[3]
-    look = due(jets.flow[:n], jets.held[:n], sigma, dt_s)
+    look = parcels_to_sample(jets.flow[:n], jets.held[:n], sigma, dt_s)
     if look.shape[0]:
         # Gusts are heard everywhere but do not carry parcels: the growth of sigma stands for that mixing already.
         u = _carrying(jets.position[:n], impulse, sigma, look, layers, r, planes, body, laws, tally)
@@ -217,7 +223,7 @@ def _drift(
             for k in range(3):
                 jets.flow[look[q], k] = u[q, k]
     speed, before, place = np.empty(n), sigma.copy(), jets.position[:n].copy()
-    drift(
+    advect_parcels(
         jets.position[:n],
         sigma,
         jets.share[:n],
@@ -274,7 +280,7 @@ def _carrying(
         for q in range(look.shape[0]):
             # Beyond the body's reach there is none.
             if answered[q, 0] != 0.0 or answered[q, 1] != 0.0 or answered[q, 2] != 0.0:
-                lead_round(body, points[q], u[q], answered[q])
+                deflect_velocity(body, points[q], u[q], answered[q])
     return u
 
 

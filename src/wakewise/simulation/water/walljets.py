@@ -19,7 +19,7 @@ from wakewise.simulation.water.bedjets import (
     merge_layers,
 )
 from wakewise.simulation.water.bedjets_sums import COLUMNS, finish_rows, leaning, with_images
-from wakewise.simulation.water.faces import TankFace, TankFaces, longer
+from wakewise.simulation.water.faces import TankFace, TankFaces, with_capacity
 
 LEAST_RING_IMAGE_M_S = 2e-4  # images whose crest would not reach this speed at the wall are left out
 _MOST = 400  # rings
@@ -117,7 +117,7 @@ def ring_places(layers: RingBuffers, count: int, planes: JetPlanes) -> Array:
 
 
 @njit(apart=True, nogil=True)
-def grow(
+def grow_rings(
     layers: RingBuffers,
     count: int,
     planes: JetPlanes,
@@ -154,7 +154,7 @@ def grow(
 
 
 @njit(apart=True, nogil=True)
-def thin(layers: RingBuffers, count: int) -> int:
+def thin_rings(layers: RingBuffers, count: int) -> int:
     """Make neighbouring rings of a plane one; of too many, let the slowest go. How many are left."""
     count = merge_layers(layers, count)
     if count > _MOST:
@@ -187,7 +187,7 @@ def wall_rows(layers: RingBuffers, count: int, planes: JetPlanes) -> tuple[Array
             rows = with_images(rows, _walls_across(planes.walls, p), LEAST_RING_IMAGE_M_S)
         end = starts[used] + rows.shape[0]
         if end > packed.shape[0]:
-            packed = longer(packed, 2 * end)
+            packed = with_capacity(packed, 2 * end)
         assign_rows(packed[starts[used] : end], rows)
         assign(frames[used], planes.frames[p])
         used += 1

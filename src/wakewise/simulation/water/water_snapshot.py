@@ -23,7 +23,7 @@ from wakewise.simulation.water.clusters import ImpulseField
 from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.induction import SINGLE
 from wakewise.simulation.water.parcels import CENTRE_SPEED, Parcels, gusty_impulse_m4_s
-from wakewise.simulation.water.space_order import in_space
+from wakewise.simulation.water.space_order import spatial_order
 from wakewise.simulation.water.stepping import flow_at
 from wakewise.simulation.water.walljets import PackedRings
 
@@ -102,7 +102,7 @@ class WaterSnapshot:
         def some(order: IntArray, _: IntArray) -> None:
             flow_at(points, order, field.rows, field.starts, rows.planes, rows.starts, rows.packed, bed, SINGLE, u)
 
-        order = in_space(points)
+        order = spatial_order(points)
         over_points(some, order, order, field.pairs(len(points)) + rows.pairs(len(points)))
         return u
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.core.defaults import BUDGET, CHANGE_WEIGHT, DISTURBANCE_WEIGHT, EFFORT_WEIGHT
-from wakewise.ui.cli.console import print_json, print_table, shown
+from wakewise.ui.cli.console import format_value, print_json, print_table
 from wakewise.ui.cli.options import Json
 from wakewise.ui.cli.points import read_points
 
@@ -104,7 +104,7 @@ def allocate(
     import numpy as np
 
     from wakewise import api
-    from wakewise.allocation import least_thrusts
+    from wakewise.allocation import min_norm_allocation
     from wakewise.api.thrusts import layout_of, pose_of, view_of
     from wakewise.core.errors import InputError
     from wakewise.robot.importers import any_vehicle
@@ -141,7 +141,7 @@ def allocate(
         budget=budget,
     )
     layout = layout_of(chosen, dead)
-    least = least_thrusts(layout, wanted, view.gram(X_WB), priority)
+    least = min_norm_allocation(layout, wanted, view.gram(X_WB), priority)
     size = float(np.linalg.norm(wanted))
     figures: dict[str, Any] = {
         "vehicle": chosen.name,
@@ -186,7 +186,9 @@ def _show(vehicle: Vehicle, gentle: Allocation, least: Allocation, figures: dict
         table.add_row(name, _newton(old), _bar(old, most), _newton(new), _bar(new, most))
     print_table(table)
     before, after = figures["disturbance_pinv"], figures["disturbance"]
-    typer.echo(f"\ndisturbance D   {shown(before)} (m/s)^2 before, {shown(after)} after" + _saved(before, after))
+    typer.echo(
+        f"\ndisturbance D   {format_value(before)} (m/s)^2 before, {format_value(after)} after" + _saved(before, after)
+    )
     certain = "exact" if gentle.gap <= 1e-5 else "budget spent: raise --budget for a smaller gap"
     typer.echo(f"method          {gentle.method}, gap {gentle.gap:.1e} ({certain})")
     typer.echo(f"wrench          error {figures['wrench_error_rel']:.1e} of what was asked")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, print_json, print_table, shown
+from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table
 from wakewise.ui.cli.options import Json
 
 Photos = Annotated[Path, typer.Argument(help="Folder of photographs of one ChArUco board.")]
@@ -69,11 +69,11 @@ def calibrate(
     for key, value in figures.items():
         if isinstance(value, dict):
             for name, each in value.items():
-                table.add_row(f"{key}: {name}", shown(each))
+                table.add_row(f"{key}: {name}", format_value(each))
         elif isinstance(value, list):
-            table.add_row(key, ", ".join(shown(each) for each in value))
+            table.add_row(key, ", ".join(format_value(each) for each in value))
         else:
-            table.add_row(key, shown(value))
+            table.add_row(key, format_value(value))
     print_table(table)
     if out is not None:
         typer.echo(f"camera: {out}; reconstruct PHOTOS --camera {out} begins with it")

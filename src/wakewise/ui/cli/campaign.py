@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, plain, print_json, print_table, shown
+from wakewise.ui.cli.console import ProgressBars, escaped, format_value, print_json, print_table
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
@@ -104,13 +104,13 @@ def run_campaign(
     takes what the first is not at. Trials that fail are kept with their reason.
     """
     from wakewise.core.errors import EnvironmentFailure, InputError
-    from wakewise.core.files import named
-    from wakewise.core.jit.precompile import warm
+    from wakewise.core.files import child_path
+    from wakewise.core.jit.precompile import compile_kernels
     from wakewise.core.optional_dependencies import need
-    from wakewise.experiments.campaigns import load_campaign, planned, run
+    from wakewise.experiments.campaigns import load_campaign, planned_trials, run
     from wakewise.experiments.campaigns.plan import keep_plan
     from wakewise.experiments.campaigns.run import check_bounds
-    from wakewise.experiments.campaigns.store import GO_ON, open_store
+    from wakewise.experiments.campaigns.store import RESUME_HINT, open_store
     from wakewise.experiments.campaigns.table import group_table, results, status
     from wakewise.operation.flying import FLIGHT_JOBS
 
@@ -129,12 +129,12 @@ def run_campaign(
     bars = ProgressBars()
     with bars.stage("plan") as progress:
         progress(0, 1, "checking every combination")
-        trials = planned(campaign, str(file))
-    folder = out or named(Path("runs"), campaign.name, f"{file}: name")
+        trials = planned_trials(campaign, str(file))
+    folder = out or child_path(Path("runs"), campaign.name, f"{file}: name")
     open_store(folder)
     keep_plan(folder, campaign, trials)
     with bars.stage("compile") as progress:  # else each of the workers would
-        warm(jobs, progress)
+        compile_kernels(jobs, progress)
     with bars.stage("trials") as progress:
         outcomes = run(
             [one.task for one in trials],
@@ -156,7 +156,7 @@ def run_campaign(
     if unmade:
         raise EnvironmentFailure(
             f"{folder}: {len(unmade)} of {len(outcomes)} trials could not be made, the first: {unmade[0].task.name}: "
-            f"{unmade[0].reason}; {GO_ON}"
+            f"{unmade[0].reason}; {RESUME_HINT}"
         )
     if found.count("done") == 0 and found.count("failed"):
         raise InputError(f"{file}: every trial failed, the first: {status(found)['failures'][0]['reason']}")
@@ -205,7 +205,7 @@ def make_page(folder: Folder, compare: Compare = "", out: PageOut = None, json: 
     from dataclasses import asdict
 
     from wakewise.core.optional_dependencies import need
-    from wakewise.experiments.campaigns.contrasts import contest, places
+    from wakewise.experiments.campaigns.contrasts import method_contrasts, paired_groups
     from wakewise.experiments.campaigns.table import results
 
     need("the page of a campaign", "reports")
@@ -215,7 +215,7 @@ def make_page(folder: Folder, compare: Compare = "", out: PageOut = None, json: 
     found = results(place)
     page = write_campaign(found, place, out, compare)
     if json:
-        judged = contest(places(found, compare))
+        judged = method_contrasts(paired_groups(found, compare))
         print_json({"page": str(page), "glances": [asdict(one) | {"sure": one.sure} for _, one in judged]})
         return
     typer.echo(f"page: {page}")
@@ -238,7 +238,7 @@ def _engine(name: str, scheduler: str | None, workers: int | None) -> TrialExecu
         If there is none of that name, or the options do not fit.
     """
     from wakewise.core.errors import InputError
-    from wakewise.experiments.campaigns.definition import close_to
+    from wakewise.experiments.campaigns.definition import nearest_name_hint
     from wakewise.experiments.campaigns.engines import ProcessExecutor
 
     if name == "dask":
@@ -246,7 +246,9 @@ def _engine(name: str, scheduler: str | None, workers: int | None) -> TrialExecu
 
         return DaskExecutor(scheduler, workers)
     if name != "processes":
-        raise InputError(f"--engine: '{name}', {close_to(name, ['processes', 'dask'])}allowed: processes, dask")
+        raise InputError(
+            f"--engine: '{name}', {nearest_name_hint(name, ['processes', 'dask'])}allowed: processes, dask"
+        )
     if scheduler is not None:
         raise InputError("--scheduler: only with --engine dask")
     return ProcessExecutor(workers)
@@ -255,10 +257,10 @@ def _engine(name: str, scheduler: str | None, workers: int | None) -> TrialExecu
 def _folder(path: Path) -> Path:
     """The folder of a campaign, where its file was given."""
     if path.is_file():
-        from wakewise.core.files import named
+        from wakewise.core.files import child_path
         from wakewise.experiments.campaigns import load_campaign
 
-        return named(Path("runs"), load_campaign(path).name, f"{path}: name")
+        return child_path(Path("runs"), load_campaign(path).name, f"{path}: name")
     return path
 
 
@@ -290,16 +292,18 @@ def _show_groups(found: Results, groups: list[dict[str, Any]]) -> None:
     for group in groups:
         lost = f" ({group['failed']} failed)" if group["failed"] else ""
         cells = [_cell(group["figures"][name]) for name in names]
-        table.add_row(*(plain(str(group[f])) for f in factors), f"{group['done']}/{group['trials']}{lost}", *cells)
+        table.add_row(*(escaped(str(group[f])) for f in factors), f"{group['done']}/{group['trials']}{lost}", *cells)
     print_table(table)
     _show_failures(failures(found))
 
 
 def _cell(figure: dict[str, Any]) -> str:
     if figure["mean"] is None:
-        return shown(None)
-    mean = shown(float(figure["mean"]))
-    return mean if figure["low"] is None else f"{mean} ({shown(figure['low'])} to {shown(figure['high'])})"
+        return format_value(None)
+    mean = format_value(float(figure["mean"]))
+    return (
+        mean if figure["low"] is None else f"{mean} ({format_value(figure['low'])} to {format_value(figure['high'])})"
+    )
 
 
 def _show_failures(failed: list[dict[str, Any]]) -> None:

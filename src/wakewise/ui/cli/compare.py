@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, no_report, print_json, print_table, shown, unit_beside
+from wakewise.ui.cli.console import ProgressBars, format_value, no_report, print_json, print_table, unit_suffix
 from wakewise.ui.cli.options import (
     Json,
     Out,
@@ -85,11 +85,15 @@ def compare(
         table.add_column(name, justify="right")
     table.add_column("unit")
     for key in _ROWS:
-        table.add_row(key, *(shown(figures["methods"][name][key]) for name in names), unit_beside(key, UNITS[key]))
+        table.add_row(
+            key, *(format_value(figures["methods"][name][key]) for name in names), unit_suffix(key, UNITS[key])
+        )
     table.add_section()
     for key in figures["ratios"][names[0]]:
         if key != "why":
-            table.add_row(f"{key} ratio", *(shown(figures["ratios"][name][key]) for name in names), f"to {names[0]}")
+            table.add_row(
+                f"{key} ratio", *(format_value(figures["ratios"][name][key]) for name in names), f"to {names[0]}"
+            )
     print_table(table)
     if no_report(result.report_fault):
         typer.echo(f"report: {result.report}")

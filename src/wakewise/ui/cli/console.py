@@ -150,14 +150,14 @@ def print_table(table: Table) -> None:
     Console(highlight=False, width=console.width if console.is_terminal else 140).print(table)
 
 
-def plain(words: str) -> Text:
+def escaped(words: str) -> Text:
     """Words of a file as they stand: what looks like markup in them is none."""
     from rich.text import Text
 
     return Text(words)
 
 
-def shown(value: Any) -> str:
+def format_value(value: Any) -> str:
     """A figure as people read it: four significant digits, words for what is missing."""
     if value is None:
         return "—"
@@ -173,12 +173,12 @@ def shown(value: Any) -> str:
 _IN_NAMES = {"m/s": "m_s", "%": "pct", "1/m": "per_m", "1/s": "per_s"}
 
 
-def unit_beside(key: str, unit: str) -> str:
+def unit_suffix(key: str, unit: str) -> str:
     """The unit to print beside a figure's name; nothing where the name ends in it or holds it."""
     return "" if f"_{_IN_NAMES.get(unit, unit)}_" in f"{key}_" else unit
 
 
-def reasons_once(why: Mapping[str, str], keys: Sequence[str]) -> list[str]:
+def unique_reasons(why: Mapping[str, str], keys: Sequence[str]) -> list[str]:
     """A line for every reason that one of these figures is missing for; figures that share a reason share the line."""
     shared: dict[str, list[str]] = {}
     for key in keys:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import print_json, print_table, shown
+from wakewise.ui.cli.console import format_value, print_json, print_table
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def evaluate(
     table.add_column("what it is")
     for key, value in figures.items():
         if not isinstance(value, (list, dict)) and key != "model_faults":
-            table.add_row(key, shown(value), definitions[key][1])
+            table.add_row(key, format_value(value), definitions[key][1])
     print_table(table)
     for share in figures.get("shares", ()):
         typer.echo(

@@ -63,10 +63,10 @@ TargetSize = Annotated[
 
 def default_folder(scenario: Scenario, what: str) -> Path:
     """Folder of a trial that was given none: another target, method or seed goes elsewhere."""
-    from wakewise.core.files import named
+    from wakewise.core.files import child_path
 
     name = f"{scenario.name}-{Path(scenario.target.kind).stem}-{what}-{scenario.seed}"
-    return named(Path("runs"), name.replace(":", "-"), "--out")
+    return child_path(Path("runs"), name.replace(":", "-"), "--out")
 
 
 def overrides(

@@ -18,8 +18,8 @@ Processes = Annotated[
 
 def warm(processes: Processes = None, json: Json = False) -> None:
     """Compile all kernels once and keep them; commands do the same for what they need when it is missing."""
+    from wakewise.core.jit.precompile import compile_kernels as compile_all
     from wakewise.core.jit.precompile import is_warm
-    from wakewise.core.jit.precompile import warm as compile_all
 
     began = time.perf_counter()
     there = is_warm()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, print_json, print_table, shown
+from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table
 from wakewise.ui.cli.options import Json
 from wakewise.ui.cli.reconstruct_log import logged
 from wakewise.ui.cli.reconstruct_options import (
@@ -128,7 +128,7 @@ def reconstruct_photos(
     if look:
         look_first(photos, out, settings.threads, json)
         return
-    for line in beside(photos):
+    for line in output_folder(photos):
         typer.echo(f"wakewise: {line}", err=True)
     with logged(out) as log, ProgressBars().stage("reconstruct") as progress:
         model = reconstruct(
@@ -183,7 +183,7 @@ def reconstruct_photos(
     table.add_column("value", justify="right")
     for key, value in figures.items():
         if isinstance(value, (int, float)) or (value is None and key not in ("suspicion", "poses_refused")):
-            table.add_row(key, shown(value))
+            table.add_row(key, format_value(value))
     print_table(table)
     for line in scale_lines(model):
         typer.echo(line)
@@ -201,11 +201,11 @@ def verdict(model: Model) -> str:
     )
 
 
-def beside(photos: Path) -> list[str]:
+def output_folder(photos: Path) -> list[str]:
     """What lies among the photographs and is not read, said before the long work."""
-    from wakewise.vision.reconstruction.photos import passed_over
+    from wakewise.vision.reconstruction.photos import unsupported_files
 
-    found = passed_over(photos) if photos.is_dir() else {}
+    found = unsupported_files(photos) if photos.is_dir() else {}
     kinds = ", ".join(f"{count} of {kind}" for kind, count in found.items())
     return [f"files that are not read: {kinds}; photos must be JPEG, PNG, TIFF or BMP, save them as such"] * bool(kinds)
 

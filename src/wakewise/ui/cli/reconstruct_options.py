@@ -101,13 +101,13 @@ def look_first(photos: Path, out: Path, threads: int, json: bool) -> None:
     from wakewise.ui.cli.console import ProgressBars as Progress
     from wakewise.ui.cli.console import print_json, write_page
     from wakewise.ui.reports.photo_preview import write_look
-    from wakewise.vision.reconstruction.photo_preview import look_at
+    from wakewise.vision.reconstruction.photo_preview import preview_photos
 
     need("wakewise reconstruct --look", "reports")
     if out.resolve() == photos.resolve():
         raise InputError(f"{out}: is the folder of the photos, the look must go elsewhere")
     with Progress().stage("look") as progress:
-        look, thumbs = look_at(photos, threads, progress)
+        look, thumbs = preview_photos(photos, threads, progress)
     write_json(out / "look.json", look.summary())
     page = write_page("page", lambda: write_look(look, thumbs, out / "look.html", photos.resolve().name))
     if json:

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, no_report, print_json, print_table, reasons_once, shown, unit_beside
+from wakewise.ui.cli.console import (
+    ProgressBars,
+    format_value,
+    no_report,
+    print_json,
+    print_table,
+    unique_reasons,
+    unit_suffix,
+)
 from wakewise.ui.cli.options import (
     Json,
     Out,
@@ -131,7 +139,7 @@ def _print_figures(scenario: Scenario, figures: dict[str, Any]) -> None:
     table.add_column("value", justify="right")
     table.add_column("unit")
     for key in _HEADLINES:
-        table.add_row(key, shown(figures[key]), unit_beside(key, figures["units"][key]))
+        table.add_row(key, format_value(figures[key]), unit_suffix(key, figures["units"][key]))
     print_table(table)
-    for line in reasons_once(figures["why"], _HEADLINES):
+    for line in unique_reasons(figures["why"], _HEADLINES):
         typer.echo(line)

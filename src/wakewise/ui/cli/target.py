@@ -64,7 +64,7 @@ def show(
     from wakewise.core.errors import InputError
     from wakewise.core.optional_dependencies import need
     from wakewise.scene.targets import (
-        delicacy,
+        find_fragility,
         find_mesh,
         is_mesh_file,
         place_on_bed,
@@ -83,7 +83,7 @@ def show(
     marked = given.scores(mesh) if given is not None else None
     if marked is not None and scores is not None:
         marked = np.maximum(marked, scores)
-    found = delicacy(mesh, scores if marked is None else marked)
+    found = find_fragility(mesh, scores if marked is None else marked)
     standing = place_on_bed(name, mesh, 0.0)
     region = sample_region(standing, points, np.random.default_rng(seed), found, gain)
     if out is not None:
@@ -138,7 +138,7 @@ def _sway(target: Target) -> dict[str, object] | None:
 
     from wakewise.core.constants import TRIM_WATER_KG_M3
     from wakewise.scene.targets import TISSUES, BendingModes
-    from wakewise.simulation.tank.soft_body import SurfaceElements, standing_m
+    from wakewise.simulation.tank.soft_body import SurfaceElements, static_deflection_m
 
     if target.name not in TISSUES:
         return None
@@ -148,6 +148,6 @@ def _sway(target: Target) -> dict[str, object] | None:
     tips = {}
     for speed in STREAMS_M_S:
         streams = speed * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-        ways = [standing_m(pieces, sway, tissue.drag * TRIM_WATER_KG_M3, stream) for stream in streams]
+        ways = [static_deflection_m(pieces, sway, tissue.drag * TRIM_WATER_KG_M3, stream) for stream in streams]
         tips[f"{speed:g}"] = 1e3 * float(np.linalg.norm(ways, axis=2).max())
     return {"stems": len(sway.height_m), "frequency_Hz": float(sway.frequency_Hz.min()), "tip_mm": tips}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.ui.cli import vehicle_import, vehicle_thruster, vehicle_trim
-from wakewise.ui.cli.console import plain, print_json, print_table, shown
+from wakewise.ui.cli.console import escaped, format_value, print_json, print_table
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
@@ -168,8 +168,8 @@ def _print_thrusters(facts: dict[str, Any]) -> None:
             t["name"],
             *(f"{value:z.3f}" for value in t["position_m"]),
             " ".join(f"{value:+z.3f}" for value in t["axis"]),
-            shown(t["max_forward_N"]),
-            shown(t["max_reverse_N"]),
+            format_value(t["max_forward_N"]),
+            format_value(t["max_reverse_N"]),
         ]
         for t in facts["thrusters"]
     ]
@@ -189,7 +189,7 @@ def _print_allocation(facts: dict[str, Any]) -> None:
         return
     columns = ["axis", "lowest", "highest", "unit", "lowest, others free", "highest, others free"]
     keys = ("lowest", "highest", "unit", "lowest_others_free", "highest_others_free")
-    rows = [[axis, *(shown(w[key]) for key in keys)] for axis, w in wrench.items()]
+    rows = [[axis, *(format_value(w[key]) for key in keys)] for axis, w in wrench.items()]
     _print_rows("achievable wrench, the other five axes at zero", columns, rows, left=1)
 
 
@@ -208,7 +208,7 @@ def _print_rows(title: str, columns: list[str], rows: list[list[Any]], left: int
     for index, column in enumerate(columns):
         table.add_column(column, justify="left" if index < left or column in ("unit", "force axis") else "right")
     for row in rows:
-        table.add_row(*(plain(str(value)) for value in row))
+        table.add_row(*(escaped(str(value)) for value in row))
     print_table(table)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import plain, print_json, print_table, shown
+from wakewise.ui.cli.console import escaped, format_value, print_json, print_table
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def import_file(
     """
     from wakewise.core.files import write_text
     from wakewise.robot.importers import find_vehicle
-    from wakewise.robot.vehicles import blanks, completed, draft_yaml, load_draft
+    from wakewise.robot.vehicles import blank_fields, completed, draft_yaml, load_draft
     from wakewise.robot.vehicles.mixing import compare_matrix
 
     if out is not None:
@@ -108,7 +108,7 @@ def import_file(
     if draft.thrusters and draft.shipped_matrix is not None:
         comparison = compare_matrix(draft, draft.shipped_matrix, str(matrix or file))
     if out is not None:
-        write_text(out, draft_yaml(draft, blanks(draft)))
+        write_text(out, draft_yaml(draft, blank_fields(draft)))
     if json:
         print_json(_facts(draft, comparison, out))
     else:
@@ -220,7 +220,7 @@ def _tell(draft: VehicleDraft, comparison: MatrixComparison | None, out: Path | 
         for t in draft.thrusters:
             axis = " ".join(f"{value:+z.3f}" for value in t.axis_B)
             limits = (t.max_forward_N, t.max_reverse_N, t.disk_area_m2, t.time_constant_s)
-            table.add_row(plain(t.name), *(f"{v:z.3f}" for v in t.p_BT_m), axis, *(shown(v) for v in limits))
+            table.add_row(escaped(t.name), *(f"{v:z.3f}" for v in t.p_BT_m), axis, *(format_value(v) for v in limits))
         print_table(table)
     for note in draft.notes:
         typer.echo(f"  {note}")

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import print_json, print_table, shown
+from wakewise.ui.cli.console import format_value, print_json, print_table
 from wakewise.ui.cli.options import Json
 
 Table = Annotated[
@@ -97,7 +97,7 @@ def lag(data: Data, average_s: Average = None, json: Json = False) -> None:
     typer.echo(f"{facts['model']}, after dead time\n")
     for name, estimate in facts["estimates"].items():
         error = estimate["standard_error"]
-        spread = "not bounded by the data" if error is None else f"standard error {shown(error)}"
+        spread = "not bounded by the data" if error is None else f"standard error {format_value(error)}"
         unit = "" if estimate["unit"] == "1" else estimate["unit"]
         typer.echo(f"  {name:<18}{estimate['value']:>10.4g}  {unit:<22}{spread}")
     typer.echo(f"\nmean delay {facts['mean_delay_s']:.4g} s by the fit", nl=False)

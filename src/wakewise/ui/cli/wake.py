@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import print_json, print_table, shown
+from wakewise.ui.cli.console import format_value, print_json, print_table
 from wakewise.ui.cli.options import Json, seed_option
 
 app = typer.Typer(
@@ -109,16 +109,16 @@ def _show_fit(result: dict[str, Any], law: str) -> None:
     for column in ("parameter", "value", "standard error", "95 % of resamples"):
         table.add_column(column, justify="left" if column == "parameter" else "right")
     for name, figure in result["parameters"].items():
-        span = "—" if figure["low"] is None else f"{shown(figure['low'])} to {shown(figure['high'])}"
-        error = "held" if figure["held"] else shown(figure["standard_error"])
-        table.add_row(name, shown(figure["value"]), error, span)
+        span = "—" if figure["low"] is None else f"{format_value(figure['low'])} to {format_value(figure['high'])}"
+        error = "held" if figure["held"] else format_value(figure["standard_error"])
+        table.add_row(name, format_value(figure["value"]), error, span)
     print_table(table)
     table = Table()
     for column in ("", "R2 in A (core)", "R2 in B (wake)", "bias beyond 0.4 m, %", "points"):
         table.add_column(column, justify="left" if not column else "right")
     for part in ("train", "test"):
         scores = result[part]
-        row = (shown(scores[key]) for key in ("r2_core", "r2_wake", "bias_far_pct", "points"))
+        row = (format_value(scores[key]) for key in ("r2_core", "r2_wake", "bias_far_pct", "points"))
         table.add_row(part, *row)
     print_table(table)
     typer.echo(f"momentum flux over thrust: {law}")

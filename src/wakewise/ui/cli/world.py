@@ -41,11 +41,11 @@ def show(name: Name, seed: Seed = None, json: Json = False) -> None:
     """Show a world: why it is flown, its fields, from where a seed draws them, and the source of each number."""
     from rich.table import Table
 
-    from wakewise.operation.randomization import values_of
+    from wakewise.operation.randomization import sample_fields
     from wakewise.operation.worlds.library import load_world
 
     world = load_world(name)
-    drawn = values_of(world.draws, seed) if seed is not None else {}
+    drawn = sample_fields(world.draws, seed) if seed is not None else {}
     if json:
         fields: dict[str, Any] = {}
         for dotted, entry in world.file.fields.items():

@@ -3,14 +3,17 @@
 `ControlLease` is a pure state machine: each move takes a time of one clock that never goes back and gives the next
 state. Its rules are those that others learnt with sticks in browsers (docs/research-log/0044):
 
-- One holder. The helm is taken where it is free or has lapsed (`LAPSE_S` without sticks), else the holder is asked and
+- One holder. The helm is taken where it is free or has lapsed (`LEASE_TIMEOUT_S` without sticks), else the holder is
+asked and
   may hand it over; nothing forces it out of a hand that flies.
 - A lapsed lease is anybody's. Its holder's next sticks take it up again while nobody has, for `FORGET_S`; after that it
   is void, so that a page left open for a day holds nothing.
-- Sticks count by their number: a replay or an older one is dropped. Sticks older than `STALE_S` when they would be
+- Sticks count by their number: a replay or an older one is dropped. Sticks older than `INPUT_TIMEOUT_S` when they would
+be
   flown are zero. Their age counts from when they were sent, as far as two clocks can tell: by how much longer than the
   fastest of this lease they were under way.
-- After a pause of `STALE_S` sticks count again once they were seen centred: what was held meanwhile was not meant.
+- After a pause of `INPUT_TIMEOUT_S` sticks count again once they were seen centred: what was held meanwhile was not
+meant.
 """
 
 from __future__ import annotations
@@ -23,8 +26,8 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.operation.teleop.input.controls import CENTRED
 
-STALE_S = 0.3
-LAPSE_S = 1.0
+INPUT_TIMEOUT_S = 0.3
+LEASE_TIMEOUT_S = 1.0
 FORGET_S = 10.0
 _MOST_PRESSED = 16
 _COMPARED = 250
@@ -81,11 +84,11 @@ class ControlLease:
 
     def held(self, now_s: float) -> bool:
         """Whether somebody flies: there is a holder, and the lease has not lapsed."""
-        return self.holder is not None and now_s - self.renewed_s <= LAPSE_S
+        return self.holder is not None and now_s - self.renewed_s <= LEASE_TIMEOUT_S
 
     def axes(self, now_s: float) -> Array:
         """Sticks as they may be flown now, shape (5,): zero where they are old or nobody's."""
-        fresh = self.armed and self.held(now_s) and now_s - self.hands.sent_s <= STALE_S
+        fresh = self.armed and self.held(now_s) and now_s - self.hands.sent_s <= INPUT_TIMEOUT_S
         return self.hands.axes if fresh else np.zeros_like(CENTRED.axes)
 
     def ask(self, client: str, now_s: float, lease: str, force: bool = False) -> tuple[ControlLease, str]:
@@ -128,7 +131,7 @@ class ControlLease:
         if not self.may(client, lease, now_s) or seq <= self.hands.seq or not math.isfinite(t_ms):
             return self, False
         hands = self.hands.then(seq, 1e-3 * t_ms, axes, now_s)
-        paused = self.hands.seq >= 0 and now_s - self.renewed_s > STALE_S
+        paused = self.hands.seq >= 0 and now_s - self.renewed_s > INPUT_TIMEOUT_S
         armed = (self.armed and not paused) or not axes.any()
         return replace(self, hands=hands, armed=armed, renewed_s=now_s), True
 

@@ -8,7 +8,7 @@ from wakewise.ui.web.blueos import ServiceDescription
 from wakewise.ui.web.files import StaticFiles
 
 PAGE = Path(__file__).with_name("page")
-OFFER = ServiceDescription(
+SERVICE = ServiceDescription(
     name="Wakewise",
     description="Fly an underwater vehicle by hand while its wash leaves the target still.",
     widget="Wakewise: gentle flight",
@@ -17,4 +17,4 @@ OFFER = ServiceDescription(
 
 def page_files() -> StaticFiles:
     """The page, and what ground stations ask for."""
-    return StaticFiles(folder=PAGE, more=OFFER.files())
+    return StaticFiles(folder=PAGE, more=SERVICE.files())

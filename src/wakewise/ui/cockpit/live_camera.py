@@ -223,8 +223,8 @@ class PictureRenderer:
 
     def draw(self, view: CameraState) -> Any:
         """The picture, RGB, shape (h, w, 3), uint8."""
-        from wakewise.vision.imaging.auto_exposure import brightness, divided, settled
-        from wakewise.vision.imaging.optics import haze_between, through_water
+        from wakewise.vision.imaging.auto_exposure import brightness, converged_gain, split_gain
+        from wakewise.vision.imaging.optics import attenuate, haze_between
         from wakewise.vision.imaging.photograph import white_balance
         from wakewise.vision.imaging.renderer import render
         from wakewise.vision.imaging.sensor import expose
@@ -238,11 +238,11 @@ class PictureRenderer:
         gain, amplification = settings.gain, 1.0
         if settings.auto_exposure:
             self._seen.append(brightness(self._scene, X_WC, self._silt, settings, self._grains, balance))
-            chosen = divided(settled(self._seen), settings)
+            chosen = split_gain(converged_gain(self._seen), settings)
             gain, amplification = chosen.gain, chosen.amplification
         seen = render(self._scene, camera, X_WC, lights, 1)
         haze = haze_between(camera, X_WC, water, self._grains, self._silt, lights)
-        radiance, _ = through_water(seen, camera, haze, water, lights.from_above, self._grains)
+        radiance, _ = attenuate(seen, camera, haze, water, lights.from_above, self._grains)
         well_e = ELECTRONS_PER_S * settings.exposure_s / amplification
         return expose(radiance, gain * balance, well_e, READ_NOISE_E, self._rng)
 

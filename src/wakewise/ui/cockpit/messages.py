@@ -2,7 +2,7 @@
 
 Nothing that comes over the wire raises: what cannot be used becomes `InvalidMessage`, which the server answers and
 counts. Axes of the sticks are the exception to strictness: numbers of any size, and what is no number (NaN), are made
-harmless by `wakewise.operation.teleop.input.controls.shaped`, as for any other device.
+harmless by `wakewise.operation.teleop.input.controls.apply_dead_zone`, as for any other device.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from wakewise.core.arrays import Array
-from wakewise.operation.teleop.input.controls import ACTIONS, CONTROL_AXES, shaped
+from wakewise.operation.teleop.input.controls import ACTIONS, CONTROL_AXES, apply_dead_zone
 
 MOST_BYTES = 65536
 """A longer message ends the connection (websockets does that while it reads)."""
@@ -140,7 +140,7 @@ def _sticks(told: dict[str, Any]) -> StickMessage:
     if not abs(t_ms) <= _LARGEST:  # what is no number, too
         raise _Wrong("t must be a time in ms")
     values = [_number(value, "axes") for value in axes]
-    return StickMessage(seq=_whole(told, "seq"), t_ms=t_ms, axes=shaped(values), lease=_word(told, "lease"))
+    return StickMessage(seq=_whole(told, "seq"), t_ms=t_ms, axes=apply_dead_zone(values), lease=_word(told, "lease"))
 
 
 def _press(told: dict[str, Any]) -> ButtonPress:

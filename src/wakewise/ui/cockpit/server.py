@@ -45,7 +45,7 @@ from wakewise.ui.cockpit.requests import SUBPROTOCOL, respond, wrong
 from wakewise.ui.cockpit.view_model import StatusMessage, ViewModel, as_json
 from wakewise.ui.web.addresses import page_addresses
 from wakewise.ui.web.files import StaticFiles
-from wakewise.ui.web.origin_check import OriginCheck, is_loopback, same
+from wakewise.ui.web.origin_check import OriginCheck, equal_secrets, is_loopback
 from wakewise.ui.web.pending import PendingConnections
 
 PROTOCOL = 1
@@ -243,7 +243,9 @@ class CockpitServer:
             ) else "say hello first"
         if first.token is not None and (why := wrong(first.token, self._gate)):
             return _REFUSED, why
-        comes_back = first.lease is not None and self._last_lease is not None and same(first.lease, self._last_lease)
+        comes_back = (
+            first.lease is not None and self._last_lease is not None and equal_secrets(first.lease, self._last_lease)
+        )
         if len(self._greeted()) >= MOST_CLIENTS + comes_back:
             return _FULL, "too many pages are open"
         return None

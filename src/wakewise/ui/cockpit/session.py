@@ -22,13 +22,20 @@ from wakewise.operation import Parts, Scenario
 from wakewise.operation.teleop.assisted import AssistedPilot, assisted
 from wakewise.operation.teleop.input.controls import CENTRED, ControlSource
 from wakewise.operation.teleop.live import LiveFlight
-from wakewise.operation.teleop.operator_state import MODES, RANGES, WAYS, OperatorSettings, OperatorState, regime
+from wakewise.operation.teleop.operator_state import (
+    MODES,
+    RANGES,
+    WAYS,
+    OperatorSettings,
+    OperatorState,
+    tracking_regime,
+)
 from wakewise.ui.cockpit.control_mailbox import ControlMailbox
 from wakewise.ui.cockpit.flight_snapshot import SnapshotRecorder
 from wakewise.ui.cockpit.live_camera import CameraState, LiveCamera
 from wakewise.ui.cockpit.live_coverage import LiveCoverage
 from wakewise.ui.cockpit.scene import ViserScene, open_scene
-from wakewise.ui.cockpit.state import StateEncoder, described, number, rounded, told_scenario
+from wakewise.ui.cockpit.state import StateEncoder, number, rounded, scenario_description, static_description
 from wakewise.ui.cockpit.view_model import CameraPicture, StatusMessage
 from wakewise.ui.cockpit.wake_readout import WakeReadout
 
@@ -145,7 +152,7 @@ class CockpitSession:
     def welcome(self) -> dict[str, Any]:
         """What a client needs once; vehicle and target are empty while they are being made."""
         nothing = {
-            "scenario": told_scenario(self._parts),
+            "scenario": scenario_description(self._parts),
             "vehicle": {"name": self._parts.scenario.vehicle, "thrusters": []},
             "target": {"points_W_m": [], "centre_W_m": [0.0, 0.0, 0.0], "radius_m": 0.0},
         }
@@ -244,7 +251,7 @@ class CockpitSession:
         self.flights += 1
         if self._gauges is None:
             self._gauges = WakeReadout.of(parts)
-            self._described = described(parts, self._gauges)
+            self._described = static_description(parts, self._gauges)
         self._say_preparing("making pilot and controllers")
         flown = assisted(parts, self.seat, self.desk)
         pilot = cast("AssistedPilot", flown.pilot)
@@ -351,4 +358,4 @@ class CockpitSession:
 
     def _desk(self) -> dict[str, Any]:
         state = self.desk.state
-        return asdict(state) | {"regime": regime(state.w_track)}
+        return asdict(state) | {"regime": tracking_regime(state.w_track)}

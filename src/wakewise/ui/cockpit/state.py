@@ -23,11 +23,11 @@ POINTS_EVERY, GAUGES_EVERY = 5, 2
 """States between two looks at the water of every point, and at D: with a current these cost the most."""
 
 
-def described(parts: Parts, gauges: WakeReadout) -> dict[str, Any]:
+def static_description(parts: Parts, gauges: WakeReadout) -> dict[str, Any]:
     """Scenario, vehicle and target, as a client is told when it comes."""
     scenario, vehicle, target = parts.scenario, parts.vehicle, parts.found_target
     return {
-        "scenario": told_scenario(parts),
+        "scenario": scenario_description(parts),
         "vehicle": {
             "name": vehicle.name,
             "thrusters": [
@@ -50,7 +50,7 @@ def described(parts: Parts, gauges: WakeReadout) -> dict[str, Any]:
     }
 
 
-def told_scenario(parts: Parts) -> dict[str, Any]:
+def scenario_description(parts: Parts) -> dict[str, Any]:
     """What a scenario is called, known before any of its parts is made."""
     scenario = parts.scenario
     return {

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.allocation import disturbance_of, least_thrusts
+from wakewise.allocation import disturbance_of, min_norm_allocation
 from wakewise.control.spare import watching
 from wakewise.control.watch import Watch
 from wakewise.core.arrays import Array, freeze
@@ -62,7 +62,7 @@ class WakeReadout:
     def disturbances(self, estimate: BodyState, thrusts_N: Array) -> tuple[float, float]:
         """D of thrusts, shape (n,), and D of the least thrusts that make the same wrench, in (m/s)^2."""
         layout = self.watch.layout
-        direct_N = least_thrusts(layout, layout.B @ thrusts_N).thrusts_N
+        direct_N = min_norm_allocation(layout, layout.B @ thrusts_N).thrusts_N
         one, other = (disturbance_of(self.watch.gram(estimate, thrusts), thrusts) for thrusts in (thrusts_N, direct_N))
         return one, other
 

@@ -8,7 +8,7 @@ without a system codec.
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.ui.film.encode import SUFFIXES
@@ -18,4 +18,4 @@ if TYPE_CHECKING:
 
 __all__ = ["SUFFIXES", "VIEWS", "View", "compared_trials", "write_film", "write_rows"]
 
-lazy_door(__name__, "reports", "photos")
+lazy_attributes(__name__, "reports", "photos")

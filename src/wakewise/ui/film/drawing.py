@@ -48,7 +48,7 @@ def write(
     return float(draw.textlength(text, font=face))
 
 
-def fitted(text: str, width: float, size: int, bold: bool = False) -> str:
+def ellipsized(text: str, width: float, size: int, bold: bool = False) -> str:
     """The text, its end replaced by an ellipsis if it is wider than `width` pixels."""
     face = font(size, bold)
     if face.getlength(text) <= width:

@@ -30,9 +30,9 @@ from wakewise.vision.imaging import (
     Render,
     Scene,
     SiltOptics,
+    attenuate,
     haze_between,
     render,
-    through_water,
     water_optics,
 )
 from wakewise.vision.imaging.sensor import srgb_encode
@@ -109,7 +109,7 @@ class ExternalView:
         view = self._with_vehicle(X_WB)
         water = water_optics(WATER_TYPE)
         haze = haze_between(self.camera, self.X_WC, water, self.grains, silt, self.lights, reach_m=6.0)
-        radiance, _ = through_water(view, self.camera, haze, water, self.lights.from_above, self.grains)
+        radiance, _ = attenuate(view, self.camera, haze, water, self.lights.from_above, self.grains)
         shown = _display(radiance * self._balance)
         if tracers is not None and len(tracers.age_s):
             glow = self._streaks(tracers, view.depth_m)

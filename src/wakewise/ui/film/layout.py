@@ -23,7 +23,7 @@ from wakewise.ui.film.drawing import (
     TEAL,
     Box,
     curve,
-    fitted,
+    ellipsized,
     paste,
     write,
 )
@@ -116,15 +116,15 @@ class FrameComposer:
         page = Pictures.new("RGB", (WIDTH, HEIGHT), PAPER)
         draw = ImageDraw.Draw(page)
         story = self.story
-        used = write(draw, (20, 37), fitted(story.title, 640, 21, True), 21, bold=True)
-        write(draw, (20 + used + 16, 37), fitted(story.subtitle, 950 - used - 60, 14), 14, MUTED)
+        used = write(draw, (20, 37), ellipsized(story.title, 640, 21, True), 21, bold=True)
+        write(draw, (20 + used + 16, 37), ellipsized(story.subtitle, 950 - used - 60, 14), 14, MUTED)
         left, top, right, bottom = _TIME
         draw.rectangle((left, top, right, bottom), fill=CARD)
         for k, (name, start_s, end_s) in enumerate(story.legs):
             a, b = self._x(start_s), self._x(end_s)
             if k % 2:
                 draw.rectangle((a, top, b, bottom), fill=(24, 39, 46))
-            if fitted(name, b - a - 8, 12) == name:
+            if ellipsized(name, b - a - 8, 12) == name:
                 write(draw, (a + 5, top - 8), name, 12, MUTED)
             draw.line((a, top - 20, a, top), fill=LINE)
         if self._top_mm_s > 0.0:
@@ -159,7 +159,7 @@ class FrameComposer:
             draw.rounded_rectangle(box, 8, fill=CARD)
             write(draw, (box[0] + width / 2, box[1] + height / 2), "no photograph yet", 14, MUTED, anchor="mm")
             return
-        paste(page, cover(moment.photo, width, height), box)
+        paste(page, fill_frame(moment.photo, width, height), box)
         fresh = max(0.0, 1.0 - moment.since_shot_s / (0.25 * self.story.pace))
         if fresh > 0.0:
             colour = tuple(round(p + fresh * (c - p)) for p, c in zip(PAPER, CORAL, strict=True))
@@ -253,7 +253,7 @@ class FrameComposer:
             draw.ellipse((x - 5, y - 5, x + 5, y + 5), fill=PAPER, outline=INK, width=2)
 
 
-def cover(picture: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+def fill_frame(picture: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
     """The picture scaled and cut so that it fills a frame."""
     h, w = picture.shape[:2]
     scale = max(width / w, height / h)

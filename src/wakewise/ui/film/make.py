@@ -25,7 +25,7 @@ from wakewise.scene.targets import stony_kinds
 from wakewise.ui.film.encode import check_film_name, film_writer
 from wakewise.ui.film.external_view import FOV_RAD, ExternalView
 from wakewise.ui.film.layout import HEIGHT, VIEWS, WIDTH, FilmFrame, FilmOverview, FrameComposer, View
-from wakewise.ui.film.viewpoint import vantage
+from wakewise.ui.film.viewpoint import choose_viewpoint
 from wakewise.ui.film.wash import RecordedMotion, Tracers, wash_of
 from wakewise.ui.reports import figures
 from wakewise.ui.reports.trial import Trial, read_trial
@@ -142,7 +142,9 @@ class _Film:
         camera = PinholeCamera(*self.page.main_size, FOV_RAD * self.page.main_size[0] / 852.0)
         first = min((shot.time_s for shot in self.trial.photographs), default=0.0)
         flown = self.motion.p_W_m[self.motion.row(first) :]
-        X_WC = vantage(camera, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m)))
+        X_WC = choose_viewpoint(
+            camera, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m))
+        )
         grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
         scene = parts.scene
         self._outside = ExternalView.build(

@@ -25,9 +25,9 @@ from wakewise.core.interfaces import no_progress
 from wakewise.operation import Scenario, read_exposures, read_scenario
 from wakewise.ui.film.drawing import INK, MUTED, PAPER, paste, write
 from wakewise.ui.film.external_view import FOV_RAD, ExternalView
-from wakewise.ui.film.layout import cover
+from wakewise.ui.film.layout import fill_frame
 from wakewise.ui.film.make import silt_at
-from wakewise.ui.film.viewpoint import vantage
+from wakewise.ui.film.viewpoint import choose_viewpoint
 from wakewise.ui.film.wash import RecordedMotion, wash_of
 from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Trial, read_trial
@@ -124,7 +124,7 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[ComparisonTile]:
     wash = {int(k): one for k, one in zip(order, tracers, strict=True)}
     flown = motion.p_W_m[motion.row(first_s) : motion.row(float(instants.max()) + 5.0)]
     far = PinholeCamera(*CELL, FOV_RAD)
-    X_WO = vantage(far, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m)))
+    X_WO = choose_viewpoint(far, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m)))
     outside = ExternalView.build(scene, far, X_WO, hull_of(parts.vehicle), scenario.imaging.lights(), grains)
     speed, turbidity = trial.column("target_speed_mean_m_s"), trial.column("turbidity_per_m")
     tilt_deg = trial.column("true_tilt_deg")  # none in trials that were flown before cameras had a joint
@@ -139,7 +139,7 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[ComparisonTile]:
         facts += [] if turbidity is None else [f"silt {number(float(turbidity[row]), 2)} /m"]
         facts += [] if speed is None else [f"water {1e3 * float(speed[row]):.1f} mm/s"]
         seen, _ = outside.picture(X_WB, silt, wash[k])
-        out.append(ComparisonTile(camera=cover(photo.image, *CELL), outside=seen, note="   ".join(facts)))
+        out.append(ComparisonTile(camera=fill_frame(photo.image, *CELL), outside=seen, note="   ".join(facts)))
     return out
 
 

@@ -15,7 +15,7 @@ _AZIMUTHS = 36
 _MARGIN = 0.05
 
 
-def vantage(camera: PinholeCamera, centre_W_m: Array, path_W_m: Array, hull_radius_m: float) -> Pose:
+def choose_viewpoint(camera: PinholeCamera, centre_W_m: Array, path_W_m: Array, hull_radius_m: float) -> Pose:
     """Camera pose X_WC that shows a target at `centre_W_m`, shape (3,), and a path, shape (n, 3), with a hull on it."""
     low, high = path_W_m.min(axis=0), path_W_m.max(axis=0)
     focus = np.array([*centre_W_m[:2], 0.5 * (0.5 * (low[2] + high[2]) + centre_W_m[2])])

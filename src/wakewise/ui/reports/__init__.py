@@ -13,7 +13,7 @@ paper's tables (both with `methods_compared.py` and `trial_pictures.py`).
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.ui.reports.campaign import write_campaign
@@ -23,4 +23,4 @@ if TYPE_CHECKING:
 
 __all__ = ["PageParts", "begin_report", "write_campaign", "write_comparison", "write_report"]
 
-lazy_door(__name__, "reports", "photos")
+lazy_attributes(__name__, "reports", "photos")

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.core.files import write_text
-from wakewise.experiments.campaigns.contrasts import comparable, contest, measures, places
+from wakewise.experiments.campaigns.contrasts import comparable, measures, method_contrasts, paired_groups
 from wakewise.experiments.campaigns.summary import FEWEST, ComparisonMetric, MethodSummary, Place
 from wakewise.experiments.campaigns.table import Results, failures, group_table
 from wakewise.experiments.trials import UNITS
-from wakewise.ui.reports.methods_compared import methods_compared, price, profiles, won
-from wakewise.ui.reports.page import fold, missing, plot, section, whole_page
+from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, winner_text
+from wakewise.ui.reports.page import collapsible_section, missing, plot, section, whole_page
 from wakewise.ui.reports.text import duration, number
 from wakewise.ui.reports.trial_pictures import worst_panels
 
@@ -50,9 +50,9 @@ def write_campaign(found: Results, folder: Path, out: Path | None = None, compar
 
 def campaign_page(found: Results, folder: Path, compare: str = "") -> str:
     """HTML of the page."""
-    ended = places(found, compare)
+    ended = paired_groups(found, compare)
     compared = compare or comparable(found)[0]
-    judged = contest(ended)
+    judged = method_contrasts(ended)
     parts = [("glance", "At a glance"), ("plots", "Trial by trial"), ("worst", "Worst trials")]
     parts += [("groups", "Groups"), ("flown", "What was flown")]
     links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in parts)
@@ -93,7 +93,7 @@ def _title(judged: Sequence[tuple[ComparisonMetric, MethodSummary]], compared: s
         return "No trials that can be compared have ended yet."
     leading = [one for measure, one in judged if measure == judged[0][0]]
     if len(leading) == 1:
-        return won(leading[0])
+        return winner_text(leading[0])
     wins = Counter(one.winner for one in leading if one.rival is not None and one.is_sure)
     what = leading[0].words
     if not wins:
@@ -104,7 +104,7 @@ def _title(judged: Sequence[tuple[ComparisonMetric, MethodSummary]], compared: s
 
 def _why(judged: Sequence[tuple[ComparisonMetric, MethodSummary]]) -> str:
     leading = [one for measure, one in judged if measure == judged[0][0]] if judged else []
-    return f'<p class="why">{escape(price(leading[0]))}</p>' if len(leading) == 1 and price(leading[0]) else ""
+    return f'<p class="why">{escape(cost_text(leading[0]))}</p>' if len(leading) == 1 and cost_text(leading[0]) else ""
 
 
 def _glance(judged: Sequence[tuple[ComparisonMetric, MethodSummary]], compared: str) -> str:
@@ -112,8 +112,8 @@ def _glance(judged: Sequence[tuple[ComparisonMetric, MethodSummary]], compared: 
         why = f"no seed has ended with every {compared}"
         return section("glance", "At a glance", "", missing("who won", why))
     rows = "".join(
-        f"<tr><td>{escape(one.words)}</td><td>{escape(one.world)}</td><td>{escape(won(one))}</td>"
-        f'<td>{escape(_chance(one))}</td><td>{escape(price(one))}</td><td class="num">{one.trials}</td></tr>'
+        f"<tr><td>{escape(one.words)}</td><td>{escape(one.world)}</td><td>{escape(winner_text(one))}</td>"
+        f'<td>{escape(_chance(one))}</td><td>{escape(cost_text(one))}</td><td class="num">{one.trials}</td></tr>'
         for _, one in judged
     )
     heads = (
@@ -176,7 +176,7 @@ def _groups(found: Results) -> str:
     lead = "Mean and 95 % interval over the trials that gave the figure."
     lost = failures(found)
     items = "".join(f"<li>{escape(one['name'])}: {escape(str(one['reason']))}</li>" for one in lost)
-    failed = fold("Failed trials", f"<ul>{items}</ul>", str(len(lost))) if lost else ""
+    failed = collapsible_section("Failed trials", f"<ul>{items}</ul>", str(len(lost))) if lost else ""
     return section("groups", "Groups", lead, f'<div class="wide">{table}</div>{failed}')
 
 

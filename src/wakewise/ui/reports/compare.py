@@ -15,7 +15,17 @@ from wakewise.ui.reports import figures
 from wakewise.ui.reports.errors import ModelErrors, model_errors
 from wakewise.ui.reports.limits import limits_section
 from wakewise.ui.reports.media import coloured_model
-from wakewise.ui.reports.page import absence, error_scale, fold, missing, panel, pictures, plot, section, whole_page
+from wakewise.ui.reports.page import (
+    collapsible_section,
+    error_scale,
+    missing,
+    missing_text,
+    panel,
+    pictures,
+    plot,
+    section,
+    whole_page,
+)
 from wakewise.ui.reports.photos import embed
 from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, data_uri, error_colours
 from wakewise.ui.reports.text import grouped, number, shown, unit, verdict
@@ -189,7 +199,7 @@ def _figures(trials: Mapping[str, Trial]) -> str:
             '<table class="compare"><colgroup><col class="key"><col class="unit"></colgroup>'
             f"<thead><tr><th>key</th><th>unit</th>{_heads(trials)}</tr></thead><tbody>{rows}</tbody></table>"
         )
-        tables.append(fold(group, f'<div class="wide">{table}</div>', f"{len(found)} figures"))
+        tables.append(collapsible_section(group, f'<div class="wide">{table}</div>', f"{len(found)} figures"))
     content = "".join(tables) or missing("the figures", "none recorded")
     lead = f"Everything in metrics.json. Ratios are to {escape(first)}; bold is better by more than 1 %."
     return section("figures", "All figures", lead, content)
@@ -306,7 +316,7 @@ def _models(trials: Mapping[str, Trial], errors: Mapping[str, ModelErrors | None
     for name, trial in trials.items():
         found = errors[name]
         if found is None or trial.truth is None:
-            gap = missing(f"the model of {name}", absence(trial, "dense.ply", "truth.ply"))
+            gap = missing(f"the model of {name}", missing_text(trial, "dense.ply", "truth.ply"))
             accuracy.append(gap)
             coverage.append(gap)
             continue

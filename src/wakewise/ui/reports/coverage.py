@@ -9,11 +9,11 @@ from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError
 from wakewise.experiments.trials.coverage import Shot, coverage_of
 from wakewise.operation import Scenario
-from wakewise.operation.calibration_error import found_target
+from wakewise.operation.calibration_error import target_with_error
 from wakewise.operation.seeds import Seeds
-from wakewise.scene.missions import Coverage, missed
+from wakewise.scene.missions import Coverage, find_coverage_gaps
 from wakewise.scene.targets import Mesh, Target
-from wakewise.ui.reports.page import absence, chip, missing, panel, pictures
+from wakewise.ui.reports.page import legend_entry, missing, missing_text, panel, pictures
 from wakewise.ui.reports.page_parts import PageParts
 from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, rgb
 from wakewise.ui.reports.trial import Trial, TrialMesh
@@ -33,7 +33,7 @@ def coverage_html(trial: Trial, draft: PageParts) -> str:
 def _made(trial: Trial) -> str:
     shots: list[Shot] = [(s.X_WC_est, s.sharpness) for s in trial.photographs if s.X_WC_est is not None]
     if trial.truth is None or trial.settings is None or not shots:
-        gaps = absence(trial, "truth.ply", "scenario.yaml", "images.csv")
+        gaps = missing_text(trial, "truth.ply", "scenario.yaml", "images.csv")
         return missing("what the photographs covered", "no poses on record" if gaps.startswith("model") else gaps)
     try:
         target = _found(trial.truth, trial.settings, trial.bed_z_m)
@@ -41,7 +41,7 @@ def _made(trial: Trial) -> str:
         coverage = coverage_of(target, lens, shots)
     except InputError as fault:
         return missing("what the photographs covered", str(fault))
-    reasons = missed(coverage, (X_WC for X_WC, _ in shots), lens)
+    reasons = find_coverage_gaps(coverage, (X_WC for X_WC, _ in shots), lens)
     why = [
         f"{100.0 * share:.0f} % {words}"
         for share, words in (
@@ -59,7 +59,7 @@ def _made(trial: Trial) -> str:
         + f". {_compared(trial)}{_blurred(coverage)}"
     )
     legend = "".join(
-        chip(colour, name)
+        legend_entry(colour, name)
         for colour, name in (
             (WELL_SEEN, "seen well"), (IN_PART, "by too few"), (NOT_COVERED, "not"), (NOT_COUNTED, "does not count"),
         )
@@ -91,7 +91,7 @@ def _found(truth: TrialMesh, settings: Scenario, bed_z_m: float) -> Target:
     middle = 0.5 * (truth.vertices_m.min(axis=0) + truth.vertices_m.max(axis=0))
     radius_m = float(np.linalg.norm(truth.vertices_m - middle, axis=1).max())
     target = Target(name="found", mesh=mesh, centre_W_m=middle, radius_m=radius_m, bed_z_m=bed_z_m)
-    return found_target(target, settings.survey, Seeds(settings.seed).survey()[0])
+    return target_with_error(target, settings.survey, Seeds(settings.seed).survey()[0])
 
 
 def _painted(coverage: Coverage, vertices_W_m: Array) -> tuple[Array, BoolArray]:

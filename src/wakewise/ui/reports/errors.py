@@ -15,7 +15,7 @@ from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError, StageError
 from wakewise.scene.targets import MeshDistance
 from wakewise.ui.reports.trial import Trial, TrialMesh
-from wakewise.vision.evaluation import Crop, IcpRefinement, refine_icp, sample_surface, thin
+from wakewise.vision.evaluation import Crop, IcpRefinement, refine_icp, sample_surface, voxel_downsample
 
 VOXEL_M = 0.0008
 """The cloud is thinned to one mean point per cell of this size, as the score does."""
@@ -77,7 +77,7 @@ def cloud_errors(trial: Trial) -> CloudErrors | None:
     with suppress(InputError, StageError):  # too little to align: shown as it came, and the report says so
         refinement = refine_icp(cloud[crop.keeps(cloud, low, high)], surface.points_m, surface.normals)
         cloud = refinement.apply(cloud)
-    kept = thin(cloud[crop.keeps(cloud, low, high)], VOXEL_M)
+    kept = voxel_downsample(cloud[crop.keeps(cloud, low, high)], VOXEL_M)
     if len(kept) == 0:
         return None
     near, tree = MeshDistance(truth.vertices_m, truth.faces), KDTree(kept)

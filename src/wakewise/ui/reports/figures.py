@@ -25,10 +25,10 @@ from wakewise.ui.reports.svg_style import (
     SLATE,
     TEAL,
     VIOLET,
-    dress,
+    add_legend,
     error_colours,
-    key,
     new_figure,
+    style_axes,
     thinned,
 )
 from wakewise.ui.reports.trial import Trial
@@ -70,7 +70,7 @@ def plan_and_side(trial: Trial, narrow: bool = False) -> Figure | None:
         (above, 1, 0, ("east (m)", "north (m)")),
         (side, 1, 2, ("east (m)", "height above the bed (m)")),
     ):
-        dress(axes, x=labels[0], y=labels[1], grid="both")
+        style_axes(axes, x=labels[0], y=labels[1], grid="both")
 
         def flat(points: Array, across: int = across, up: int = up) -> Array:
             vertical = trial.bed_z_m - points[..., 2] if up == 2 else points[..., up]
@@ -130,7 +130,7 @@ def water_over_time(trial: Trial, narrow: bool = False) -> Figure | None:
     grid = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
     exposures = exposure_times(trial)
     for axes, (label, lines) in zip(grid, rows, strict=True):
-        dress(axes, y=label)
+        style_axes(axes, y=label)
         for (name, values, colour), width in zip(lines, (1.4, 1.1, 1.0), strict=False):
             axes.plot(*thinned(time_s, values, buckets), color=colour, linewidth=width, label=name)
         top = max(float(np.nanmax(values)) for _, values, _ in lines)
@@ -138,7 +138,7 @@ def water_over_time(trial: Trial, narrow: bool = False) -> Figure | None:
         axes.vlines(exposures, 0.0, 0.06, transform=axes.get_xaxis_transform(), color=CORAL, linewidth=1.1)
         shade_legs(axes, trial)
         if len(lines) > 1:
-            key(axes, loc="upper right", ncols=3, borderaxespad=0.1)
+            add_legend(axes, loc="upper right", ncols=3, borderaxespad=0.1)
         axes.margins(x=0.0)
     name_legs(grid[0], trial)
     grid[-1].set_xlabel("time (s)", color=MUTED, fontsize=9.5)
@@ -231,8 +231,8 @@ def thrust_strip(trial: Trial, names_of: Sequence[str] = (), narrow: bool = Fals
     figure = new_figure(NARROW_IN if narrow else WIDTH_IN, 0.8 + 0.3 * len(names))
     strip, bars = figure.subplots(1, 2, width_ratios=(4.0, 1.0) if narrow else (9.0, 1.0), sharey=True)
     named = len(names_of) == len(names)
-    dress(strip, x="time (s)", y="" if named else "thruster", grid="")
-    dress(bars, x="rms (N)", grid="x")
+    style_axes(strip, x="time (s)", y="" if named else "thruster", grid="")
+    style_axes(bars, x="rms (N)", grid="x")
     image = strip.imshow(
         shown, aspect="auto", cmap=THRUSTS, vmin=-limit, vmax=limit, interpolation="nearest",
         extent=(float(time_s[0]), float(time_s[-1]), len(names) + 0.5, 0.5),
@@ -274,7 +274,7 @@ def error_histogram(errors: CloudErrors, narrow: bool = False) -> Figure:
     error_mm = 1e3 * errors.accuracy_m
     edges = np.linspace(0.0, 5.0, 51)
     shares = 100.0 * np.histogram(np.minimum(error_mm, 4.999), edges)[0] / len(error_mm)
-    dress(accuracy, x="distance from the true surface (mm)", y="points of the model (%)")
+    style_axes(accuracy, x="distance from the true surface (mm)", y="points of the model (%)")
     colours = error_colours(1e-3 * 0.5 * (edges[1:] + edges[:-1]))
     accuracy.bar(edges[:-1], shares, np.diff(edges), align="edge", color=colours, edgecolor=MUTED, linewidth=0.4)
     accuracy.set_xlim(0.0, 5.0)
@@ -286,7 +286,7 @@ def error_histogram(errors: CloudErrors, narrow: bool = False) -> Figure:
         f"median {median:.2f} mm\n{beyond:.1f} % beyond {edges[-1]:g} mm", (1.0, 1.0), xycoords="axes fraction",
         ha="right", va="top", color=MUTED, fontsize=9,
     )  # fmt: skip
-    dress(coverage, x="within (mm)", y="true surface covered (%)")
+    style_axes(coverage, x="within (mm)", y="true surface covered (%)")
     within = np.linspace(0.0, 5.0, 101)
     covered = [errors.completeness_pct(1e-3 * w) for w in within]
     coverage.fill_between(within, covered, color=TEAL, alpha=0.16, linewidth=0)
@@ -316,8 +316,8 @@ def overlaid_speeds(trials: dict[str, Trial], narrow: bool = False) -> Figure | 
         return None
     figure = new_figure(*((NARROW_IN, 5.8) if narrow else (WIDTH_IN, 3.6)))
     clock, shares = figure.subplots(2, 1) if narrow else figure.subplots(1, 2, width_ratios=(2.4, 1.0))
-    dress(clock, x="time (s)", y="mean water speed at the target (mm/s)" if not narrow else "mean speed (mm/s)")
-    dress(shares, x="water speed (mm/s)", y="share of the time below (%)", grid="both")
+    style_axes(clock, x="time (s)", y="mean water speed at the target (mm/s)" if not narrow else "mean speed (mm/s)")
+    style_axes(shares, x="water speed (mm/s)", y="share of the time below (%)", grid="both")
     for (name, (time_s, speed)), colour in zip(found.items(), SERIES * len(found), strict=False):
         clock.plot(*thinned(time_s, speed, 200 if narrow else 900), color=colour, linewidth=1.1, label=name)
         ordered = np.sort(speed[np.isfinite(speed)])
@@ -327,5 +327,5 @@ def overlaid_speeds(trials: dict[str, Trial], narrow: bool = False) -> Figure | 
     clock.margins(x=0.0)
     shares.set_xlim(left=0.0)
     shares.set_ylim(0.0, 102.0)
-    key(clock, loc="upper left", bbox_to_anchor=(0.0, 1.14), ncols=4, borderaxespad=0.0)
+    add_legend(clock, loc="upper left", bbox_to_anchor=(0.0, 1.14), ncols=4, borderaxespad=0.0)
     return figure

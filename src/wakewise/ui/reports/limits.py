@@ -10,7 +10,7 @@ from html import escape
 from wakewise.operation.worlds.lattice_world import CELL_M
 from wakewise.operation.worlds.makers import WORLDS, flow_name
 from wakewise.simulation.tank.validation_limits import ABSENT, limits_table
-from wakewise.ui.reports.page import fold, missing, prose, section
+from wakewise.ui.reports.page import collapsible_section, missing, prose, section
 from wakewise.ui.reports.trial import Trial
 
 _OTHERS = {
@@ -71,9 +71,9 @@ def _tank_html() -> str:
         f"<tbody>{''.join(map(_row, rows))}</tbody></table>"
     )
     absent = "".join(f"<li>{prose(line)}</li>" for line in ABSENT)
-    return fold("Laws it is held against", table, f"{missed} of {len(rows)} missed, these first") + fold(
-        "What it has not at all", f"<ul>{absent}</ul>", f"{len(ABSENT)} things"
-    )
+    return collapsible_section(
+        "Laws it is held against", table, f"{missed} of {len(rows)} missed, these first"
+    ) + collapsible_section("What it has not at all", f"<ul>{absent}</ul>", f"{len(ABSENT)} things")
 
 
 def _row(row: Mapping[str, str]) -> str:

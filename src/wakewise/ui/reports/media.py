@@ -17,7 +17,7 @@ from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Photograph, Trial, TrialMesh
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.imaging.sensor import srgb_encode
-from wakewise.vision.texturing.colour import WaterFit, balanced, fit_water, without_water
+from wakewise.vision.texturing.colour import WaterFit, fit_water, remove_water, white_balanced
 from wakewise.vision.texturing.photo_colours import RangeMaps
 from wakewise.vision.texturing.textured import read_textured
 
@@ -64,7 +64,7 @@ def colours_html(trial: Trial) -> str:
         if image is None:
             continue
         range_m = ranges.get(shot.name)
-        after = balanced(image) if fit is None or range_m is None else without_water(image, range_m, fit)
+        after = white_balanced(image) if fit is None or range_m is None else remove_water(image, range_m, fit)
         cells.append(_pair(shot, image, after))
     if not cells:
         return ""

@@ -11,7 +11,18 @@ from matplotlib.figure import Figure
 from wakewise.experiments.campaigns.statistics import performance_profile, stratified_bootstrap
 from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place
 from wakewise.ui.reports.figures import NARROW_IN, WIDTH_IN
-from wakewise.ui.reports.svg_style import CORAL, INK, MUTED, SAND, SLATE, TEAL, VIOLET, dress, key, new_figure
+from wakewise.ui.reports.svg_style import (
+    CORAL,
+    INK,
+    MUTED,
+    SAND,
+    SLATE,
+    TEAL,
+    VIOLET,
+    add_legend,
+    new_figure,
+    style_axes,
+)
 from wakewise.ui.reports.text import number, percent
 
 Row = Mapping[str, Any]
@@ -45,7 +56,7 @@ def colours_of(methods: Sequence[str]) -> dict[str, str]:
     return {method: _OTHERS[k % len(_OTHERS)] for k, method in enumerate(methods)}
 
 
-def won(glance: MethodSummary) -> str:
+def winner_text(glance: MethodSummary) -> str:
     """Who won, by how much, how sure; nobody where the interval of the difference holds zero or pairs are few."""
     value = number(glance.means[glance.winner])
     if glance.rival is None:
@@ -68,7 +79,7 @@ def _better(glance: MethodSummary) -> str:
     return " ".join(part for part in percent(glance.less_pct, glance.interval_pct, more=True) if part)
 
 
-def price(glance: MethodSummary) -> str:
+def cost_text(glance: MethodSummary) -> str:
     """What the winner costs, and where trials failed."""
     said = []
     if glance.energy_ratio is not None:
@@ -101,7 +112,7 @@ def methods_compared(
     panels = drawn.subplots(len(worlds) if narrow else 1, across, squeeze=False).ravel()
     rng = np.random.default_rng(0)
     for number_, (axes, world) in enumerate(zip(panels, worlds, strict=True)):
-        dress(axes, x=words, grid="x")
+        style_axes(axes, x=words, grid="x")
         for place, method in enumerate(methods):
             values = scale * np.array([v for _, v in _known(places, world, figure, method)])
             quoted = _quoted(rows, world, method, figure)
@@ -140,7 +151,7 @@ def profiles(measure: ComparisonMetric, places: Sequence[Place], narrow: bool = 
     drawn = new_figure(NARROW_IN, 2.6 * len(worlds)) if narrow else new_figure(WIDTH_IN, 3.0)
     panels = drawn.subplots(len(worlds) if narrow else 1, 1 if narrow else len(worlds), squeeze=False).ravel()
     for axes, world in zip(panels, worlds, strict=True):
-        dress(axes, x=f"at most, {words}", y="share of trials", grid="both")
+        style_axes(axes, x=f"at most, {words}", y="share of trials", grid="both")
         every = scale * np.array([v for _, v in _known(places, world, figure)])
         top = min(float(every.max()), _MOST_BEYOND * float(np.median(every))) * 1.05
         steps = np.linspace(0.0, top, 200)
@@ -151,7 +162,7 @@ def profiles(measure: ComparisonMetric, places: Sequence[Place], narrow: bool = 
         axes.set_ylim(0.0, 1.03)
         axes.set_xlim(0.0, top)
         axes.set_title(world, loc="left", color=INK, fontsize=10.5)
-    key(panels[0], loc="lower right")
+    add_legend(panels[0], loc="lower right")
     return drawn
 
 

@@ -6,7 +6,17 @@ from wakewise.core.arrays import Array
 from wakewise.ui.reports import figures
 from wakewise.ui.reports.errors import CloudErrors, ModelErrors, cloud_errors, model_errors
 from wakewise.ui.reports.media import coloured_model
-from wakewise.ui.reports.page import absence, chip, error_scale, missing, panel, pictures, plot, scene_box, section
+from wakewise.ui.reports.page import (
+    error_scale,
+    legend_entry,
+    missing,
+    missing_text,
+    panel,
+    pictures,
+    plot,
+    scene_box,
+    section,
+)
 from wakewise.ui.reports.page_parts import PageParts
 from wakewise.ui.reports.scene3d import CAMERA_RGB, HULL_RGB, PATH_RGB, PLANNED_RGB, scene_html
 from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, error_colours
@@ -82,7 +92,7 @@ def model_section(trial: Trial, draft: PageParts) -> str:
     drawing = None if coloured is None else Drawing(coloured[0])
     scene = _scene(trial, errors, _poster(trial, errors, coloured, drawing))
     if errors is None or trial.truth is None:
-        why = absence(trial, "dense.ply", "truth.ply")
+        why = missing_text(trial, "dense.ply", "truth.ply")
         gap = missing("the model's error", why)
         return section("model", "The model", "There is nothing to measure.", scene + gap)
     aligned = "after rigid alignment to the truth" if errors.fine_aligned else "as it came, without fine alignment"
@@ -136,9 +146,9 @@ def _scene(trial: Trial, errors: ModelErrors | None, poster: str) -> str:
     """The 3D scene, opened on the model, and what its layers are."""
     html = scene_html(trial, errors)
     if html is None:
-        return missing("the 3D scene", absence(trial, "steps.parquet", "images.csv", "truth.ply"))
+        return missing("the 3D scene", missing_text(trial, "steps.parquet", "images.csv", "truth.ply"))
     legend = "".join(
-        chip("rgb({},{},{})".format(*colour), name)
+        legend_entry("rgb({},{},{})".format(*colour), name)
         for colour, name in (
             (PATH_RGB, "path"),
             (CAMERA_RGB, "photographs"),

@@ -54,7 +54,7 @@ def missing(what: str, why: str) -> str:
     return f'<p class="missing"><b>{escape(what[:1].upper() + what[1:])}</b> cannot be shown: {prose(why)}.</p>'
 
 
-def absence(trial: Trial, *parts: str) -> str:
+def missing_text(trial: Trial, *parts: str) -> str:
     """Why a view that needs these files of a trial cannot be drawn."""
     gaps = [f"{part} {trial.missing[part]}" for part in parts if part in trial.missing]
     return "; ".join(gaps) or "model and truth do not meet"
@@ -113,13 +113,13 @@ def scene_box(html: str, legend: str, poster: str = "") -> str:
     )
 
 
-def fold(title: str, content: str, note: str = "", folded: bool = False) -> str:
+def collapsible_section(title: str, content: str, note: str = "", folded: bool = False) -> str:
     """A part with a heading that can be folded; a phone folds it at first."""
     aside = f"<span>{escape(note)}</span>" if note else ""
     way = "" if folded else " open"
     return f'<details class="fold"{way}><summary>{escape(title)}{aside}</summary>{content}</details>'
 
 
-def chip(colour: str, name: str) -> str:
+def legend_entry(colour: str, name: str) -> str:
     """One entry of a legend."""
     return f'<span class="chip"><i style="background:{colour}"></i>{escape(name)}</span>'

@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 
 from wakewise.core.files import write_text
-from wakewise.ui.reports.page import fold, section, tile, whole_page
+from wakewise.ui.reports.page import collapsible_section, section, tile, whole_page
 from wakewise.ui.reports.svg_style import data_uri
 from wakewise.ui.reports.text import fixed, shown
 from wakewise.vision.reconstruction.photo_preview import PhotoPreview, PhotoQuality
@@ -62,9 +62,9 @@ def look_page(look: PhotoPreview, thumbs: Mapping[str, bytes], title: str) -> st
         again += f"<p>Files that are not read: {escape(others)}.</p>"
     sheets = ""
     if bad:
-        sheets += fold("To look at again", _sheet(bad, thumbs), f"{len(bad)} photographs")
+        sheets += collapsible_section("To look at again", _sheet(bad, thumbs), f"{len(bad)} photographs")
     if good:
-        sheets += fold("Nothing stands out", _sheet(good, thumbs), f"{len(good)} photographs")
+        sheets += collapsible_section("Nothing stands out", _sheet(good, thumbs), f"{len(good)} photographs")
     body = (
         f'<header class="top"><p class="eyebrow"><span>photographs <b>{escape(title)}</b></span></p>'
         f'<h1 class="{state}"><span class="mark"></span>{escape(headline)}</h1><dl class="tiles">{tiles}</dl></header>'

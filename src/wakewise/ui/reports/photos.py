@@ -7,7 +7,7 @@ from html import escape
 
 import cv2
 
-from wakewise.ui.reports.page import fold
+from wakewise.ui.reports.page import collapsible_section
 from wakewise.ui.reports.svg_style import data_uri
 from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Photograph, Trial
@@ -74,7 +74,7 @@ def contact_sheet(trial: Trial, leg_of: dict[int, str]) -> str:
     for leg, found in groups:
         sheet = f'<div class="sheet">{"".join(found)}</div>'
         count = f"{len(found)} photograph{'s' if len(found) > 1 else ''}"
-        parts.append(fold(leg, sheet, count) if leg else sheet)
+        parts.append(collapsible_section(leg, sheet, count) if leg else sheet)
     return "".join(parts)
 
 

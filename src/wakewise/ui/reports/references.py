@@ -16,7 +16,7 @@ from wakewise.ui.reports.page import section
 from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Trial
 
-ALIKE = 0.03
+EQUAL_WITHIN = 0.03
 """Two figures this near to one another, relative, are called the same."""
 UNIT, NO_BREAK = re.compile(r"(?<=\d) (?=[m%µP])"), "\u00a0"
 """The space before a unit, at which no line may end."""
@@ -50,14 +50,14 @@ class ReferenceComparison:
     bars: tuple[ReferenceBar, ...]
 
 
-def yardsticks(trial: Trial) -> list[ReferenceComparison]:
+def reference_comparisons(trial: Trial) -> list[ReferenceComparison]:
     """Those that the trial's figures allow, in the order of the page."""
     return [found for found in (against_water(trial), against_dp(trial), against_grains(trial)) if found is not None]
 
 
 def yardstick_html(trial: Trial) -> str:
     """The section of a page; empty if nothing can be held against anything."""
-    cards = "".join(_card(found) for found in yardsticks(trial))
+    cards = "".join(_card(found) for found in reference_comparisons(trial))
     if not cards:
         return ""
     lead = (
@@ -180,13 +180,13 @@ def _share_over(trial: Trial, limit: float) -> float | None:
 
 
 def _against(ratio: float) -> str:
-    if abs(ratio - 1.0) <= ALIKE:
+    if abs(ratio - 1.0) <= EQUAL_WITHIN:
         return "the same"
     return f"{number(100.0 * abs(ratio - 1.0), 2)} % {'less' if ratio < 1.0 else 'more'}"
 
 
 def _good(ratio: float) -> bool | None:
-    return None if abs(ratio - 1.0) <= ALIKE else ratio < 1.0
+    return None if abs(ratio - 1.0) <= EQUAL_WITHIN else ratio < 1.0
 
 
 def _share(share: float) -> str:

@@ -12,7 +12,7 @@ from wakewise.ui.reports.coverage import coverage_html
 from wakewise.ui.reports.limits import limits_section
 from wakewise.ui.reports.media import colours_html, film_html
 from wakewise.ui.reports.model import before_colours, before_mesh, model_section
-from wakewise.ui.reports.page import absence, fold, missing, plot, prose, section, tile, whole_page
+from wakewise.ui.reports.page import collapsible_section, missing, missing_text, plot, prose, section, tile, whole_page
 from wakewise.ui.reports.page_parts import PageParts
 from wakewise.ui.reports.photos import contact_sheet
 from wakewise.ui.reports.references import yardstick_html
@@ -182,7 +182,7 @@ def _flown_section(trial: Trial) -> str:
             figures.plan_and_side(trial),
             "flight from above and from the side",
             "Arrows point where the camera looked; crosses are the planned viewpoints.",
-            absence(trial, "steps.parquet", "images.csv"),
+            missing_text(trial, "steps.parquet", "images.csv"),
             narrow=figures.plan_and_side(trial, narrow=True),
         ),
     )
@@ -202,7 +202,7 @@ def _seen_photographs(trial: Trial, draft: PageParts) -> str:
 
 def _seen(trial: Trial, draft: PageParts) -> str:
     if not trial.photographs:
-        gap = missing("the photographs", absence(trial, "images.csv"))
+        gap = missing("the photographs", missing_text(trial, "images.csv"))
         return section("seen", "What was seen", "No photographs are on record.", gap)
     lead = (
         f"{len(trial.photographs)} photographs in the order they were taken"
@@ -222,7 +222,7 @@ def _water(trial: Trial, draft: PageParts) -> str:
 
 
 def _water_section(trial: Trial) -> str:
-    gap = absence(trial, "steps.parquet")
+    gap = missing_text(trial, "steps.parquet")
     exposures = len(figures.exposure_times(trial))
     vehicle = vehicle_of(trial)
     names = [] if vehicle is None else [thruster.name for thruster in vehicle.thrusters]
@@ -253,7 +253,7 @@ def _water_section(trial: Trial) -> str:
 def _figures(trial: Trial) -> str:
     metrics = trial.metrics
     if not metrics.values:
-        gap = missing("the figures", absence(trial, "metrics.json"))
+        gap = missing("the figures", missing_text(trial, "metrics.json"))
         return section("figures", "The figures", "No figures are on record.", gap)
     tables = []
     told: set[str] = set()
@@ -264,7 +264,7 @@ def _figures(trial: Trial) -> str:
             '<thead><tr><th>key</th><th class="num">value</th><th>unit</th><th>definition</th></tr></thead>'
             f"<tbody>{rows}</tbody></table>"
         )
-        tables.append(fold(group, table, f"{len(keys)} figures"))
+        tables.append(collapsible_section(group, table, f"{len(keys)} figures"))
     lead = "Everything in metrics.json. A figure that could not be computed says why."
     return section("figures", "The figures", lead, "".join(tables))
 
@@ -303,7 +303,7 @@ def _again(trial: Trial) -> str:
         )
     facts = [("seed", trial.seed), ("method", trial.method), ("versions", ", ".join(known) or "not recorded")]
     listed = "".join(f"<dt>{name}</dt><dd>{escape(value)}</dd>" for name, value in facts)
-    scenario = missing("the scenario", absence(trial, "scenario.yaml"))
+    scenario = missing("the scenario", missing_text(trial, "scenario.yaml"))
     if trial.scenario_text:
         scenario = (
             f"<details><summary>scenario.yaml, everything resolved</summary><pre>{escape(trial.scenario_text)}</pre>"

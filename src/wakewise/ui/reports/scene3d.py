@@ -60,7 +60,7 @@ def scene_html(trial: Trial, errors: ModelErrors | None) -> str | None:
         return None
     # viser greets on standard output, which belongs to the command line's own answer.
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        with unheard():
+        with without_server():
             server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             scene = server.scene
@@ -79,7 +79,7 @@ def scene_html(trial: Trial, errors: ModelErrors | None) -> str | None:
 
 
 @contextlib.contextmanager
-def unheard() -> Iterator[None]:
+def without_server() -> Iterator[None]:
     """Keep viser's server from listening: nobody is to connect, and a report needs no port, not even a local one."""
 
     @contextlib.asynccontextmanager
@@ -127,7 +127,7 @@ def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None)
     scene = server.scene
     found = coloured_model(trial)
     if errors is not None and errors.model is not None and errors.model_accuracy_m is not None:
-        model, chosen = lightened(errors.model)
+        model, chosen = decimated(errors.model)
         mesh = trimesh.Trimesh(upright(model.vertices_m, trial.bed_z_m), model.faces, process=False)
         # Without a material of its own, glTF takes a mesh for bare metal, which is black without an environment map.
         matt = trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)
@@ -136,7 +136,7 @@ def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None)
         scene.add_mesh_trimesh("/model by error", mesh, visible=found is None)
     if found is not None:
         whole, colours = found
-        model, chosen = lightened(whole)
+        model, chosen = decimated(whole)
         mesh = trimesh.Trimesh(upright(model.vertices_m, trial.bed_z_m), model.faces, process=False)
         mesh.visual = trimesh.visual.TextureVisuals(
             material=trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)
@@ -162,7 +162,7 @@ def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None)
             visible=found is None,
         )  # fmt: skip
     if trial.truth is not None:
-        truth, _ = lightened(trial.truth)
+        truth, _ = decimated(trial.truth)
         scene.add_mesh_simple(
             "/true target",
             vertices=upright(truth.vertices_m, trial.bed_z_m).astype(np.float32),
@@ -173,7 +173,7 @@ def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None)
         )
 
 
-def lightened(mesh: TrialMesh, max_faces: int = MAX_FACES) -> tuple[TrialMesh, IntArray]:
+def decimated(mesh: TrialMesh, max_faces: int = MAX_FACES) -> tuple[TrialMesh, IntArray]:
     """A mesh light enough for a page, and for each of its vertices the index of the one that it was.
 
     Vertices that share a cell of a grid become one; the cells grow until at most `max_faces` triangles are left.

@@ -55,7 +55,7 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return Figure(figsize=(width_in, height_in), facecolor="none", layout="constrained")
 
 
-def dress(axes: Axes, *, x: str = "", y: str = "", grid: str = "y") -> None:
+def style_axes(axes: Axes, *, x: str = "", y: str = "", grid: str = "y") -> None:
     """Give axes the quiet look of the report: two spines, a light grid, labels with units."""
     axes.set_facecolor("none")
     for side, spine in axes.spines.items():
@@ -71,7 +71,7 @@ def dress(axes: Axes, *, x: str = "", y: str = "", grid: str = "y") -> None:
         axes.set_ylabel(y, color=MUTED, fontsize=9.5)
 
 
-def key(axes: Axes, **options: object) -> None:
+def add_legend(axes: Axes, **options: object) -> None:
     """Add a legend without a frame, in the ink of the page, if anything is labelled."""
     if axes.get_legend_handles_labels()[0]:
         settings: dict[str, object] = {"frameon": False, "fontsize": 9, "labelcolor": MUTED, "handlelength": 1.4}

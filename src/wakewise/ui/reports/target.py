@@ -19,9 +19,9 @@ from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file, write_bytes, write_text
 from wakewise.scene.targets import Fragility, Region, Target
-from wakewise.scene.targets.fragility import DELICATE_FROM, SHARP_PER_M, THIN_M
+from wakewise.scene.targets.fragility import FRAGILE_FROM, SHARP_PER_M, THIN_M
 from wakewise.ui.reports.page import plot, tile, whole_page
-from wakewise.ui.reports.svg_style import INK, LINE, MUTED, SLATE, TEAL, dress, new_figure
+from wakewise.ui.reports.svg_style import INK, LINE, MUTED, SLATE, TEAL, new_figure, style_axes
 from wakewise.ui.reports.trial import TrialMesh
 from wakewise.ui.reports.views import ViewBounds, Viewpoint, draw_surface
 
@@ -107,7 +107,7 @@ def spread(target: Target, delicacy: Fragility) -> Figure:
         (thick, 1e3 * delicacy.thickness_m, 1e3 * np.array(THIN_M), "thickness (mm)", False),
         (curved, delicacy.curvature_per_m, np.array(SHARP_PER_M), "mean curvature (1/m)", True),
     ):
-        dress(axes, x=unit, y="surface (%)")
+        style_axes(axes, x=unit, y="surface (%)")
         per_face = values[faces].mean(axis=1)
         low, high = np.percentile(per_face, [0.2, 99.8])
         low, high = (min(low, 0.0), max(high, 1.1 * bounds[1])) if not rising else (low, max(high, 1.1 * bounds[1]))
@@ -129,7 +129,7 @@ def region_points(target: Target, region: Region) -> Figure:
         (side, 2, "height above the bed (mm)", "from the south"),
         (above, 0, "north (mm)", "from above"),
     ):
-        dress(axes, x="east (mm)", y=label, grid="both")
+        style_axes(axes, x="east (mm)", y=label, grid="both")
 
         def flat(points: Array, up: int = up) -> tuple[Array, Array]:
             vertical = target.bed_z_m - points[:, 2] if up == 2 else points[:, up] - target.centre_W_m[up]
@@ -158,7 +158,7 @@ def target_page(target: Target, delicacy: Fragility, region: Region) -> str:
         tile("size", f"{length:.0f}×{width:.0f}×{height:.0f}", "mm", "box round the mesh, with what is buried"),
         tile("surface", f"{1e4 * mesh.face_areas_m2.sum():.0f}", "cm²", f"{len(mesh.faces):,} triangles"),
         tile("thickness", f"{middle:.1f}", "mm", "median over the vertices"),
-        tile("delicate", f"{100 * delicacy.share(mesh):.0f}", "%", f"of the surface scores {DELICATE_FROM:g} or more"),
+        tile("delicate", f"{100 * delicacy.share(mesh):.0f}", "%", f"of the surface scores {FRAGILE_FROM:g} or more"),
     ))  # fmt: skip
     thin, sharp = 1e3 * np.array(THIN_M), SHARP_PER_M
     seen = plot(

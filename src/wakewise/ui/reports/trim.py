@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from wakewise.core.errors import InputError
-from wakewise.operation.flight_trim import proposal
+from wakewise.operation.flight_trim import ballast_proposal
 from wakewise.ui.reports.trial import Trial
 
 
@@ -14,7 +14,7 @@ def trim_html(trial: Trial) -> str:
     if trial.settings is None or trial.steps is None:
         return ""
     try:
-        said = proposal(trial.settings.parts().vehicle, trial.steps)
+        said = ballast_proposal(trial.settings.parts().vehicle, trial.steps)
     except InputError:  # the vehicle was given in Python
         return ""
     return "" if said is None else f"<p>Before the next flight: {escape(said)}.</p>"

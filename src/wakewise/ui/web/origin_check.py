@@ -65,7 +65,7 @@ class OriginCheck:
 
     def fits(self, token: str | None) -> bool:
         """Whether a token is the right one; takes the same time whatever is wrong with it."""
-        return token is not None and same(token, self.token)
+        return token is not None and equal_secrets(token, self.token)
 
     def _origins(self, host: str) -> set[str]:
         """Where a page must come from that was asked for under this name."""
@@ -83,7 +83,7 @@ class OriginCheck:
         return ", ".join(f"{name}:{self.port}" for name in LOOPBACK)
 
 
-def same(one: str, other: str) -> bool:
+def equal_secrets(one: str, other: str) -> bool:
     """Whether two secrets are the same, in a time that tells nothing; any text may be compared."""
     return hmac.compare_digest(one.encode(errors="surrogatepass"), other.encode(errors="surrogatepass"))
 

@@ -9,7 +9,7 @@ figure is.
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.vision.evaluation.alignment import IcpRefinement, Similarity, refine_icp, robust_similarity, umeyama
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         evaluate_surface,
         sample_surface,
         suspicious_scale,
-        thin,
+        voxel_downsample,
     )
     from wakewise.vision.evaluation.definitions import MESH_REFERENCE as MESH_REFERENCE_DEFINITIONS
     from wakewise.vision.evaluation.definitions import SURFACE as SURFACE_DEFINITIONS
@@ -74,8 +74,8 @@ __all__ = [
     "sample_surface",
     "shares",
     "suspicious_scale",
-    "thin",
     "umeyama",
+    "voxel_downsample",
 ]
 
-lazy_door(__name__, "photos")
+lazy_attributes(__name__, "photos")

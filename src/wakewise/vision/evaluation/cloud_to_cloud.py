@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError, StageError
 from wakewise.vision.evaluation.alignment import IcpRefinement, refine_icp
-from wakewise.vision.evaluation.cloud_to_surface import Crop, suspicious_extent, thin
+from wakewise.vision.evaluation.cloud_to_surface import Crop, suspicious_extent, voxel_downsample
 from wakewise.vision.evaluation.definitions import DTU, TANKS_AND_TEMPLES
 from wakewise.vision.evaluation.thresholds import ThresholdScore, shares
 
@@ -122,7 +122,7 @@ def compare_clouds(
         raise InputError(f"reference cloud: {len(truth)} of its points count, needs at least {LEAST_POINTS}")
     spacing = float(np.median(np.asarray(KDTree(truth).query(_some(truth), k=2)[0])[:, 1]))
     cell = max(0.5e-3 * min(thresholds_mm), spacing)
-    even_truth = thin(truth, cell)
+    even_truth = voxel_downsample(truth, cell)
     low, high = truth.min(axis=0), truth.max(axis=0)
     cloud = np.asarray(cloud_W_m, dtype=np.float64).reshape(-1, 3)
     kept = cloud[crop.keeps(cloud, low, high)]
@@ -132,7 +132,7 @@ def compare_clouds(
     if refinement is not None:
         moved = refinement.apply(cloud)
         kept = moved[crop.keeps(moved, low, high)]
-    even = thin(kept, cell)
+    even = voxel_downsample(kept, cell)
     to_truth = 1e3 * np.asarray(KDTree(even_truth).query(even, workers=-1)[0])
     to_model = 1e3 * np.asarray(KDTree(even).query(even_truth, workers=-1)[0])
     score = CloudScore(

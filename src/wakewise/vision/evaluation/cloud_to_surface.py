@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
-from wakewise.core.checks import truth
+from wakewise.core.checks import boolean
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.optional_dependencies import need
 from wakewise.scene.targets import MeshDistance
@@ -180,7 +180,7 @@ def count_views(
     return seen
 
 
-def thin(points_m: Array, voxel_m: float) -> Array:
+def voxel_downsample(points_m: Array, voxel_m: float) -> Array:
     """One point, the mean, per cell of a grid, so that dense spots do not dominate; order follows the grid."""
     if len(points_m) == 0:
         return np.zeros((0, 3))
@@ -259,7 +259,7 @@ def compare_surface(
         If too little of the cloud lies near the truth to say anything, its scale is suspicious, or ICP says that the
         two do not belong together.
     """
-    icp = truth(icp, "icp")
+    icp = boolean(icp, "icp")
     suspicion = suspicious_scale(cloud_W_m, mesh)
     if suspicion is not None:
         raise StageError(suspicion)
@@ -276,7 +276,7 @@ def compare_surface(
         refinement = refine_icp(kept, surface.points_m, surface.normals)
         moved = refinement.apply(cloud)
         kept = moved[crop.keeps(moved, low, high)]
-    even = thin(kept, voxel_m)
+    even = voxel_downsample(kept, voxel_m)
     distance = distance or MeshDistance(mesh.vertices_m, mesh.faces)
     to_truth_mm = 1e3 * distance(even)
     to_cloud_mm = 1e3 * np.asarray(KDTree(even).query(surface.points_m, workers=-1)[0])
@@ -315,7 +315,7 @@ def compare_surface(
     if thresholds_mm:
         fine, near = to_truth_mm, to_cloud_mm
         if 0.5e-3 * min(thresholds_mm) < voxel_m:
-            finer = thin(kept, 0.5e-3 * min(thresholds_mm))
+            finer = voxel_downsample(kept, 0.5e-3 * min(thresholds_mm))
             fine, near = 1e3 * distance(finer), 1e3 * np.asarray(KDTree(finer).query(surface.points_m, workers=-1)[0])
         found = shares(fine, near, thresholds_mm)
     return SurfaceComparison(score=score, points_W_m=even, error_mm=to_truth_mm, shares=found)
@@ -337,12 +337,12 @@ def suspicious_extent(cloud_m: Array, truth_m: Array) -> str | None:
     # The middle nine tenths: one stray point must not make a cloud look large.
     low, high = np.percentile(cloud, (5.0, 95.0), axis=0)
     extent = float(np.linalg.norm(high - low)) / 0.9
-    truth = float(np.linalg.norm(np.ptp(truth_m, axis=0)))
-    if extent <= 0.0 or truth <= 0.0 or 1.0 / MAX_SCALE_RATIO < extent / truth < MAX_SCALE_RATIO:
+    boolean = float(np.linalg.norm(np.ptp(truth_m, axis=0)))
+    if extent <= 0.0 or boolean <= 0.0 or 1.0 / MAX_SCALE_RATIO < extent / boolean < MAX_SCALE_RATIO:
         return None
-    ratio = extent / truth
+    ratio = extent / boolean
     return (
-        f"reference: {truth:.3g} m across while the cloud is {extent:.3g} m, a suspicious scale (ratio {ratio:.3g}); "
+        f"reference: {boolean:.3g} m across while the cloud is {extent:.3g} m, a suspicious scale (ratio {ratio:.3g}); "
         "are both in metres?"
     )
 

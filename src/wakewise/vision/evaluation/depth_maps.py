@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.size_limits import check_arrays
-from wakewise.vision.evaluation.cloud_to_surface import thin
+from wakewise.vision.evaluation.cloud_to_surface import voxel_downsample
 
 THRESHOLDS_MM = (5, 10, 20, 50)
 
@@ -157,7 +157,7 @@ def compare_depths(cloud_W_m: Array, views: list[DepthView], cap_m: float = 0.1)
     spacing = float(np.median(np.concatenate(steps)))
     pick = rng.choice(len(points), size=min(len(points), 400_000), replace=False)
     truth, tree = points[pick], KDTree(points[pick])
-    even = thin(cloud_W_m, spacing)
+    even = voxel_downsample(cloud_W_m, spacing)
     distance, nearest = (np.asarray(found) for found in tree.query(even, distance_upper_bound=cap_m))
     near = np.isfinite(distance)
     if near.sum() < 100:

@@ -13,7 +13,7 @@ Start reading in `photograph.py` (one photograph, step by step) and `scene.py` (
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.vision.imaging.blur import Shutter, motion_blur, motion_px, pose_at
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from wakewise.vision.imaging.optics import (
         SiltOptics,
         WaterOptics,
+        attenuate,
         haze_between,
-        through_water,
         water_optics,
         water_types,
     )
@@ -48,6 +48,7 @@ __all__ = [
     "Shutter",
     "SiltOptics",
     "WaterOptics",
+    "attenuate",
     "calibrate",
     "haze_between",
     "motion_blur",
@@ -57,9 +58,8 @@ __all__ = [
     "pose_at",
     "render",
     "sharpness",
-    "through_water",
     "water_optics",
     "water_types",
 ]
 
-lazy_door(__name__, "photos")
+lazy_attributes(__name__, "photos")

@@ -18,7 +18,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid
-from wakewise.vision.imaging.optics import SiltOptics, haze_between, through_water
+from wakewise.vision.imaging.optics import SiltOptics, attenuate, haze_between
 from wakewise.vision.imaging.renderer import render
 from wakewise.vision.imaging.scene import Scene
 from wakewise.vision.imaging.settings import LONGEST_S, METERED_EVERY_S, ImagingSettings
@@ -60,13 +60,13 @@ def brightness(
     lights, water = settings.lights(), settings.water()
     view = render(scene, camera, X_WC, lights, samples=1)
     haze = haze_between(camera, X_WC, water, grains, silt, lights)
-    radiance, _ = through_water(view, camera, haze, water, lights.from_above)
+    radiance, _ = attenuate(view, camera, haze, water, lights.from_above)
     weights = np.ones((height, WIDTH_PX))
     weights[height // 3 : height - height // 3, WIDTH_PX // 3 : WIDTH_PX - WIDTH_PX // 3] = MIDDLE
     return float(np.average(radiance @ (LUMINANCE * balance), weights=weights))
 
 
-def settled(seen: Sequence[float]) -> float:
+def converged_gain(seen: Sequence[float]) -> float:
     """Gain after views of this brightness at gain 1, oldest first, METERED_EVERY_S apart; settled on the first."""
     wished = [math.log(TARGET / max(value, 1e-6)) for value in seen]
     stays = (1.0 - SPEED) ** (FRAMES_PER_S * METERED_EVERY_S)
@@ -76,7 +76,7 @@ def settled(seen: Sequence[float]) -> float:
     return math.exp(log_gain)
 
 
-def divided(gain: float, settings: ImagingSettings) -> ExposureSetting:
+def split_gain(gain: float, settings: ImagingSettings) -> ExposureSetting:
     """A gain made of exposure first, then of amplification, as far as they go.
 
     `settings.gain` at `settings.exposure_s` is the sensor unamplified.
@@ -91,7 +91,7 @@ def divided(gain: float, settings: ImagingSettings) -> ExposureSetting:
     )
 
 
-def automatic(
+def automatic_exposure(
     scene: Scene,
     before: Sequence[Pose],
     silt: ScalarGrid | None,
@@ -103,4 +103,4 @@ def automatic(
 
     The silt is that of the photograph: what hangs in the water does not change in a second.
     """
-    return divided(settled([brightness(scene, X, silt, settings, grains, balance) for X in before]), settings)
+    return split_gain(converged_gain([brightness(scene, X, silt, settings, grains, balance) for X in before]), settings)

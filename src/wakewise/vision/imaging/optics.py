@@ -182,7 +182,7 @@ def haze_between(
     return Haze(ranges_m=ranges, table=table, stride=stride)
 
 
-def through_water(
+def attenuate(
     view: Render,
     camera: Camera,
     haze: Haze,
@@ -300,7 +300,7 @@ def _mean_decay(rate: float, length: float, kept: float) -> float:
 
 
 @njit(inline="always")
-def decayed(tau: float) -> float:
+def exp_minus(tau: float) -> float:
     """exp(-tau) of an optical depth, not negative: a 64th of it by series, then squared six times.
 
     Within 1e-8 of exp(-tau) itself everywhere; below exp(-60) it stays there.
@@ -361,12 +361,12 @@ def _apply(
         for c in range(3):
             veil = veils[c]
             for x in range(w):
-                kept[x] = decayed(signal[c] * lengths[x] + silts[x])
+                kept[x] = exp_minus(signal[c] * lengths[x] + silts[x])
             for x in range(w):
                 lit[x] = kept[x]
             if lost < 1.0:
                 for x in range(w):
-                    lit[x] = decayed(signal[c] * lengths[x] + lost * silts[x])
+                    lit[x] = exp_minus(signal[c] * lengths[x] + lost * silts[x])
             for x in range(w):
                 lamp = lamp_radiance[y, x, c]
                 seen = kept[x] * (radiance[y, x, c] - lamp + lamp * lit[x])
@@ -377,5 +377,5 @@ def _apply(
         for x in range(w):
             if lengths[x] > reach:
                 for c in range(3):
-                    far = 1.0 - decayed(veil_rate[c] * (lengths[x] - reach))
-                    out[y, x, c] += water_veil[c] * decayed(veil_rate[c] * reach + silts[x]) * far
+                    far = 1.0 - exp_minus(veil_rate[c] * (lengths[x] - reach))
+                    out[y, x, c] += water_veil[c] * exp_minus(veil_rate[c] * reach + silts[x]) * far

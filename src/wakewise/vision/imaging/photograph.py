@@ -13,10 +13,10 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import FlakeCloud, ScalarGrid
-from wakewise.vision.imaging.auto_exposure import ExposureSetting, automatic
+from wakewise.vision.imaging.auto_exposure import ExposureSetting, automatic_exposure
 from wakewise.vision.imaging.blur import motion_blur, pose_at
 from wakewise.vision.imaging.camera import Camera
-from wakewise.vision.imaging.optics import SiltOptics, haze_between, through_water
+from wakewise.vision.imaging.optics import SiltOptics, attenuate, haze_between
 from wakewise.vision.imaging.particles import draw_flakes, flakes_before
 from wakewise.vision.imaging.renderer import Image, Render, render
 from wakewise.vision.imaging.scene import Scene
@@ -90,7 +90,7 @@ def photograph(
     if settings.auto_exposure:
         balance = white_balance(settings)
         metered = before or (pose_at(poses, 0.5),)
-        chosen = automatic(scenes[0], metered, silt, settings, grains or SiltOptics(), balance)
+        chosen = automatic_exposure(scenes[0], metered, silt, settings, grains or SiltOptics(), balance)
     return photograph_of(view, camera, poses, silt, settings, rng, grains, chosen, drifting)
 
 
@@ -122,7 +122,7 @@ def photograph_of(
     lights, water = settings.lights(), settings.water()
     grains = grains or SiltOptics()
     haze = haze_between(camera, middle, water, grains, silt, lights)
-    radiance, silt_per_m = through_water(view, camera, haze, water, lights.from_above, grains)
+    radiance, silt_per_m = attenuate(view, camera, haze, water, lights.from_above, grains)
     radiance = motion_blur(radiance, view.depth_m, camera, poses, shutter)
     flakes = flakes_before(camera, middle, silt, settings.flakes_per_m3, FLAKES_PER_KG, rng, drifting)
     radiance = draw_flakes(radiance, view.depth_m, camera, poses, flakes, settings.window_s, water, lights, shutter)

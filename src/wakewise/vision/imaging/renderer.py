@@ -24,8 +24,8 @@ from wakewise.vision.imaging.bed_view import draw_bed, project_bed
 from wakewise.vision.imaging.camera import Camera
 from wakewise.vision.imaging.lens import IDEAL
 from wakewise.vision.imaging.scene import BED, Scene
-from wakewise.vision.imaging.shading import aim, average, needs_more, overlay
-from wakewise.vision.imaging.tile_culling import TILE_PX, may_meet
+from wakewise.vision.imaging.shading import aim, average, needs_supersampling, overlay
+from wakewise.vision.imaging.tile_culling import TILE_PX, tile_sphere_overlap
 
 Image = NDArray[np.float32]
 LAMP_REFERENCE_M = 0.5
@@ -116,7 +116,7 @@ def render(scene: Scene, camera: Camera, X_WC: Pose, lights: Lights, samples: in
         project_bed(scene.bed, row, R, origin, crossings, boxes)
     tiles = np.empty((-(-h // TILE_PX), -(-w // TILE_PX)), np.bool_)
     spheres_C = np.column_stack([(scene.spheres_F_m[:, :3] - origin) @ R, scene.spheres_F_m[:, 3]])
-    may_meet(row, w, h, spheres_C, tiles)
+    tile_sphere_overlap(row, w, h, spheres_C, tiles)
 
     def cast(pixels: NDArray[np.int64], across: int) -> tuple[Any, ...]:
         most = len(pixels) * across**2
@@ -148,7 +148,7 @@ def render(scene: Scene, camera: Camera, X_WC: Pose, lights: Lights, samples: in
     in_threads(first, range(0, h, rows))
     if samples > 1:
         again = np.empty((h, w), np.bool_)
-        in_threads(lambda y: needs_more(kind, depth, y, min(y + rows, h), again), range(0, h, rows))
+        in_threads(lambda y: needs_supersampling(kind, depth, y, min(y + rows, h), again), range(0, h, rows))
         more = np.flatnonzero(again)
         step = max(1, BAND_RAYS // samples**2)
 

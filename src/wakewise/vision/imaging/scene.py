@@ -29,7 +29,7 @@ from wakewise.vision.imaging.tile_culling import BoundingSpheres
 TARGET, BED, STONE = 0, 1, 2
 """Numbers of the three kinds of surface, as ray casting returns them."""
 
-APRON_M = 12.0
+BED_HALF_WIDTH_M = 12.0
 """Half width of the whole bed: beyond it there is only water."""
 
 
@@ -149,13 +149,13 @@ class Scene:
         """
         if seed < 0:
             raise InputError(f"scene: seed {seed}, must not be negative")
-        if not 0.3 <= bed_half_m < APRON_M:
-            raise InputError(f"scene: bed_half_m {bed_half_m:g}, allowed 0.3 to {APRON_M:g}")
+        if not 0.3 <= bed_half_m < BED_HALF_WIDTH_M:
+            raise InputError(f"scene: bed_half_m {bed_half_m:g}, allowed 0.3 to {BED_HALF_WIDTH_M:g}")
         if stones < 0:
             raise InputError(f"scene: {stones} stones, must not be negative")
         noise_seed = seed % 65521 * 1000
         foot_W = np.array([target.centre_W_m[0], target.centre_W_m[1], target.bed_z_m])
-        vertices, faces = target.mesh.vertices_m - foot_W, facing_out(target.mesh).faces
+        vertices, faces = target.mesh.vertices_m - foot_W, outward_oriented(target.mesh).faces
         clear_m = float(np.max(np.hypot(vertices[:, 0], vertices[:, 1])))
 
         lines, bed_vertices = _bed(clear_m, bed_half_m, noise_seed)
@@ -204,7 +204,7 @@ def vertex_normals(vertices_m: Array, faces: IntArray) -> Array:
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
 
 
-def facing_out(mesh: Mesh) -> Mesh:
+def outward_oriented(mesh: Mesh) -> Mesh:
     """The mesh, turned inside out if its volume is negative."""
     about_middle = Mesh(mesh.vertices_m - mesh.vertices_m.mean(axis=0), mesh.faces)
     return mesh if about_middle.volume_m3 >= 0.0 else Mesh(mesh.vertices_m, mesh.faces[:, ::-1])
@@ -214,11 +214,11 @@ def _bed(clear_m: float, half_m: float, seed: int) -> tuple[Array, Array]:
     """Lines of a square grid that is fine near the foot and coarsens outward, and a vertex at each crossing."""
     # Steps grow from 6 mm under the target to 3 cm at the edge of the fine part, then to 1 m on the apron.
     steps, edge = [], 0.0
-    while edge < APRON_M:
+    while edge < BED_HALF_WIDTH_M:
         step = 0.006 if edge < clear_m + 0.05 else min(0.03, 0.006 + 0.06 * (edge - clear_m - 0.05))
         steps.append(step if edge < half_m else min(1.0, 0.3 * (edge - half_m) + 0.03))
         edge += steps[-1]
-    positive = np.cumsum(steps) * (APRON_M / edge)
+    positive = np.cumsum(steps) * (BED_HALF_WIDTH_M / edge)
     line = np.concatenate([-positive[::-1], [0.0], positive])
     x, y = np.meshgrid(line, line, indexing="ij")
     xy = np.stack([x.ravel(), y.ravel()], axis=1)

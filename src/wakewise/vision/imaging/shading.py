@@ -55,7 +55,7 @@ def aim(
 
 
 @njit(nogil=True)
-def needs_more(kind: Any, depth_m: Any, first: int, last: int, out: Any) -> None:
+def needs_supersampling(kind: Any, depth_m: Any, first: int, last: int, out: Any) -> None:
     """Where one ray is not enough: not bed and not open water, or beside another kind or a step of 4 % in depth.
 
     `kind`, `depth_m` and `out` are whole images (h, w); rows first to last - 1 are written.

@@ -104,7 +104,7 @@ def _meets(
 
 
 @njit(nogil=True)
-def may_meet(row: Any, width: int, height: int, spheres_C: Any, out: Any) -> None:
+def tile_sphere_overlap(row: Any, width: int, height: int, spheres_C: Any, out: Any) -> None:
     """Write, for each tile of 8 x 8 pixels, whether a ray through it may meet a sphere.
 
     `spheres_C` (k, 4) in the camera frame; `out` (ceil(height / 8), ceil(width / 8)) of bool.

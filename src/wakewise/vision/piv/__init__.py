@@ -4,7 +4,14 @@ from wakewise.vision.piv.correlation import correlate
 from wakewise.vision.piv.folder import PivFolder, read_pairs, read_piv_settings, samples_of_folder, samples_of_vectors
 from wakewise.vision.piv.images import CameraSettings, ImagePair, photograph_pair, picture
 from wakewise.vision.piv.processing import Engine, displacements, has_openpiv
-from wakewise.vision.piv.tracers import Sheet, TracerSettings, carried, relaxation_s, seed_sheet, settling_speed_m_s
+from wakewise.vision.piv.tracers import (
+    LightSheet,
+    TracerSettings,
+    carried,
+    relaxation_s,
+    seed_sheet,
+    settling_speed_m_s,
+)
 from wakewise.vision.piv.vectors import Displacements, averaged
 
 __all__ = [
@@ -12,8 +19,8 @@ __all__ = [
     "Displacements",
     "Engine",
     "ImagePair",
+    "LightSheet",
     "PivFolder",
-    "Sheet",
     "TracerSettings",
     "averaged",
     "carried",

@@ -13,7 +13,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.interfaces import Flow
 from wakewise.core.jit.njit import njit
 from wakewise.core.settings import Settings
-from wakewise.vision.piv.tracers import Sheet, TracerSettings, carried, seed_sheet
+from wakewise.vision.piv.tracers import LightSheet, TracerSettings, carried, seed_sheet
 
 Picture = NDArray[np.uint8]
 
@@ -49,7 +49,7 @@ class ImagePair:
 
 
 def photograph_pair(
-    flow: Flow, sheet: Sheet, camera: CameraSettings, tracers: TracerSettings, rng: np.random.Generator
+    flow: Flow, sheet: LightSheet, camera: CameraSettings, tracers: TracerSettings, rng: np.random.Generator
 ) -> ImagePair:
     """Photograph tracers half a gap before and half a gap after this instant of a flow.
 

@@ -36,7 +36,7 @@ def settling_speed_m_s(diameter_m: float, density_kg_m3: float) -> float:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sheet:
+class LightSheet:
     """A plane of light in the world: picture axes `right_W` and `down_W`, unit vectors, shape (3,), about `centre_W_m`.
 
     Depth through the sheet is along right x down. Its brightness is exp(-2 (depth / half_thickness_m)^2).
@@ -58,7 +58,7 @@ class Sheet:
         return np.asarray(vectors_W @ axes.T)
 
 
-def seed_sheet(sheet: Sheet, half_extent_m: tuple[float, float], count: int, rng: np.random.Generator) -> Array:
+def seed_sheet(sheet: LightSheet, half_extent_m: tuple[float, float], count: int, rng: np.random.Generator) -> Array:
     """Uniformly strewn particles in world coordinates, shape (count, 3).
 
     They fill |right| and |down| below `half_extent_m` and |depth| below twice the half thickness, where less than

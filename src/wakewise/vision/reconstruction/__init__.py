@@ -19,7 +19,7 @@ neural radiance field from the same photographs.
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.vision.reconstruction.calibration import CalibrationBoard, CameraCalibration, calibrate
@@ -57,4 +57,4 @@ __all__ = [
     "write_mesh",
 ]
 
-lazy_door(__name__, "photos")
+lazy_attributes(__name__, "photos")

@@ -25,14 +25,14 @@ from wakewise.core.errors import EnvironmentFailure, StageError
 
 __all__ = [
     "RESERVE_MB",
-    "be_quiet",
     "call",
     "call_apart",
+    "database_folder",
     "keep_sigterm",
     "no_stderr",
     "pycolmap",
     "settle",
-    "workroom",
+    "silence_logging",
 ]
 
 T = TypeVar("T")
@@ -42,7 +42,7 @@ RESERVE_MB = 16.0
 MEMORY, MOST_IN_MEMORY = Path("/dev/shm"), 200e6
 
 
-def be_quiet() -> None:
+def silence_logging() -> None:
     """Only fatal messages; everything else would land between the lines of a progress bar or of JSON."""
     pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
 
@@ -53,7 +53,7 @@ def keep_sigterm() -> None:
         signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGTERM))
 
 
-be_quiet()
+silence_logging()
 keep_sigterm()
 
 
@@ -88,7 +88,7 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
 
     def body() -> None:
         try:
-            be_quiet()  # a bundle adjustment on its own makes COLMAP talk again
+            silence_logging()  # a bundle adjustment on its own makes COLMAP talk again
             result.append(work(cancellation_token=token))
         except (RuntimeError, ValueError, IndexError, TypeError, OSError) as error:
             failure.append(error)
@@ -177,7 +177,7 @@ def _see_out(thread: threading.Thread, ended: threading.Event) -> None:
 
 
 @contextmanager
-def workroom(beside: Path, size_bytes: float) -> Iterator[Path]:
+def database_folder(beside: Path, size_bytes: float) -> Iterator[Path]:
     """Folder for a database that COLMAP works in, removed afterwards: in memory if that is small beside what is there.
 
     COLMAP ends the whole process when its database finds no room, so it should not lie where others write. A large one,

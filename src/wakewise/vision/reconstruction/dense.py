@@ -16,11 +16,11 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import StageError
 from wakewise.core.interfaces import Progress
-from wakewise.core.run_lock import half_done
+from wakewise.core.run_lock import temporary_prefix
 from wakewise.vision.reconstruction.cells import CellMeans
 from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud
 from wakewise.vision.reconstruction.depth_store import DepthStore
-from wakewise.vision.reconstruction.fusion import facing_normals, fuse, lonely
+from wakewise.vision.reconstruction.fusion import facing_normals, fuse, outlier_mask
 from wakewise.vision.reconstruction.masks import masked
 from wakewise.vision.reconstruction.photos import Image, PhotoStore
 from wakewise.vision.reconstruction.registered_photos import (
@@ -67,7 +67,7 @@ def densify(
     scale = _scale(views, region, settings)
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)  # the threads are over photos and pairs
-    with tempfile.TemporaryDirectory(prefix=half_done("depths"), dir=out.parent) as scratch:
+    with tempfile.TemporaryDirectory(prefix=temporary_prefix("depths"), dir=out.parent) as scratch:
         maps = DepthStore(Path(scratch))
         try:
             given = store or PhotoStore(folder)
@@ -185,7 +185,7 @@ def _fuse_all(
         gathered.add(rows)
     cloud, _ = gathered.means()
     del gathered  # as large as the cloud and half as large again
-    return cloud[~lonely(cloud[:, :3], threads=settings.threads)]
+    return cloud[~outlier_mask(cloud[:, :3], threads=settings.threads)]
 
 
 def in_order(work: Callable[[T], S], items: Iterable[T], threads: int) -> Iterator[S]:

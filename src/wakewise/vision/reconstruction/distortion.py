@@ -16,12 +16,12 @@ WIDEST = np.radians(89.0)
 """Angle from the axis of a fisheye's outermost rays: beyond, a direction has no slope."""
 
 
-def bent(slopes: Array, params: Array, *, fisheye: bool) -> Array:
+def distort(slopes: Array, params: Array, *, fisheye: bool) -> Array:
     """Images, shape (n, 2), of slopes, shape (n, 2), by a lens of four parameters."""
     return _fisheye(slopes, params) if fisheye else _brown(slopes, params)
 
 
-def straight(images: Array, params: Array, *, fisheye: bool) -> Array:
+def undistort(images: Array, params: Array, *, fisheye: bool) -> Array:
     """Slopes, shape (n, 2), that a lens of four parameters brings to these images, shape (n, 2).
 
     Where the lens folds the image over, or a fisheye sees sideways, there is none; what comes out is finite.

@@ -14,10 +14,10 @@ import numpy as np
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import Progress
-from wakewise.core.run_lock import half_done
-from wakewise.vision.reconstruction.colmap import call, pycolmap, settle, workroom
+from wakewise.core.run_lock import temporary_prefix
+from wakewise.vision.reconstruction.colmap import call, database_folder, pycolmap, settle
 from wakewise.vision.reconstruction.guided import Poses, match_by_poses
-from wakewise.vision.reconstruction.image_retrieval import like_pairs, read_looks
+from wakewise.vision.reconstruction.image_retrieval import read_descriptors, retrieve_pairs
 from wakewise.vision.reconstruction.lens_groups import LensGroup, group_photos
 from wakewise.vision.reconstruction.lenses import Lens
 from wakewise.vision.reconstruction.masks import write_for_colmap
@@ -92,7 +92,7 @@ def match_photos(
     _check_pairs(names, pairs)
     pycolmap.set_random_seed(RANDOM_SEED)
     size = database_bytes(len(photos), len(pairs) + look_alikes * len(photos), settings)
-    with whole_file(database) as whole, workroom(database, size) as room:
+    with whole_file(database) as whole, database_folder(database, size) as room:
         work = room / "database.db"
         work.touch()
         lenses = group_photos(photos, lenses=lens) if groups is None else groups
@@ -100,7 +100,7 @@ def match_photos(
         _extract(store, lenses, work, settings, focal_px, progress, room)
         _check_all_there(work, folder, names)
         if look_alikes:
-            pairs = sorted({*pairs, *like_pairs(read_looks(work), look_alikes)})
+            pairs = sorted({*pairs, *retrieve_pairs(read_descriptors(work), look_alikes)})
         left = pairs if poses is None else match_by_poses(work, pairs, poses, settings.threads, progress)
         match_pairs(work, settings, left, progress)
         figures = _figures(work, len(photos)) | {"pairs": len(pairs), "posed_pairs": len(pairs) - len(left)}
@@ -277,7 +277,7 @@ def match_pairs(
     done = 0
     for batch in _batches(pairs, min(MATCHING_BATCHES, -(-len(pairs) // LEAST_PAIRS))):
         progress(done, len(pairs), "matches")
-        with tempfile.TemporaryDirectory(prefix=half_done("pairs"), dir=database.parent) as scratch:
+        with tempfile.TemporaryDirectory(prefix=temporary_prefix("pairs"), dir=database.parent) as scratch:
             listing = Path(scratch) / "pairs.txt"
             listing.write_text("".join(f"{ids[a]} {ids[b]}\n" for a, b in batch), encoding="utf-8")
             pairing.match_list_path = str(listing)

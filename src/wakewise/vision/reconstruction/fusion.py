@@ -181,7 +181,7 @@ def fuse(
     return _gather(mean, votes, against, own.wanted, own.colours, camera, agreeing)
 
 
-def lonely(points_m: Array, neighbours: int = 12, sigmas: float = 2.0, threads: int = 1) -> BoolArray:
+def outlier_mask(points_m: Array, neighbours: int = 12, sigmas: float = 2.0, threads: int = 1) -> BoolArray:
     """Which points are outliers: their mean distance to their nearest neighbours is far above the usual.
 
     R. B. Rusu et al., Towards 3D point cloud based object maps for household environments, Robotics and Autonomous

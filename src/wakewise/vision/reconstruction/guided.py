@@ -111,7 +111,7 @@ def match_by_poses(
             return None
         matches = match_pair(a, b, pose)
         fitted, right = verify(a.xy[matches[:, 0]], b.xy[matches[:, 1]], pose, max(focal[name] for name in pair))
-        return (matches[right], fitted) if trusted(right, pose, fitted) else None
+        return (matches[right], fitted) if pose_supported(right, pose, fitted) else None
 
     found = []
     for done, result in enumerate(in_order(one, pairs, threads)):
@@ -293,7 +293,7 @@ def _sampson(E: Array, one: Array, two: Array, products: Array, focal_px: float)
     return (products @ E.ravel()) * per_px, per_px
 
 
-def trusted(inliers: BoolArray, known: RelativePose, fitted: RelativePose) -> bool:
+def pose_supported(inliers: BoolArray, known: RelativePose, fitted: RelativePose) -> bool:
     """Whether a pair's matches bear out its pose: enough of them, most of all, and to a turn that is near the known.
 
     Far from it the band held a few matches by luck, and among all features there are more.

@@ -45,7 +45,7 @@ class ImageDescriptors:
         return found
 
 
-def read_looks(database: Path) -> ImageDescriptors:
+def read_descriptors(database: Path) -> ImageDescriptors:
     """Looks of every photograph in COLMAP's database."""
     link = pycolmap.Database.open(database)
     try:
@@ -61,7 +61,7 @@ def read_looks(database: Path) -> ImageDescriptors:
     return ImageDescriptors(names=tuple(image.name for image in images), vectors=vectors)
 
 
-def like_pairs(looks: ImageDescriptors, most: int = LOOK_ALIKES) -> Pairs:
+def retrieve_pairs(looks: ImageDescriptors, most: int = LOOK_ALIKES) -> Pairs:
     """Each photograph with those that look most like it."""
     likeness = looks.likeness()
     found = set()

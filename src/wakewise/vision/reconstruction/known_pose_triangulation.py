@@ -15,7 +15,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import StageError
 from wakewise.core.interfaces import Progress
-from wakewise.vision.reconstruction.colmap import be_quiet, pycolmap
+from wakewise.vision.reconstruction.colmap import pycolmap, silence_logging
 from wakewise.vision.reconstruction.guided import Poses
 from wakewise.vision.reconstruction.registered_photos import MIN_SHARED, RegionOfInterest
 from wakewise.vision.reconstruction.settings import RANDOM_SEED
@@ -48,7 +48,7 @@ def map_at_poses(database: Path, poses: Poses, photos: int, progress: Progress) 
     photos : int
         How many there are, for the progress.
     """
-    be_quiet()
+    silence_logging()
     link = pycolmap.Database.open(database)
     try:
         options = pycolmap.DatabaseCacheOptions()
@@ -82,7 +82,7 @@ def map_at_poses(database: Path, poses: Poses, photos: int, progress: Progress) 
     return FixedPoseModel(model=model, kept_pct=100.0 * model.compute_num_observations() / matched if matched else None)
 
 
-def common_sight(model: pycolmap.Reconstruction) -> RegionOfInterest | None:
+def common_region(model: pycolmap.Reconstruction) -> RegionOfInterest | None:
     """What all cameras look at, where most see too few sparse points to tell; None where they do, or look about.
 
     Raises

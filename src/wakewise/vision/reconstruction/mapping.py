@@ -17,15 +17,20 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_folder
 from wakewise.core.interfaces import Progress
 from wakewise.vision.evaluation import robust_similarity
-from wakewise.vision.reconstruction.colmap import call, no_stderr, pycolmap, settle, workroom
+from wakewise.vision.reconstruction.colmap import call, database_folder, no_stderr, pycolmap, settle
 from wakewise.vision.reconstruction.guided import Poses
 from wakewise.vision.reconstruction.known_pose_triangulation import map_at_poses
-from wakewise.vision.reconstruction.model_quality import doubts, evidence, few_doubts, known_doubts
+from wakewise.vision.reconstruction.model_quality import (
+    evidence,
+    known_pose_warnings,
+    quality_warnings,
+    registration_warnings,
+)
 from wakewise.vision.reconstruction.per_photo_intrinsics import (
     LEAST_POINTS,
     PerPhotoIntrinsics,
-    heaps,
-    own_lenses,
+    fit_per_photo_intrinsics,
+    focal_clusters,
     set_cameras,
 )
 from wakewise.vision.reconstruction.photos import PhotoStore
@@ -100,7 +105,7 @@ def map_photos(
     StageError
         If too few photos register or the model cannot be aligned.
     """
-    with workroom(sparse, 4.0 * database.stat().st_size) as room:
+    with database_folder(sparse, 4.0 * database.stat().st_size) as room:
         # A copy, as even reading makes COLMAP write into it.
         copy = Path(shutil.copyfile(database, room / "database.db"))
         if settings.position_priors and references is not None:
@@ -126,7 +131,7 @@ def map_photos(
             )
         own, regrouped = None, None
         if settings.lens_check and photos >= LEAST_FOR_CHECK and given is None:
-            own = own_lenses(folder, copy, room, settings, photos, progress)
+            own = fit_per_photo_intrinsics(folder, copy, room, settings, photos, progress)
             regrouped = _by_own_lens(copy, own) if settings.refine_camera else None
             if regrouped is not None:
                 set_cameras(copy, regrouped)
@@ -141,13 +146,13 @@ def map_photos(
             _tighten(model, settings)
         cut_pct = 100.0 * (1.0 - model.compute_num_observations() / max(before, 1))
         found = evidence(model, copy)
-        left = left_out(model, copy)
+        left = unregistered_photos(model, copy)
     opinion_pct = None if own is None else _second_opinion_pct(model, own)
     if given is None:
-        wrong = few_doubts(registered, photos) + doubts(found, uncut_px=uncut_px, cut_pct=cut_pct)
-        wrong += lens_doubts(model, own, opinion_pct)
+        wrong = registration_warnings(registered, photos) + quality_warnings(found, uncut_px=uncut_px, cut_pct=cut_pct)
+        wrong += lens_warnings(model, own, opinion_pct)
     else:
-        wrong = known_doubts(found, error_px=uncut_px, kept_pct=given.kept_pct)
+        wrong = known_pose_warnings(found, error_px=uncut_px, kept_pct=given.kept_pct)
     figures: dict[str, Any] = {
         "cameras_rmse_mm": None,
         "cameras_max_mm": None,
@@ -202,7 +207,7 @@ def _by_own_lens(database: Path, own: PerPhotoIntrinsics) -> list[tuple[tuple[st
     out = []
     for number, camera in cameras.items():
         names = [image.name for image in images if image.camera_id == number]
-        parts = heaps({name: own.lenses[name] for name in names if name in own.lenses})
+        parts = focal_clusters({name: own.lenses[name] for name in names if name in own.lenses})
         if len(parts) > 1:
             placed = {name for part in parts for name in part}
             out += [(part, camera) for part in parts] + [((name,), camera) for name in names if name not in placed]
@@ -224,7 +229,9 @@ def _second_opinion_pct(model: pycolmap.Reconstruction, own: PerPhotoIntrinsics)
     return 100.0 * float(np.sqrt((error**2).mean()) / np.sqrt(((b - b.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 
-def lens_doubts(model: pycolmap.Reconstruction, own: PerPhotoIntrinsics | None, opinion_pct: float | None) -> list[str]:
+def lens_warnings(
+    model: pycolmap.Reconstruction, own: PerPhotoIntrinsics | None, opinion_pct: float | None
+) -> list[str]:
     """Reasons not to trust a model that come from mapping with a lens for each photo."""
     if own is None:
         return []
@@ -259,7 +266,7 @@ def _lenses(model: pycolmap.Reconstruction) -> list[dict[str, Any]]:
     return sorted(out, key=lambda one: str(one["photos"][0]))
 
 
-def left_out(model: pycolmap.Reconstruction, database: Path) -> list[dict[str, Any]]:
+def unregistered_photos(model: pycolmap.Reconstruction, database: Path) -> list[dict[str, Any]]:
     """Each photo that found no place, with the photo that it shares most verified matches with."""
     placed = {image.name for image in model.images.values() if image.has_pose}
     link = pycolmap.Database.open(database)

@@ -16,7 +16,7 @@ from scipy.spatial import KDTree
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.core.run_lock import alone, half_done
+from wakewise.core.run_lock import exclusive_run, temporary_prefix
 from wakewise.vision.reconstruction.clouds import read_cloud, write_cloud, write_mesh
 from wakewise.vision.reconstruction.colmap import call_apart, pycolmap
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
@@ -63,7 +63,7 @@ def mesh_points(
     options.color = False
     # Its threads wait for each other by spinning: two took 8 times as long as one (measured, 430,000 points, depth 8).
     options.num_threads = 1
-    with tempfile.TemporaryDirectory(prefix=half_done("mesh"), dir=out.parent) as scratch:
+    with tempfile.TemporaryDirectory(prefix=temporary_prefix("mesh"), dir=out.parent) as scratch:
         raw, points = Path(scratch) / "poisson.ply", dense
         if len(cloud.points_m) < len(whole.points_m):
             points = Path(scratch) / "points.ply"
@@ -81,7 +81,7 @@ def mesh_points(
     faces = faces[near[faces].all(axis=1)]
     if len(faces) == 0:
         raise StageError("mesh: none of the surface lies near the dense points")
-    faces = without_crumbs(faces, len(vertices))
+    faces = drop_small_components(faces, len(vertices))
     used, index = np.unique(faces, return_inverse=True)
     colours = cloud.colours[nearest[used]].mean(axis=1)
     write_mesh(out, vertices[used], index.reshape(faces.shape), colours)
@@ -112,7 +112,7 @@ def mesh_model(
     if not known or not dense.is_file():
         raise InputError(f"{out}: holds no dense points of a reconstruction (dense.ply, stages/dense.json)")
     spacing = 1e-3 * known["figures"]["point_spacing_mm"]
-    with nullcontext() if held else alone(out):
+    with nullcontext() if held else exclusive_run(out):
         return run_stage(
             out,
             "mesh",
@@ -122,7 +122,7 @@ def mesh_model(
         )
 
 
-def without_crumbs(faces: IntArray, vertices: int, share: float = 0.005) -> IntArray:
+def drop_small_components(faces: IntArray, vertices: int, share: float = 0.005) -> IntArray:
     """Faces, shape (m, 3), less those of pieces with fewer faces than this share of the largest piece's."""
     edges = np.concatenate([faces[:, :2], faces[:, 1:]])
     graph = coo_array((np.ones(len(edges), dtype=np.int8), (edges[:, 0], edges[:, 1])), shape=(vertices, vertices))

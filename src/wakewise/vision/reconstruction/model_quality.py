@@ -72,7 +72,7 @@ def evidence(model: pycolmap.Reconstruction, database: Path) -> ModelEvidence:
     )
 
 
-def doubts(found: ModelEvidence, *, uncut_px: float, cut_pct: float) -> list[str]:
+def quality_warnings(found: ModelEvidence, *, uncut_px: float, cut_pct: float) -> list[str]:
     """Each reason not to trust a model, in words with its figure; none if it may be trusted."""
     out = []
     if found.observations_per_photo < LEAST_OBSERVATIONS:
@@ -104,7 +104,7 @@ def doubts(found: ModelEvidence, *, uncut_px: float, cut_pct: float) -> list[str
     return out
 
 
-def few_doubts(registered: int, photos: int) -> list[str]:
+def registration_warnings(registered: int, photos: int) -> list[str]:
     """The reason not to trust a model that leaves most photographs out, if it does."""
     if registered >= LEAST_REGISTERED * photos:
         return []
@@ -113,7 +113,7 @@ def few_doubts(registered: int, photos: int) -> list[str]:
     ]
 
 
-def known_doubts(found: ModelEvidence, *, error_px: float, kept_pct: float | None) -> list[str]:
+def known_pose_warnings(found: ModelEvidence, *, error_px: float, kept_pct: float | None) -> list[str]:
     """Reasons not to trust cameras that were given and kept: what the photographs' features say of them."""
     if kept_pct is None or (found.agreeing_pairs_pct is None and kept_pct < LEAST_KEPT_PCT):
         return ["nothing in the photos confirms the cameras that were given: hardly any features match between them"]

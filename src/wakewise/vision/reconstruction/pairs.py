@@ -53,12 +53,12 @@ def choose_pairs(
         if axes_W is not None and all(name in axes_W for name in names):
             axes = np.array([axes_W[name] for name in names])
         return pose_pairs(names, centres, axes, neighbours)
-    if settings.matching == "sequential" or by_looks(len(names), settings):
+    if settings.matching == "sequential" or uses_retrieval(len(names), settings):
         return sequence_pairs(names, SEQUENCE_OVERLAP)
     return list(combinations(names, 2))
 
 
-def by_looks(photos: int, settings: ReconstructionSettings) -> bool:
+def uses_retrieval(photos: int, settings: ReconstructionSettings) -> bool:
     """Whether photos that look alike are matched as well, which is known only when they have features."""
     return settings.matching == "look-alike" or (settings.matching == "auto" and photos > EXHAUSTIVE_UP_TO)
 

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.interfaces import Progress
-from wakewise.core.run_lock import half_done
+from wakewise.core.run_lock import temporary_prefix
 from wakewise.vision.reconstruction.clouds import read_cloud, write_cloud
 from wakewise.vision.reconstruction.colmap import call, pycolmap
 from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
@@ -58,7 +58,7 @@ def patch_match(
     StageError
         If no points come out.
     """
-    with tempfile.TemporaryDirectory(prefix=half_done("patch-match"), dir=out.parent) as scratch:
+    with tempfile.TemporaryDirectory(prefix=temporary_prefix("patch-match"), dir=out.parent) as scratch:
         work = Path(scratch) / "work"
         call(partial(pycolmap.undistort_images, work, sparse, folder), "dense", lambda: progress(0, 3, "undistort"))
         options = pycolmap.PatchMatchOptions()

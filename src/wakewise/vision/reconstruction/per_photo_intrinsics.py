@@ -45,7 +45,7 @@ class PerPhotoIntrinsics:
     centres: dict[str, Array]
 
 
-def own_lenses(
+def fit_per_photo_intrinsics(
     folder: Path, database: Path, scratch: Path, settings: ReconstructionSettings, photos: int, progress: Progress
 ) -> PerPhotoIntrinsics:
     """Map with a lens for each photo.
@@ -112,7 +112,7 @@ def _like(camera: pycolmap.Camera) -> pycolmap.Camera:
     return new
 
 
-def heaps(own: dict[str, PhotoIntrinsics]) -> list[tuple[str, ...]]:
+def focal_clusters(own: dict[str, PhotoIntrinsics]) -> list[tuple[str, ...]]:
     """Photos by lens: one group where focal lengths scatter, several where they lie in heaps well apart.
 
     A photo that rests on few points goes where its focal length is nearest. The best cut of the sorted logarithms in

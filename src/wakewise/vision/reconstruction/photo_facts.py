@@ -16,7 +16,7 @@ from wakewise.vision.reconstruction.lenses import lens_of
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PhotoFact:
+class PhotoStatistics:
     """One photo. R_WC and p_WC: turn and place in the model, None without a place; observations: sparse points that it
     sees; error_px: their mean error; fov_deg: down the picture; aspect: width over height.
     """
@@ -33,10 +33,10 @@ class PhotoFact:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ModelFacts:
+class ModelStatistics:
     """All photos by name, verified matches of each pair, shape (n, n), sparse points, shape (m, 3), and colours."""
 
-    photos: tuple[PhotoFact, ...]
+    photos: tuple[PhotoStatistics, ...]
     matches: IntArray
     points: Array
     colours: Array
@@ -45,7 +45,7 @@ class ModelFacts:
         freeze(self, points=(None, 3), colours=(None, 3))
 
 
-def model_facts(model: Path) -> ModelFacts:
+def model_facts(model: Path) -> ModelStatistics:
     """Read sparse/ and database.db of a model's folder.
 
     Raises
@@ -77,7 +77,7 @@ def model_facts(model: Path) -> ModelFacts:
         for image in listed
     )
     points = list(sparse.points3D.values())
-    return ModelFacts(
+    return ModelStatistics(
         photos=photos,
         matches=matches,
         points=np.array([point.xyz for point in points]).reshape(-1, 3),
@@ -91,7 +91,7 @@ def _fact(
     sparse: pycolmap.Reconstruction,
     camera: pycolmap.Camera,
     features: int,
-) -> PhotoFact:
+) -> PhotoStatistics:
     own = camera if image is None else image.camera
     try:
         focal_y = float(lens_of(own).params[1])
@@ -99,13 +99,13 @@ def _fact(
         focal_y = float(own.mean_focal_length())
     size = {"fov_deg": float(np.degrees(2 * np.arctan(0.5 * own.height / focal_y))), "aspect": own.width / own.height}
     if image is None:
-        return PhotoFact(
+        return PhotoStatistics(
             name=name, R_WC=None, p_WC=None, features=features, observations=0, error_px=None, focal_px=focal_y, **size
         )
     pose = image.cam_from_world().matrix()
     # The mean error of a point stands for its error in each photo that sees it.
     errors = [sparse.points3D[p.point3D_id].error for p in image.points2D if p.has_point3D()]
-    return PhotoFact(
+    return PhotoStatistics(
         name=name,
         R_WC=np.ascontiguousarray(pose[:, :3].T),
         p_WC=np.asarray(image.projection_center()),

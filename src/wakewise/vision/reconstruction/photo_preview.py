@@ -21,7 +21,7 @@ from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.vision.reconstruction.dense import in_order
-from wakewise.vision.reconstruction.photos import Image, PhotoStore, passed_over, read_photos
+from wakewise.vision.reconstruction.photos import Image, PhotoStore, read_photos, unsupported_files
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.sift import Features, photo_features
 from wakewise.vision.reconstruction.video_frames import sharpness_of
@@ -93,7 +93,9 @@ class _Seen:
     size: tuple[int, int]
 
 
-def look_at(folder: Path, threads: int = 2, progress: Progress = no_progress) -> tuple[PhotoPreview, dict[str, bytes]]:
+def preview_photos(
+    folder: Path, threads: int = 2, progress: Progress = no_progress
+) -> tuple[PhotoPreview, dict[str, bytes]]:
     """Look at a folder of photographs; also small JPEG copies of them, by name.
 
     Raises
@@ -125,7 +127,7 @@ def look_at(folder: Path, threads: int = 2, progress: Progress = no_progress) ->
                 matched[pair] = rows
     finally:
         cv2.setNumThreads(before)
-    look = _judged(names, [(p.width, p.height) for p in found], seen, matched, len(pairs), passed_over(folder))
+    look = _judged(names, [(p.width, p.height) for p in found], seen, matched, len(pairs), unsupported_files(folder))
     return look, {name: one.thumb for name, one in zip(names, seen, strict=True)}
 
 

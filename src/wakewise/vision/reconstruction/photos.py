@@ -153,7 +153,7 @@ def _below(folder: Path) -> list[Path]:
     ]
 
 
-def passed_over(folder: Path) -> dict[str, int]:
+def unsupported_files(folder: Path) -> dict[str, int]:
     """How many files beside the photographs hold pictures that are not read, by kind: video, HEIC, RAW, others.
 
     In the folder itself, and in those in it where the photographs lie in them.

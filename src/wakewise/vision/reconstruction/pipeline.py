@@ -14,7 +14,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_json
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.core.run_lock import alone
+from wakewise.core.run_lock import exclusive_run
 from wakewise.vision.reconstruction.guided import Poses
 from wakewise.vision.reconstruction.image_retrieval import LOOK_ALIKES
 from wakewise.vision.reconstruction.known_cameras import KnownCameras, match_known
@@ -24,15 +24,15 @@ from wakewise.vision.reconstruction.mapping import MAPPINGS
 from wakewise.vision.reconstruction.masks import read_masks
 from wakewise.vision.reconstruction.meshing import FIGURES as MESH_FIGURES
 from wakewise.vision.reconstruction.meshing import mesh_model
-from wakewise.vision.reconstruction.pairs import BAND_NEIGHBOURS, POSE_NEIGHBOURS, by_looks, choose_pairs
+from wakewise.vision.reconstruction.pairs import BAND_NEIGHBOURS, POSE_NEIGHBOURS, choose_pairs, uses_retrieval
 from wakewise.vision.reconstruction.patchmatch import require_cuda
-from wakewise.vision.reconstruction.photos import Photo, PhotoStore, passed_over, read_photos, without_duplicates
+from wakewise.vision.reconstruction.photos import Photo, PhotoStore, read_photos, unsupported_files, without_duplicates
 from wakewise.vision.reconstruction.references import match_references
 from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise.vision.reconstruction.request import ReconstructionRequest
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.stage_keys import stage_key
-from wakewise.vision.reconstruction.stages import StageResult, make_folder, run_stage, withdraw
+from wakewise.vision.reconstruction.stages import StageResult, invalidate_stage, make_folder, run_stage
 from wakewise.vision.reconstruction.steps import dense_step, map_step, match_step, scale_step
 
 LATER = ("scale_bars", "scale_fixes", "dense_points", "depth_maps", "point_spacing_mm", *MESH_FIGURES)
@@ -232,12 +232,12 @@ def reconstruct(
     begun = None if poses is None else {n: [*R.ravel().tolist(), *p.tolist()] for n, (R, p) in poses.items()}
     near = POSE_NEIGHBOURS if poses is None else BAND_NEIGHBOURS
     listed = choose_pairs(names, settings, references, axes, near) if pairs is None else [(a, b) for a, b in pairs]
-    alike = LOOK_ALIKES if pairs is None and poses is None and by_looks(len(names), settings) else 0
+    alike = LOOK_ALIKES if pairs is None and poses is None and uses_retrieval(len(names), settings) else 0
     make_folder(out)
     database, sparse, dense = out / "database.db", out / "sparse", out / "dense.ply"
 
     results: dict[str, StageResult] = {}
-    with alone(out):
+    with exclusive_run(out):
         results["match"] = run_stage(
             out,
             "match",
@@ -279,7 +279,7 @@ def reconstruct(
         )
         bars, fixes = wishes.bars, wishes.fixes
         if bars is None and fixes is None:
-            withdraw(out, "scale", "map")
+            invalidate_stage(out, "scale", "map")
         else:
             results["scale"] = run_stage(
                 out,
@@ -313,7 +313,7 @@ def reconstruct(
     model = Model(
         images=len(found) + len(strangers),
         duplicates=duplicates,
-        passed_over=passed_over(photos),
+        passed_over=unsupported_files(photos),
         wall_s=time.perf_counter() - start,
         stages_s={name: result.wall_s for name, result in results.items()},
         skipped=tuple(name for name, result in results.items() if result.skipped),

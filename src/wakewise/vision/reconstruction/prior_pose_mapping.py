@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 
 from wakewise.core.interfaces import Progress
-from wakewise.vision.reconstruction.colmap import be_quiet, call, no_stderr, pycolmap
+from wakewise.vision.reconstruction.colmap import call, no_stderr, pycolmap, silence_logging
 from wakewise.vision.reconstruction.guided import Poses
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 
@@ -60,7 +60,7 @@ def map_from_poses(
     StageError
         If COLMAP fails.
     """
-    be_quiet()
+    silence_logging()
     link = pycolmap.Database.open(database)
     try:
         options = pycolmap.DatabaseCacheOptions()

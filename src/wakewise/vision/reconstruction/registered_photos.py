@@ -10,7 +10,7 @@ import numpy as np
 from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.errors import StageError
 from wakewise.vision.reconstruction.colmap import pycolmap
-from wakewise.vision.reconstruction.distortion import bent, straight
+from wakewise.vision.reconstruction.distortion import distort, undistort
 from wakewise.vision.reconstruction.lenses import lens_of
 
 # Stereo is best near this angle between two views: less is imprecise, more looks too different. The band is what was
@@ -71,13 +71,13 @@ class RegisteredPhoto:
         """Pixels, shape (n, 2), and depths, shape (n,), of points, shape (n, 3); pixels hold where the depth is > 0."""
         points = (np.asarray(points_W_m) - self.p_WC_m) @ self.R_CW.T
         xy = points[:, :2] / np.maximum(points[:, 2:], 1e-9)
-        images = bent(xy, np.append(self.radial, self.bend), fisheye=self.fisheye)
+        images = distort(xy, np.append(self.radial, self.bend), fisheye=self.fisheye)
         return self.focals_px * images + self.centre_px, points[:, 2]
 
     def rays(self, pixels: Array) -> Array:
         """Directions with unit z in the camera frame, shape (n, 3), of pixels, shape (n, 2), distortion undone."""
         images = (np.asarray(pixels) - self.centre_px) / self.focals_px
-        xy = straight(images, np.append(self.radial, self.bend), fisheye=self.fisheye)
+        xy = undistort(images, np.append(self.radial, self.bend), fisheye=self.fisheye)
         return np.concatenate([xy, np.ones((len(xy), 1))], axis=1)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.colmap import call, call_apart, pycolmap
 from wakewise.vision.reconstruction.features import match_pairs
-from wakewise.vision.reconstruction.image_retrieval import read_looks
+from wakewise.vision.reconstruction.image_retrieval import read_descriptors
 from wakewise.vision.reconstruction.pairs import Pairs
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 
@@ -129,7 +129,7 @@ def solve_again(
     count = len(names)
     if len(placed) == count or len(tried) == count * (count - 1) // 2:
         return models
-    looks = read_looks(database)
+    looks = read_descriptors(database)
     likeness = looks.likeness()
     one, two = np.triu_indices(count, 1)
     pairs: Pairs = []

@@ -70,7 +70,7 @@ def run_stage(
     return StageResult(figures=figures, wall_s=wall_s, key=key, skipped=False)
 
 
-def withdraw(folder: Path, name: str, changed: str) -> None:
+def invalidate_stage(folder: Path, name: str, changed: str) -> None:
     """Forget a stage that is no longer asked for; the stage whose files it changed is done again."""
     stamps = folder / "stages"
     if (stamps / f"{name}.json").exists():

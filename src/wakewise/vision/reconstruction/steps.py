@@ -11,7 +11,7 @@ from wakewise.vision.reconstruction.colmap import pycolmap
 from wakewise.vision.reconstruction.dense import densify
 from wakewise.vision.reconstruction.features import database_bytes, match_photos
 from wakewise.vision.reconstruction.guided import Poses
-from wakewise.vision.reconstruction.known_pose_triangulation import common_sight
+from wakewise.vision.reconstruction.known_pose_triangulation import common_region
 from wakewise.vision.reconstruction.lens_groups import LensGroup
 from wakewise.vision.reconstruction.mapping import map_photos
 from wakewise.vision.reconstruction.pairs import Pairs
@@ -109,7 +109,7 @@ def dense_step(
 ) -> dict[str, Any]:
     """sparse/ to dense.ply, cut to a box; see `dense.densify`. `fixed`: the poses are known and stay."""
     if fixed and region is None:
-        region = common_sight(pycolmap.Reconstruction(sparse))
+        region = common_region(pycolmap.Reconstruction(sparse))
     if settings.dense == "patch-match":
         figures = patch_match(store.folder, sparse, dense, settings, region=region, progress=progress)
     else:

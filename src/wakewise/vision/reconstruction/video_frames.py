@@ -20,7 +20,7 @@ from wakewise.core.arrays import Array, IntArray
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_folder
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.core.run_lock import alone
+from wakewise.core.run_lock import exclusive_run
 from wakewise.vision.reconstruction.colmap import no_stderr
 from wakewise.vision.reconstruction.photos import Image
 from wakewise.vision.reconstruction.stages import fingerprint, make_folder, run_stage
@@ -94,7 +94,7 @@ def take_frames(film: Path, out: Path, progress: Progress = no_progress) -> tupl
         while block := file.read(1 << 22):
             digest.update(block)
     key = fingerprint(VERSION, digest.hexdigest(), STEP_SHARE, MOST_FRAMES)
-    with alone(out):
+    with exclusive_run(out):
         done = run_stage(out, "frames", key, (folder,), lambda: {"film": asdict(_take(film, folder, progress))})
     return folder, VideoFrames(**done.figures["film"])
 

@@ -163,7 +163,7 @@ def _gains(linear: Array) -> Array:
     return np.asarray(gains * min(_MIDDLE / max(float(middle), 1e-6), _WHITE / max(float(high), 1e-6)))
 
 
-def without_water(image: Photo8, range_m: NDArray[np.float32], fit: WaterFit) -> Photo8:
+def remove_water(image: Photo8, range_m: NDArray[np.float32], fit: WaterFit) -> Photo8:
     """The photograph as it would be without the water between.
 
     Parameters
@@ -187,7 +187,7 @@ def without_water(image: Photo8, range_m: NDArray[np.float32], fit: WaterFit) ->
     return srgb_bytes(srgb_encode(linear))
 
 
-def balanced(image: Photo8) -> Photo8:
+def white_balanced(image: Photo8) -> Photo8:
     """A photograph without ranges, its colour cast taken away and its contrast stretched; same shape."""
     linear = srgb_decode(image).astype(np.float64)
     mean = linear.reshape(-1, 3).mean(axis=0)

@@ -26,7 +26,7 @@ from wakewise.core.size_limits import picture_depth
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import read_photos
 from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto, read_views
-from wakewise.vision.texturing.colour import WaterFit, balanced, fit_water, without_water
+from wakewise.vision.texturing.colour import WaterFit, fit_water, remove_water, white_balanced
 
 FIT_PHOTOS = 16
 """Photographs, spread over the set, that the water is fitted to."""
@@ -141,9 +141,9 @@ def correct_photos(
         if path.exists():
             continue
         if fit is not None and depths is not None and known:
-            shown = without_water(image, depths.ranges_m(name, image.shape[:2]), fit)
+            shown = remove_water(image, depths.ranges_m(name, image.shape[:2]), fit)
         else:
-            shown = balanced(image)
+            shown = white_balanced(image)
         with whole_file(path) as temporary:
             jpeg = cv2.imencode(".jpg", np.ascontiguousarray(shown[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
             temporary.write_bytes(jpeg[1].tobytes())

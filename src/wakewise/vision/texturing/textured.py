@@ -64,13 +64,13 @@ def write_textured(
     colours, seen = vertex_colours(vertices, faces, views, photos, progress)
     if not seen.any():
         raise StageError(f"{model / 'mesh.ply'}: no photograph sees it")
-    colours = filled(colours, seen, faces)
+    colours = fill_unseen_colours(colours, seen, faces)
     # As light as a viewer can show it: what water and a short exposure leave is dark.
     brightest = colours.max(axis=1)
     colours = colours * min(
         _MIDDLE / max(float(np.median(brightest)), 1e-6), 0.9 / max(float(np.quantile(brightest, 0.99)), 1e-6)
     )
-    mesh = trimesh.Trimesh(standing(vertices, bed_z_m), faces, process=False)
+    mesh = trimesh.Trimesh(y_up_vertices(vertices, bed_z_m), faces, process=False)
     # glTF has colours in linear light; without a material of its own it takes a mesh for bare metal.
     rgba = np.concatenate([np.round(255 * np.clip(colours, 0, 1)), np.full((len(colours), 1), 255)], axis=1)
     mesh.visual = trimesh.visual.TextureVisuals(
@@ -110,7 +110,7 @@ def read_textured(path: Path) -> tuple[Array, IntArray, Array]:
     return vertices, column(primitive["indices"], "<u4", 1).astype(np.int64).reshape(-1, 3), colours
 
 
-def standing(vertices_m: Array, bed_z_m: float | None) -> Array:
+def y_up_vertices(vertices_m: Array, bed_z_m: float | None) -> Array:
     """Vertices with y up, as GLB has it, of a model in NED; unchanged without a bed."""
     if bed_z_m is None:
         return vertices_m
@@ -161,7 +161,7 @@ def vertex_colours(
     return total / np.maximum(weight, 1e-300)[:, None], seen
 
 
-def filled(colours: Array, seen: NDArray[np.bool_], faces: IntArray) -> Array:
+def fill_unseen_colours(colours: Array, seen: NDArray[np.bool_], faces: IntArray) -> Array:
     """Colours in which vertices that nothing saw take the mean of neighbours that have one, ring by ring.
 
     A neighbour counts once for each face it shares.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, print_json, shown, write_page
+from wakewise.ui.cli.console import ProgressBars, format_value, print_json, write_page
 from wakewise.ui.cli.options import Json
 from wakewise_ardusub.cli import link_ardusub, link_script, link_share, link_sitl
 from wakewise_ardusub.cli.link_points import Ahead, Points, WakeModelName, region_ahead, region_words
@@ -120,7 +120,7 @@ def _hindsight(
     """Flown thrusts against others, or why there is none; a vehicle that was named must fit, the default may not."""
     from wakewise import wake
     from wakewise.core.errors import InputError
-    from wakewise_ardusub.logs.replay_allocation import hindsight
+    from wakewise_ardusub.logs.replay_allocation import replay_log
 
     model = wake.wake_model(wake_model)
     if found.identity.is_other:
@@ -133,7 +133,7 @@ def _hindsight(
     if "servo" not in found.series:
         return None, "the log holds no servo outputs"
     try:
-        return hindsight(table.rows, found.parameters, vehicle, region, model), None
+        return replay_log(table.rows, found.parameters, vehicle, region, model), None
     except InputError as fault:
         if named:
             raise
@@ -162,13 +162,13 @@ def _show(facts: dict[str, Any], folder: Path, page: bool) -> None:
         f"time            {facts['duration_s']:.0f} s, armed {facts['armed_s']:.0f} s; {modes or 'no mode said'}"
     )
     what = "height" if "height_max_m" in facts else "depth"
-    typer.echo(f"{what:16}{shown(facts[f'{what}_max_m'])} m at most, from {facts['depth_from'] or 'nothing'}")
+    typer.echo(f"{what:16}{format_value(facts[f'{what}_max_m'])} m at most, from {facts['depth_from'] or 'nothing'}")
     if "why_no_hindsight" in facts:
         typer.echo(f"thrusters       {facts['why_no_hindsight']}")
     elif not facts["running_s"]:
         typer.echo("thrusters       none ran, so there is nothing to spare")
     else:
-        flown, least, gentle = (shown(facts[f"disturbance_{k}"]) for k in ("flown", "least", "gentle"))
+        flown, least, gentle = (format_value(facts[f"disturbance_{k}"]) for k in ("flown", "least", "gentle"))
         typer.echo(f"thrusters       ran {facts['running_s']:.0f} s as {facts['vehicle']}'s")
         typer.echo(f"mean D          {flown} (m/s)^2 as flown, {least} with least thrusts, {gentle} with gentle ones")
         if facts["saved_pct"] is not None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, plain, print_json, print_table
+from wakewise.ui.cli.console import ProgressBars, escaped, print_json, print_table
 
 if TYPE_CHECKING:
     from wakewise_ardusub.link.checks import CheckInputs, CheckResult
@@ -196,7 +196,7 @@ def _show(rows: tuple[CheckResult, ...], said: str, facts: CheckInputs) -> None:
     for column in ("", "what", "asked for", "found", "what to do"):
         table.add_column(column, overflow="fold")
     for row in rows:
-        table.add_row(_MARKS[row.verdict], *(plain(words) for words in (row.what, row.asked, row.found, row.do)))
+        table.add_row(_MARKS[row.verdict], *(escaped(words) for words in (row.what, row.asked, row.found, row.do)))
     print_table(table)
     wrong = sum(row.verdict == "no-go" for row in rows)
     open_rows = sum(row.verdict == "unknown" and row.needed for row in rows)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import print_json, shown
+from wakewise.ui.cli.console import format_value, print_json
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
@@ -139,4 +139,4 @@ def _line(told: dict[str, Any]) -> str:
 def _value(value: Any) -> str:
     if isinstance(value, list):
         return " ".join(f"{x:.3f}" for x in value)
-    return f"{value:.3f}" if isinstance(value, float) else shown(value)
+    return f"{value:.3f}" if isinstance(value, float) else format_value(value)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, print_json, shown, status_line
+from wakewise.ui.cli.console import ProgressBars, format_value, print_json, status_line
 from wakewise.ui.cli.options import Json, Preset, ScenarioFile, Sets, Vehicle, World, overrides
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ def stand_in(
     need("wakewise link stand-in", "links", only=("pymavlink", "lupa"))
     from wakewise.robot.importers import any_vehicle
     from wakewise_ardusub.sitl.own_parameters import own_parameters, read_params
-    from wakewise_ardusub.sitl.scripted_ground_station import ScriptedGroundStation, carry_to
+    from wakewise_ardusub.sitl.scripted_ground_station import ScriptedGroundStation, route_messages
     from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
     from wakewise_ardusub.sitl.udp_endpoints import UdpEndpoint, UdpPhysics, run
 
@@ -207,7 +207,7 @@ def stand_in(
         held.callback(behind.close)
         for link in links:
             held.callback(link.close)
-        turn = ScriptedGroundStation(made, carry_to(made, links)).turn if pilot else None
+        turn = ScriptedGroundStation(made, route_messages(made, links)).turn if pilot else None
         run(made, behind, links, _until(seconds), turn=turn, said=lambda: status_line(_stand_in_line(made)))
     if json:
         print_json(_stand_in_facts(made))
@@ -283,7 +283,7 @@ def _physics_line(figures: PhysicsFigures, depths: DepthMonitor | None) -> str:
     pulses = " ".join(str(pulse) for pulse in figures.pulses_us[:8])
     where = figures.stage or ("" if depths is None else depths.words)
     return (
-        f"{shown(figures.rate_hz)} Hz, {figures.lost} lost, {figures.repeats} repeated, {figures.refused} refused; "
+        f"{format_value(figures.rate_hz)} Hz, {figures.lost} lost, {figures.repeats} repeated, {figures.refused} refused; "
         f"t {figures.time_s:.1f} s, depth {figures.depth_m or 0.0:.2f} m{', ' if where else ''}{where}; pulses {pulses}"
     )
 

@@ -159,10 +159,10 @@ def _run(work: MeterLoop) -> dict[str, Any]:
 def _write(path: Path, craft: VehicleSummary) -> None:
     from wakewise.core.errors import InputError
     from wakewise.core.files import write_text
-    from wakewise_ardusub.vehicle_summary import craft_json
+    from wakewise_ardusub.vehicle_summary import vehicle_summary_json
     from wakewise_ardusub.wash_savings import WashSavingsCalculator
 
-    text = craft_json(craft)
+    text = vehicle_summary_json(craft)
     if not WashSavingsCalculator.is_small(craft):
         raise InputError(
             f"--write {path}: vehicle {craft.name} has spare thrusters that cannot be looked at one by one; its meter "

@@ -62,7 +62,7 @@ def free_buttons(parameters: Mapping[str, float]) -> list[int]:
     ]
 
 
-def buttons_amiss(buttons: Mapping[str, int], parameters: Mapping[str, float]) -> str:
+def button_faults(buttons: Mapping[str, int], parameters: Mapping[str, float]) -> str:
     """The first of the companion's buttons at which the autopilot acts as well, in words; empty where there is none."""
     for what, button in buttons.items():
         words = conflict(button, what, parameters)

@@ -150,7 +150,7 @@ class Connection:
 
     def hear(self, kinds: Collection[str], timeout_s: float) -> Any:
         """The next message of these kinds that the vehicle's autopilot sent, None if none came in time."""
-        return heard_of(self, kinds, timeout_s)
+        return receive_kind(self, kinds, timeout_s)
 
     def send(self, name: str, **fields: Any) -> None:
         """Send a message by the name of pymavlink's encoder.
@@ -166,7 +166,7 @@ class Connection:
             raise EnvironmentFailure(f"{self.endpoint.words}: {fault.strerror or fault}") from None
 
 
-def heard_of(talk: MavlinkSession, kinds: Collection[str], timeout_s: float) -> Any:
+def receive_kind(talk: MavlinkSession, kinds: Collection[str], timeout_s: float) -> Any:
     """The next message of these kinds from the autopilot of a connection's vehicle, None if none came in time."""
     until = time.monotonic() + timeout_s
     while True:

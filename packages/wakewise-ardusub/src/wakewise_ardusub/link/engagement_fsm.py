@@ -32,7 +32,7 @@ FAULTS: tuple[Kind, ...] = (
 """What can be amiss, the gravest first."""
 REST_S = 1.0
 """How long a fault keeps consent from counting."""
-ACTS_WITHIN_S = 1.2
+ACTUATION_TIMEOUT_S = 1.2
 """From the first thrusts to a script that says that it acts: two of its reports and what they take."""
 
 
@@ -172,7 +172,7 @@ def faults(facts: EngagementInputs, limits: EngagementLimits, *, engaged: bool) 
             found["late"] = f"no thrusts from the controller for {f.thrusts_s:.2f} s"
         if not f.standstill_s <= m.standstill_s:
             found["stopped"] = f"this program stood still for {f.standstill_s:.2f} s"
-        if f.acts is False and f.engaged_s > ACTS_WITHIN_S and f.acts_s < f.engaged_s - ACTS_WITHIN_S:
+        if f.acts is False and f.engaged_s > ACTUATION_TIMEOUT_S and f.acts_s < f.engaged_s - ACTUATION_TIMEOUT_S:
             found["script"] = "the script does not act on the thrusts"
     low, high = m.depth_m
     figures: tuple[tuple[Kind, bool, str], ...] = (

@@ -35,7 +35,7 @@ _WHOLE, _FIRST = 30, 11
 _KEPT = 20_000
 
 
-def stilled(data: bytes) -> bytes:
+def neutralize_sticks(data: bytes) -> bytes:
     """A datagram with the sticks of each MANUAL_CONTROL let go; all else, noise too, stays as it is.
 
     One that is signed cannot be changed without its key and is left out.
@@ -153,7 +153,7 @@ class MavlinkRelay:
                     self._put(self._ground, data, station)
             else:
                 self._came_from(sender, began_s)
-                forward = stilled(data) if self._driving() else data
+                forward = neutralize_sticks(data) if self._driving() else data
                 if self._vehicle_at is None:
                     self.dropped += 1
                 elif forward:

@@ -1,8 +1,8 @@
 """What is known of a vehicle from the MAVLink messages that were heard: a record that each message leaves anew.
 
-`LinkState` is frozen and `heard` is pure, so that any sequence of messages can be played to it. Only what the vehicle's
-own autopilot says counts as its state; sticks count from whoever sends them to this vehicle, ground stations are told
-apart by their system id. A message that says nonsense changes nothing and is counted.
+`LinkState` is frozen and `update_link_state` is pure, so that any sequence of messages can be played to it. Only what
+the vehicle's own autopilot says counts as its state; sticks count from whoever sends them to this vehicle, ground
+stations are told apart by their system id. A message that says nonsense changes nothing and is counted.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import quat_from_euler
-from wakewise.operation.teleop.input.controls import CONTROL_AXES, shaped
+from wakewise.operation.teleop.input.controls import CONTROL_AXES, apply_dead_zone
 from wakewise_ardusub.link import protocol
 from wakewise_ardusub.logs.channels import MODES
 
@@ -168,7 +168,7 @@ WANTED = frozenset({
 """Messages that are looked into, here or in `measuring.py`."""
 
 
-def heard(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
+def update_link_state(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
     """What is known after a message."""
     known = replace(known, messages=known.messages + 1)
     if said.name not in WANTED:
@@ -329,7 +329,7 @@ def stick_axes(fields: Mapping[str, Any]) -> Array:
     axes += [math.nan if v == _NO_AXIS else v / 1000.0 for v in (r, s)]
     if any(abs(v) > 1.0 + 1e-9 for v in axes if math.isfinite(v)) or len(axes) != len(CONTROL_AXES):
         raise ValueError
-    return shaped(axes)
+    return apply_dead_zone(axes)
 
 
 def tilt_of(known: LinkState) -> float:

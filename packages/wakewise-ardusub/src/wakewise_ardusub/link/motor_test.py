@@ -22,7 +22,7 @@ from wakewise_ardusub.link.frames import force_words
 from wakewise_ardusub.link.motor_results import Answer, MotorObservation, MotorResults
 from wakewise_ardusub.link.output import motor_output
 from wakewise_ardusub.link.protocol import MIDDLE_US
-from wakewise_ardusub.link.vehicle_survey import say_hello
+from wakewise_ardusub.link.vehicle_survey import send_heartbeat
 from wakewise_ardusub.motors import pulses_of_thrusts, supply_in_table
 
 RENEW_S = 0.1
@@ -144,7 +144,7 @@ def run_motor_test(
 
 
 def _until_armed(talk: MavlinkSession, operator: Operator) -> None:
-    say_hello(talk)
+    send_heartbeat(talk)
     while not _armed(talk):
         operator.arms("ArduSub turns motors only while it is armed, and disarms by itself after each")
 

@@ -22,11 +22,11 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Measurement
 from wakewise_ardusub.link import protocol
-from wakewise_ardusub.link.buttons import BUTTON_PARAMETERS, buttons_amiss
+from wakewise_ardusub.link.buttons import BUTTON_PARAMETERS, button_faults
 from wakewise_ardusub.link.engagement_fsm import EngagementInputs, EngagementLimits, EngagementState, faults
 from wakewise_ardusub.link.freshness_margins import FreshnessMargins
 from wakewise_ardusub.link.journal_events import EventLogger
-from wakewise_ardusub.link.message_state import REMEMBERED_S, LinkState, MavlinkMessage, heard, tilt_of
+from wakewise_ardusub.link.message_state import REMEMBERED_S, LinkState, MavlinkMessage, tilt_of, update_link_state
 from wakewise_ardusub.link.motor_interface import MotorInterface
 from wakewise_ardusub.link.requests import (
     AGAIN_S,
@@ -36,7 +36,7 @@ from wakewise_ardusub.link.requests import (
     parameter_request,
 )
 from wakewise_ardusub.link.session_log import SessionLog
-from wakewise_ardusub.link.telemetry_adapter import TelemetryAdapter, measured
+from wakewise_ardusub.link.telemetry_adapter import TelemetryAdapter, to_measurements
 
 Send = Callable[[str, Mapping[str, Any]], None]
 """Sends a message: its name as pymavlink's encoders have it, and its fields."""
@@ -127,7 +127,7 @@ class OutputGate:
         parameters = self.known.parameters
         if self._buttons and any(name not in parameters for name in BUTTON_PARAMETERS):
             return None
-        return buttons_amiss(self._buttons, parameters)
+        return button_faults(self._buttons, parameters)
 
     @property
     def entry(self) -> int | None:
@@ -185,7 +185,7 @@ class OutputGate:
         if parameters is not self._judged_for:
             missing = next((name for name in self._needs if name not in parameters), None)
             words = f"parameters of the autopilot are not known yet: {missing}" if missing else ""
-            words = words or buttons_amiss(self._buttons, parameters) or self._drive.amiss(parameters)
+            words = words or button_faults(self._buttons, parameters) or self._drive.amiss(parameters)
             self._judged_for, self._amiss = parameters, words
         changed = [name for name, value in self._engaged_with.items() if parameters.get(name) != value]
         return self._amiss or (f"{changed[0]} was changed" if changed else "")
@@ -194,8 +194,8 @@ class OutputGate:
         """A message came."""
         with self._lock:
             now_s, before = self.clock(), self.known
-            self.known = known = heard(before, said, now_s)
-            self._telemetry, found = measured(self._telemetry, said, now_s, known.system)
+            self.known = known = update_link_state(before, said, now_s)
+            self._telemetry, found = to_measurements(self._telemetry, said, now_s, known.system)
             self._measurements.extend(found)
             self._news.changed(before, known, self._telemetry.jump)
             if known.sticks is not None and known.sticks is not before.sticks:

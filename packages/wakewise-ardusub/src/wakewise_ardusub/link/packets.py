@@ -67,7 +67,7 @@ def packet_at(data: bytes, at: int) -> MavlinkPacket | None:
     return MavlinkPacket(at, end, payload, number) if checksum(data[at + 1 : last], message.crc_extra) == told else None
 
 
-def begun_at(data: bytes) -> int:
+def partial_packet_start(data: bytes) -> int:
     """Where a packet begins whose end has not come yet, by what its head promises; the end where there is none."""
     at = 0
     for part in packets(data):

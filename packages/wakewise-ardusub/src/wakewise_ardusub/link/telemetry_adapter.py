@@ -100,7 +100,7 @@ class TelemetryAdapter:
     jump_s: float = -math.inf
 
 
-def measured(
+def to_measurements(
     known: TelemetryAdapter, said: MavlinkMessage, came_s: float, system: int
 ) -> tuple[TelemetryAdapter, tuple[Measurement, ...]]:
     """The memory after a message, and what it measured; times are on the clock of `came_s`.

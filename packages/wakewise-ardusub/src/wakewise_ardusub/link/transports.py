@@ -13,7 +13,7 @@ from typing import Any
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise_ardusub.link.connection import Endpoint, open_serial
-from wakewise_ardusub.link.packets import begun_at
+from wakewise_ardusub.link.packets import partial_packet_start
 from wakewise_ardusub.sensors.devices import SerialPort
 
 LARGEST = 65535
@@ -109,7 +109,7 @@ class StreamTransport:
             came = b""
         self._gone = not came  # a line that can be read and has nothing is one whose other side is gone
         data = self._kept + came
-        at = begun_at(data)
+        at = partial_packet_start(data)
         self._kept = data[at:]
         return data[:at]
 

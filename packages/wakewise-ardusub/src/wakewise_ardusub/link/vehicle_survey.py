@@ -73,7 +73,7 @@ def await_autopilot(talk: MavlinkSession, patience_s: float | None = None) -> An
     patience_s = PATIENCE_S if patience_s is None else patience_s
     until = time.monotonic() + patience_s
     while True:
-        say_hello(talk)
+        send_heartbeat(talk)
         next_s = time.monotonic() + HEARTBEAT_PERIOD_S
         while (message := talk.hear_any(max(min(next_s, until) - time.monotonic(), 0.0))) is not None:
             if message.get_type() != "HEARTBEAT":
@@ -88,7 +88,7 @@ def await_autopilot(talk: MavlinkSession, patience_s: float | None = None) -> An
     raise EnvironmentFailure(f"no heartbeat of system {talk.system} in {patience_s:g} s{instead}")
 
 
-def say_hello(talk: MavlinkSession) -> None:
+def send_heartbeat(talk: MavlinkSession) -> None:
     """The companion's heartbeat: an onboard controller, never a ground station."""
     talk.send("heartbeat", type=18, autopilot=8, base_mode=0, custom_mode=0, system_status=4)
 
@@ -119,7 +119,7 @@ def _listened(talk: MavlinkSession, seconds: float, kind: str, *, mavlink_2: boo
     settled_s = time.monotonic() + min(SETTLE_S, 0.5 * seconds)
     while (left_s := until - time.monotonic()) > 0.0:
         if time.monotonic() >= hello_s:
-            say_hello(talk)
+            send_heartbeat(talk)
             if firmware is None:
                 send_command(talk, _REQUEST_MESSAGE, _AUTOPILOT_VERSION)
             hello_s = time.monotonic() + HEARTBEAT_PERIOD_S

@@ -113,7 +113,7 @@ class VehicleLog:
         return max((float(s.time_s[-1]) for s in self.series.values()), default=0.0)
 
 
-def sound(channel: str, values: Iterable[float]) -> tuple[float, ...]:
+def valid_or_nan(channel: str, values: Iterable[float]) -> tuple[float, ...]:
     """Values of a channel's sample; one out of its range, or none, becomes NaN."""
     low, high = _ALLOWED[channel.partition(" ")[0]]
     return tuple(float(v) if low <= v <= high else math.nan for v in values)
@@ -135,7 +135,7 @@ class SystemRecords:
 
     def put(self, channel: str, time_s: float, values: Iterable[float]) -> None:
         """Keep one sample; a value out of its range, or none, becomes NaN."""
-        kept = sound(channel, values)
+        kept = valid_or_nan(channel, values)
         self.rows.setdefault(channel, []).append((time_s, *kept))
 
     def parameter(self, name: str, value: float) -> None:

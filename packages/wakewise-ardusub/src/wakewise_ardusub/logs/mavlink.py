@@ -58,7 +58,7 @@ class MessageListener(Protocol):
         ...
 
 
-def take(
+def record_message(
     gather: MessageListener, stamp_s: float, system: int, component: int, name: str, fields: Mapping[str, Any]
 ) -> None:
     """Keep what a message says; those that are not `WANTED` only set the clock.

@@ -15,7 +15,7 @@ from io import BytesIO
 from typing import Any
 
 from wakewise_ardusub.logs.channels import LogCollector
-from wakewise_ardusub.logs.mavlink import take
+from wakewise_ardusub.logs.mavlink import record_message
 
 MAGIC = b"\x89MCAP0\r\n"
 _HEADER, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END, _FOOTER = 0x01, 0x04, 0x05, 0x06, 0x0F, 0x02
@@ -102,5 +102,5 @@ def _message(gather: LogCollector, body: bytes, topics: dict[int, tuple[int, int
         content = json.loads(text)
     except ValueError:  # JSON5, whose keys need no quotes
         content = json.loads(_BARE_KEY.sub(r'\1"\2":', text))
-    take(gather, 1e-9 * at_ns, system, component, name, content["message"])
+    record_message(gather, 1e-9 * at_ns, system, component, name, content["message"])
     return True

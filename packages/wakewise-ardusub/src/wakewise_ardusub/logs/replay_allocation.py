@@ -24,7 +24,7 @@ from wakewise_ardusub.wash_savings import (
     Shares,
     WashSavingsCalculator,
     bow_ball,
-    look,
+    influence_model,
     saved_pct,
 )
 
@@ -91,7 +91,7 @@ def bow_points(vehicle: Vehicle, ahead_m: float) -> Region:
     return Region(points_W_m=points, weights=np.ones(len(points)), distance_m=np.zeros(len(points)))
 
 
-def hindsight(
+def replay_log(
     rows: pl.DataFrame, parameters: dict[str, float], vehicle: Vehicle, region: Region, wake: WakeModel
 ) -> ReplayedAllocation:
     """Hold the flown thrusts of a log's table against least and gentle ones.
@@ -119,7 +119,7 @@ def hindsight(
     voltages = np.array([sparing.supply_V(volts) for volts in rows["voltage_V"]])
     known = np.isfinite(pulses).all(axis=1)
     unique, back = _distinct(np.column_stack([pulses[known], voltages[known]]))
-    view = look(craft, region.points_W_m, region.weights)
+    view = influence_model(craft, region.points_W_m, region.weights)
     gram = view.gram(Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])))
     m = craft.count
     thrusts = {share: np.zeros((len(unique), m)) for share in SHARES}

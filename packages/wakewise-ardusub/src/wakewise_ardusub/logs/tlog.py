@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wakewise_ardusub.logs.channels import LogCollector
-from wakewise_ardusub.logs.mavlink import WANTED, take
+from wakewise_ardusub.logs.mavlink import WANTED, record_message
 
 Buffer = Any
 """Bytes, or a file mapped into memory."""
@@ -86,7 +86,7 @@ def read_tlog(data: Buffer) -> LogCollector:
                 gather.spoiled("fields", size)
                 continue
         try:
-            take(gather, packet.stamp_s, packet.system, packet.component, message.msgname, fields)
+            record_message(gather, packet.stamp_s, packet.system, packet.component, message.msgname, fields)
         except (KeyError, TypeError, ValueError):
             gather.spoiled("fields", size)
     return gather

@@ -6,7 +6,7 @@ import math
 import time
 from typing import Protocol
 
-from wakewise_ardusub.link.message_state import LinkState, MavlinkMessage, heard
+from wakewise_ardusub.link.message_state import LinkState, MavlinkMessage, update_link_state
 from wakewise_ardusub.link.protocol import DEFAULT_SYSTEM
 
 APART_M = 0.3
@@ -46,7 +46,7 @@ class DepthMonitor:
             if not said and not bad:
                 break
             for message in said:
-                self._known = heard(self._known, message, time.monotonic())
+                self._known = update_link_state(self._known, message, time.monotonic())
         fresh = time.monotonic() - self._known.depth_s < FRESH_S
         if depth_m is None or not fresh:
             self.off_m = math.nan

@@ -20,9 +20,9 @@ from wakewise.ui.reports.svg_style import (
     SLATE,
     TEAL,
     VIOLET,
-    dress,
-    key,
+    add_legend,
     new_figure,
+    style_axes,
     thinned,
 )
 
@@ -47,7 +47,7 @@ def dive(rows: pl.DataFrame, narrow: bool = False) -> Figure | None:
     grid = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     time_s = column(rows, "time_s")
     for axes, (label, lines) in zip(grid, panels, strict=True):
-        dress(axes, y=label)
+        style_axes(axes, y=label)
         _shade_armed(axes, rows, time_s)
         for name, values, colour in lines:
             axes.plot(*_broken(time_s, values, 200 if narrow else 800), color=colour, linewidth=1.2, label=name)
@@ -55,7 +55,7 @@ def dive(rows: pl.DataFrame, narrow: bool = False) -> Figure | None:
             axes.invert_yaxis()
         _room(axes, label, lines)
         if len(lines) > 1:
-            key(axes, loc="upper right", ncols=2 if narrow else 4, borderaxespad=0.1)
+            add_legend(axes, loc="upper right", ncols=2 if narrow else 4, borderaxespad=0.1)
         axes.margins(x=0.0)
     _name_modes(grid[0], rows, time_s)
     grid[-1].set_xlabel("time (s)", color=MUTED, fontsize=9.5)
@@ -85,7 +85,7 @@ def speeds(rows: pl.DataFrame, total_weight: float, narrow: bool = False) -> Fig
     figure = new_figure(NARROW_IN if narrow else WIDTH_IN, 2.9)
     axes = figure.subplots()
     time_s = column(rows, "time_s")
-    dress(axes, x="time (s)", y="speed at the points\n(mm/s, rms)")
+    style_axes(axes, x="time (s)", y="speed at the points\n(mm/s, rms)")
     _shade_armed(axes, rows, time_s)
     # What was flown is often the least: the wider line shows under the other.
     for (share, name, colour), width in zip(SHARES, (3.2, 1.2, 1.2), strict=True):
@@ -93,7 +93,7 @@ def speeds(rows: pl.DataFrame, total_weight: float, narrow: bool = False) -> Fig
         axes.plot(*_broken(time_s, speed, 200 if narrow else 800), color=colour, linewidth=width, label=name)
     axes.set_ylim(bottom=0.0)
     axes.margins(x=0.0)
-    key(axes, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.1)
+    add_legend(axes, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.1)
     return figure
 
 
@@ -129,7 +129,7 @@ def _strip(
     for axes, (title, values) in zip(grid, parts, strict=True):
         edges = np.linspace(0, values.shape[1], min(400 if narrow else 1100, values.shape[1]) + 1).astype(int)
         shown = np.add.reduceat(np.nan_to_num(values), edges[:-1], axis=1) / np.diff(edges)
-        dress(axes, grid="")
+        style_axes(axes, grid="")
         image = axes.imshow(
             shown, aspect="auto", cmap=THRUSTS, vmin=-limit, vmax=limit, interpolation="nearest",
             extent=(0.0, max(float(time_s[-1]), 1e-3), count + 0.5, 0.5),

@@ -6,7 +6,7 @@ into our frames and back, `cloud.py` reads the bytes of a PointCloud2.
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise_ardusub.ros.allocator import NodeAllocation, ProtectedPoints, ThrustAllocator, failed_thrusters
@@ -28,4 +28,4 @@ __all__ = [
     "wrench_of",
 ]
 
-lazy_door(__name__)
+lazy_attributes(__name__)

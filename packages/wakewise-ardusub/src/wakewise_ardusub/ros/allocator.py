@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocation, least_thrusts
+from wakewise.allocation import Layout, Weights, compile_layout, min_norm_allocation, min_wash_allocation
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.defaults import BUDGET, DISTURBANCE_WEIGHT
 from wakewise.core.errors import InputError
@@ -129,11 +129,11 @@ class ThrustAllocator:
     ) -> NodeAllocation:
         """Thrusts for a wrench, shape (6,), in FRD."""
         gram, total_weight, way = self._gram(target, X_WB)
-        least = least_thrusts(self.layout, wrench_B, gram, self.priority)
+        least = min_norm_allocation(self.layout, wrench_B, gram, self.priority)
         chosen = least
         if gram is not None:
             weights = replace(self.weights, disturbance=self.weights.disturbance / total_weight)
-            chosen = gentle_allocation(self.layout, wrench_B, gram, weights, previous_N, self.priority, self.budget)
+            chosen = min_wash_allocation(self.layout, wrench_B, gram, weights, previous_N, self.priority, self.budget)
         return NodeAllocation(
             thrusts_N=chosen.thrusts_N,
             wrench_B=chosen.wrench_B,

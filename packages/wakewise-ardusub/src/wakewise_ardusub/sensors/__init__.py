@@ -8,7 +8,7 @@ by `wakewise_ardusub.link.telemetry_adapter`. `devices.py` is the serial port, t
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise_ardusub.sensors.devices import LinuxI2C, SerialPort, UdpSocket
@@ -34,4 +34,4 @@ __all__ = [
     "vision_position_estimate",
 ]
 
-lazy_door(__name__, "links")
+lazy_attributes(__name__, "links")

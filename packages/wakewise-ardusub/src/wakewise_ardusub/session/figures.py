@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.allocation import disturbance_of, least_thrusts
+from wakewise.allocation import disturbance_of, min_norm_allocation
 from wakewise.control import vehicle_layout
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
@@ -54,7 +54,7 @@ class WashFigures:
         if not np.isfinite(gram).all():
             return
         found = {DISTURBANCE_NAME: disturbance_of(gram, thrusts)}
-        least = least_thrusts(self._layout, self._layout.B @ thrusts, gram).disturbance or 0.0
+        least = min_norm_allocation(self._layout, self._layout.B @ thrusts, gram).disturbance or 0.0
         weight = self._view.total_weight
         self.speeds_m_s = (math.sqrt(found[DISTURBANCE_NAME] / weight), math.sqrt(max(least, 0.0) / weight))
         if engaged and least > weight * STILL_M_S**2:

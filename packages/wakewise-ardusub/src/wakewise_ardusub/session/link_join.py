@@ -52,7 +52,7 @@ class VehicleFlight:
     turn: FlightOwnership = field(default_factory=FlightOwnership)
 
 
-def at_sea(
+def join_vehicle(
     scenario: Scenario,
     warden: OutputGate,
     *,

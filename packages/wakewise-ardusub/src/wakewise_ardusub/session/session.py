@@ -20,7 +20,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.geometry import Pose, matrix_from_quat
 from wakewise.core.interfaces import BodyState
-from wakewise.core.jit.precompile import warm
+from wakewise.core.jit.precompile import compile_kernels
 from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.teleop.live import LiveFlight
@@ -31,9 +31,9 @@ from wakewise_ardusub.link.motor_interface import VehicleMotors
 from wakewise_ardusub.link.output_gate import OutputGate, Send
 from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
 from wakewise_ardusub.session.cameras import MakeCamera, note_view
-from wakewise_ardusub.session.link_join import VehicleFlight, at_sea
+from wakewise_ardusub.session.link_join import VehicleFlight, join_vehicle
 from wakewise_ardusub.session.protected_region import ProtectedRegion, ball
-from wakewise_ardusub.session.warm_up import rehearse
+from wakewise_ardusub.session.warm_up import run_warm_up
 
 LOOK_S = 0.05
 LEFT_S = 2.0
@@ -175,7 +175,7 @@ class VehicleSession:
     def _prepared(self) -> VehicleFlight | None:
         """Wait for the vehicle, and join the parts to it; None where the session ended before."""
         warden = self.warden
-        warm(FLIGHT_JOBS, self._warming)
+        compile_kernels(FLIGHT_JOBS, self._warming)
         while not self._over.wait(LOOK_S):
             facts, buttons = warden.facts(), warden.buttons_amiss
             if buttons:
@@ -203,7 +203,7 @@ class VehicleSession:
         start = self._here()
         middle, radius, region = self.spare.found(start, self.vehicle.size_m[0], float(self.vehicle.X_BC.p_m[2]))
         warden.target_W_m = middle
-        sea = at_sea(
+        sea = join_vehicle(
             self.scenario,
             warden,
             start=start,
@@ -215,7 +215,7 @@ class VehicleSession:
             photographed=self._photographed,
         )
         self.preparing = "rehearses"
-        took_s, period_s = rehearse(sea), 1.0 / sea.parts.control.rate_hz
+        took_s, period_s = run_warm_up(sea), 1.0 / sea.parts.control.rate_hz
         self.journal.write("rehearsed", step_ms=1e3 * took_s, period_ms=1e3 * period_s, target_W_m=middle)
         if took_s > period_s:
             raise StageError(

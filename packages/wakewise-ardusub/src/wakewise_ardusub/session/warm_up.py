@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.allocation import least_thrusts
+from wakewise.allocation import min_norm_allocation
 from wakewise.control import make_tracker, vehicle_layout
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.interfaces import Goal, Measurement
@@ -35,7 +35,7 @@ class _Waving:
         return Controls(axes=np.array([0.0, 0.1, 0.1, 0.1, 0.0]))
 
 
-def rehearse(sea: VehicleFlight, steps: int = 12) -> float:
+def run_warm_up(sea: VehicleFlight, steps: int = 12) -> float:
     """Let the whole chain decide a few times for nobody, so that its kernels are there when thrusts count.
 
     Returns
@@ -65,6 +65,6 @@ def rehearse(sea: VehicleFlight, steps: int = 12) -> float:
         took_s = max(took_s, time.perf_counter() - began) if k >= steps // 2 else 0.0
         own, _ = method.step(own, dt_s, estimate, goal)  # what it keeps beside its state
     tracker = make_tracker(parts.vehicle, parts.control)
-    least_thrusts(layout, tracker.wrench(tracker.init(), dt_s, start, Goal(X_WB=start.X_WB))[1])
+    min_norm_allocation(layout, tracker.wrench(tracker.init(), dt_s, start, Goal(X_WB=start.X_WB))[1])
     sea.figures.begin()
     return took_s

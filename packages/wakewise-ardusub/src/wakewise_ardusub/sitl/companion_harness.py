@@ -1,8 +1,8 @@
 """The companion's own watch beside the stand-in, in one process and in the rehearsal's time.
 
 What is flown is the shipped warden with its post, drive and limits; the controller is the plainest there can be,
-constant thrusts ten times a second. `FAULTS_ABOARD` is what may go wrong around it, and `suffer_aboard` says how long a
-script still drove an output then.
+constant thrusts ten times a second. `FAULTS_ABOARD` is what may go wrong around it, and `run_companion_fault` says how
+long a script still drove an output then.
 """
 
 from __future__ import annotations
@@ -278,7 +278,9 @@ FAULTS_ABOARD: dict[str, Callable[[CompanionHarness], None]] = {
 """What may happen around a companion that drives, and after which the outputs must be the autopilot's again."""
 
 
-def suffer_aboard(vehicle: Vehicle, fault: Callable[[CompanionHarness], None], seconds: float = 1.5) -> FaultOutcome:
+def run_companion_fault(
+    vehicle: Vehicle, fault: Callable[[CompanionHarness], None], seconds: float = 1.5
+) -> FaultOutcome:
     """Drive as the companion does, let something go wrong, and look at the outputs."""
     aboard = CompanionHarness(InProcessSession(vehicle)).engaged()
     began_s = aboard.flight.now_s

@@ -298,7 +298,7 @@ def outcome(flight: InProcessSession, began_s: float) -> FaultOutcome:
     )
 
 
-def suffer(vehicle: Vehicle, fault: Callable[[InProcessSession], None], seconds: float = 1.5) -> FaultOutcome:
+def run_fault(vehicle: Vehicle, fault: Callable[[InProcessSession], None], seconds: float = 1.5) -> FaultOutcome:
     """Drive by a mere stream of thrusts, let something go wrong, and look at the outputs."""
     flight = InProcessSession(vehicle).engaged()
     began_s = flight.now_s

@@ -33,7 +33,7 @@ ACCEPTED, DENIED, UNSUPPORTED, FAILED = (
 )
 
 
-def hear(board: SimulatedAutopilot, message: Any) -> None:
+def handle_message(board: SimulatedAutopilot, message: Any) -> None:
     """Do what a message asks for, if it is for this vehicle's autopilot."""
     own, component = board.system, board.component
     if message.get_srcSystem() == own and message.get_srcComponent() == component:

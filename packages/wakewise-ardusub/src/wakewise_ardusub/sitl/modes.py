@@ -50,7 +50,7 @@ class ModeControllers:
         return ModeControllers(throttle=self.throttle, climb_sum=-self.throttle if mode == ALT_HOLD else 0.0)
 
 
-def fly(
+def apply_mode(
     mode: int,
     loops: ModeControllers,
     demands: PilotDemands,

@@ -69,7 +69,7 @@ class ScriptedGroundStation:
         return True
 
 
-def carry_to(made: SimulatedAutopilot, links: list[UdpEndpoint]) -> Callable[[bytes, str], None]:
+def route_messages(made: SimulatedAutopilot, links: list[UdpEndpoint]) -> Callable[[bytes, str], None]:
     """Carries bytes to the stand-in and out on its links, as its router does."""
 
     def carry(data: bytes, name: str) -> None:
@@ -88,6 +88,6 @@ def fly_piloted(vehicle: str, port: int, seconds: float = 3600.0, loop_hz: float
     link = UdpEndpoint("127.0.0.1", port, out=True)
     behind = InProcessPhysics(body=FreeWater(chosen), table=PulseTable.of(chosen, values))
     end_s = time.monotonic() + seconds
-    ashore = ScriptedGroundStation(made, carry_to(made, [link]))
+    ashore = ScriptedGroundStation(made, route_messages(made, [link]))
     run(made, behind, [link], lambda: time.monotonic() < end_s, turn=ashore.turn)
     link.close()

@@ -26,9 +26,9 @@ from wakewise_ardusub.physics.datagrams import PhysicsState
 from wakewise_ardusub.sitl.failsafes import Action, ground_station, pilot_input
 from wakewise_ardusub.sitl.files import MavftpServer
 from wakewise_ardusub.sitl.joystick import ButtonHandler, can_disarm
-from wakewise_ardusub.sitl.mavlink_in import hear
+from wakewise_ardusub.sitl.mavlink_in import handle_message
 from wakewise_ardusub.sitl.mavlink_out import BUILDERS, MessageSchedule, parameter
-from wakewise_ardusub.sitl.modes import MODES, ModeControllers, fly
+from wakewise_ardusub.sitl.modes import MODES, ModeControllers, apply_mode
 from wakewise_ardusub.sitl.motor_tests import MotorTest
 from wakewise_ardusub.sitl.motors import directions_of, factors_of, motor_pulses_us
 from wakewise_ardusub.sitl.own_parameters import own_parameters
@@ -188,7 +188,7 @@ class SimulatedAutopilot:
             if message.get_type() == "BAD_DATA":
                 self.bad_data += 1
             elif message.get_msgId() >= 0:
-                hear(self, message)
+                handle_message(self, message)
 
     def send(self, message: Any) -> None:
         """Put a message among what goes out."""
@@ -209,7 +209,7 @@ class SimulatedAutopilot:
         self._watch()
         for script in self._scripts:
             script.step()
-        self._loops, demands = fly(self.mode, self._loops, self._demands, motion, self.parameters, dt_s or 1e-3)
+        self._loops, demands = apply_mode(self.mode, self._loops, self._demands, motion, self.parameters, dt_s or 1e-3)
         motors: list[int] | None = None
         if self.motor_test.over(self.now_s):
             self.say(_INFO, "Motor test timed out!")
@@ -365,6 +365,6 @@ class SimulatedAutopilot:
         self.send(mavlink.MAVLink_named_value_float_message(self.boot_ms, name[:10].encode("ascii", "replace"), value))
 
 
-def thrusting(pulses_us: tuple[int, ...], channels: tuple[int, ...], within_us: int = 0) -> bool:
+def any_output_active(pulses_us: tuple[int, ...], channels: tuple[int, ...], within_us: int = 0) -> bool:
     """Whether an output of these channels, numbered from 1, is off the middle by more than so much; 0 is no signal."""
     return any(p != 0 and abs(p - MIDDLE_US) > within_us for p in (pulses_us[c - 1] for c in channels))

@@ -18,7 +18,7 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise_ardusub.link.parameters import read_parameter_file
-from wakewise_ardusub.vehicle_summary import read_craft
+from wakewise_ardusub.vehicle_summary import read_vehicle_summary
 from wakewise_ardusub.wash_meter.run import MeterLoop
 from wakewise_ardusub.wash_meter.settings import PORT, MeterSettings
 from wakewise_ardusub.wash_savings import bow_ball
@@ -28,7 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the meter as the options say; 2 where they cannot be used."""
     asked = _options().parse_args(arguments)
     try:
-        craft = read_craft(asked.craft)
+        craft = read_vehicle_summary(asked.craft)
         points = bow_ball(craft.bow_m, craft.camera_z_m, asked.ahead)
         settings = MeterSettings(
             connection=asked.connection,

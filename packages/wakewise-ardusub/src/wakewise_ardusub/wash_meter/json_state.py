@@ -9,7 +9,7 @@ from wakewise_ardusub.wash_meter.meter import MeterReading, WashMeter
 from wakewise_ardusub.wash_savings import SHARES
 
 
-def told(meter: WashMeter, reading: MeterReading, history: WashHistory, points: str) -> dict[str, Any]:
+def reading_as_json(meter: WashMeter, reading: MeterReading, history: WashHistory, points: str) -> dict[str, Any]:
     """How it stands; no number is NaN, what is not known is null."""
     craft, hearing, now_s = meter.craft, meter.hearing, reading.time_s
     armed = hearing.number("armed", now_s)

@@ -16,7 +16,7 @@ from wakewise_ardusub.logs.channels import SERVOS
 from wakewise_ardusub.motors import directions_of_motors, motor_channels
 from wakewise_ardusub.vehicle_summary import VehicleSummary
 from wakewise_ardusub.wash_meter.vehicle_listener import VehicleListener
-from wakewise_ardusub.wash_savings import SHARES, Shares, WashSavings, WashSavingsCalculator, look, saved_pct
+from wakewise_ardusub.wash_savings import SHARES, Shares, WashSavings, WashSavingsCalculator, influence_model, saved_pct
 
 MINUTE_S = 60.0
 """Over how long the one number is taken: long enough to be calm, short enough to answer what a pilot tries."""
@@ -96,7 +96,7 @@ class WashMeter:
         self.weight = float(np.sum(weights))
         self.dive = WashTotals()
         self._points_B_m, self._weights = points_B_m, weights
-        self._carried = _Seen.at(look(craft, points_B_m, weights), _HERE)
+        self._carried = _Seen.at(influence_model(craft, points_B_m, weights), _HERE)
         self._mark: InfluenceModel | None = None
         self._minute: deque[tuple[float, float, float]] = deque()
         self._known: dict[str, float] | None = None
@@ -125,7 +125,7 @@ class WashMeter:
         pose = self.hearing.pose(now_s)
         if pose is None:
             return "the autopilot does not say where the vehicle is (LOCAL_POSITION_NED and ATTITUDE)"
-        self._mark = look(self.craft, pose.apply(self._points_B_m), self._weights)
+        self._mark = influence_model(self.craft, pose.apply(self._points_B_m), self._weights)
         return None
 
     def unmark(self) -> None:

@@ -16,7 +16,7 @@ from wakewise_ardusub.link.protocol import DISTURBANCE_NAME, SAVED_NAME
 from wakewise_ardusub.logs.channels import SERVOS
 from wakewise_ardusub.vehicle_summary import VehicleSummary
 from wakewise_ardusub.wash_meter.history import WashHistory
-from wakewise_ardusub.wash_meter.json_state import told
+from wakewise_ardusub.wash_meter.json_state import reading_as_json
 from wakewise_ardusub.wash_meter.mavlink_socket import MavlinkSocket
 from wakewise_ardusub.wash_meter.meter import MeterReading, WashMeter, WashTotals
 from wakewise_ardusub.wash_meter.record import DiveRecord
@@ -108,7 +108,7 @@ class MeterLoop:
     def state(self) -> dict[str, Any]:
         """How it stands, as JSON has it."""
         with self._lock:
-            state = told(self.meter, self._reading, self.history, self.points)
+            state = reading_as_json(self.meter, self._reading, self.history, self.points)
         return state | {
             "up_s": state["time_s"] - self._began_s,
             "messages": self.hearing.messages,

@@ -33,7 +33,7 @@ OFFER = ServiceDescription(
     description="What the thrusters do to the target's water, and what gentler thrusts would spare. Listens only.",
     widget="Wakewise: gentle meter",
 )
-WISHES = ("mark", "unmark", "begin")
+PAGE_REQUESTS = ("mark", "unmark", "begin")
 _STATE, _HISTORY = "/state.json", "/history.json"
 MOST_KEPT = 32
 """Connections that are kept open for callers who were let in; of more, each ends with its answer."""
@@ -51,7 +51,7 @@ class MeterServer:
     state, history : callable
         What is told at the two addresses.
     wish : callable
-        Does one of `WISHES`; says why not, or None.
+        Does one of `PAGE_REQUESTS`; says why not, or None.
     host, port : str, int
         Where to listen; port 0 takes any that is free.
     token : bool
@@ -118,7 +118,7 @@ class MeterServer:
             return 401, _line("a token is needed: open the address that was printed")
         if method == "GET" and (file := self._files.at(path)) is not None:
             return 200, file
-        if method == "POST" and address.removeprefix("/") in WISHES:
+        if method == "POST" and address.removeprefix("/") in PAGE_REQUESTS:
             why_not = self._wish(address.removeprefix("/"))
             return (200, as_json({"done": True})) if why_not is None else (409, as_json({"why_not": why_not}))
         return 404, _line("there is nothing here")

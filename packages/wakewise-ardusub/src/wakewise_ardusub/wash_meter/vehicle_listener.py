@@ -11,9 +11,9 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, quat_from_euler
-from wakewise_ardusub.logs.channels import HELD_S, MODES, is_parameter, sound
+from wakewise_ardusub.logs.channels import HELD_S, MODES, is_parameter, valid_or_nan
 from wakewise_ardusub.logs.identity import VehicleIdentity
-from wakewise_ardusub.logs.mavlink import AUTOPILOT, ClockModel, take
+from wakewise_ardusub.logs.mavlink import AUTOPILOT, ClockModel, record_message
 
 _SLACK_S = 1e-9
 
@@ -28,7 +28,7 @@ class LatestSamples:
 
     def put(self, channel: str, time_s: float, values: Iterable[float]) -> None:
         """Keep a sample in place of the last."""
-        self.samples[channel] = (time_s, sound(channel, values))
+        self.samples[channel] = (time_s, valid_or_nan(channel, values))
 
     def parameter(self, name: str, value: float) -> None:
         """Keep a parameter under a name that can be one."""
@@ -76,7 +76,7 @@ class VehicleListener:
     def hear(self, stamp_s: float, system: int, component: int, name: str, fields: Mapping[str, Any]) -> None:
         """Take in one message; one whose fields make no sense is passed over."""
         try:
-            take(self, stamp_s, system, component, name, fields)
+            record_message(self, stamp_s, system, component, name, fields)
         except (KeyError, TypeError, ValueError):
             return
         self.messages += 1

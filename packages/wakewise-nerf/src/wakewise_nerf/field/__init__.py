@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise_nerf.field.backend import DEVICES, pick_device, require_torch
@@ -19,4 +19,4 @@ __all__ = [
     "require_torch",
 ]
 
-lazy_door(__name__, "nerf", "photos")
+lazy_attributes(__name__, "nerf", "photos")

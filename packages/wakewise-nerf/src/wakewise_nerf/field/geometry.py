@@ -12,7 +12,7 @@ from wakewise.core.errors import StageError
 from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.cells import CellMeans
 from wakewise.vision.reconstruction.clouds import OrientedPointCloud
-from wakewise.vision.reconstruction.fusion import facing_normals, fuse, lonely
+from wakewise.vision.reconstruction.fusion import facing_normals, fuse, outlier_mask
 from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise.vision.reconstruction.stereo import DepthMap
 from wakewise_nerf.field.posed import PosedPhoto
@@ -130,6 +130,6 @@ def fuse_depth(maps: list[DepthMap], agreeing: int, progress: Progress) -> tuple
     if confirmed < FEWEST_POINTS:
         raise StageError(f"neural field: {confirmed} points are confirmed by {agreeing} other views, needs 100")
     cloud, _ = gathered.means()
-    cloud = cloud[~lonely(cloud[:, :3])]
+    cloud = cloud[~outlier_mask(cloud[:, :3])]
     points, colours, towards = cloud[:, :3], cloud[:, 3:6], cloud[:, 6:]
     return OrientedPointCloud(points_m=points, normals=facing_normals(points, towards), colours=colours), spacing

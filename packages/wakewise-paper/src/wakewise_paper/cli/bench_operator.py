@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from wakewise.ui.cli.console import print_table, shown
+from wakewise.ui.cli.console import format_value, print_table
 from wakewise_paper.cli.bench_wash import reduction
 
 _BARS = (
@@ -34,8 +34,10 @@ def show_operator(result: Mapping[str, Any]) -> None:
         table.add_column(title, justify="left" if not title else "right")
     for key, ends, name, bar in _BARS:
         told = claim[ends]
-        interval = "" if told is None else f"{shown(told[0])} to {shown(told[1])}"
-        table.add_row(name, shown(claim[key]), interval, *(shown(one[key]) for one in beside.values()), bar)
+        interval = "" if told is None else f"{format_value(told[0])} to {format_value(told[1])}"
+        table.add_row(
+            name, format_value(claim[key]), interval, *(format_value(one[key]) for one in beside.values()), bar
+        )
     print_table(table)
     table = Table(title="worlds; less wash and D than direct allocation on the same seeds", title_justify="left")
     table.add_column("world")
@@ -50,7 +52,8 @@ def show_operator(result: Mapping[str, Any]) -> None:
     for key, where in (("w_track", "in front"), ("w_track_over", "above")):
         for w_track, row in result["paper"][key].items():
             typer.echo(
-                f"paper (circular), {where}, w_track {w_track}: deviation {shown(row['velocity_deviation_pct'])} %, "
+                f"paper (circular), {where}, w_track {w_track}: "
+                f"deviation {format_value(row['velocity_deviation_pct'])} %, "
                 f"D less by {reduction(row['disturbance_reduction_pct'])}, "
                 f"wash by {reduction(row['target_speed_reduction_pct'])}"
             )
@@ -82,17 +85,17 @@ def _show_cockpit(result: Mapping[str, Any]) -> None:
 
 def _cells(row: Mapping[str, Any]) -> list[str]:
     def mm_s(key: str) -> str:
-        return shown(None if row[key] is None else 1e3 * row[key])
+        return format_value(None if row[key] is None else 1e3 * row[key])
 
     return [
         str(row["flights"]),
-        shown(row["velocity_deviation_pct"]),
-        shown(row["velocity_deviation_floor_pct"]),
-        shown(row["velocity_deviation_planned_pct"]),
+        format_value(row["velocity_deviation_pct"]),
+        format_value(row["velocity_deviation_floor_pct"]),
+        format_value(row["velocity_deviation_planned_pct"]),
         mm_s("target_speed_mean_m_s"),
         mm_s("direct_target_speed_mean_m_s"),
         reduction(row["target_speed_reduction_all_pct"], row["target_speed_reduction_all_interval_pct"]),
         reduction(row["target_speed_reduction_pct"]),
         reduction(row["disturbance_reduction_pct"]),
-        shown(row["energy_ratio"]),
+        format_value(row["energy_ratio"]),
     ]

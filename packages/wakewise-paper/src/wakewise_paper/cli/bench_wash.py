@@ -6,7 +6,7 @@ from typing import Any
 
 import typer
 
-from wakewise.ui.cli.console import print_table, shown
+from wakewise.ui.cli.console import format_value, print_table
 
 _COLUMNS = (
     ("target_speed_mean_m_s", "mm/s", 1e3),
@@ -55,7 +55,7 @@ def show_gentle(result: dict[str, Any]) -> None:
         for title in ("less than dp", "worst"):
             table.add_column(title, justify="right")
         for method, row in scenario["methods"].items():
-            cells = [shown(None if row[key] is None else scale * row[key]) for key, _, scale in _COLUMNS]
+            cells = [format_value(None if row[key] is None else scale * row[key]) for key, _, scale in _COLUMNS]
             worst = row.get("worst_seed_vs_dp_pct")
             less = reduction(row.get("reduction_vs_dp_pct"), row.get("reduction_vs_dp_interval_pct"))
             table.add_row(method, *cells, less, reduction(worst))
@@ -91,16 +91,17 @@ def _show_headline(headline: dict[str, Any]) -> None:
         own = headline[part]
         for place, (key, words, bar) in enumerate(bars):
             ends = own.get(key.removesuffix("_pct") + ("_interval_pct" if key.endswith("_pct") else "_interval"))
-            interval = "" if ends is None else f"{shown(ends[0])} to {shown(ends[1])}"
-            others = [shown(beside[name][part].get(key)) for name in beside]
+            interval = "" if ends is None else f"{format_value(ends[0])} to {format_value(ends[1])}"
+            others = [format_value(beside[name][part].get(key)) for name in beside]
             label = f"{part}, {own['flights']} flights" if place == 0 else ""
-            table.add_row(label, words, shown(own.get(key)), interval, *others, bar)
+            table.add_row(label, words, format_value(own.get(key)), interval, *others, bar)
     print_table(table)
     most = headline["everywhere"]
     for name, words in (("wash", "wash"), ("silt_rays", "silt on the rays"), ("sway", "sway")):
         if most[f"{name}_most_ratio"] is not None:
             typer.echo(
-                f"worst anywhere: {words} {shown(most[f'{name}_most_ratio'])} times dp's, {most[f'{name}_most_where']}"
+                f"worst anywhere: {words} {format_value(most[f'{name}_most_ratio'])} times dp's, "
+                f"{most[f'{name}_most_where']}"
             )
 
 
@@ -136,10 +137,10 @@ def _show_bound(bound: dict[str, Any]) -> None:
             for name in ENERGIES
         ]
         named = [
-            f"{reduction(row[f'{name}_less_pct'])}, {shown(row[f'{name}_energy'])}"
+            f"{reduction(row[f'{name}_less_pct'])}, {format_value(row[f'{name}_energy'])}"
             for name in ("rule", "belief", "belief_any")
         ]
-        table.add_row(flight, shown(None if speed is None else 1e3 * speed), *most, *named)
+        table.add_row(flight, format_value(None if speed is None else 1e3 * speed), *most, *named)
     print_table(table)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import typer
 
-from wakewise.ui.cli.console import print_table, shown
+from wakewise.ui.cli.console import format_value, print_table
 
 _COLUMNS = (
     ("target_speed_mean_m_s", "target mm/s", 1e3),
@@ -38,7 +38,7 @@ def show_worlds(result: dict[str, Any]) -> None:
         first = next(iter(world["methods"]))
         table.add_column(f"less than {first}", justify="right")
         for method, row in world["methods"].items():
-            cells = [shown(None if row[key] is None else scale * row[key]) for key, _, scale in _COLUMNS]
+            cells = [format_value(None if row[key] is None else scale * row[key]) for key, _, scale in _COLUMNS]
             table.add_row(method, *cells, _less(row["against"].get(first)))
         print_table(table)
     if result["judge"]:
@@ -63,7 +63,7 @@ def _show_judge(judge: dict[str, Any]) -> None:
             for place in ("tank_", "tank_clear_", "lattice_", "lattice_clear_"):
                 speed, less = row[f"{place}m_s"], row[f"{place}less_pct"]
                 part = "" if less is None or method == "dp" else f" ({less:.0f} %)"
-                cells.append(shown(None if speed is None else 1e3 * speed) + part)
+                cells.append(format_value(None if speed is None else 1e3 * speed) + part)
             table.add_row(world, method, *cells)
     print_table(table)
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, print_json, print_table, shown, write_page
+from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table, write_page
 from wakewise.ui.cli.options import Json, Preset, Sets, TargetName
 
 Out = Annotated[Path, typer.Option("--out", help="Folder of the study; what is done there is not done again.")]
@@ -57,7 +57,9 @@ def degrade(
     for key in ("factor", *keys, "failure"):
         table.add_column(key)
     for row in rows:
-        table.add_row(f"{row['factor']}, {row['unit']}", *(shown(row[key]) for key in keys), row["failure"] or "")
+        table.add_row(
+            f"{row['factor']}, {row['unit']}", *(format_value(row[key]) for key in keys), row["failure"] or ""
+        )
     print_table(table)
     typer.echo(f"table and plots: {out}")
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, plain, print_json, print_table, shown, write_page
+from wakewise.ui.cli.console import ProgressBars, escaped, format_value, print_json, print_table, write_page
 from wakewise.ui.cli.options import Json
 
 Names = Annotated[
@@ -160,14 +160,14 @@ def show_table(table: dict[str, Any]) -> None:
     ):
         drawn.add_column(title, justify="left" if side == "left" else "right")
     for row in table["rows"]:
-        ends = "" if row["low"] is None else f"{shown(row['low'])} to {shown(row['high'])}"
+        ends = "" if row["low"] is None else f"{format_value(row['low'])} to {format_value(row['high'])}"
         drawn.add_row(
             row["world"],
-            plain(row["method"]),
+            escaped(row["method"]),
             row["target"] or "all",
-            plain(row["figure"]),
-            shown(row["paper"]),
-            shown(row["ours"]),
+            escaped(row["figure"]),
+            format_value(row["paper"]),
+            format_value(row["ours"]),
             ends,
             str(row["n"]),
             row["unit"],

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, print_json, print_table, shown, write_page
+from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table, write_page
 from wakewise.ui.cli.options import Json, seed_option
 
 Seed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of the split and of the resamples.")]
@@ -73,12 +73,12 @@ def _show_validation(values: dict[str, Any]) -> None:
         for flow in flows:
             table.add_column(flow, justify="right")
         for model, by_flow in values["models"].items():
-            table.add_row(model, *(shown(by_flow[flow][key]) for flow in flows))
+            table.add_row(model, *(format_value(by_flow[flow][key]) for flow in flows))
         print_table(table)
     paper = values["paper"]
     typer.echo(f"the paper claims {paper['r2_core']} and {paper['r2_wake']} for its proxy")
     convergence = values["grid_convergence_pct"]
-    typer.echo(f"lattice, two grids, centreline speed at 0.3 m: {shown(convergence)} % apart")
+    typer.echo(f"lattice, two grids, centreline speed at 0.3 m: {format_value(convergence)} % apart")
     for key, reason in values["why"].items():
         typer.echo(f"not computed: {key}: {reason}")
 
@@ -132,7 +132,7 @@ def _show_rivals(result: dict[str, Any]) -> None:
         for truth in result["scores"]:
             table.add_column(truth, justify="right")
         for model in next(iter(result["scores"].values())):
-            table.add_row(model, *(shown(by_model[model][key]) for by_model in result["scores"].values()))
+            table.add_row(model, *(format_value(by_model[model][key]) for by_model in result["scores"].values()))
         print_table(table)
     typer.echo(f"learned: {result['weights']} weights, {result['circular']}")
 
@@ -173,20 +173,20 @@ def calibrate_flight(
     table.add_row(
         "0",
         "0",
-        *map(shown, (result["believed"]["slope"], None, 1.0, None)),
+        *map(format_value, (result["believed"]["slope"], None, 1.0, None)),
         "",
-        shown(result["believed"]["error_share"]),
+        format_value(result["believed"]["error_share"]),
     )
     for row in result["curve"]:
         numbers = (row["half_width_slope"], row["slope_standard_error"], row["gain"], row["gain_standard_error"])
         table.add_row(
-            shown(row["minutes"]),
+            format_value(row["minutes"]),
             str(row["flakes"]),
-            *map(shown, numbers),
-            shown(row["slope_error_pct"]),
-            shown(row["error_share"]),
+            *map(format_value, numbers),
+            format_value(row["slope_error_pct"]),
+            format_value(row["error_share"]),
         )
     print_table(table)
     if result["curve"]:
-        law = shown(result["curve"][-1]["gain"] ** 2)
+        law = format_value(result["curve"][-1]["gain"] ** 2)
         typer.echo(f"momentum flux over thrust: {law} at the end, strength squared; the law says 1")

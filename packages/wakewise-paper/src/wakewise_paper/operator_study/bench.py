@@ -33,8 +33,8 @@ from wakewise_paper.operator_study.plan import (
     flight_s,
     key_of,
     planned_trials,
-    wished_w_tracks,
-    wished_worlds,
+    selected_w_tracks,
+    selected_worlds,
 )
 from wakewise_paper.operator_study.worlds import water_of
 from wakewise_paper.wash_reduction.figures import Row
@@ -64,7 +64,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
         If a world is not known or a w_track not possible.
     """
     began = time.monotonic()
-    worlds, w_tracks = wished_worlds(options.worlds), wished_w_tracks(options.w_tracks)
+    worlds, w_tracks = selected_worlds(options.worlds), selected_w_tracks(options.w_tracks)
     trials = planned_trials(worlds, w_tracks, options.seeds, min(options.seeds, GRID_SEEDS))
     store = FlightStore(options.store or store_folder("operator"), options.fresh, SOURCES)
     left_s = sum(flight_s(trial) for trial in trials.values() if store.load(trial, _FLY) is None)

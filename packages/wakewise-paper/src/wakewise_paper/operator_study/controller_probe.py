@@ -41,13 +41,13 @@ class ControllerProbe:
         """Decide, and remember what was asked and what the plan expects by then."""
         state, command = self.inner.step(state, dt_s, estimate, goal)
         self.asked_W_m_s = goal.X_WB.R @ goal.nu_B[:3]
-        planner, plan = within(self.inner, PlanningController), within(state, PlanState)
+        planner, plan = find_record(self.inner, PlanningController), find_record(state, PlanState)
         expected = None if planner is None or plan is None else planner.expected(plan)
         self.planned_W_m_s = None if expected is None else matrix_from_quat(expected[3:7]) @ expected[7:10]
         return state, command
 
 
-def within(record: Any, kind: type[T], deep: int = DEEPEST) -> T | None:
+def find_record(record: Any, kind: type[T], deep: int = DEEPEST) -> T | None:
     """The record itself or the first of that kind in its fields, in those of its fields, and so on; None if none is."""
     if isinstance(record, kind):
         return record
@@ -56,7 +56,7 @@ def within(record: Any, kind: type[T], deep: int = DEEPEST) -> T | None:
     for one in fields(record):
         value = getattr(record, one.name, None)
         if is_dataclass(value) and not isinstance(value, np.ndarray):
-            found = within(value, kind, deep - 1)
+            found = find_record(value, kind, deep - 1)
             if found is not None:
                 return found
     return None

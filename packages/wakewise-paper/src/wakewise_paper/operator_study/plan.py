@@ -19,7 +19,7 @@ SEEDS, GRID_SEEDS = 3, 1
 """At the paper's w_track, and at the others where only the script flies: unless more are asked for."""
 
 
-def wished_worlds(wished: tuple[str, ...] | None) -> tuple[str, ...]:
+def selected_worlds(wished: tuple[str, ...] | None) -> tuple[str, ...]:
     """Worlds to fly in.
 
     Raises
@@ -33,7 +33,7 @@ def wished_worlds(wished: tuple[str, ...] | None) -> tuple[str, ...]:
     return DEFAULT_WORLDS if wished is None else tuple(dict.fromkeys(wished))
 
 
-def wished_w_tracks(wished: tuple[float, ...] | None) -> tuple[float, ...]:
+def selected_w_tracks(wished: tuple[float, ...] | None) -> tuple[float, ...]:
     """Weights to fly, in order.
 
     Raises

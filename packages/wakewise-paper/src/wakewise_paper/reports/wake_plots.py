@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from wakewise.core.arrays import Array
 from wakewise.core.constants import FRESH_WATER_KG_M3
-from wakewise.ui.reports.svg_style import CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET, dress, new_figure
+from wakewise.ui.reports.svg_style import CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET, new_figure, style_axes
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.samples import CORE, WAKE, JetSamples
 from wakewise.wake.scores import predicted_speed
@@ -39,7 +39,7 @@ def scatters(result: WakeValidation, flow: str) -> Figure:
     across = test.speed_m_s / scale
     for axes, (name, by_flow) in zip(panels, result.verdicts.items(), strict=False):
         up = predicted_speed(by_flow[flow].model, test) / scale
-        dress(axes, grid="both")
+        style_axes(axes, grid="both")
         high = top if name != "paper" else max(1.05 * float(up.max()), top)
         axes.plot([0, top], [0, top], color=INK, linewidth=0.9)
         rest = ~wake
@@ -122,7 +122,7 @@ def _panels(result: WakeValidation, draw, x: str, y: str) -> Figure | None:  # t
     figure = new_figure(10.2, 2.9 * rows + 0.5)
     panels = np.atleast_1d(figure.subplots(rows, 3, squeeze=False)).ravel()
     for axes, flow in zip(panels, flows, strict=False):
-        dress(axes, grid="both")
+        style_axes(axes, grid="both")
         draw(axes, flow)
         axes.set_title(flow.name, loc="left", color=INK, fontsize=10.5)
     for axes in panels[len(flows) :]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place, glance
+from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place, summarize
 
 JUDGED = {
     "dynamic": ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True),
@@ -25,7 +25,7 @@ def glances(table: str, places: Sequence[Place]) -> list[MethodSummary]:
     """One for each world of a table, over the trials that all of its methods have; none of tables without methods."""
     if table not in JUDGED:
         return []
-    found = (glance(JUDGED[table], world, places) for world in dict.fromkeys(place["world"] for place in places))
+    found = (summarize(JUDGED[table], world, places) for world in dict.fromkeys(place["world"] for place in places))
     return [one for one in found if one is not None]
 
 
@@ -35,7 +35,7 @@ SETUP = "pump-tank"
 """The world that is the paper's own set-up: its tank, with the water that pumps move."""
 
 
-def tally(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, int]:
+def count_met(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, int]:
     """How many of the figures that the paper quotes are met, each counted once, however many worlds or flows it has.
 
     `quoted`: figures with a value of the paper and one of ours; `met`: in some world that is not circular; `surely`:

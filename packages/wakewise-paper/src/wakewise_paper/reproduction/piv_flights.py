@@ -20,7 +20,7 @@ from wakewise.operation import Parts
 from wakewise.scene.targets import Target
 from wakewise.vision.piv.images import CameraSettings, photograph_pair
 from wakewise.vision.piv.processing import displacements
-from wakewise.vision.piv.tracers import Sheet, TracerSettings
+from wakewise.vision.piv.tracers import LightSheet, TracerSettings
 from wakewise_paper.wash_reduction.routes import SETTLE_S
 
 NEAR_M, CLEAR_M = 0.05, 0.004
@@ -52,7 +52,7 @@ class PivRecorder:
     """Photographs the water of a flight at given times; make one with `over`."""
 
     target: Target
-    sheet: Sheet
+    sheet: LightSheet
     times_s: list[float]
     rng: np.random.Generator
     rows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
@@ -63,7 +63,7 @@ class PivRecorder:
         target = parts.target
         out = parts.start.X_WB.p_m - target.centre_W_m
         along = np.array([out[0], out[1], 0.0])
-        sheet = Sheet(
+        sheet = LightSheet(
             centre_W_m=target.centre_W_m - [0.0, 0.0, 0.02],
             right_W=along / np.linalg.norm(along),
             down_W=np.array([0.0, 0.0, 1.0]),

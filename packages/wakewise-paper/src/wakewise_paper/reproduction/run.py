@@ -16,7 +16,7 @@ from typing import Any
 
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.core.jit.precompile import warm
+from wakewise.core.jit.precompile import compile_kernels
 from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.campaigns import run as run_campaign
 from wakewise.experiments.campaigns.store import CampaignStore, open_store
@@ -140,7 +140,7 @@ def reproduce(names: Sequence[str], folder: Path, options: ReproduceOptions) -> 
     for table in tables:
         table.block_s = TABLE[table.name].block_s
     options.progress(0, 1, "compiling what is not compiled yet")
-    warm(progress=options.progress)
+    compile_kernels(progress=options.progress)
     if options.budget_s is None:
         for table in tables:
             while table.take() is not None:

@@ -11,7 +11,7 @@ from wakewise.core.errors import InputError
 
 Settings = dict[str, Any]
 
-LEVERS: dict[str, Settings] = {
+MECHANISMS: dict[str, Settings] = {
     "drift": {"levers.drift": False},
     "jets that meet": {"levers.meet": False},
     "floor": {"wake.floor": False},
@@ -27,7 +27,7 @@ LEVER_SEEDS = 3
 """Levers fly the first seeds only, which have all trims and all sides once."""
 
 
-def wished_levers(wished: tuple[str, ...] | None) -> tuple[str, ...]:
+def selected_mechanisms(wished: tuple[str, ...] | None) -> tuple[str, ...]:
     """Names of the levers to switch; none if not given, `all` for all.
 
     Raises
@@ -37,16 +37,16 @@ def wished_levers(wished: tuple[str, ...] | None) -> tuple[str, ...]:
     """
     names = () if wished is None or wished == ("none",) else wished
     for name in names:
-        if name not in (*LEVERS, "all"):
-            raise InputError(f"levers: '{name}' is not known, allowed: none, all, {', '.join(LEVERS)}")
-    return tuple(LEVERS) if "all" in names else tuple(name for name in LEVERS if name in names)
+        if name not in (*MECHANISMS, "all"):
+            raise InputError(f"levers: '{name}' is not known, allowed: none, all, {', '.join(MECHANISMS)}")
+    return tuple(MECHANISMS) if "all" in names else tuple(name for name in MECHANISMS if name in names)
 
 
 def without(*names: str) -> Settings:
     """Fields that take these levers away."""
     merged: Settings = {}
     for name in names:
-        merged |= LEVERS[name]
+        merged |= MECHANISMS[name]
     return merged
 
 
@@ -54,18 +54,18 @@ def lever_settings(names: tuple[str, ...]) -> dict[str, Settings]:
     """Settings of the flights that judge some levers, by what the flight is called."""
     if not names:
         return {}
-    table = {NONE: without(*LEVERS)}
+    table = {NONE: without(*MECHANISMS)}
     for name in names:
-        table[left_out(name)] = without(name)
-        table[alone(name)] = without(*(other for other in LEVERS if other != name))
+        table[without_name(name)] = without(name)
+        table[only_name(name)] = without(*(other for other in MECHANISMS if other != name))
     return table
 
 
-def left_out(name: str) -> str:
+def without_name(name: str) -> str:
     """What the flight without a lever is called."""
     return f"wake-aware without {name}"
 
 
-def alone(name: str) -> str:
+def only_name(name: str) -> str:
     """What the flight with a lever alone is called."""
     return f"wake-aware, {name} alone"

@@ -24,7 +24,7 @@ ALIKE_N = 0.03
 _NOT_IN_IT = 1e-3
 
 
-def sharings(layout: Layout, least_N: Array) -> Array:
+def candidate_allocations(layout: Layout, least_N: Array) -> Array:
     """Thrusts of all sharings, shape (j, k, n), the first of them the least thrusts themselves, shape (k, n).
 
     Raises

@@ -21,7 +21,7 @@ from wakewise.experiments.trials.timing import BenchOptions
 from wakewise_paper import flight_batches
 from wakewise_paper.flight_batches import FlightFailure, Key
 from wakewise_paper.flight_store import FlightStore, store_folder
-from wakewise_paper.wash_reduction.ablations import LEVERS, NONE, alone, left_out, wished_levers
+from wakewise_paper.wash_reduction.ablations import MECHANISMS, NONE, only_name, selected_mechanisms, without_name
 from wakewise_paper.wash_reduction.energy_optimum import BoundTrial
 from wakewise_paper.wash_reduction.energy_optimum_tables import bound_figures
 from wakewise_paper.wash_reduction.figures import SPEED, Row, log_reduction_pct, means, pairs_of, reduction_pct
@@ -54,7 +54,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     scenarios = names_of(None if wished is None else tuple(name for name in wished if name != PAPER))
     with_paper = wished is None or PAPER in wished
     methods, reasons = flown_methods(options.methods)
-    levers = wished_levers(options.levers)
+    levers = selected_mechanisms(options.levers)
     began = time.monotonic()
     trials = planned_trials(scenarios, methods, levers, options.seeds)
     folder = options.store or store_folder()
@@ -168,8 +168,8 @@ def lever_figures(name: str, here: Mapping[str, Mapping[int, Row]], strata: Mapp
     """What a lever is worth here: with it and without, all others on; it alone and none."""
     answer: dict[str, Any] = {}
     for key, base, ours in (
-        ("left_out", left_out(name), "wake-aware"),
-        ("alone", NONE, alone(name)),
+        ("left_out", without_name(name), "wake-aware"),
+        ("alone", NONE, only_name(name)),
     ):
         pairs = pairs_of(here.get(base, {}), here.get(ours, {}), SPEED, strata)
         answer[f"{key}_pct"], answer[f"{key}_interval_pct"], _ = log_reduction_pct(pairs)
@@ -206,7 +206,7 @@ def paper_figures(rows: Mapping[Key, Row], methods: tuple[str, ...]) -> dict[str
 def why(levers: tuple[str, ...], with_paper: bool) -> dict[str, str]:
     """Reasons of what was not flown."""
     reasons = {} if with_paper else {PAPER: "this flow was left out"}
-    for name in LEVERS:
+    for name in MECHANISMS:
         if name not in levers:
             reasons[name] = "this lever was not switched; --levers all, or its name"
     return reasons

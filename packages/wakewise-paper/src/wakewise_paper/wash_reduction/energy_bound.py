@@ -10,7 +10,7 @@ _LEVELS = 2000
 """Steps in which the energy over the least is counted; each choice is rounded up, so that the bound is kept."""
 
 
-def chosen(wash: Array, energy: Array, most: float) -> IntArray:
+def choose_under_budget(wash: Array, energy: Array, most: float) -> IntArray:
     """Which choice to take in each stretch, shape (b,), so that the sum of wash is least and that of energy in bounds.
 
     Exact but for the rounding of energy, by dynamic programming over stretches (the knapsack with one choice of each).

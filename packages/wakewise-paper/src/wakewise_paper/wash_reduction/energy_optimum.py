@@ -2,9 +2,9 @@
 
 A flight of `dp` is taken as it was, its true way and the wrench that its thrusters made, and its water is made anew
 with other thrusts of the same wrench (`wakewise.simulation.tank.prescribed_motion`): each of some 80 sharings
-(`sharings.py`), the bow rule's, and what the belief of `wake-aware` would have flown, with its bound on power and
-without. Then one who knows all of these waters chooses a sharing for each `STRETCH_S` of the flight within a bound on
-energy (`choosing.py`).
+(`candidate_allocations.py`), the bow rule's, and what the belief of `wake-aware` would have flown, with its bound on
+power and without. Then one who knows all of these waters chooses a sharing for each `STRETCH_S` of the flight within a
+bound on energy (`choosing.py`).
 
 Two numbers hold the answer between them. *bound*: the stretches' own waters put together, each as if its sharing had
 been flown before, too, and chosen by the very gusts it is judged by: more than can be had. *attained*: the choice, led
@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import polars as pl
 
-from wakewise.allocation import Layout, PowerLaw, least_thrusts
+from wakewise.allocation import Layout, PowerLaw, min_norm_allocation
 from wakewise.control.bow_rule import bow_layout
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import vehicle_layout
@@ -40,8 +40,8 @@ from wakewise.simulation.tank.prescribed_motion import PrescribedMotionTank, Pre
 from wakewise.simulation.tank.tank import tank_ambient, tank_points
 from wakewise.simulation.tank.world import TankWorld
 from wakewise.wake import bed_of
-from wakewise_paper.wash_reduction.allocations import sharings, split
-from wakewise_paper.wash_reduction.energy_bound import chosen, sum_of
+from wakewise_paper.wash_reduction.allocations import candidate_allocations, split
+from wakewise_paper.wash_reduction.energy_bound import choose_under_budget, sum_of
 from wakewise_paper.wash_reduction.flight import WashTrial, parts_of
 
 ENERGIES: dict[str, float] = {"1.05": 1.05, "1.15": 1.15, "1.3": 1.3, "1.5": 1.5, "1.7": 1.7, "any": np.inf}
@@ -104,7 +104,8 @@ def fly_bound(trial: BoundTrial) -> dict[str, float | None]:
     `least_m_s` the same led without the noise of its wrench; for each of `ENERGIES`
     `bound_1.3_m_s`, `bound_1.3_energy`, `attained_1.3_m_s`, `attained_1.3_energy`; `rule_m_s`, `rule_energy`, None
     where the rule does not fit; `belief_*` and `belief_any_*` what `wake-aware` believes best on the way of `dp`, with
-    its bound on power and without; `sharings`, how many there were; `dp_power_W`, `least_power_W`, `cpu_s`.
+    its bound on power and without; `candidate_allocations`, how many there were; `dp_power_W`, `least_power_W`,
+    `cpu_s`.
     """
     began = time.process_time()
     flown = fly_dp(trial)
@@ -121,7 +122,7 @@ def fly_bound(trial: BoundTrial) -> dict[str, float | None]:
         number = named.get(name)
         told = (None, None) if number is None else judge.judged(judge.throughout(number))
         found[f"{name}_m_s"], found[f"{name}_energy"] = told
-    found |= attained(judge)
+    found |= attained_reductions(judge)
     found["cpu_s"] = time.process_time() - began
     return found
 
@@ -180,14 +181,14 @@ def fly_dp(trial: BoundTrial) -> RecordedFlight:
 
 def candidates(flown: RecordedFlight) -> tuple[Array, dict[str, int]]:
     """Thrusts of all sharings of a flight, shape (j, k, n), the least first, and the numbers of those with a name."""
-    rows, named = list(sharings(flown.layout, flown.least_N)), {}
+    rows, named = list(candidate_allocations(flown.layout, flown.least_N)), {}
     try:
         rule = bow_layout(flown.vehicle)
     except InputError:
         rule = None
     if rule is not None:
         named["rule"] = len(rows)
-        rows.append(np.array([least_thrusts(rule, wrench).thrusts_N for wrench in flown.least_N @ rule.B.T]))
+        rows.append(np.array([min_norm_allocation(rule, wrench).thrusts_N for wrench in flown.least_N @ rule.B.T]))
     parts = flown.parts
     region = with_bed_points(parts.region, parts.control.levers, bed_of(parts.wake))
     watch = watching(parts.vehicle, region, parts.wake, parts.control)
@@ -289,7 +290,7 @@ class AllocationJudge:
         return float(wash.mean()), sum_of(self.by_stretch()[1], picks)
 
 
-def attained(judge: AllocationJudge) -> dict[str, float | None]:
+def attained_reductions(judge: AllocationJudge) -> dict[str, float | None]:
     """What the bounds on energy allow: `bound_*` by putting stretches together, `attained_*` by leading the choice."""
     found: dict[str, float | None] = {}
     waters = {lag: judge.by_stretch(lag) for lag in LAGS_S}
@@ -302,7 +303,7 @@ def attained(judge: AllocationJudge) -> dict[str, float | None]:
         return tried[key]
 
     for name, most in ENERGIES.items():
-        choices = {lag: chosen(wash, energy, most) for lag, (wash, energy) in waters.items()}
+        choices = {lag: choose_under_budget(wash, energy, most) for lag, (wash, energy) in waters.items()}
         lag = min(choices, key=lambda lag: sum_of(waters[lag][0], choices[lag]))
         found[f"bound_{name}_m_s"], found[f"bound_{name}_energy"] = (sum_of(v, choices[lag]) for v in waters[lag])
         starts = [*choices.values(), _throughout(judge, most)]

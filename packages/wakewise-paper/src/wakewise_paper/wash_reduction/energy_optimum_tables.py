@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wakewise_paper.flight_batches import Key
-from wakewise_paper.wash_reduction.energy_bound import chosen
+from wakewise_paper.wash_reduction.energy_bound import choose_under_budget
 from wakewise_paper.wash_reduction.energy_optimum import ENERGIES
 from wakewise_paper.wash_reduction.figures import LEAST_M_S, Row
 from wakewise_paper.wash_reduction.summary_table import TROUBLE_M_S
@@ -68,7 +68,7 @@ def _summed(rows: list[Row], kind: str, most: float) -> float | None:
     powers = np.array([float(row["least_power_W"] or 0.0) for row in rows])
     logs = np.array([[_log(row, "least_m_s"), *(_log(row, f"{kind}_{name}_m_s") for name in ENERGIES)] for row in rows])
     energy = np.array([[1.0, *(float(row[f"{kind}_{name}_energy"] or 0.0) for name in ENERGIES)] for row in rows])
-    picks = chosen(logs, energy * powers[:, None], most * float(powers.sum()))
+    picks = choose_under_budget(logs, energy * powers[:, None], most * float(powers.sum()))
     return _less([float(own[pick]) for own, pick in zip(logs, picks, strict=True)])
 
 

@@ -32,7 +32,13 @@ from wakewise_paper.wash_reduction.routes import (
     station_route,
     transect_route,
 )
-from wakewise_paper.wash_reduction.scenario_files import WORLD, SampledConditions, drawn, fields_of, load_scenario_file
+from wakewise_paper.wash_reduction.scenario_files import (
+    WORLD,
+    SampledConditions,
+    fields_of,
+    load_scenario_file,
+    sample_conditions,
+)
 from wakewise_paper.world_study.flight import WorldTrial, short_flight
 
 TRIM = "+trim"
@@ -120,7 +126,7 @@ def parts_of(trial: WashTrial) -> Parts:
 
 def scenario_parts(name: str, vehicle: str, method: str, seed: int) -> Parts:
     """Parts of a flight of one of the bench's own scenarios."""
-    file, what = load_scenario_file(name), drawn(name, seed)
+    file, what = load_scenario_file(name), sample_conditions(name, seed)
     values, draws = fields_of(name)
     told: dict[str, Any] = values | {
         "world": "tank",

@@ -81,7 +81,7 @@ def load_scenario_file(name: str) -> ScenarioFile:
         raise InputError(f"scenario {name}: {describe_faults(fault, ScenarioFile, 'file')}") from None
 
 
-def drawn(name: str, seed: int) -> SampledConditions:
+def sample_conditions(name: str, seed: int) -> SampledConditions:
     """What a seed, from 1, of a scenario is: its stratum, and what is drawn within."""
     file, number = load_scenario_file(name), SCENARIOS.index(name)
     own = SEEDS_EACH * (number + 1) + seed
@@ -148,4 +148,4 @@ def title_of(full: str) -> str:
 
 def trim_of(full: str, seed: int) -> str:
     """The stratum's trim; a world has none of its own."""
-    return "" if full.startswith(WORLD) else drawn(full.partition("/")[0], seed).trim
+    return "" if full.startswith(WORLD) else sample_conditions(full.partition("/")[0], seed).trim

@@ -41,8 +41,8 @@ def headline(flights: Flights, trims: Mapping[Known, str], failed: set[tuple[str
 
     def table(method: str, by: Mapping[Known, float]) -> dict[str, Any]:
         return {
-            "trouble": trouble(method, {k for k in by if by[k] > TROUBLE_M_S}, flights, trims, failed),
-            "calm": calm(method, {k for k in by if by[k] < CALM_M_S}, flights, trims),
+            "trouble": exposed_figures(method, {k for k in by if by[k] > TROUBLE_M_S}, flights, trims, failed),
+            "calm": still_water_figures(method, {k for k in by if by[k] < CALM_M_S}, flights, trims),
         }
 
     beside = [name for name in BESIDE if flights.get(name)]
@@ -50,7 +50,7 @@ def headline(flights: Flights, trims: Mapping[Known, str], failed: set[tuple[str
         "method": "wake-aware",
         **table("wake-aware", speeds),
         "by_scenario": table("wake-aware", whole),
-        "everywhere": harm(flights.get("dp", {}), flights.get("wake-aware", {})),
+        "everywhere": worst_harm(flights.get("dp", {}), flights.get("wake-aware", {})),
         "beside": {name: table(name, speeds) for name in beside},
     }
 
@@ -60,7 +60,7 @@ def tag_of(rival: str) -> str:
     return rival.replace("-", "_").replace("+", "_")
 
 
-def trouble(
+def exposed_figures(
     method: str, where: set[Known], flights: Flights, trims: Mapping[Known, str], failed: set[tuple[str, Known]]
 ) -> dict[str, Any]:
     """Figures over the flights in which `dp` leaves too much."""
@@ -92,12 +92,12 @@ def trouble(
         answer[f"{name}_reduction_pct"], answer[f"{name}_reduction_interval_pct"] = less
         answer[f"{name}_worst_world_pct"] = _worst_ratio(dp, ours, figure, answer["scenarios"])
     if method == "wake-aware":
-        answer |= keeps(dp, ours, rows.get(WRONG, {}), trims)
+        answer |= acceptance_checks(dp, ours, rows.get(WRONG, {}), trims)
     answer["why"] = _why(answer, len(where))
     return answer
 
 
-def calm(method: str, where: set[Known], flights: Flights, trims: Mapping[Known, str]) -> dict[str, Any]:
+def still_water_figures(method: str, where: set[Known], flights: Flights, trims: Mapping[Known, str]) -> dict[str, Any]:
     """Figures over the flights in which there is nothing to gain: do no harm."""
     ours, dp = ({k: v for k, v in flights.get(name, {}).items() if k in where} for name in (method, "dp"))
     answer: dict[str, Any] = {"flights": len(where)}
@@ -107,7 +107,7 @@ def calm(method: str, where: set[Known], flights: Flights, trims: Mapping[Known,
     return answer
 
 
-def harm(dp: Mapping[Known, Row], ours: Mapping[Known, Row]) -> dict[str, Any]:
+def worst_harm(dp: Mapping[Known, Row], ours: Mapping[Known, Row]) -> dict[str, Any]:
     """Where ours does most harm, over all scenarios, in trouble or not: silt on the rays and sway over `dp`'s."""
     answer: dict[str, Any] = {}
     for name, figure in (("wash", SPEED), ("silt_rays", SILT), ("sway", SWAY)):
@@ -138,7 +138,7 @@ def place(dp: Mapping[Known, Row], ours: Mapping[Known, Row], lost: int) -> dict
     return answer
 
 
-def keeps(
+def acceptance_checks(
     dp: Mapping[Known, Row], ours: Mapping[Known, Row], wrong: Mapping[Known, Row], trims: Mapping[Known, str]
 ) -> dict[str, Any]:
     """How much of the reduction stays with a wrong current, over the flights that were flown with both."""

@@ -15,7 +15,7 @@ from wakewise.experiments.campaigns.task import Task, TrialOutcome
 from wakewise.ui.reports.methods_compared import methods_compared, profiles
 from wakewise_paper.reports.reproduction import plots, write_pages, write_results
 from wakewise_paper.reports.reproduction.results import standalone_svg
-from wakewise_paper.reports.reproduction.sentences import machine, reproduced
+from wakewise_paper.reports.reproduction.sentences import computer_description, reproduced
 from wakewise_paper.reproduction.acceptance import JUDGED
 from wakewise_paper.reproduction.flights import SERIES
 from wakewise_paper.reproduction.rows import CompletedCase
@@ -175,7 +175,7 @@ def test_plots_of_nothing_are_none():
 
 def test_the_machine_is_told_without_a_name():
     """Cores, system, versions; no host, no user, no folder."""
-    told = machine()
+    told = computer_description()
     assert int(told["cores"]) >= 1 and "numpy" in told
     assert not any("/" in value or platform.node() in value for value in told.values())
 

@@ -9,7 +9,7 @@ set is still what it was.
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.experiments.trials.dataset.build import DatasetBuildResult, build_dataset
@@ -18,4 +18,4 @@ if TYPE_CHECKING:
 
 __all__ = ["ChecksumReport", "DatasetBuildResult", "build_dataset", "check_dataset", "read_words"]
 
-lazy_door(__name__)
+lazy_attributes(__name__)

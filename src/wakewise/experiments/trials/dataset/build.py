@@ -15,7 +15,7 @@ import polars as pl
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file, write_json, write_text
 from wakewise.core.interfaces import no_progress
-from wakewise.core.run_lock import LOCK, alone
+from wakewise.core.run_lock import LOCK, exclusive_run
 from wakewise.experiments.exports.checksums import SUMS, sha256_of, sums_text
 from wakewise.experiments.trials.dataset.metadata import FIGURES, METADATA, SHEET, TRIALS, columns_of, metadata
 from wakewise.experiments.trials.dataset.part import KNOWN, NOTE, TRUTH, TrialPart, part_of
@@ -66,7 +66,7 @@ def build_dataset(
     if out.resolve().is_relative_to(folder.resolve()) and out.resolve().parent.name != "export":
         raise InputError(f"--out {out}: lies among the trials that it is made from; give a folder elsewhere")
     growing = out.parent / f".{out.name}.building"
-    with alone(growing):
+    with exclusive_run(growing):
         parts, left_out, made = _gather(trials, growing / _PARTS, progress)
         left_out |= dict.fromkeys(unfinished, "was not flown to its end")
         if not parts:

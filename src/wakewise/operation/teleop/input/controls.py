@@ -67,7 +67,7 @@ class ControlSource(Protocol):
         ...
 
 
-def shaped(raw: Iterable[float], dead_zone: float = 0.05) -> Array:
+def apply_dead_zone(raw: Iterable[float], dead_zone: float = 0.05) -> Array:
     """Axes as a device gives them, made harmless: shape (5,), dead zone taken out, the rest stretched to full.
 
     What is not a number counts as centred, what is larger than full as full.

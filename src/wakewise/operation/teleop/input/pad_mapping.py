@@ -27,7 +27,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import yaml_file
-from wakewise.operation.teleop.input.controls import ACTIONS, CONTROL_AXES, shaped
+from wakewise.operation.teleop.input.controls import ACTIONS, CONTROL_AXES, apply_dead_zone
 
 STICKS = ("leftx", "lefty", "rightx", "righty", "triggerleft", "triggerright")
 """SDL's names of a known pad's axes, in its order."""
@@ -65,7 +65,7 @@ class AxisBinding:
         """Share of full stick, -1 to 1."""
         raw = state.values.get(self.of, 0.0)
         raw = (raw - self.rest) / (1.0 - self.rest) if self.rest else raw
-        return self.sign * float(shaped([raw], self.dead_zone)[0])
+        return self.sign * float(apply_dead_zone([raw], self.dead_zone)[0])
 
 
 def _parts(*names: str) -> tuple[AxisBinding, ...]:

@@ -25,7 +25,7 @@ READERS: dict[str, Callable[[Path], ControlSource]] = {
 }
 
 
-def hands_from(path: Path) -> ControlSource:
+def read_input(path: Path) -> ControlSource:
     """Hands that a file tells of.
 
     Raises

@@ -13,13 +13,22 @@ from matplotlib.figure import Figure
 from wakewise.core.arrays import IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
-from wakewise.ui.reports.page import chip, fold, missing, plot, scene_box, section, tile, whole_page
+from wakewise.ui.reports.page import (
+    collapsible_section,
+    legend_entry,
+    missing,
+    plot,
+    scene_box,
+    section,
+    tile,
+    whole_page,
+)
 from wakewise.ui.reports.photo_model.rows import facts_list, table_row
 from wakewise.ui.reports.photo_model.scale import scale_section, scale_tile
 from wakewise.ui.reports.photo_model.scene import model_scene
-from wakewise.ui.reports.svg_style import TEAL, dress, new_figure
+from wakewise.ui.reports.svg_style import TEAL, new_figure, style_axes
 from wakewise.ui.reports.text import NONE, fixed, number, shown
-from wakewise.vision.reconstruction.photo_facts import ModelFacts, model_facts
+from wakewise.vision.reconstruction.photo_facts import ModelStatistics, model_facts
 
 PARTS = (
     ("model", "Model"),
@@ -50,7 +59,7 @@ def write_model_report(model: Path, photos: Path) -> Path:
     return path
 
 
-def model_page(name: str, figures: dict[str, Any], facts: ModelFacts, scene: str | None) -> str:
+def model_page(name: str, figures: dict[str, Any], facts: ModelStatistics, scene: str | None) -> str:
     """HTML of the report."""
     links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in PARTS)
     body = (
@@ -101,18 +110,20 @@ def _count(value: int | None) -> str:
     return f"{value:,}".replace(",", " ") if value < 1_000_000 else f"{value / 1e6:.2f} M"
 
 
-def _model(figures: dict[str, Any], facts: ModelFacts, scene: str | None) -> str:
+def _model(figures: dict[str, Any], facts: ModelStatistics, scene: str | None) -> str:
     lead = (
         "Turn it by dragging, come nearer by the wheel. Surface, points and photographs can be switched in the scene's "
         f"tree. Its cameras were found {figures.get('mapping') or 'in a way that is not on record'}."
     )
     placed = sum(photo.p_WC is not None for photo in facts.photos)
-    legend = chip("#d9562b", f"{placed} photographs") + chip("#8fa0a6", f"{_count(len(facts.points))} sparse points")
+    legend = legend_entry("#d9562b", f"{placed} photographs") + legend_entry(
+        "#8fa0a6", f"{_count(len(facts.points))} sparse points"
+    )
     content = missing("the model", "no photograph has a place") if scene is None else scene_box(scene, legend)
     return section("model", "The model", lead, content)
 
 
-def _matches(facts: ModelFacts) -> str:
+def _matches(facts: ModelStatistics) -> str:
     partners = (facts.matches > 0).sum(axis=1)
     lead = (
         f"Each photograph shares verified matches with {int(np.median(partners))} others (median). Breaks in the band "
@@ -134,7 +145,7 @@ def match_figure(matches: IntArray) -> Figure | None:
         return None
     figure = new_figure(9.6, 5.0)
     axes = figure.subplots()
-    dress(axes, x="photograph", y="photograph", grid="")
+    style_axes(axes, x="photograph", y="photograph", grid="")
     i, j = np.nonzero(matches)
     strength = np.sqrt(matches[i, j] / matches.max())
     size = (280.0 / count) ** 2
@@ -145,7 +156,7 @@ def match_figure(matches: IntArray) -> Figure | None:
     return figure
 
 
-def _photos(figures: dict[str, Any], facts: ModelFacts) -> str:
+def _photos(figures: dict[str, Any], facts: ModelStatistics) -> str:
     left = {one["name"]: one for one in figures.get("left_out") or []}
     head = table_row(
         ("photograph", "place", "features", "points seen", "error", "partners", "focal length"), "th", "tlrrrrr"
@@ -164,7 +175,7 @@ def _photos(figures: dict[str, Any], facts: ModelFacts) -> str:
         rows.append(table_row(cells, "td", "tlrrrrr"))
     table = f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>"
     lead = "Errors are means over the sparse points that a photograph sees, each point's over all that see it."
-    content = fold("Every photograph", table, f"{len(rows)}") if len(rows) > _LONG else table
+    content = collapsible_section("Every photograph", table, f"{len(rows)}") if len(rows) > _LONG else table
     return section("photos", "Photographs", lead, content)
 
 
@@ -198,7 +209,7 @@ def _figures(figures: dict[str, Any]) -> str:
     stages = ", ".join(f"{name} {fixed(took, 0)} s" for name, took in (figures.get("stages_s") or {}).items())
     table = f'<table class="main"><tbody>{rows}</tbody></table>'
     lead = f"As in reconstruction.json. Stages took: {stages}."
-    return section("figures", "All figures", escape(lead), fold("All figures", table))
+    return section("figures", "All figures", escape(lead), collapsible_section("All figures", table))
 
 
 def _plain(value: Any) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.ui.reports.page import fold, section, tile
+from wakewise.ui.reports.page import collapsible_section, section, tile
 from wakewise.ui.reports.photo_model.rows import facts_list, table_row
 from wakewise.ui.reports.text import fixed, number, shown
 
@@ -107,7 +107,7 @@ def _by_bars(bars: dict[str, Any]) -> tuple[str, str]:
     if targets:
         head = table_row(("target", "photos", "error", "side", "middle, m"), "th", "trrrl")
         inner = f"<table><thead>{head}</thead><tbody>{targets}</tbody></table>"
-        table += fold(f"Targets ({bars['family']})", inner, f"{len(bars['targets'])}")
+        table += collapsible_section(f"Targets ({bars['family']})", inner, f"{len(bars['targets'])}")
     return lead, table
 
 

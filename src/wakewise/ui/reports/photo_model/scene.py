@@ -13,11 +13,11 @@ import viser
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import quat_from_matrix
-from wakewise.ui.reports.scene3d import CAMERA_RGB, MAX_POINTS, lightened, unheard
+from wakewise.ui.reports.scene3d import CAMERA_RGB, MAX_POINTS, decimated, without_server
 from wakewise.ui.reports.trial import TrialMesh
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import read_cloud
-from wakewise.vision.reconstruction.photo_facts import ModelFacts, PhotoFact
+from wakewise.vision.reconstruction.photo_facts import ModelStatistics, PhotoStatistics
 from wakewise.vision.texturing.textured import read_textured
 
 FOV_RAD = float(np.radians(40.0))
@@ -26,7 +26,7 @@ FRUSTUM_SHARE = 0.12
 _THUMB_PX, _MOST_PICTURES = 128, 120
 
 
-def model_up(facts: ModelFacts) -> Array:
+def model_up(facts: ModelStatistics) -> Array:
     """Which way is up, a unit vector: the pictures' own where they agree on it, else against where cameras look."""
     turns = [photo.R_WC for photo in facts.photos if photo.R_WC is not None]
     if not turns:
@@ -37,7 +37,7 @@ def model_up(facts: ModelFacts) -> Array:
     return np.asarray(best / length, dtype=np.float64) if length > 1e-6 else np.array([0.0, 0.0, 1.0])
 
 
-def model_scene(model: Path, photos: Path, facts: ModelFacts) -> str | None:
+def model_scene(model: Path, photos: Path, facts: ModelStatistics) -> str | None:
     """Whole HTML page with the scene of a model's folder; None if no photograph has a place."""
     placed = [photo for photo in facts.photos if photo.p_WC is not None]
     if not placed or not len(facts.points):
@@ -46,7 +46,7 @@ def model_scene(model: Path, photos: Path, facts: ModelFacts) -> str | None:
     middle = np.median(facts.points, axis=0)
     # viser greets on standard output, which belongs to the command line's own answer.
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        with unheard():
+        with without_server():
             server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             up = model_up(facts)
@@ -62,13 +62,13 @@ def model_scene(model: Path, photos: Path, facts: ModelFacts) -> str | None:
             server.stop()
 
 
-def _subject(server: viser.ViserServer, model: Path, facts: ModelFacts) -> Array:
+def _subject(server: viser.ViserServer, model: Path, facts: ModelStatistics) -> Array:
     """Add surface, dense and sparse points; what is in sight at first, as points."""
     scene, seen = server.scene, facts.points
     surface = (model / "mesh.glb").is_file()
     if surface:
         vertices, faces, colours = read_textured(model / "mesh.glb")
-        light, chosen = lightened(TrialMesh(vertices_m=vertices, faces=faces))
+        light, chosen = decimated(TrialMesh(vertices_m=vertices, faces=faces))
         mesh = trimesh.Trimesh(light.vertices_m, light.faces, process=False)
         mesh.visual = trimesh.visual.TextureVisuals(
             material=trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)
@@ -101,7 +101,7 @@ def _points(server: viser.ViserServer, name: str, points: Array, colours: Array,
     )
 
 
-def _cameras(server: viser.ViserServer, photos: Path, placed: list[PhotoFact], size: float) -> None:
+def _cameras(server: viser.ViserServer, photos: Path, placed: list[PhotoStatistics], size: float) -> None:
     every = max(1, -(-len(placed) // _MOST_PICTURES))
     for k, photo in enumerate(placed):
         if photo.R_WC is None or photo.p_WC is None:

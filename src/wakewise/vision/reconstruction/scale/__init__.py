@@ -8,7 +8,7 @@ asks what it is worth.
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.lazy_imports import lazy_door
+from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.vision.reconstruction.scale.bars import ScaleBar, ScaleBars, parse_bar, read_bars
@@ -16,4 +16,4 @@ if TYPE_CHECKING:
 
 __all__ = ["PositionFixes", "ScaleBar", "ScaleBars", "exif_fixes", "parse_bar", "read_bars", "read_fixes"]
 
-lazy_door(__name__, "photos")
+lazy_attributes(__name__, "photos")

@@ -9,12 +9,12 @@ from typing import Any
 
 from wakewise.core.arrays import Array
 from wakewise.core.files import write_text
-from wakewise.ui.reports.methods_compared import methods_compared, price, profiles, won
-from wakewise.ui.reports.page import fold, missing, plot, prose, section, whole_page
+from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, winner_text
+from wakewise.ui.reports.page import collapsible_section, missing, plot, prose, section, whole_page
 from wakewise.ui.reports.text import NONE, duration, number, shown
 from wakewise.ui.reports.trial_pictures import worst_panels
 from wakewise_paper.reports.reproduction import plots, sentences
-from wakewise_paper.reproduction.acceptance import CIRCULAR, JUDGED, glances, tally
+from wakewise_paper.reproduction.acceptance import CIRCULAR, JUDGED, count_met, glances
 from wakewise_paper.reproduction.flights import read_series
 from wakewise_paper.reproduction.published_tables import UNKNOWN
 from wakewise_paper.reproduction.worlds import water
@@ -56,7 +56,7 @@ def tables_page(tables: Mapping[str, Mapping[str, Any]], store: Path) -> str:
 
 
 def _head(tables: Mapping[str, Mapping[str, Any]]) -> str:
-    counts = tally({name: table["rows"] for name, table in tables.items()})
+    counts = count_met({name: table["rows"] for name, table in tables.items()})
     trials, failed = (sum(table[key] or 0 for table in tables.values()) for key in ("made", "failed"))
     took = duration(sum(table["trial_s"] or 0.0 for table in tables.values()))
     title = (
@@ -95,7 +95,7 @@ def _glance(tables: Mapping[str, Mapping[str, Any]]) -> str:
             circular = " (circular)" if one.world in CIRCULAR else ""
             rows.append(
                 f'<tr><td><a href="#{name}">{name}</a></td><td>{escape(one.world)}{circular}</td>'
-                f"<td>{escape(won(one))}</td><td>{escape(price(one))}</td>"
+                f"<td>{escape(winner_text(one))}</td><td>{escape(cost_text(one))}</td>"
                 f'<td class="num">{one.trials}</td></tr>'
             )
     if not rows:
@@ -128,7 +128,7 @@ def _table(table: Mapping[str, Any], store: Path) -> str:
         parts.append(worst_panels(JUDGED[name], places, store))
     if table["failures"]:
         items = "".join(f"<li>{escape(f['trial'])}: {escape(str(f['reason']))}</li>" for f in table["failures"])
-        parts.append(fold("Failed trials", f"<ul>{items}</ul>", f"{len(table['failures'])}"))
+        parts.append(collapsible_section("Failed trials", f"<ul>{items}</ul>", f"{len(table['failures'])}"))
     return section(name, name.capitalize(), lead, "".join(parts))
 
 
@@ -165,7 +165,9 @@ def _rows(rows: Sequence[Mapping[str, Any]]) -> str:
     over_all = {(row["world"], row["method"], row["figure"]) for row in rows if row["target"] is None}
     parts = [row for row in rows if row["target"] and (row["world"], row["method"], row["figure"]) in over_all]
     shown = _listed([row for row in rows if row not in parts])
-    return shown + (fold("Target by target", _listed(parts), f"{len(parts)} rows", folded=True) if parts else "")
+    return shown + (
+        collapsible_section("Target by target", _listed(parts), f"{len(parts)} rows", folded=True) if parts else ""
+    )
 
 
 def _listed(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -216,7 +218,7 @@ def _mark(row: Mapping[str, Any]) -> str:
 
 
 def _row(row: Mapping[str, Any], several: bool) -> str:
-    said = row.get("our_order") or sentences.ours(row)
+    said = row.get("our_order") or sentences.our_value(row)
     more = [row["how"], f"paper: {row['paper_says']}"]
     if row.get("p_holm") is not None:
         more.append(f"paired t-test p {_two(row['p_t'])}, Holm {_two(row['p_holm'])}")
@@ -273,6 +275,6 @@ def _limits(tables: Mapping[str, Mapping[str, Any]]) -> str:
 
     content = ""
     for title, lines in (("Met in some world", could), ("Met in none", could_not), ("Not judged", unknown)):
-        content += fold(title, listed(lines), str(len(lines))) if lines else ""
-    content += fold("Not known here of the paper", listed(UNKNOWN), str(len(UNKNOWN)))
+        content += collapsible_section(title, listed(lines), str(len(lines))) if lines else ""
+    content += collapsible_section("Not known here of the paper", listed(UNKNOWN), str(len(UNKNOWN)))
     return section("limits", "What could be reproduced, and what not", "Computed from the rows above.", content)

@@ -12,7 +12,19 @@ from matplotlib.figure import Figure
 from wakewise.core.arrays import Array
 from wakewise.ui.reports.figures import NARROW_IN, WIDTH_IN
 from wakewise.ui.reports.methods_compared import colour_of
-from wakewise.ui.reports.svg_style import CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET, dress, key, new_figure
+from wakewise.ui.reports.svg_style import (
+    CORAL,
+    INK,
+    LINE,
+    MUTED,
+    SAND,
+    SLATE,
+    TEAL,
+    VIOLET,
+    add_legend,
+    new_figure,
+    style_axes,
+)
 
 Row = Mapping[str, Any]
 
@@ -26,13 +38,13 @@ def over_time(series: Mapping[str, Mapping[str, Array]], narrow: bool = False) -
     panels = list(drawn.subplots(count + 2, 1, sharex=True))
     most = max(float(np.abs(one["thrusts_N"]).max()) for one in series.values())
     for axes, (method, one) in zip(panels, series.items(), strict=False):
-        dress(axes, y="thrust (N)", grid="y")
+        style_axes(axes, y="thrust (N)", grid="y")
         axes.plot(one["time_s"], one["thrusts_N"], color=colour_of(method), linewidth=0.6, alpha=0.75)
         axes.set_ylim(-1.05 * most, 1.05 * most)
         axes.set_title(f"{method}: all thrusters", loc="left", color=INK, fontsize=10)
     water, disturbance = panels[count], panels[count + 1]
-    dress(disturbance, x="time (s)", y="D (m²/s²)", grid="y")
-    dress(water, y="target (mm/s)", grid="y")
+    style_axes(disturbance, x="time (s)", y="D (m²/s²)", grid="y")
+    style_axes(water, y="target (mm/s)", grid="y")
     for method, one in series.items():
         water.plot(one["time_s"], 1e3 * one["speed_m_s"], color=colour_of(method), linewidth=1.0, label=method)
         disturbance.plot(one["D_time_s"], np.maximum(one["D"], 1e-12), color=colour_of(method), linewidth=0.9)
@@ -43,7 +55,7 @@ def over_time(series: Mapping[str, Mapping[str, Array]], narrow: bool = False) -
     begins_s = float(next(iter(series.values()))["begins_s"])
     for axes in panels:
         axes.axvspan(0.0, begins_s, color=LINE, alpha=0.35, linewidth=0)
-    key(water, loc="upper right", ncols=count)
+    add_legend(water, loc="upper right", ncols=count)
     return drawn
 
 
@@ -68,7 +80,7 @@ def obedience(rows: Sequence[Row], narrow: bool = False) -> Figure | None:
         return None
     drawn = new_figure(NARROW_IN if narrow else 0.62 * WIDTH_IN, 3.4)
     axes: Axes = drawn.subplots()
-    dress(axes, x="deviation from the velocity asked for (%)", y="less wash than direct (%)", grid="both")
+    style_axes(axes, x="deviation from the velocity asked for (%)", y="less wash than direct (%)", grid="both")
     for (world, points), colour in zip(lines.items(), (TEAL, CORAL, VIOLET, SAND, SLATE), strict=False):
         axes.plot([p[1] for p in points], [p[2] for p in points], "o-", color=colour, label=world, linewidth=1.2)
         for w_track, x, y in points:
@@ -76,7 +88,7 @@ def obedience(rows: Sequence[Row], narrow: bool = False) -> Figure | None:
     axes.plot([15.0, 15.0, 0.0], [105.0, 60.0, 60.0], color=INK, linewidth=1.0, linestyle=(0, (4, 3)))
     axes.set_xlim(0.0, max(18.0, 1.1 * max(p[1] for points in lines.values() for p in points)))
     axes.set_ylim(top=105.0)
-    key(axes, loc="lower right")
+    add_legend(axes, loc="lower right")
     return drawn
 
 
@@ -92,7 +104,7 @@ def agreement(rows: Sequence[Row], narrow: bool = False) -> Figure | None:
     panels = drawn.subplots(2 if narrow else 1, 1 if narrow else 2, squeeze=False).ravel()
     marks = ("x", "s", "^", "D")
     for axes, (figure, words) in zip(panels, panels_of, strict=True):
-        dress(axes, x="R2 (worse than -1 at the edge)", grid="x")
+        style_axes(axes, x="R2 (worse than -1 at the edge)", grid="x")
         for (model, mark), colour in zip(zip(models, marks, strict=False), (CORAL, SAND, SLATE, TEAL), strict=False):
             found = [(r["ours"], flows.index(r["target"])) for r in rows if (r["method"], r["key"]) == (model, figure)]
             known = [(max(float(v), -1.0), place) for v, place in found if v is not None]
@@ -109,5 +121,5 @@ def agreement(rows: Sequence[Row], narrow: bool = False) -> Figure | None:
         axes.set_ylim(len(flows) - 0.5, -0.7)
         axes.set_yticks(range(len(flows)), flows if narrow or figure == "r2_core" else [""] * len(flows))
         axes.set_title(words, loc="left", color=INK, fontsize=10.5)
-    key(panels[0], loc="lower left")
+    add_legend(panels[0], loc="lower left")
     return drawn

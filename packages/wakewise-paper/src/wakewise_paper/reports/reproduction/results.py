@@ -19,7 +19,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.files import whole_file, write_text
 from wakewise.experiments.campaigns.statistics import smallest_effect
 from wakewise.experiments.campaigns.summary import worst_trials
-from wakewise.ui.reports.methods_compared import methods_compared, price, profiles, won
+from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, winner_text
 from wakewise.ui.reports.svg_style import CARD, CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET
 from wakewise.ui.reports.text import duration, number, shown
 from wakewise.ui.reports.trial_pictures import sheet
@@ -110,13 +110,13 @@ def _index(tables: Mapping[str, Mapping[str, Any]], note: str) -> str:
         "",
         "## At a glance",
         "",
-        "| table | world | who won, by how much, how sure | at what price |",
+        "| table | world | who winner_text, by how much, how sure | at what cost_text |",
         "|---|---|---|---|",
     ]
     for name, table in tables.items():
         for one in glances(name, table["places"]):
             circular = " (circular)" if one.world in CIRCULAR else ""
-            lines.append(f"| {name} | {one.world}{circular} | {won(one)} | {price(one)} |")
+            lines.append(f"| {name} | {one.world}{circular} | {winner_text(one)} | {cost_text(one)} |")
     lines += [
         "",
         "## How",
@@ -132,7 +132,7 @@ def _index(tables: Mapping[str, Mapping[str, Any]], note: str) -> str:
         "",
         "| | |",
         "|---|---|",
-        *(f"| {name} | {value} |" for name, value in sentences.machine().items()),
+        *(f"| {name} | {value} |" for name, value in sentences.computer_description().items()),
         f"| time of all trials | {duration(sum(table['trial_s'] or 0.0 for table in tables.values()))} |",
     ]
     return "\n".join(lines) + "\n"
@@ -256,7 +256,7 @@ def _table(rows: Any) -> list[str]:
         "|---|---|---|--:|--:|--:|--:|---|--:|--:|",
     ]
     for row in rows:
-        ours = row.get("our_order") or sentences.ours(row)
+        ours = row.get("our_order") or sentences.our_value(row)
         paper = row["paper_says"] if row["paper"] is None and row["asked"] is not None else sentences.quoted(row)
         paper = row["paper_says"] if row["reading"] == "order" else paper
         p = "" if row.get("p_holm") is None else f"{row['p_holm']:.2g}"

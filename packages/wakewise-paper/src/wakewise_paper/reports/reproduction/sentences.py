@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from wakewise.ui.reports.text import number, percent, shown
-from wakewise_paper.reproduction.acceptance import SETUP, tally
+from wakewise_paper.reproduction.acceptance import SETUP, count_met
 
 Row = Mapping[str, Any]
 Table = Mapping[str, Any]
@@ -18,7 +18,7 @@ _PACKAGES = ("wakewise", "numpy", "scipy", "numba", "pycolmap", "embreex", "daqp
 
 def met_of(tables: Mapping[str, Sequence[Row]]) -> str:
     """How many of the paper's figures are met, by the rows of one table or of several."""
-    counts = tally(tables)
+    counts = count_met(tables)
     if not counts["quoted"]:
         return "no figure of the paper is quoted here"
     figures = "figures that the paper quotes are" if counts["quoted"] > 1 else "figure that the paper quotes is"
@@ -51,7 +51,7 @@ def interval(row: Row) -> str:
     return "" if row["low"] is None else f"{number(row['low'])} to {number(row['high'])}"
 
 
-def ours(row: Row) -> str:
+def our_value(row: Row) -> str:
     """Our figure with its unit; how much less by more than a factor of 3 as that factor."""
     if row["reading"] == "less_pct":
         return percent(row["ours"], _ends(row))[0]
@@ -110,12 +110,12 @@ def _place(row: Row) -> str:
     where = row["target"] if row["world"] == "-" else row["world"]
     where = f"{where} ({row['target']})" if row["world"] != "-" and row["target"] else where
     ends = interval(row)
-    said = row.get("our_order") or ours(row)
+    said = row.get("our_order") or our_value(row)
     head = f"{where}: " if where else ""
     return f"{head}{said}" + (f" ({ends})" if ends else "") + f", n = {shown(row['n'])}"
 
 
-def machine() -> dict[str, str]:
+def computer_description() -> dict[str, str]:
     """The computer in words that name nobody: cores, system, versions."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     found = {"cores": str(cores), "system": f"{platform.system()} {platform.machine()}"}
