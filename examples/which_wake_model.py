@@ -7,7 +7,7 @@ import wakewise as ww
 from wakewise.wake.models import OWN_MODELS
 from wakewise.wake.samples import read_samples
 from wakewise.wake.scores import score
-from wakewise_paper.lattice_reference import oracle_jets
+from wakewise_paper.flows import oracle_jets
 from wakewise_paper.wake_validation import sampled
 
 if sys.argv[1:]:  # CSV files with x_m, r_m, thrust_N, u_m_s, disk_diameter_m: see `wakewise wake fit --help`

@@ -42,7 +42,7 @@ def without_extras(script: str, folder: Path) -> subprocess.CompletedProcess[str
     )
 
 
-def test_rooms_of_the_core_and_all_settings_are_imported_without_extras(tmp_path):
+def test_packages_of_the_core_and_all_settings_are_imported_without_extras(tmp_path):
     """Scenario holds the settings of every room; the names of a lazy room that need no extra can be had."""
     found = without_extras(
         """

@@ -13,10 +13,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from wakewise.simulation.lattice import CASES, compute_mean_field, compute_run, find_case, save_mean_field
-from wakewise.simulation.lattice.crossing import crossing_field, is_crossing, save_crossing
-from wakewise.simulation.lattice.deflected_jet import is_past_box, past_field, save_past_box
-from wakewise.simulation.lattice.laws import convergence
-from wakewise.simulation.lattice.meanfield import DATA, SHIPPED
+from wakewise.simulation.lattice.crossing import (
+    crossing_field,
+    is_crossing,
+    is_past_box,
+    past_field,
+    save_crossing,
+    save_past_box,
+)
+from wakewise.simulation.lattice.meanfield import DATA, SHIPPED, convergence
 from wakewise.ui.cli.console import ProgressBars
 
 

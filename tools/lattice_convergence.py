@@ -19,8 +19,7 @@ from wakewise.core.errors import WakewiseError
 from wakewise.simulation.lattice import CASES, LatticeRun, compute_run, find_case
 from wakewise.simulation.lattice.crossing import crossing_figures, is_crossing
 from wakewise.simulation.lattice.engines import DEVICES
-from wakewise.simulation.lattice.laws import figures
-from wakewise.simulation.lattice.meanfield import mean_field
+from wakewise.simulation.lattice.meanfield import figures, mean_field
 from wakewise.ui.cli.console import ProgressBars
 
 

@@ -145,7 +145,7 @@ def vehicle_page() -> str:
 
 def _vehicle_table(group: str, model: type[BaseModel]) -> str:
     from wakewise.robot.vehicles import plausible, unit_of
-    from wakewise.robot.vehicles.needs import NEEDED_FIELDS
+    from wakewise.robot.vehicles.draft import NEEDED_FIELDS
 
     rows = ["| field | unit | for a flight | value | in the library | what |", "|---|---|---|---|---|---|"]
     forms = model.model_json_schema()["properties"]

@@ -8,7 +8,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import quat_from_euler, quat_from_rotvec
-from wakewise_benchmarks.dead_reckoning import dead_reckoned, local_north_east_down
+from wakewise_benchmarks.estimator import dead_reckoned, local_north_east_down
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[3] / "shared" / "data")) / "auv_dvl"
 

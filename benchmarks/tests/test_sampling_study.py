@@ -2,7 +2,7 @@
 
 import pytest
 
-from wakewise_benchmarks.sampling_study import sampling_errors
+from wakewise_benchmarks.disturbance import sampling_errors
 
 
 @pytest.mark.slow

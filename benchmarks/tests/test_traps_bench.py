@@ -6,7 +6,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise_benchmarks import BENCHES, adversarial_photos, adversarial_scenes
-from wakewise_benchmarks.bench_adversarial import show_traps
+from wakewise_benchmarks.command import show_traps
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ from wakewise.core.jit.njit import njit
 from wakewise.experiments.trials.timing import BenchOptions, timed_us
 from wakewise.wake import WakeSettings, disturbance, wake_model
 from wakewise.wake.influence import InfluenceModel
-from wakewise_benchmarks.cases import VEHICLE, bench_region, bench_target, cases
+from wakewise_benchmarks.registry import VEHICLE, bench_region, bench_target, cases
 
 GRID = 1201
 PROBLEMS = 1000

@@ -93,7 +93,7 @@ def _dask_s(folder: Path) -> float | None:
     """The same on a cluster of this computer; None without Dask."""
     if not has("dask"):
         return None
-    from wakewise.experiments.campaigns.cluster import DaskExecutor
+    from wakewise.experiments.campaigns.engines import DaskExecutor
 
     return between_trials_s(folder, DaskExecutor(workers=1))
 

@@ -1,4 +1,7 @@
-"""`wakewise bench`: speed and quality of one part, side by side with a peer."""
+"""`wakewise bench`: speed and quality of one part, side by side with a peer.
+
+What `wakewise bench traps` prints: a row a trap, and how many were silent.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +15,21 @@ import typer
 from wakewise.ui.cli.commands import STUDIES, Command
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, write_page
 from wakewise.ui.cli.options import Json
-from wakewise_benchmarks.bench_adversarial import show_traps
 from wakewise_paper.cli.bench_operator import show_operator
 from wakewise_paper.cli.bench_wash import show_gentle
 from wakewise_paper.cli.bench_worlds import show_worlds
+
+
+def show_traps(result: dict[str, Any]) -> None:
+    """A row per trap: verdict, photographs with a place, error of the cameras, and what was said."""
+    for name, row in result["traps"].items():
+        placed = f"{row['registered']} of {row['photos']}"
+        off = "" if row["off_pct"] is None else f"{format_value(row['off_pct'])} %"
+        typer.echo(f"  {name:<20}{row['verdict']:<8}{placed:>9}{off:>9}  {row['why']}")
+        for words in row["said"]:
+            typer.echo(f"  {'':<20}  {words}")
+    typer.echo(f"  right {result['right']}, said {result['said']}, silently wrong {result['silent_wrongs']}")
+
 
 Name = Annotated[str, typer.Argument(help="Which bench, or all; without a name they are listed.", show_default=False)]
 Data = Annotated[

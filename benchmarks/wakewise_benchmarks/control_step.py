@@ -19,9 +19,9 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.robot.thrusters import thruster_lag
 from wakewise.robot.vehicles import compile_body
-from wakewise.robot.vehicles.runge_kutta import rk4_kernel
+from wakewise.robot.vehicles.semi_implicit import rk4_kernel
 from wakewise.wake import wake_model
-from wakewise_benchmarks.cases import VEHICLE, bench_region, bench_target
+from wakewise_benchmarks.registry import VEHICLE, bench_region, bench_target
 
 METHODS = ("wake-aware", "instant", "unaware", "dp")
 SECONDS, WARM_UP_S, DT_S = 11.0, 1.0, 0.02

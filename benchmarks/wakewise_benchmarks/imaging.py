@@ -37,7 +37,7 @@ from wakewise.vision.imaging import (
 from wakewise.vision.imaging.particles import draw_flakes, flakes_before
 from wakewise.vision.imaging.sensor import expose
 from wakewise.vision.imaging.settings import FLAKES_PER_KG
-from wakewise_benchmarks.cases import bench_target
+from wakewise_benchmarks.registry import bench_target
 
 FRAMES = 6
 PEAK_THRESHOLDS = (0.02, 0.0067)

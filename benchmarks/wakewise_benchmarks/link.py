@@ -20,7 +20,7 @@ from wakewise.core.optional_dependencies import need
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import load_scenario
 from wakewise_ardusub.physics import PhysicsServer, PulseTable, ServoFrame, write_request
-from wakewise_ardusub.physics.udp import LOOPBACK, open_socket, serve
+from wakewise_ardusub.physics.physics import LOOPBACK, open_socket, serve
 from wakewise_ardusub.sitl_plant import SitlPlant
 
 VEHICLE = "bluerov2-heavy"
@@ -147,11 +147,9 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
     """
     from wakewise.core.jit.precompile import compile_kernels
     from wakewise_ardusub.link.connection import Endpoint
-    from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
-    from wakewise_ardusub.link.transports import UdpTransport
+    from wakewise_ardusub.link.transports import MavlinkCodec, UdpTransport
     from wakewise_ardusub.session.link_join import SEA
-    from wakewise_ardusub.session.protected_region import ProtectedRegion
-    from wakewise_ardusub.session.session import VehicleSession
+    from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession
     from wakewise_ardusub.sitl.scripted_ground_station import fly_piloted
 
     compile_kernels(("plan", "fly"), options.progress)

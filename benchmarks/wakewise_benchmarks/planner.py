@@ -6,11 +6,20 @@ The rest is the planner alone in the paper's own wake model. Scenario A floats (
 `paper-calibrated` with a smooth edge of 3 deg. The plant that carries the problems on flies the commands of
 `mm_quality` with 15 % more drag and 10 % more current than the planner believes. Every solver starts from its own last
 plan. Times are the thread's CPU per plan after the first three.
+
+Whether the planner's deadline holds on the wall's clock while every core is busy with something else.
+
+IPOPT on the planner's own objective: what a plan's quality is held against. Needs casadi, a development
+dependency.
 """
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -19,19 +28,155 @@ from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import Goal
 from wakewise.experiments.trials.timing import BenchOptions
+from wakewise.planning.guard import Guard
 from wakewise.planning.planner import PlanModel, Planner, compile_plan
-from wakewise.planning.problem import Horizon, PlanProblem, PlanSettings, PlanTerms, shifted
+from wakewise.planning.problem import PLAN_EVERY_S, Horizon, PlanProblem, PlanSettings, PlanTerms, shifted
 from wakewise.planning.reference import reference_of
 from wakewise.planning.surroundings import Surroundings
 from wakewise.robot.thrusters import thruster_lag
 from wakewise.robot.vehicles import compile_body
-from wakewise.robot.vehicles.runge_kutta import rk4_kernel
+from wakewise.robot.vehicles.semi_implicit import rk4_kernel
 from wakewise.wake import WakeSettings, wake_model
-from wakewise_benchmarks.cases import VEHICLE, bench_region, bench_target
 from wakewise_benchmarks.control_step import METHODS, flown_step
 from wakewise_benchmarks.paper_planner import PaperPlanner
-from wakewise_benchmarks.planner_load import deadline_misses
-from wakewise_benchmarks.planner_reference import IpoptReference
+from wakewise_benchmarks.registry import VEHICLE, bench_region, bench_target
+
+PLANS = 100
+
+
+def deadline_misses(model: PlanModel, problem: PlanProblem) -> tuple[int, float]:
+    """Late plans of `PLANS`, ten per second, and the longest time in ms, with one busy process per core."""
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() or 1)]
+    try:
+        guard = Guard(planner=Planner(model), deadline_s=PLAN_EVERY_S)
+        plan, longest = None, 0.0
+        guard.ask(lambda: problem, None, 0.0)
+        guard.counts.clear()
+        for _ in range(PLANS):
+            began = time.perf_counter()
+            plan = guard.ask(lambda: problem, plan, model.settings.stage_s).plan
+            longest = max(longest, time.perf_counter() - began)
+            time.sleep(max(0.02 - (time.perf_counter() - began), 0.0))
+        return guard.counts.get("late", 0), float(np.round(1e3 * longest, 2))
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+
+
+class IpoptReference:
+    """Minimises the cost of commands within their limits, from any start, with exact gradients and their differences.
+
+    IPOPT: A. Waechter and L. T. Biegler, Mathematical Programming 106 (2006) 25, doi 10.1007/s10107-004-0559-y.
+
+    Raises
+    ------
+    ImportError
+        Where casadi is not installed.
+    """
+
+    def __init__(self, planner: Planner, iterations: int = 20) -> None:
+        casadi: Any = import_module("casadi")
+
+        table, stages = planner.model.table, planner.model.settings.stages
+        self._shape = (stages, planner.model.thrusters)
+        size = stages * planner.model.thrusters
+        shape = self._shape
+
+        class Gradient(casadi.Callback):  # type: ignore[misc]
+            def __init__(self) -> None:
+                casadi.Callback.__init__(self)
+                self.construct("gradient", {})
+
+            def get_n_in(self) -> int:
+                return 2
+
+            def get_n_out(self) -> int:
+                return 1
+
+            def get_sparsity_in(self, i: int) -> object:
+                return casadi.Sparsity.dense(size if i == 0 else 1, 1)
+
+            def get_sparsity_out(self, _: int) -> object:
+                return casadi.Sparsity.dense(1, size)
+
+            def eval(self, args: list[Any]) -> list[object]:
+                U = np.array(args[0]).reshape(shape)
+                return [casadi.DM(planner.gradient(U)).T]
+
+        class Cost(casadi.Callback):  # type: ignore[misc]
+            def __init__(self) -> None:
+                casadi.Callback.__init__(self)
+                self._gradient = Gradient()
+                self.construct("cost", {})
+
+            def get_n_in(self) -> int:
+                return 1
+
+            def get_n_out(self) -> int:
+                return 1
+
+            def get_sparsity_in(self, _: int) -> object:
+                return casadi.Sparsity.dense(size, 1)
+
+            def get_sparsity_out(self, _: int) -> object:
+                return casadi.Sparsity.dense(1, 1)
+
+            def eval(self, args: list[Any]) -> list[object]:
+                return [planner.cost(np.array(args[0]).reshape(shape))]
+
+            def has_jacobian(self) -> bool:
+                return True
+
+            def get_jacobian(self, *_: object) -> object:
+                return self._gradient
+
+        class Hessian(casadi.Callback):  # type: ignore[misc]
+            def __init__(self) -> None:
+                casadi.Callback.__init__(self)
+                self.construct("hessian", {})
+
+            def get_n_in(self) -> int:
+                return 4
+
+            def get_n_out(self) -> int:
+                return 1
+
+            def get_sparsity_in(self, i: int) -> object:
+                return casadi.Sparsity.dense(*((size, 1), (0, 1), (1, 1), (0, 1))[i])
+
+            def get_sparsity_out(self, _: int) -> object:
+                return casadi.Sparsity.upper(size)
+
+            def eval(self, args: list[Any]) -> list[object]:
+                z, scale = np.array(args[0]).reshape(-1), float(args[2])
+                H = np.empty((size, size))
+                here = planner.gradient(z.reshape(shape)).copy()
+                for i in range(size):
+                    moved = z.copy()
+                    moved[i] += 1e-6
+                    H[i] = (planner.gradient(moved.reshape(shape)) - here) / 1e-6
+                return [casadi.triu(casadi.DM(0.5 * scale * (H + H.T)))]
+
+        self._cost, self._hessian = Cost(), Hessian()
+        z = casadi.MX.sym("z", size)
+        options = {
+            "hess_lag": self._hessian,
+            "ipopt.max_iter": iterations,
+            "ipopt.tol": 1e-4,
+            "ipopt.acceptable_iter": 0,
+            "ipopt.print_level": 0,
+            "ipopt.sb": "yes",
+            "print_time": False,
+        }
+        self._solver = casadi.nlpsol("plan", "ipopt", {"x": z, "f": self._cost(z)}, options)
+        self._bounds = {"lbx": np.tile(table.lower, stages), "ubx": np.tile(table.upper, stages)}
+
+    def solve(self, start_N: Array) -> tuple[Array, float]:
+        """Commands, shape (N, n), and their cost, for the problem last loaded into the planner."""
+        found = self._solver(x0=start_N.reshape(-1), **self._bounds)
+        return np.array(found["x"]).reshape(self._shape), float(found["f"])
+
 
 SCENARIOS = {"A": -1.5, "B": 3.0}
 """Net weight in N, positive sinks."""

@@ -23,8 +23,7 @@ from wakewise.operation import Scenario, load_scenario
 from wakewise.scene.targets import stony_kinds
 from wakewise.vision.reconstruction import ReconstructionSettings
 from wakewise_benchmarks import imaging
-from wakewise_paper.photo_model import judge
-from wakewise_paper.photo_sets import planned_views, read_photo_set, write_photos
+from wakewise_paper.photo_sets import judge, planned_views, read_photo_set, write_photos
 
 PRESET, SEED = "standard", 1
 _ALONE = ("rmse_mm", "completeness_pct", "completeness_visible_pct", "mapping", "stages_s", "total_s", "total_cpu_s")

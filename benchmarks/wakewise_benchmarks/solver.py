@@ -20,8 +20,8 @@ from wakewise.experiments.trials.timing import timed_us
 from wakewise.planning.planner import PlanModel, Planner
 from wakewise.planning.problem import Horizon, shifted
 from wakewise.wake import InfluenceModel, WakeSettings, disturbance, wake_model
-from wakewise_benchmarks.cases import VEHICLE
 from wakewise_benchmarks.planner import SCENARIOS, WARM_UP, MismatchedPlant, plan_model, restart_spread
+from wakewise_benchmarks.registry import VEHICLE
 
 OURS, RECIPE = "wake-aware", "the paper's recipe"
 LATE_MS = 50.0

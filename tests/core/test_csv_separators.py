@@ -12,11 +12,11 @@ import pytest
 from wakewise.core.csv_separators import other_separator
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.robot.thrusters.step_file import read_step
+from wakewise.robot.thrusters.lag_fit import read_step
 from wakewise.robot.thrusters.thrust_table import read_thrust_table
 from wakewise.robot.vehicles import load_vehicle
-from wakewise.scene.targets.fragility_marks import read_marks
-from wakewise.simulation.tank.probe_tables import read_table
+from wakewise.scene.targets.fragility import read_marks
+from wakewise.simulation.tank.probe import read_table
 from wakewise.simulation.water.current_series import read_current_series
 from wakewise.ui.cli.points import read_points
 

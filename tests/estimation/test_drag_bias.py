@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 
 from wakewise.core.geometry import matrix_from_quat
-from wakewise.estimation.drag_bias import DRAG, drag_at_rest, drag_at_rest_jacobian
-from wakewise.estimation.eskf_kernels import CURRENT, GAINS, INERTIA, adapted_parameters, propagate_mean
+from wakewise.estimation.eskf_kernels import (
+    CURRENT,
+    DRAG,
+    GAINS,
+    INERTIA,
+    adapted_parameters,
+    drag_at_rest,
+    drag_at_rest_jacobian,
+    propagate_mean,
+)
 from wakewise.robot.vehicles import acceleration, compile_body, load_vehicle
 
 VEHICLE = load_vehicle("paper")

@@ -20,8 +20,7 @@ from wakewise.estimation.eskf_kernels import residual_wrench
 from wakewise.estimation.settings import FilterSettings, Priors
 from wakewise.robot.thrusters import thruster_lag
 from wakewise.robot.vehicles import compile_body, load_vehicle, step_rk4
-from wakewise.simulation.tank.gauss_markov import GaussMarkovProcess
-from wakewise.simulation.tank.sensors import FORCE_WALK_M_S2, GYRO_WALK_RAD_S
+from wakewise.simulation.tank.sensors import FORCE_WALK_M_S2, GYRO_WALK_RAD_S, GaussMarkovProcess
 from wakewise.simulation.tank.settings import MismatchSettings, SensorSettings
 
 VEHICLE = load_vehicle("paper")

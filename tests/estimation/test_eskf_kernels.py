@@ -15,9 +15,16 @@ from estimation_helpers import (
 )
 
 from wakewise.core.geometry import matrix_from_quat, quat_from_rotvec, quat_multiply
-from wakewise.estimation.drag_bias import DRAG, drag_at_rest, turn
-from wakewise.estimation.eskf_kernels import quat_minus, quat_plus, residual_wrench, specific_force
-from wakewise.estimation.prediction import predict
+from wakewise.estimation.eskf_kernels import (
+    DRAG,
+    drag_at_rest,
+    predict,
+    quat_minus,
+    quat_plus,
+    residual_wrench,
+    specific_force,
+    turn,
+)
 from wakewise.robot.vehicles import acceleration
 
 GRAVITY = np.array([0.0, 0.0, 9.80665])

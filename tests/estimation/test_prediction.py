@@ -15,8 +15,7 @@ from estimation_helpers import (
     random_mean,
 )
 
-from wakewise.estimation.eskf_kernels import CURRENT, GAINS
-from wakewise.estimation.prediction import advance, predict
+from wakewise.estimation.eskf_kernels import CURRENT, GAINS, advance, predict
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from wakewise.core.geometry import Pose, quat_from_rotvec
 from wakewise.core.interfaces import ScalarGrid
 from wakewise.operation import BackgroundRenderer, load_scenario, photograph_flight
 from wakewise.operation.background_renderer import MOST_WAITING, packed, unpacked
-from wakewise.operation.exposures import ExposureRecord, read_exposures, write_exposures
+from wakewise.operation.flight_log import ExposureRecord, read_exposures, write_exposures
 from wakewise.operation.photography import fingerprint, take_photograph
 from wakewise.simulation.tank.flakes import Flakes
 from wakewise.simulation.water import SteadyCurrent

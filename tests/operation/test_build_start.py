@@ -8,7 +8,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.operation import fly, load_scenario
-from wakewise.operation.known_obstacles import surroundings_of
+from wakewise.operation.preflight import surroundings_of
 from wakewise.operation.worlds.makers import true_start
 from wakewise.planning import Surroundings, check_start
 from wakewise.ui.cli.main import run

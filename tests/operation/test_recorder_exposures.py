@@ -6,7 +6,7 @@ import pytest
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid
 from wakewise.operation import Scenario, fly, load_scenario
-from wakewise.operation.exposures import ExposureRecord, exposure_arrays, read_exposures, write_exposures
+from wakewise.operation.flight_log import ExposureRecord, exposure_arrays, read_exposures, write_exposures
 from wakewise.operation.photography import fingerprint, take_photograph
 from wakewise.vision.imaging.settings import LONGEST_S
 

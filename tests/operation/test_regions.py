@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from wakewise.operation import regions
-from wakewise.operation.regions import MOST_KEPT, region_of
-from wakewise.operation.seeds import Seeds
+from wakewise.operation import parts
+from wakewise.operation.parts import MOST_KEPT, region_of
+from wakewise.operation.randomization import Seeds
 from wakewise.scene.targets import Mesh, place_on_bed, sample_region
 
 POINTS = 6
@@ -20,7 +20,7 @@ def pyramid(height_m=0.1, bed_z_m=1.0):
 
 @pytest.fixture(autouse=True)
 def nothing_kept(monkeypatch):
-    monkeypatch.setattr(regions, "_kept", {})
+    monkeypatch.setattr(parts, "_kept", {})
 
 
 def test_the_kept_region_is_the_one_that_would_be_drawn():
@@ -35,7 +35,7 @@ def test_the_kept_region_is_the_one_that_would_be_drawn():
 
 def test_any_change_of_what_it_follows_from_draws_anew(monkeypatch):
     """Shape, depth, number of points, seed and gain each have their own."""
-    monkeypatch.setattr(regions, "sample_region", lambda *_: object())
+    monkeypatch.setattr(parts, "sample_region", lambda *_: object())
     asked = [
         (pyramid(), POINTS, Seeds(0), 0.0),
         (pyramid(0.11), POINTS, Seeds(0), 0.0),
@@ -52,7 +52,7 @@ def test_any_change_of_what_it_follows_from_draws_anew(monkeypatch):
 def test_the_oldest_goes_first(monkeypatch):
     """Memory is bounded; what was asked for again has become the youngest."""
     drawn = []
-    monkeypatch.setattr(regions, "sample_region", lambda target, points, *_: drawn.append(points) or object())
+    monkeypatch.setattr(parts, "sample_region", lambda target, points, *_: drawn.append(points) or object())
     for points in (*range(MOST_KEPT), 0, MOST_KEPT, 0, 1):
         region_of(pyramid(), points, Seeds(0))
     assert drawn == [*range(MOST_KEPT), MOST_KEPT, 1]

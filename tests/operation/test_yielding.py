@@ -11,7 +11,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid, TargetDeformation
 from wakewise.operation.background_renderer import packed, unpacked
-from wakewise.operation.exposures import ExposureRecord, exposure_arrays, read_exposures
+from wakewise.operation.flight_log import ExposureRecord, exposure_arrays, read_exposures
 from wakewise.operation.photography import fingerprint, moved_m, scenes_of
 from wakewise.operation.preflight import check_target
 from wakewise.operation.recorder import step_columns

@@ -12,8 +12,7 @@ from wakewise.planning.planner import Planner
 from wakewise.planning.qp import BoxQP
 from wakewise.robot.vehicles import step_rk4
 from wakewise.wake import gauss_newton, wake_model
-from wakewise.wake.packed_model import wake_table
-from wakewise.wake.plan_disturbance import stage_disturbance, wake_scratch
+from wakewise.wake.plan_disturbance import stage_disturbance, wake_scratch, wake_table
 
 
 def table_of(wake, superposition):

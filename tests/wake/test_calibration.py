@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.wake.calibration import calibrate, split_samples
+from wakewise.wake.calibration import FAMILIES, calibrate, family, split_samples
 from wakewise.wake.fit_file import fit_figures, read_wake_settings, write_fit
-from wakewise.wake.fit_parameters import FAMILIES, family
 from wakewise.wake.samples import JetSamples
 from wakewise.wake.scores import score, score_speeds
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.wake.calibration import _bootstrap, _standard_errors
-from wakewise.wake.fit_parameters import family
+from wakewise.wake.calibration import _bootstrap, _standard_errors, family
 from wakewise.wake.samples import JetSamples
 
 

@@ -5,8 +5,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.wake import WakeSettings, bed_of, free_jet, gram, point_disturbance, wake_model
-from wakewise.wake.learned import LearnedWake, load_network, save_network, shape, shipped
-from wakewise.wake.network import EDGES, JetPoints, Network
+from wakewise.wake.learned import EDGES, JetPoints, LearnedWake, Network, load_network, save_network, shape, shipped
 from wakewise.wake.wall_jet import WALL_SPEED, wall_velocity
 
 AREA = 0.25 * np.pi * 0.06**2

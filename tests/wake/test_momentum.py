@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.wake.fit_parameters import family
+from wakewise.wake.calibration import family, flux_over_thrust, momentum_law
 from wakewise.wake.jets import GaussianJet, RoundJet
-from wakewise.wake.momentum import flux_over_thrust, momentum_law
 from wakewise.wake.samples import JetSamples
 
 AREA = 0.25 * math.pi * 0.06**2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.wake.network import EDGES, INPUTS, JetPoints, Network, history_bins, remembered
+from wakewise.wake.learned import EDGES, INPUTS, JetPoints, Network, history_bins, remembered
 
 BINS = len(EDGES) - 1
 

@@ -16,7 +16,7 @@ pytest.importorskip("mcap", reason="the extra `links` is not installed")
 import made_logs
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.main import run
-from wakewise_ardusub.logs.identity import VehicleIdentity, firmware_of
+from wakewise_ardusub.logs.channels import VehicleIdentity, firmware_of
 from wakewise_ardusub.logs.read import read_log
 from wakewise_ardusub.logs.table import tabulate
 from wakewise_ardusub.wash_meter.vehicle_listener import VehicleListener

@@ -18,10 +18,9 @@ import made_logs
 from wakewise.core.errors import InputError
 from wakewise_ardusub.logs.channels import LogCollector, VehicleLog
 from wakewise_ardusub.logs.dataflash import read_dataflash
-from wakewise_ardusub.logs.mcap_file import read_mcap
+from wakewise_ardusub.logs.mavlink import packet_at, read_mcap, read_tlog
 from wakewise_ardusub.logs.read import read_log
 from wakewise_ardusub.logs.table import RATE_HZ, tabulate
-from wakewise_ardusub.logs.tlog import packet_at, read_tlog
 
 MADE = {"dive.tlog": made_logs.tlog, "dive.BIN": made_logs.dataflash, "dive.mcap": made_logs.mcap}
 READERS = {"dive.tlog": read_tlog, "dive.BIN": read_dataflash, "dive.mcap": read_mcap}
@@ -284,10 +283,10 @@ def test_what_is_no_log_is_one_line(tmp_path: Path, data: bytes, said: str) -> N
 
 def test_blueos_keys_without_quotes_are_read() -> None:
     """Its JSON may be JSON5."""
-    from wakewise_ardusub.logs import mcap_file
+    from wakewise_ardusub.logs import mavlink
 
     gather = LogCollector()
     body = b'{header: {system_id: 1}, message: {type: "VFR_HUD", alt: -2.5}}'
-    head = mcap_file._MESSAGE_HEAD.pack(7, 0, 10**9, 10**9)
-    assert mcap_file._message(gather, head + body, {7: (1, 1, "VFR_HUD")})
+    head = mavlink._MESSAGE_HEAD.pack(7, 0, 10**9, 10**9)
+    assert mavlink._message(gather, head + body, {7: (1, 1, "VFR_HUD")})
     assert gather.vessel(1).rows["depth VFR_HUD"] == [(0.0, 2.5)]

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
-from wakewise.robot.thrusters.curve_library import library_curve
+from wakewise.robot.thrusters.thrust_table import library_curve
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.robot.vehicles.vehicle import LeastThrust
 from wakewise_ardusub.motors import (

@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.robot.thrusters.curve_library import library_curve
+from wakewise.robot.thrusters.thrust_table import library_curve
 from wakewise.robot.vehicles import Vehicle, load_vehicle
 from wakewise.wake import wake_model
 from wakewise_ardusub.logs.replay_allocation import bow_points, replay_log

@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra `nerf` (PyTorch)")
 
-from wakewise_nerf.field.hash_grid import HashGrid
+from wakewise_nerf.field.field import HashGrid
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,10 @@ torch = pytest.importorskip("torch", reason="needs the extra `nerf` (PyTorch)")
 
 from wakewise.core.errors import StageError
 from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
-from wakewise_nerf.field.field import RadianceField
+from wakewise_nerf.field.field import OccupancyGrid, RadianceField
 from wakewise_nerf.field.held_out_views import draw, psnr_db, split, ssim
-from wakewise_nerf.field.occupancy import OccupancyGrid
 from wakewise_nerf.field.posed import read_model, read_posed
-from wakewise_nerf.field.rays import RayTable, origin_in
+from wakewise_nerf.field.rendering import RayTable, origin_in
 from wakewise_nerf.field.settings import FieldSettings
 from wakewise_nerf.field.training import read_checkpoint, train
 

@@ -8,7 +8,7 @@ from wakewise.core.errors import InputError
 from wakewise.operation import load_scenario
 from wakewise_paper import photo_robustness
 from wakewise_paper.photo_robustness import COLUMNS, FACTORS, degrade
-from wakewise_paper.reports.photo_robustness import plot_degradation
+from wakewise_paper.reports.operator_bench_plot import plot_degradation
 
 SMALL = {
     "target.kind": "brain",

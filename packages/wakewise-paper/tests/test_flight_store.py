@@ -3,8 +3,8 @@
 from pools import Here
 from wakewise.experiments.campaigns.store import open_store
 from wakewise.experiments.trials import BenchOptions
-from wakewise_paper import flight_batches, flight_store
-from wakewise_paper.flight_store import FlightStore, store_folder
+from wakewise_paper import flight_batches
+from wakewise_paper.flight_batches import FlightStore, store_folder
 from wakewise_paper.wash_reduction.flight import WashTrial
 
 FLY = f"{__name__}:made_up"
@@ -41,9 +41,9 @@ def test_flights_are_kept_by_what_was_flown(tmp_path, monkeypatch):
 
 def test_what_flies_is_part_of_a_flight():
     """Flights and models name the parts of the package that can change them."""
-    assert set(flight_store.FLIES) < set(flight_store.PHOTOGRAPHS)
+    assert set(flight_batches.FLIES) < set(flight_batches.PHOTOGRAPHS)
     task = FlightStore(store_folder()).task(WashTrial(scenario="orbit/paper", method="dp", seed=1), FLY)
-    assert task.sources == flight_store.FLIES and len(task.key) == 32
+    assert task.sources == flight_batches.FLIES and len(task.key) == 32
 
 
 def test_the_cache_folder_follows_the_environment(monkeypatch, tmp_path):

@@ -16,8 +16,15 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise_paper.flows import BLAAUW_VAN_DE_KAA, FUEHRER_ROEMISCH, Gusts, ParcelJet, TableJet, exit_speed_m_s
-from wakewise_paper.piv_reference import read_air_jet
+from wakewise_paper.flows import (
+    BLAAUW_VAN_DE_KAA,
+    FUEHRER_ROEMISCH,
+    Gusts,
+    ParcelJet,
+    TableJet,
+    exit_speed_m_s,
+    read_air_jet,
+)
 
 DATA = pathlib.Path(os.environ.get("WAKEWISE_DATA", pathlib.Path(__file__).parents[4] / "shared" / "data"))
 

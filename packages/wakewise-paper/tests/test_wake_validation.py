@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from wakewise.simulation.lattice import load_mean_field
-from wakewise.wake.calibration import split_samples
-from wakewise.wake.fit_parameters import FAMILIES
-from wakewise_paper.flows import FUEHRER_ROEMISCH
-from wakewise_paper.lattice_reference import grid_convergence_pct, oracle_jets
+from wakewise.wake.calibration import FAMILIES, split_samples
+from wakewise_paper.flows import FUEHRER_ROEMISCH, grid_convergence_pct, oracle_jets
 from wakewise_paper.wake_piv import piv_samples
 from wakewise_paper.wake_validation import (
     TEST_THRUSTS_N,

@@ -8,8 +8,8 @@ comes in as the Gram matrix G of `s' G s`, where s are roots of thrusts.
 
 Start reading in `allocate.py` (what is asked and answered). `layout.py` is the matrix and its null space,
 `attainable_set.py` what the limits leave. The search for the minimum: `line_search.py` for one or two spare thrusts,
-`branch_and_bound.py` with `cost_bounds.py` and `coordinate_descent.py` (branch and bound) for more, `convex.py` for the
-convex cost of effort alone. `power.py` leaves what is not worth its electrical power, and keeps a bound on it.
+`branch_and_bound.py` with `branch_and_bound.py` and `coordinate_descent.py` (branch and bound) for more, `convex.py`
+for the convex cost of effort alone. `power.py` leaves what is not worth its electrical power, and keeps a bound on it.
 """
 
 from wakewise.allocation.allocate import (

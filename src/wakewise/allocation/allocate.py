@@ -20,10 +20,9 @@ from wakewise.allocation.attainable_set import (
     parse_priority,
     prioritized_allocation,
 )
-from wakewise.allocation.branch_and_bound import global_minimum
+from wakewise.allocation.branch_and_bound import RELATIVE_GAP, global_minimum
 from wakewise.allocation.convex import convex_allocation
 from wakewise.allocation.coordinate_descent import coupled_directions, feasible_starts, idle_starts, start_directions
-from wakewise.allocation.cost_bounds import RELATIVE_GAP
 from wakewise.allocation.layout import Layout, compile_layout
 from wakewise.allocation.line_search import cost, disjoint_search, split_allocation
 from wakewise.core.arrays import Array, freeze, frozen

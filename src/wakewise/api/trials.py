@@ -68,7 +68,7 @@ def trial(
     """
     need("ww.trial", *_EXTRAS)
     from wakewise.experiments.trials import SilentProgress, run_trial
-    from wakewise.experiments.trials.reporting import report_attempt
+    from wakewise.experiments.trials.stages import report_attempt
     from wakewise.ui.reports import PageParts, begin_report, write_report
 
     place, draft = path_of(folder, "folder"), PageParts()
@@ -110,7 +110,7 @@ def compare(
     """
     need("ww.compare", *_EXTRAS)
     from wakewise.experiments.trials import SilentProgress, compare_methods
-    from wakewise.experiments.trials.reporting import report_attempt
+    from wakewise.experiments.trials.stages import report_attempt
     from wakewise.ui.reports import PageParts, begin_report, write_comparison, write_report
 
     if not isinstance(flights, Mapping):
@@ -137,7 +137,7 @@ def compare(
 
 def _early(begin: Callable[..., None]) -> Callable[..., None]:
     """What makes parts of a report while the trial still runs, which it must not end: `write_report` tells of it."""
-    from wakewise.experiments.trials.reporting import report_attempt
+    from wakewise.experiments.trials.stages import report_attempt
 
     def parts(*given: str) -> None:
         with report_attempt():

@@ -19,8 +19,8 @@ import numpy as np
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
-from wakewise.robot.thrusters.curve_library import library_curve
 from wakewise.robot.thrusters.thrust_curve import ThrustCurve
+from wakewise.robot.thrusters.thrust_table import library_curve
 from wakewise.robot.vehicles import Vehicle
 
 FULL_US, MIDDLE_US = 400.0, 1500.0

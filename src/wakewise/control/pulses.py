@@ -23,7 +23,7 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.interfaces import BodyState, Command, Controller, Goal
 from wakewise.core.jit.njit import njit
 from wakewise.robot.thrusters import ThrustSteps
-from wakewise.robot.thrusters.thrust_steps import nearest
+from wakewise.robot.thrusters.thrust_curve import nearest
 from wakewise.robot.vehicles import Vehicle
 
 

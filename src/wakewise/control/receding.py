@@ -42,7 +42,7 @@ from wakewise.planning.surroundings import Surroundings, around_target
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake import ImpingingJet
-from wakewise.wake.disturbance_derivatives import Superposition
+from wakewise.wake.disturbance import Superposition
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ from wakewise.core.defaults import DISTURBANCE_WEIGHT, EFFORT_WEIGHT
 from wakewise.core.settings import Settings
 from wakewise.planning.problem import PlanSettings
 from wakewise.wake import WakeSettings
-from wakewise.wake.disturbance_derivatives import Superposition
+from wakewise.wake.disturbance import Superposition
 
 Coordinate = Annotated[float, Field(ge=-100.0, le=100.0)]
 Radius = Annotated[float, Field(gt=0.0, le=10.0)]

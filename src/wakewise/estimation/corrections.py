@@ -13,8 +13,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.jit.njit import assign, njit
-from wakewise.estimation.drag_bias import DRAG, turn
-from wakewise.estimation.eskf_kernels import GAINS, quat_minus, quat_plus, specific_force
+from wakewise.estimation.eskf_kernels import DRAG, GAINS, quat_minus, quat_plus, specific_force, turn
 
 NOTHING = -1
 """In place of where a second error begins, if a measurement tells only one."""

@@ -43,8 +43,7 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Measurement
 from wakewise.estimation.corrections import NOTHING, correct_by_force, correct_by_pose, correct_by_sum
 from wakewise.estimation.current_from_drag import current_if_known
-from wakewise.estimation.eskf_kernels import CURRENT, FORCE, GYRO, TURNING, residual_wrench
-from wakewise.estimation.prediction import TICK_S, advance
+from wakewise.estimation.eskf_kernels import CURRENT, FORCE, GYRO, TICK_S, TURNING, advance, residual_wrench
 from wakewise.estimation.settings import FilterSettings, Priors
 from wakewise.robot.vehicles import Vehicle, compile_body, with_each_drag
 

@@ -7,6 +7,23 @@ in drag (28:34) and inertia (34:40) per degree of freedom and in each thruster's
 the sensors' slow errors: the camera's shift in W and turn in B, the tracking's shift in W, the depth's bias. `P` is the
 covariance of the error, which has one entry less: position in W (0:3), turn, a rotation vector in B (3:6), then as in
 `mean`, each place one lower.
+
+What a current does to the vehicle at rest, taken out of its motion and put into the load that nothing explains.
+
+At rest a current's drag and Munk moment cannot be told from any other load, and nothing need tell them apart. Yet they
+go with the square of the current: a filter that reckons with them as such holds for knowledge of the current what is
+only the bend of that curve, taken at one estimate after the other. So the unmodelled force and moment of the filter
+are those *at rest*, in one attitude, the first one, with drag and Munk moment of the current in them; to the
+equations of motion comes only by how much either differs once the vehicle moves or has turned. That is the same
+model, in variables in which hovering says nothing of the current.
+
+The current is `mean[25:28]`, `own` the vehicle's packed numbers with drag and inertia as believed (see
+`wakewise.robot.vehicles.kernels`), `rest_q` the attitude.
+
+Compiled prediction of the error-state filter: mean, covariance and thrusts from one time to the next.
+
+Mean and covariance are laid out as in `kernels`. A covariance that is symmetric to the bit stays so: `corrections`
+reads rows of it for columns.
 """
 
 from __future__ import annotations
@@ -15,9 +32,97 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.jit.njit import assign, njit
-from wakewise.estimation.drag_bias import DRAG, drag_at_rest, drag_at_rest_jacobian
-from wakewise.robot.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, Three, damping, rate_kernel, rotate
-from wakewise.robot.vehicles.runge_kutta import rk4_jacobian_kernel
+from wakewise.robot.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, Three, coriolis, damping, rate_kernel, rotate
+from wakewise.robot.vehicles.semi_implicit import rk4_jacobian_kernel
+
+DRAG = 27
+"""Where the error's drag begins; inertia comes six places later."""
+
+
+@njit
+def turn(q: Array, v: Array, sign: float) -> Array:
+    """Vector R(q) v for sign = 1, R(q)' v for sign = -1."""
+    w, x, y, z = q[0], sign * q[1], sign * q[2], sign * q[3]
+    tx, ty, tz = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
+    return np.array([v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx])
+
+
+@njit
+def _past_at_rest(mean: Array, rest_q: Array) -> tuple[float, float, float, float, float, float]:
+    x, y, z = rotate(-rest_q[0], rest_q[1], rest_q[2], rest_q[3], mean[25], mean[26], mean[27])
+    return -x, -y, -z, 0.0, 0.0, 0.0
+
+
+@njit(apart=True)
+def drag_at_rest(own: Array, mean: Array, rest_q: Array) -> Array:
+    """Drag and Munk moment of the current on the vehicle at rest, as the equations of motion subtract them, shape (6,).
+
+    Force in W, moment in B.
+    """
+    past = _past_at_rest(mean, rest_q)
+    drag, munk = damping(own, past), coriolis(own, past)
+    wrench = np.empty(6)
+    assign(wrench[:3], turn(rest_q, np.array([drag[0], drag[1], drag[2]]), 1.0))
+    assign(wrench[3:], np.array([drag[3] + munk[3], drag[4] + munk[4], drag[5] + munk[5]]))
+    return wrench
+
+
+@njit(inline="always")
+def _cross(a: Three, b: Three) -> Three:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(inline="always")
+def _momentum(own: Array, v: Three) -> Three:
+    """Linear momentum at a linear velocity."""
+    return (
+        own[0, 0] * v[0] + own[0, 1] * v[1] + own[0, 2] * v[2],
+        own[1, 0] * v[0] + own[1, 1] * v[1] + own[1, 2] * v[2],
+        own[2, 0] * v[0] + own[2, 1] * v[1] + own[2, 2] * v[2],
+    )
+
+
+@njit(apart=True)
+def drag_at_rest_jacobian(own: Array, mean: Array, rest_q: Array) -> Array:
+    """By what `drag_at_rest`, with its force in B, changes with current (3), drag (6) and inertia (6), shape (6,
+    15).
+    """
+    past = _past_at_rest(mean, rest_q)
+    v, drag = (past[0], past[1], past[2]), damping(own, past)
+    h = _momentum(own, v)
+    effect = np.zeros((6, 15))
+    for j in range(3):
+        axis = (-1.0 if j == 0 else 0.0, -1.0 if j == 1 else 0.0, -1.0 if j == 2 else 0.0)
+        seen = rotate(-rest_q[0], rest_q[1], rest_q[2], rest_q[3], axis[0], axis[1], axis[2])
+        turning, turned = _cross(seen, h), _cross(v, _momentum(own, seen))
+        for i in range(6):
+            for k in range(3):
+                effect[i, j] += own[LINEAR + i, k] * seen[k]
+        for i in range(3):
+            effect[i, j] += 2.0 * own[QUADRATIC, i] * abs(v[i]) * seen[i]
+            effect[3 + i, j] += turning[i] + turned[i]
+    for i in range(6):
+        effect[i, 3 + i] = drag[i] / (1.0 + mean[1 + DRAG + i])
+    for i in range(3):
+        share = 0.5 / (1.0 + mean[1 + DRAG + 6 + i])
+        change = np.zeros(3)
+        for j in range(3):
+            change[i] += share * own[i, j] * v[j]
+            change[j] += share * own[j, i] * v[i]
+        turning = _cross(v, (change[0], change[1], change[2]))
+        for k in range(3):
+            effect[3 + k, 9 + i] = turning[k]
+    for j in range(9):
+        _turn_as_at_rest(effect[:3, j], mean[3:7], rest_q)
+    return effect
+
+
+@njit(inline="always")
+def _turn_as_at_rest(force: Array, q: Array, rest_q: Array) -> None:
+    """A force in the body at rest, in place, as the body at q sees it that has turned since."""
+    x, y, z = rotate(rest_q[0], rest_q[1], rest_q[2], rest_q[3], force[0], force[1], force[2])
+    force[0], force[1], force[2] = rotate(-q[0], q[1], q[2], q[3], x, y, z)
+
 
 _INSTANT_S = 1e-7
 TURNING, MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, INERTIA, GAINS = 9, 12, 12, 15, 18, 21, 24, 33, 39
@@ -268,3 +373,140 @@ def specific_force(
         H[i, 3 + b] -= down_B[a]
         H[i, FELT + i] += 1.0
     return force
+
+
+TICK_S = 1e-9
+"""Times closer than this are one."""
+
+
+@njit
+def advance(
+    packed: Array,
+    allocation: Array,
+    lag_s: Array,
+    mean: Array,
+    P: Array,
+    thrusts_N: Array,
+    rest_q: Array,
+    since_s: Array,
+    commands_N: Array,
+    time_s: float,
+    until_s: float,
+    noise: Array,
+    scale: float,
+    spread: Array,
+    lasts_s: Array,
+) -> float:
+    """Move mean, covariance and thrusts on in place from a time to another, command by command; returns when it is.
+
+    Parameters
+    ----------
+    packed, allocation : ndarray, shape (20, 6) and (6, n)
+        The vehicle (see `wakewise.robot.vehicles.kernels`).
+    lag_s : ndarray, shape (n,)
+        Time constants of the thrusters, whose thrusts are `thrusts_N`, shape (n,).
+    rest_q : ndarray, shape (4,)
+        Attitude that the unmodelled load is told for.
+    since_s, commands_N : ndarray, shape (k,) and (k, n)
+        From when which thrusts were commanded, one at least.
+    noise, spread, lasts_s : ndarray
+        As `predict` has them; the model's part of the noise, its first four, is `scale` times as large.
+    """
+    loud = noise.copy()
+    for i in range(4):
+        loud[i] *= scale
+    push = np.empty_like(thrusts_N)
+    while until_s - time_s > TICK_S:
+        now = 0
+        while now + 1 < since_s.shape[0] and since_s[now + 1] <= time_s + TICK_S:
+            now += 1
+        end_s = min(until_s, since_s[now + 1]) if now + 1 < since_s.shape[0] else until_s
+        dt_s = end_s - time_s
+        for k in range(push.shape[0]):
+            kept, ahead = np.exp(-dt_s / lag_s[k]), thrusts_N[k] - commands_N[now, k]
+            # Mean thrust over the step, exact for the first-order lag.
+            push[k] = commands_N[now, k] + ahead * (lag_s[k] / dt_s) * (1.0 - kept)
+            thrusts_N[k] = commands_N[now, k] + kept * ahead
+        predict(packed, allocation, mean, P, push, rest_q, dt_s, loud, spread, lasts_s)
+        time_s = end_s
+    return time_s
+
+
+@njit
+def predict(
+    packed: Array,
+    allocation: Array,
+    mean: Array,
+    P: Array,
+    thrusts_N: Array,
+    rest_q: Array,
+    dt_s: float,
+    noise: Array,
+    spread: Array,
+    lasts_s: Array,
+) -> None:
+    """Advance mean and covariance in place by dt_s, some hundredths at most.
+
+    `noise`, shape (6,), are spectral densities (amplitudes) of the errors of the modelled linear and angular
+    acceleration and of the random walks of force, moment, gyro bias and accelerometer bias. What comes after the
+    accelerometer's bias is a first-order Gauss-Markov process each, of standard deviation `spread` and time `lasts_s`,
+    both of shape (E - 24,).
+    """
+    q = mean[3:7].copy()
+    F = propagate_mean(packed, allocation, mean, thrusts_N, rest_q, dt_s, P.shape[0])
+    _carry(P, F)
+    _add_noise(P, q, dt_s, noise)
+    _fade(mean, P, dt_s, spread, lasts_s)
+
+
+@njit
+def _carry(P: Array, F: Array) -> None:
+    """Carry the covariance on by the Jacobian F of what moves; the other errors stay."""
+    top = F @ P
+    block = top @ F.T
+    for i in range(MOVING):
+        for j in range(MOVING):
+            P[i, j] = 0.5 * (block[i, j] + block[j, i])
+        for j in range(MOVING, P.shape[0]):
+            P[i, j] = top[i, j]
+            P[j, i] = top[i, j]
+
+
+@njit
+def _fade(mean: Array, P: Array, dt_s: float, spread: Array, lasts_s: Array) -> None:
+    """Let the Markov processes forget, and new chance at them."""
+    kept = np.ones(P.shape[0])
+    for k in range(spread.shape[0]):
+        i = CURRENT + k
+        # Neighbours mostly last as long as each other.
+        again = k > 0 and lasts_s[k] == lasts_s[k - 1]
+        kept[i] = kept[i - 1] if again else np.exp(-dt_s / lasts_s[k])
+        mean[1 + i] *= kept[i]
+    for i in range(P.shape[0]):
+        for j in range(P.shape[0]):
+            P[i, j] *= kept[i] * kept[j]
+    for k in range(spread.shape[0]):
+        i = CURRENT + k
+        P[i, i] += spread[k] ** 2 * (1.0 - kept[i] * kept[i])
+
+
+@njit
+def _add_noise(P: Array, q: Array, dt_s: float, noise: Array) -> None:
+    linear, angular = noise[0] ** 2, noise[1] ** 2
+    for i in range(3):
+        P[i, i] += linear * dt_s**3 / 3.0
+        P[6 + i, 6 + i] += linear * dt_s
+        P[3 + i, 3 + i] += angular * dt_s**3 / 3.0
+        P[9 + i, 9 + i] += angular * dt_s
+        P[3 + i, 9 + i] += angular * dt_s**2 / 2.0
+        P[9 + i, 3 + i] += angular * dt_s**2 / 2.0
+        # The body's axis i, as the world sees it.
+        x, y, z = 1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0
+        column = rotate(q[0], q[1], q[2], q[3], x, y, z)
+        for j in range(3):
+            P[j, 6 + i] += column[j] * linear * dt_s**2 / 2.0
+            P[6 + i, j] += column[j] * linear * dt_s**2 / 2.0
+    for block in range(4):
+        for i in range(3):
+            k = FORCE + 3 * block + i
+            P[k, k] += noise[2 + block] ** 2 * dt_s

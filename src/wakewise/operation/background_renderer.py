@@ -22,7 +22,7 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING
 
 from wakewise.core.run_lock import remove_stale
-from wakewise.operation.exposures import ExposureRecord, packed, unpacked
+from wakewise.operation.flight_log import ExposureRecord, packed, unpacked
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts

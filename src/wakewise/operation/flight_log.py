@@ -2,21 +2,165 @@
 
 Parts keep a flight of an hour as small in memory as one of a minute, and leave what was flown where a process is
 killed: each part is whole or not there.
+
+What is kept of each opening of the shutter, as a record and as the arrays of exposures.npz.
 """
 
 from __future__ import annotations
 
+import io
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 import polars as pl
 
 from wakewise.core.arrays import Array
 from wakewise.core.files import whole_file
-from wakewise.operation.exposures import ExposureRecord, packed, unpacked
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import FlakeCloud, ScalarGrid
+
+STANCE = ("tips_m", "tip_speeds_m_s", "shift_m")
+"""Fields of an exposure that tell of a target that yields."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ExposureRecord:
+    """One opening of the shutter: true camera poses across it, the estimate at its middle, the silt in the water.
+
+    `X_WC_before` are true poses of the camera before, oldest first, which automatic exposure goes by; else none.
+    `flakes` are those that drift before the camera; None where nobody knows, so that they are drawn for each
+    photograph.
+    Of a target that yields also, as in `wakewise.core.interfaces.TargetDeformation`, how it stood at its opening:
+    `tips_m` and `tip_speeds_m_s` (k, 2), `shift_m` (2,).
+    """
+
+    time_s: float
+    X_WC_true: tuple[Pose, ...]
+    X_WC_est: Pose
+    silt: ScalarGrid
+    X_WC_before: tuple[Pose, ...] = ()
+    flakes: FlakeCloud | None = None
+    tips_m: Array | None = None
+    tip_speeds_m_s: Array | None = None
+    shift_m: Array | None = None
+
+
+def write_exposures(path: Path, exposures: list[ExposureRecord], exposure_s: float) -> None:
+    """Write what each photograph needs to be rendered later."""
+    with whole_file(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, exposure_s=np.array(exposure_s), **exposure_arrays(exposures))
+
+
+def exposure_arrays(exposures: list[ExposureRecord]) -> dict[str, Any]:
+    """What an exposure is, as the arrays that are kept of it; silt in single precision."""
+    before = [[X.p_m for X in e.X_WC_before] for e in exposures], [[X.q for X in e.X_WC_before] for e in exposures]
+    metered = {"X_WC_before_p_m": np.array(before[0]), "X_WC_before_q": np.array(before[1])}
+    stance = {name: [getattr(e, name) for e in exposures] for name in STANCE}
+    return (metered if exposures[0].X_WC_before else {}) | {
+        **{name: np.array(values) for name, values in stance.items() if values[0] is not None},
+        "time_s": np.array([e.time_s for e in exposures]),
+        "X_WC_p_m": np.array([[X.p_m for X in e.X_WC_true] for e in exposures]),
+        "X_WC_q": np.array([[X.q for X in e.X_WC_true] for e in exposures]),
+        "X_WC_est_p_m": np.array([e.X_WC_est.p_m for e in exposures]),
+        "X_WC_est_q": np.array([e.X_WC_est.q for e in exposures]),
+        "silt_origin_W_m": exposures[0].silt.origin_W_m,
+        "silt_spacing_m": np.array(exposures[0].silt.spacing_m),
+        "silt_kg_m3": np.array([e.silt.values for e in exposures], dtype=np.float32),
+        **_outer_arrays([e.silt.outer for e in exposures]),
+        **_flake_arrays([e.flakes for e in exposures]),
+    }
+
+
+def packed(number: int, exposure: ExposureRecord) -> bytes:
+    """An exposure and its number as bytes, in the arrays of the flight's record."""
+    file = io.BytesIO()
+    np.savez(file, number=np.array(number), **exposure_arrays([exposure]))
+    return file.getvalue()
+
+
+def unpacked(message: bytes) -> tuple[int, ExposureRecord]:
+    """What `packed` packed."""
+    with np.load(io.BytesIO(message)) as data:
+        number = int(data["number"])
+    return number, read_exposures(io.BytesIO(message))[0]
+
+
+def _flake_arrays(clouds: list[FlakeCloud | None]) -> dict[str, Any]:
+    """Arrays of the drifting flakes, one after the other; nothing where they are not known."""
+    known = [cloud for cloud in clouds if cloud is not None]
+    if len(known) < len(clouds) or not known:
+        return {}
+    one = known[0]
+    return {
+        "flakes": np.array([len(cloud.p_W_m) for cloud in known]),
+        "flake_p_W_m": np.concatenate([cloud.p_W_m for cloud in known]).astype(np.float32),
+        "flake_v_W_m_s": np.concatenate([cloud.v_W_m_s for cloud in known]).astype(np.float16),
+        "flake_looks": np.concatenate([cloud.looks for cloud in known]).astype(np.float16),
+        "flake_box_W_m": np.stack([one.low_W_m, one.high_W_m]),
+        "flake_limits": np.array([one.per_m3, one.depth_m, *one.slopes]),
+    }
+
+
+def _read_flakes(data: Any, count: int) -> list[FlakeCloud | None]:
+    """The flakes of each exposure; None of files of before they were kept."""
+    if "flakes" not in data:
+        return [None] * count
+    ends = np.cumsum(data["flakes"])
+    low, high = data["flake_box_W_m"]
+    per_m3, depth_m, across, along = (float(v) for v in data["flake_limits"])
+    parts = [np.split(data[f"flake_{name}"].astype(np.float64), ends[:-1]) for name in ("p_W_m", "v_W_m_s", "looks")]
+    return [
+        FlakeCloud(
+            p_W_m=p, v_W_m_s=v, looks=looks, low_W_m=low, high_W_m=high, per_m3=per_m3, depth_m=depth_m,
+            slopes=(across, along),
+        )
+        for p, v, looks in zip(*parts, strict=True)
+    ]  # fmt: skip
+
+
+def _outer_arrays(grids: list[ScalarGrid | None]) -> dict[str, Any]:
+    """Arrays of the silt's outer grids; nothing where there are none."""
+    known = [grid for grid in grids if grid is not None]
+    if len(known) < len(grids) or not known:
+        return {}
+    return {
+        "silt_outer_origin_W_m": known[0].origin_W_m,
+        "silt_outer_spacing_m": np.array(known[0].spacing_m),
+        "silt_outer_kg_m3": np.array([grid.values for grid in known], dtype=np.float32),
+    }
+
+
+def read_exposures(path: Path | IO[bytes]) -> list[ExposureRecord]:
+    """Read what `write_exposures` wrote, or the same arrays from an open file."""
+    with np.load(path) as data:
+        origin, spacing = data["silt_origin_W_m"], float(data["silt_spacing_m"])
+        p, q, silt = data["X_WC_p_m"], data["X_WC_q"], data["silt_kg_m3"]
+        est_p, est_q = data["X_WC_est_p_m"], data["X_WC_est_q"]
+        none = np.empty((len(p), 0))
+        before_p, before_q = data.get("X_WC_before_p_m", none), data.get("X_WC_before_q", none)
+        flakes = _read_flakes(data, len(p))
+        outers: list[ScalarGrid | None] = [None] * len(p)
+        if "silt_outer_kg_m3" in data:  # not in files of before there was one
+            far, coarse = data["silt_outer_origin_W_m"], float(data["silt_outer_spacing_m"])
+            outers = [ScalarGrid(origin_W_m=far, spacing_m=coarse, values=v) for v in data["silt_outer_kg_m3"]]
+        stance = {name: data[name] for name in STANCE if name in data}
+        return [
+            ExposureRecord(
+                time_s=float(time_s),
+                X_WC_true=tuple(Pose(p[k, i], q[k, i]) for i in range(p.shape[1])),
+                X_WC_est=Pose(est_p[k], est_q[k]),
+                silt=ScalarGrid(origin_W_m=origin, spacing_m=spacing, values=silt[k], outer=outers[k]),
+                X_WC_before=tuple(Pose(*X) for X in zip(before_p[k], before_q[k], strict=True)),
+                flakes=flakes[k],
+                **{name: values[k] for name, values in stance.items()},
+            )
+            for k, time_s in enumerate(data["time_s"])
+        ]
+
 
 PARTS = ".flight"
 """Folder of a flight's parts within that of its trial; gone when the flight is whole."""

@@ -19,7 +19,7 @@ from wakewise.core.errors import InputError, StageError, WakewiseError
 from wakewise.core.interfaces import Plant, TruthProvider, no_progress
 from wakewise.core.jit.precompile import compile_kernels
 from wakewise.core.optional_dependencies import has
-from wakewise.operation.exposures import ExposureRecord
+from wakewise.operation.flight_log import ExposureRecord
 from wakewise.operation.loop import Step, run_loop
 from wakewise.operation.parts import Parts
 from wakewise.operation.preflight import check_begin

@@ -2,14 +2,20 @@
 
 Here, and nowhere below, the controller's world and the true one are made side by side: the world gets its own,
 perturbed vehicle parameters and its own water; the controller gets the nominal vehicle and a wake model.
+
+The region of a flight, kept: drawing its points takes seconds, and flights that are compared share them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from hashlib import blake2b
+from threading import Lock
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self, TypeVar, overload
+
+import numpy as np
 
 from wakewise.control import ControlSettings, in_pulses, make_controller
 from wakewise.control.settings import flown_by
@@ -19,19 +25,17 @@ from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
 from wakewise.estimation import ErrorStateFilter
 from wakewise.operation.calibration_error import current_with_error, target_with_error
-from wakewise.operation.known_obstacles import surroundings_of, tank_bounds
 from wakewise.operation.pilot_makers import make_pilot
 from wakewise.operation.plugin_adapter import described, external_parts, with_failsafe
-from wakewise.operation.preflight import PreflightResult, preflight
-from wakewise.operation.regions import region_of
-from wakewise.operation.seeds import Seeds
+from wakewise.operation.preflight import PreflightResult, preflight, surroundings_of, tank_bounds
+from wakewise.operation.randomization import Seeds
 from wakewise.operation.worlds.makers import make_world
 from wakewise.planning import Surroundings
 from wakewise.robot.importers import any_vehicle
 from wakewise.robot.vehicles import Vehicle
 from wakewise.robot.vehicles.ballast import with_blocks
 from wakewise.scene.missions import CameraAim, Route, TankBounds, aim_of, plan_route
-from wakewise.scene.targets import BendingModes, Region, Target, find_target
+from wakewise.scene.targets import BendingModes, Region, Target, find_fragility, find_target, sample_region
 from wakewise.simulation.tank import build_ambient
 from wakewise.simulation.tank.soft_body import DRAG, TargetCompliance, UnanchoredTarget
 from wakewise.wake import wake_model
@@ -39,6 +43,52 @@ from wakewise.wake import wake_model
 if TYPE_CHECKING:
     from wakewise.operation.scenario import Scenario
     from wakewise.vision.imaging import LensCamera, PinholeCamera, Scene
+
+
+MOST_KEPT = 16
+"""Regions that are kept, the last ones asked for: 300 points are 12 kB."""
+
+_kept: dict[bytes, Region] = {}
+_one_at_a_time = Lock()
+
+
+def region_of(target: Target, points: int, seeds: Seeds, delicate_gain: float = 0.0) -> Region:
+    """Points that stand for the water round a target; asking again for the same is answered from memory.
+
+    Parameters
+    ----------
+    target : Target
+        What counts is its shape and place, not which object it is.
+    points : int
+    seeds : Seeds
+    delicate_gain : float
+        Above 0 the target's delicate features are found and weighted, see `sample_region`.
+
+    Raises
+    ------
+    InputError
+        As `sample_region`.
+    """
+    key = _fingerprint(target, points, seeds, delicate_gain)
+    with _one_at_a_time:
+        found = _kept.pop(key, None)
+        if found is None:
+            marks = find_fragility(target.mesh) if delicate_gain > 0.0 else None
+            found = sample_region(target, points, seeds.region(), marks, delicate_gain)
+        _kept[key] = found  # the last one asked for is the last to go
+        while len(_kept) > MOST_KEPT:
+            del _kept[next(iter(_kept))]
+        return found
+
+
+def _fingerprint(target: Target, points: int, seeds: Seeds, delicate_gain: float) -> bytes:
+    """Of all that the points follow from; the name stands in errors only, of which nothing is kept."""
+    told = blake2b(repr((points, seeds.seed, float(delicate_gain), target.bed_z_m, target.radius_m)).encode())
+    for values in (target.mesh.vertices_m, target.mesh.faces, target.centre_W_m):
+        told.update(repr(values.shape).encode())
+        told.update(np.ascontiguousarray(values).data)
+    return told.digest()
+
 
 T = TypeVar("T")
 

@@ -20,7 +20,7 @@ from wakewise.core.files import whole_file, write_text
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import no_progress
 from wakewise.operation.calibration_error import calibration_with_error
-from wakewise.operation.exposures import ExposureRecord, read_exposures
+from wakewise.operation.flight_log import ExposureRecord, read_exposures
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario
 from wakewise.scene.targets import turned_normals

@@ -10,7 +10,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Pilot
 from wakewise.core.plugins import find
 from wakewise.operation.teleop.human_pilot import HumanPilot
-from wakewise.operation.teleop.input.sources import read_input
+from wakewise.operation.teleop.input.script import read_input
 from wakewise.scene.missions import RoutePilot
 
 if TYPE_CHECKING:
@@ -52,8 +52,8 @@ def operator_pilot(parts: Parts) -> Pilot:
 def assisted_person(parts: Parts) -> Pilot:
     """`assisted`: the person of `human` at the desk's sticks, camera kept on the target, brakes and all."""
     from wakewise.operation.teleop.assisted import assisted_pilot
+    from wakewise.operation.teleop.human_pilot import SimulatedOperatorInput
     from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
-    from wakewise.operation.teleop.simulated_operator import SimulatedOperatorInput
 
     hands = SimulatedOperatorInput(
         wish=route_pilot(parts),

@@ -1,4 +1,13 @@
-"""What is checked before a flight: parts that do not fit each other, the water, or the mission are refused here."""
+"""What is checked before a flight: parts that do not fit each other, the water, or the mission are refused here.
+
+The tank as a controller is told of it: its walls, stated obstacles, the target.
+
+Switches that are set and cannot act: what a scenario asks for that its method, vehicle or pilot has no use for.
+
+A setting that contradicts itself is refused where it is made (`control.levers`). One that merely has no effect here is
+said before the flight, so that nobody reads a difference into it that is none: the same settings are flown with many
+methods, and most of them are somebody's.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +17,75 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wakewise.control import METHODS
 from wakewise.core.errors import InputError
-from wakewise.operation.known_obstacles import surroundings_of
-from wakewise.operation.setting_checks import ineffective_settings
-from wakewise.planning import check_start, state_of
+from wakewise.planning import PlanSettings, Surroundings, check_start, covering_spheres, state_of
 from wakewise.robot.vehicles import possible_drags, with_drag
-from wakewise.scene.missions import check_clearance, check_tilt
+from wakewise.scene.missions import TankBounds, check_clearance, check_tilt
+from wakewise.scene.targets import Target
 from wakewise.simulation.tank import StationKeepingDemand, station_keeping_demand, tank_ambient
 from wakewise.simulation.tank.soft_body import check_loose, check_sway
 from wakewise.simulation.tank.station_keeping import check_fit
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
+    from wakewise.operation.scenario import Scenario
     from wakewise.robot.vehicles import Vehicle
+
+
+def tank_bounds(scenario: Scenario) -> TankBounds:
+    """The tank's water."""
+    length, width, depth = scenario.tank.size_m
+    return TankBounds(
+        low_W_m=np.array([-length / 2, -width / 2, 0.0]), high_W_m=np.array([length / 2, width / 2, depth])
+    )
+
+
+def surroundings_of(scenario: Scenario, target: Target | None = None) -> Surroundings:
+    """What a planner keeps clear of: floor, walls and surface of the tank, stated obstacles, the target if given."""
+    bounds = tank_bounds(scenario)
+    obstacles = np.array(scenario.control.obstacles).reshape(-1, 4)
+    names = tuple(f"obstacle {k + 1} (control.obstacles)" for k in range(len(obstacles)))
+    around = np.zeros((0, 4)) if target is None else covering_spheres(target.mesh.vertices_m)
+    return Surroundings.tank(
+        bounds.low_W_m, bounds.high_W_m, np.vstack([obstacles, around]), (*names, *("the target",) * len(around))
+    )
+
+
+PLANNING = frozenset({"pseudo-inverse", "unaware", "smooth", "linear", "wake-aware"})
+"""Our methods that plan."""
+MITIGATION_METHODS = frozenset({"pseudo-inverse", "linear", "instant", "wake-aware"})
+"""Our methods that use levers; of these all but `instant` need `spare` for all of them but the bed."""
+_AFTER_SPARE = ("meet", "drift", "doubt", "thrift")
+
+
+def ineffective_settings(scenario: Scenario, vehicle: Vehicle) -> tuple[str, ...]:
+    """What is set and does nothing, a sentence each, with the field's name; nothing is known of a method from outside.
+
+    Levers are on by default, so a method without levers is only told of the one that is not.
+    """
+    control, method, found = scenario.control, scenario.method, []
+    if method in METHODS:
+        levers = control.levers
+        if method in MITIGATION_METHODS & PLANNING and not levers.spare:
+            on = [name for name in _AFTER_SPARE if getattr(levers, name)]
+            if on:
+                found.append(
+                    f"control.levers.{', '.join(on)}: nothing without control.levers.spare, which {method} shares by"
+                )
+        if levers.bed and method not in MITIGATION_METHODS:
+            found.append(f"control.levers.bed: nothing for {method}, which has no levers")
+        if method not in PLANNING:
+            if control.obstacles:
+                found.append(f"control.obstacles: not kept clear of by {method}, which does not plan")
+            if control.plan != PlanSettings():
+                found.append(f"control.plan: nothing for {method}, which does not plan")
+        if control.person is not None and method != "manual" and scenario.pilot not in ("human", "assisted"):
+            found.append(f"control.person: nobody flies {method} by hand with the pilot {scenario.pilot}")
+    if control.pulse_s is not None and vehicle.thrust_steps is None:
+        found.append(f"control.pulse_s: the thrusters of {vehicle.name} hold any thrust, so none is sent as pulses")
+    return tuple(found)
+
 
 log = logging.getLogger(__name__)
 

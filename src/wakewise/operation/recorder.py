@@ -20,10 +20,9 @@ from wakewise.core.arrays import Array
 from wakewise.core.files import whole_file
 from wakewise.core.geometry import Pose, quat_integrate
 from wakewise.core.interfaces import BodyState, FlakeCloud, TargetDeformation, TruthProvider, WaterTruth
-from wakewise.operation.exposures import STANCE, ExposureRecord, write_exposures
-from wakewise.operation.flight_log import FlightLog, steps_of, timings_of
+from wakewise.operation.flight_log import STANCE, ExposureRecord, FlightLog, steps_of, timings_of, write_exposures
 from wakewise.operation.loop import Step
-from wakewise.robot.vehicles.tilt import TiltJoint
+from wakewise.robot.vehicles.vehicle import TiltJoint
 from wakewise.vision.imaging.settings import METERED_EVERY_S
 
 _STATE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")

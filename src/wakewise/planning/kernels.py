@@ -20,7 +20,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.jit.njit import assign, njit
 from wakewise.planning.barrier import add_barrier, least_gap
-from wakewise.robot.vehicles.runge_kutta import rk4_jacobian_kernel, rk4_kernel
+from wakewise.robot.vehicles.semi_implicit import rk4_jacobian_kernel, rk4_kernel
 from wakewise.wake.plan_disturbance import stage_disturbance
 
 

@@ -41,8 +41,7 @@ from wakewise.robot.vehicles import Vehicle, compile_body
 from wakewise.scene.targets import Region
 from wakewise.wake import PaperJet, gram
 from wakewise.wake.finite_difference import FiniteDifferenceWake
-from wakewise.wake.packed_model import PackedWakeModel, is_compiled, wake_table, with_smooth_edge
-from wakewise.wake.plan_disturbance import wake_scratch
+from wakewise.wake.plan_disturbance import PackedWakeModel, is_compiled, wake_scratch, wake_table, with_smooth_edge
 
 BARRIER_RANGE = (0.02, 20.0)
 """Least and largest mu of the clearance barrier: it grows from plan to plan while the plan comes too close."""

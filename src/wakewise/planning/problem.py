@@ -24,7 +24,7 @@ from wakewise.core.defaults import DISTURBANCE_WEIGHT, EFFORT_WEIGHT
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState
 from wakewise.core.settings import Settings
-from wakewise.wake.disturbance_derivatives import SUPERPOSITIONS, Superposition
+from wakewise.wake.disturbance import SUPERPOSITIONS, Superposition
 
 PLAN_EVERY_S = 0.1
 """Time between two plans, and the most that one may take: a thruster's lag, within which nothing can be undone."""

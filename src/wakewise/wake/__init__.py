@@ -4,14 +4,14 @@ D is here and nowhere else: the weighted mean square of the water's speed at the
 never uses this room: a planner that knew the truth would prove nothing.
 
 Start reading in `disturbance.py` (D, its Gram matrix, and D of jets that go astray) and `models.py` (models by name).
-Models: `cones.py` (the paper's), `jets.py` (round turbulent jets), `wall_jet.py` (their wall jets; `bed_depth.py` tells
-a bed of a model), `advected_jets.py` and `advected_wall_jet.py` (both in a current), `fit_parameters.py` (what can be
-fitted), `learned.py` with `network.py` (a trained rival that remembers). Sums: `gram.py` and `wall_jet_gram.py` with
-`kernels.py` (compiled), `disturbance_derivatives.py` with `stage_cost.py` (derivatives of D), `finite_difference.py`
-(the same for models that bring none), `input_checks.py` (what is refused), `packed_model.py` and `plan_disturbance.py`
-(D and derivatives over a planner's stage), `influence.py` (D from a vehicle's pose). `point_files.py` reads measured
-velocities, `calibration.py`, `samples.py`, `scores.py` and `fit_file.py` fit a model to them, `momentum.py` holds them
-against the law that they must obey.
+Models: `jets.py` (the paper's), `jets.py` (round turbulent jets), `wall_jet.py` (their wall jets; `models.py` tells
+a bed of a model), `advected_jets.py` and `advected_jets.py` (both in a current), `calibration.py` (what can be
+fitted), `learned.py` with `learned.py` (a trained rival that remembers). Sums: `gram.py` and `wall_jet.py` with
+`kernels.py` (compiled), `disturbance.py` with `gram.py` (derivatives of D), `finite_difference.py`
+(the same for models that bring none), `disturbance.py` (what is refused), `plan_disturbance.py` and
+`plan_disturbance.py` (D and derivatives over a planner's stage), `influence.py` (D from a vehicle's pose).
+`point_files.py` reads measured velocities, `calibration.py`, `samples.py`, `scores.py` and `fit_file.py` fit a model to
+them, `calibration.py` holds them against the law that they must obey.
 """
 
 from __future__ import annotations
@@ -21,20 +21,23 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
-    from wakewise.wake.bed_depth import bed_of, free_jet
-    from wakewise.wake.cones import PaperJet, PowerJet
-    from wakewise.wake.disturbance import disturbance, gram, incoherent, point_disturbance, split_roots, velocity
-    from wakewise.wake.disturbance_derivatives import (
+    from wakewise.wake.disturbance import (
         SUPERPOSITIONS,
         Superposition,
+        disturbance,
         disturbance_slopes,
         gauss_newton,
+        gram,
         gram_with_derivatives,
+        incoherent,
+        point_disturbance,
         smooth_roots,
+        split_roots,
+        velocity,
     )
     from wakewise.wake.influence import InfluenceModel
-    from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
-    from wakewise.wake.models import WakeSettings, model_names, wake_model
+    from wakewise.wake.jets import AxialJet, GaussianJet, PaperJet, PowerJet, RoundJet
+    from wakewise.wake.models import WakeSettings, bed_of, free_jet, model_names, wake_model
     from wakewise.wake.wall_jet import ImpingingJet
 
 __all__ = [

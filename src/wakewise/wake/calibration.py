@@ -2,6 +2,13 @@
 
 What is minimised is the sum of squared errors of the axial speed over the square root of thrust, so that strong and
 weak thrusts count alike. Scores are those of the other part.
+
+Which numbers of which wake model can be fitted: where a search starts, what is allowed, what each number shapes.
+
+The law that a free jet obeys: the momentum flux through any plane across it is the thrust that made it.
+
+Whatever a fit scores, measured speeds and thrusts must keep to it. A thrust in kilograms-force for newtons, or speeds
+in feet a second, are off by a factor of four and more, and no residual shows it.
 """
 
 from __future__ import annotations
@@ -13,10 +20,96 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
+from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.wake.fit_parameters import WakeFamily
+from wakewise.wake.jets import AxialJet
+from wakewise.wake.models import ModelName, WakeSettings, wake_model
 from wakewise.wake.samples import JetRegion, JetSamples
 from wakewise.wake.scores import WakeScores, score
+
+
+@dataclass(frozen=True)
+class FitParameter:
+    """One number of a model, named as in `WakeSettings`. `shapes` is what it tells of: "level", "reach" or "angle"."""
+
+    name: str
+    start: float
+    low: float
+    high: float
+    shapes: str
+
+
+@dataclass(frozen=True)
+class WakeFamily:
+    """A wake model with its free parameters; none for a model that is never fitted."""
+
+    name: ModelName
+    parameters: tuple[FitParameter, ...] = ()
+
+    @property
+    def start(self) -> Array:
+        """Where the search starts, shape (p,)."""
+        return np.array([parameter.start for parameter in self.parameters])
+
+    def settings(self, values: Array) -> WakeSettings:
+        """Settings of the model with parameter values, shape (p,)."""
+        numbers = {p.name: float(v) for p, v in zip(self.parameters, values, strict=True)}
+        return WakeSettings.model_validate({"model": self.name, **numbers})
+
+    def model(self, values: Array) -> AxialJet:
+        """The free jet with parameter values, shape (p,)."""
+        jet = wake_model(self.settings(values).model_copy(update={"floor": False}))
+        if not isinstance(jet, AxialJet):
+            raise InputError(f"wake model '{self.name}': has a floor term, only the free jet can be fitted")
+        return jet
+
+
+FAMILIES: dict[str, WakeFamily] = {
+    family.name: family
+    for family in (
+        WakeFamily("paper"),
+        WakeFamily("paper-calibrated", (FitParameter("gain", 0.036, 1e-4, 50.0, "level"),)),
+        WakeFamily(
+            "fitted",
+            (
+                FitParameter("gain", 0.6, 1e-4, 50.0, "level"),
+                FitParameter("decay_power", 0.85, 0.0, 6.0, "reach"),
+                FitParameter("cosine_power", 47.0, 0.0, 600.0, "angle"),
+                # At most the core of a 60 mm disk's jet, 6.2 diameters; beyond, it only trades with the power.
+                FitParameter("soft_radius_m", 0.02, 0.0, 0.37, "reach"),
+            ),
+        ),
+        # Its one number sets width and decay together, through momentum: points on the axis are enough.
+        WakeFamily("jet", (FitParameter("half_width_slope", 0.13, 0.05, 0.4, "level"),)),
+        WakeFamily(
+            "jet-fitted",
+            (
+                FitParameter("decay", 4.0, 0.05, 50.0, "level"),
+                FitParameter("virtual_origin_diameters", 3.0, 0.01, 60.0, "reach"),
+                FitParameter("start_width_diameters", 0.5, 0.0, 5.0, "angle"),
+                FitParameter("half_width_slope", 0.13, 0.002, 0.8, "angle"),
+            ),
+        ),
+        WakeFamily("linear"),
+    )
+}
+"""Every wake model and what can be fitted of it. Without soft_radius_m the start of `fitted` is the model's default."""
+
+
+def family(name: str) -> WakeFamily:
+    """The family of a wake model that can be fitted.
+
+    Raises
+    ------
+    InputError
+        If there is no such model, or nothing of it can be fitted.
+    """
+    fittable = [each.name for each in FAMILIES.values() if each.parameters]
+    if name not in fittable:
+        why = "has no free parameters" if name in FAMILIES else "unknown"
+        raise InputError(f"wake model '{name}': {why}, can be fitted: {', '.join(fittable)}")
+    return FAMILIES[name]
+
 
 AXIS_ANGLE_RAD = math.radians(2.0)
 """If no point lies farther off the axis, nothing can be said about angles."""
@@ -288,3 +381,89 @@ def _drawn(group: IntArray, rng: np.random.Generator) -> Array:
     """How often each row counts when its groups, shape (n,), are drawn with replacement."""
     n = int(group.max()) + 1
     return np.asarray(rng.multinomial(n, np.full(n, 1.0 / n))[group], dtype=np.float64)
+
+
+LIKELY = (0.5, 1.3)
+"""Momentum flux over thrust that a jet of water may have: swirl, walls and the near field take from it, little adds."""
+POSSIBLE = (0.25, 3.0)
+"""Outside of this no jet lies: every confusion of units does."""
+_RADII = 4000
+_REACH = 6.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class MomentumLaw:
+    """Momentum flux over thrust: `measured`, of a Gaussian jet through all points, and `fitted`, of the fitted model.
+
+    Both are medians over the planes in which points lie, from `nearest_m` to `farthest_m`. `measured` is None where no
+    point lies off the axis, so that the flux cannot be told.
+    """
+
+    measured: float | None
+    fitted: float
+    nearest_m: float
+    farthest_m: float
+
+    @property
+    def words(self) -> str:
+        """For people."""
+        where = f"{self.nearest_m:.2g} to {self.farthest_m:.2g} m from the disk"
+        points = "not told by points on the axis" if self.measured is None else f"{self.measured:.2f} by the points"
+        marked = f"; units? a jet in water has {LIKELY[0]:g} to {LIKELY[1]:g}"
+        doubt = any(not is_likely(value) for value in (self.measured, self.fitted) if value is not None)
+        return f"{points}, {self.fitted:.2f} by the model, {where}; the law says 1{marked if doubt else ''}"
+
+
+def is_likely(ratio: float) -> bool:
+    """Whether a momentum flux over thrust is one of a jet in water."""
+    return LIKELY[0] <= ratio <= LIKELY[1]
+
+
+def flux_over_thrust(jet: AxialJet, along_m: Array, area_m2: float) -> Array:
+    """Momentum flux through planes across a free jet over its thrust, in fresh water.
+
+    Parameters
+    ----------
+    jet : AxialJet
+    along_m : ndarray, shape (n,)
+        Distances of the planes from the disk, more than 0.
+    area_m2 : float
+        Of the disk.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    edge = _REACH * (along_m[:, None] + np.sqrt(area_m2))
+    # Finer near the axis, where the speed is.
+    r = edge * np.linspace(0.0, 1.0, _RADII) ** 2
+    speed = jet.speed(along_m[:, None], r, 1.0, area_m2)
+    return np.asarray(2.0 * np.pi * FRESH_WATER_KG_M3 * np.trapezoid(speed**2 * r, r, axis=1))
+
+
+def momentum_law(samples: JetSamples, model: AxialJet) -> MomentumLaw:
+    """Momentum flux over thrust of measured speeds and of the model that was fitted to them.
+
+    Raises
+    ------
+    InputError
+        If that of the speeds lies where no jet's does: their unit or the thrusts' is another.
+    """
+    planes = np.quantile(samples.x_m, np.linspace(0.05, 0.95, 19))
+    area = samples.disk_area_m2
+    gaussian = family("jet-fitted")
+    values, held = calibrated_values(gaussian, samples)
+    told = not any(p.shapes == "angle" and p.name in held for p in gaussian.parameters)
+    measured = float(np.median(flux_over_thrust(gaussian.model(values), planes, area))) if told else None
+    if measured is not None and not POSSIBLE[0] <= measured <= POSSIBLE[1]:
+        raise InputError(
+            f"{samples.title}: units? the points' momentum flux in water is {measured:.2g} times the thrust, a jet has "
+            f"{LIKELY[0]:g} to {LIKELY[1]:g}; thrusts must be in N (1 kgf is 9.81 N) of one thruster, speeds in m/s, "
+            "radii from the axis in m"
+        )
+    return MomentumLaw(
+        measured=measured,
+        fitted=float(np.median(flux_over_thrust(model, planes, area))),
+        nearest_m=float(planes[0]),
+        farthest_m=float(planes[-1]),
+    )

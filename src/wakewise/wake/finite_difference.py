@@ -16,7 +16,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.core.interfaces import WakeModel
-from wakewise.wake.stage_cost import smooth_root
+from wakewise.wake.gram import smooth_root
 
 STEP_M, STEP_RAD = 1e-4, 1e-4
 """Half-widths of the differences: far below a jet's width, far above the rounding of a velocity."""

@@ -12,9 +12,8 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
 from wakewise.core.safe_yaml import YamlError, read_yaml
 from wakewise.core.settings import describe_faults
-from wakewise.wake.calibration import WakeCalibration
+from wakewise.wake.calibration import MomentumLaw, WakeCalibration
 from wakewise.wake.models import WakeSettings
-from wakewise.wake.momentum import MomentumLaw
 
 
 def fit_yaml(fit: WakeCalibration, source: str, disk_diameter_m: float, law: MomentumLaw | None = None) -> str:

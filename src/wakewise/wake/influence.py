@@ -15,10 +15,9 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import WakeModel
 from wakewise.core.jit.njit import njit
 from wakewise.wake.advected_jets import CrossFlow
-from wakewise.wake.bed_depth import free_jet
-from wakewise.wake.disturbance import gram, scattered_jet_gram
-from wakewise.wake.disturbance_derivatives import SUPERPOSITIONS, Superposition
+from wakewise.wake.disturbance import SUPERPOSITIONS, Superposition, gram, scattered_jet_gram
 from wakewise.wake.jets import AxialJet, JetLaw
+from wakewise.wake.models import free_jet
 
 if TYPE_CHECKING:
     from wakewise.robot.vehicles import Vehicle

@@ -1,4 +1,4 @@
-"""On a Dask cluster a campaign is the same campaign: the same figures, whatever dies."""
+"""On a Dask engines a campaign is the same campaign: the same figures, whatever dies."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ import pytest
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.core.run_lock import is_running
-from wakewise.experiments.campaigns import ProcessExecutor, cluster, run
+from wakewise.experiments.campaigns import ProcessExecutor, engines, run
 from wakewise.experiments.campaigns.store import open_store
 from wakewise.experiments.campaigns.trial_lock import holder_of
 
 pytest.importorskip("distributed")
-from wakewise.experiments.campaigns.cluster import DaskExecutor
+from wakewise.experiments.campaigns.engines import DaskExecutor
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]  # those of other people's threads and sockets
 
@@ -59,7 +59,7 @@ def test_a_cluster_that_goes_away_is_told_of_in_a_line(
     tmp_path: Path, running: _Cluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What was finished is kept, what was begun counts as no failure."""
-    monkeypatch.setattr(cluster, "CONNECT_S", 2.0)  # how long it is looked for before it is given up
+    monkeypatch.setattr(engines, "CONNECT_S", 2.0)  # how long it is looked for before it is given up
     tasks = cheap.adding(30, takes_s=0.2)
     store = open_store(tmp_path / "c")
 
@@ -78,7 +78,7 @@ def test_a_cluster_that_goes_away_is_told_of_in_a_line(
 
 
 def test_stopping_ends_what_is_under_way_on_the_cluster(tmp_path: Path, running: _Cluster) -> None:
-    """The cluster stays, the trial's process does not."""
+    """The engines stays, the trial's process does not."""
     (task,) = cheap.adding(1, takes_s=60.0)
     place = open_store(tmp_path / "c").place(task.key)
     holders = []
@@ -98,7 +98,7 @@ def test_stopping_ends_what_is_under_way_on_the_cluster(tmp_path: Path, running:
 
 def test_an_address_that_does_not_answer_is_told_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With what would answer."""
-    monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
+    monkeypatch.setattr(engines, "CONNECT_S", 0.5)
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
@@ -115,8 +115,8 @@ def test_settings_of_a_campaign_are_gone_after_it_and_no_others(tmp_path: Path) 
         "cluster.CONNECT_S = 0.1\n"
         "for _ in range(2):\n"
         "    try:\n"
-        "        cluster.Dask('tcp://127.0.0.1:1').crew(pathlib.Path('x')).__enter__()\n"
-        "    except cluster.InputError: pass\n"
+        "        engines.Dask('tcp://127.0.0.1:1').crew(pathlib.Path('x')).__enter__()\n"
+        "    except engines.InputError: pass\n"
         "print(dask.config.get('distributed.comm.require-encryption'))\n"
         "print(dask.config.get('distributed.scheduler.allowed-failures'))\n"
     )
@@ -128,7 +128,7 @@ def test_a_cluster_without_workers_is_told_of(
     tmp_path: Path, running: _Cluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """After a while, with how one is started."""
-    monkeypatch.setattr(cluster, "WORKERS_S", 0.5)
+    monkeypatch.setattr(engines, "WORKERS_S", 0.5)
     for worker in running.workers:
         worker.terminate()
         worker.wait()

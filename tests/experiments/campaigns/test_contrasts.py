@@ -3,8 +3,8 @@
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.campaigns.contrasts import measures, method_contrasts, paired_groups
-from wakewise.experiments.campaigns.plan import CampaignPlan, PlanEntry
+from wakewise.experiments.campaigns.definition import CampaignPlan, PlanEntry
+from wakewise.experiments.campaigns.summary import measures, method_contrasts, paired_groups
 from wakewise.experiments.campaigns.table import Results, TrialRecord
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from wakewise.core.geometry import matrix_from_quat, quat_from_euler, quat_from_matrix
-from wakewise.experiments.exports.frames import enu_of, flu_of, opengl_camera, ros_body, ros_optical
+from wakewise.experiments.exports.records import enu_of, flu_of, opengl_camera, ros_body, ros_optical
 
 RNG = np.random.default_rng(18)
 Q = RNG.normal(size=(20, 4))

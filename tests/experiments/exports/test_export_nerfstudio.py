@@ -8,8 +8,8 @@ import trimesh
 
 from wakewise.core.geometry import Pose
 from wakewise.experiments.exports import Photographs, SparsePoints, write_nerfstudio
-from wakewise.experiments.exports.frames import flu_of
-from wakewise.vision.imaging.camera_model import OpenCVCamera
+from wakewise.experiments.exports.records import flu_of
+from wakewise.vision.imaging.camera import OpenCVCamera
 
 
 def _undistorted(x: float, y: float, k1: float, k2: float, p1: float, p2: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import matrix_from_quat
 from wakewise.experiments.exports import Photographs, ThrustRecord, Trajectory
-from wakewise.experiments.exports.frames import enu_of, ros_body
+from wakewise.experiments.exports.records import enu_of, ros_body
 
 pytest.importorskip("rosbags")
 from rosbags.rosbag2 import Reader

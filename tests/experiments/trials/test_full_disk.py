@@ -14,7 +14,7 @@ from wakewise.experiments.trials import trial as trials
 from wakewise.experiments.trials.stages import StageCosts
 from wakewise.operation import Parts, load_scenario
 from wakewise.vision.reconstruction import ReconstructionSettings, features
-from wakewise_paper import photo_model, photo_robustness
+from wakewise_paper import photo_robustness, photo_sets
 from wakewise_paper.photo_sets import PhotoSet
 
 TINY = {
@@ -98,7 +98,7 @@ def test_a_photo_set_is_not_judged_on_a_full_disk(tmp_path: Path, monkeypatch: p
     def fail(*_: object, **__: object) -> None:
         raise EnvironmentFailure("match: the disk is full")
 
-    monkeypatch.setattr(photo_model, "reconstruct", fail)
+    monkeypatch.setattr(photo_sets, "reconstruct", fail)
     target = load_scenario("quick", None, TINY).parts().target
     photos = PhotoSet(
         folder=tmp_path,
@@ -109,7 +109,7 @@ def test_a_photo_set_is_not_judged_on_a_full_disk(tmp_path: Path, monkeypatch: p
         est_R_WC=np.eye(3)[None],
     )
     with pytest.raises(EnvironmentFailure):
-        photo_model.judge(photos, target, ReconstructionSettings(), tmp_path / "model")
+        photo_sets.judge(photos, target, ReconstructionSettings(), tmp_path / "model")
 
 
 def test_a_level_that_met_a_full_disk_is_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,8 +6,11 @@ import pytest
 
 from wakewise.control import vehicle_layout
 from wakewise.core.geometry import Pose, look_at
-from wakewise.experiments.trials.metrics import BETTER, DEFINITIONS, UNITS, MetricsCollector
-from wakewise.experiments.trials.reference_values import (
+from wakewise.experiments.trials.metrics import (
+    BETTER,
+    DEFINITIONS,
+    UNITS,
+    MetricsCollector,
     add_reference_values,
     allocation_figures,
     ambient_speed_m_s,

@@ -6,8 +6,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.operation.teleop.input.control_log import ControlLog
-from wakewise.operation.teleop.input.script import ScriptedInput
-from wakewise.operation.teleop.input.sources import read_input
+from wakewise.operation.teleop.input.script import ScriptedInput, read_input
 
 
 def test_the_ending_says_how_a_file_is_read(tmp_path):

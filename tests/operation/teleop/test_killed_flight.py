@@ -11,7 +11,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.operation import LiveFlight, read_exposures, read_scenario
 from wakewise.operation.flight_log import PARTS
-from wakewise.operation.teleop.live_folder import collect_flight
+from wakewise.operation.teleop.live import collect_flight
 
 pytestmark = pytest.mark.slow
 

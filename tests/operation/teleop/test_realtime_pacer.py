@@ -2,7 +2,7 @@
 
 import pytest
 
-from wakewise.operation.teleop.realtime_pacer import MOST_CATCHING_UP_S, RealTimePacer
+from wakewise.operation.teleop.live import MOST_CATCHING_UP_S, RealTimePacer
 
 
 class Clock:

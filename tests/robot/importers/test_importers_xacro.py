@@ -11,8 +11,8 @@ from wakewise.core.errors import InputError
 from wakewise.robot.importers import import_vehicle
 from wakewise.robot.importers.expressions import evaluate
 from wakewise.robot.importers.packages import PackagePaths
-from wakewise.robot.importers.scopes import literal, parse_parameters
 from wakewise.robot.importers.xacro import XacroExpander
+from wakewise.robot.importers.xacro_text import literal, parse_parameters
 from wakewise.robot.importers.xml import Element, SourceLocation, parse_xml
 
 HEAD = '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">'

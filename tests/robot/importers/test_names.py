@@ -7,7 +7,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.robot.importers import import_vehicle
-from wakewise.robot.importers.names import compare_names, contradictions
+from wakewise.robot.importers.thruster_checks import compare_names, contradictions
 from wakewise.robot.vehicles import VehicleDraft
 
 PLACES = np.array([[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]])

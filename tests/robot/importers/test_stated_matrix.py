@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
-from wakewise.robot.importers.stated_matrix import MOTOR_COLUMNS, read_number_matrix
+from wakewise.robot.importers.find import MOTOR_COLUMNS, read_number_matrix
 from wakewise.robot.vehicles import ARDUSUB_VECTORED_6DOF
 from wakewise.robot.vehicles.mixing import factors_as_wrench
 

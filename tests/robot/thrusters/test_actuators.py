@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wakewise.robot.thrusters import electrical_power_W, library_curve, saturate, scale_to_limits, thruster_lag
-from wakewise.robot.thrusters.actuators import FIGURE_OF_MERIT_FORWARD, FIGURE_OF_MERIT_REVERSE
+from wakewise.robot.thrusters.thruster import FIGURE_OF_MERIT_FORWARD, FIGURE_OF_MERIT_REVERSE
 from wakewise.robot.vehicles import load_vehicle
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[4] / "shared" / "data"))

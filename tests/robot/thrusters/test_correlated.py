@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.robot.thrusters.correlated import newey_west_errors, samples_per_reading
+from wakewise.robot.thrusters.lag_fit import newey_west_errors, samples_per_reading
 
 
 def test_independent_readings_count_one_each_and_constant_ones_too() -> None:

@@ -9,9 +9,8 @@ import pytest
 from scipy.signal import TransferFunction, step
 
 from wakewise.core.errors import InputError
-from wakewise.robot.thrusters.lag_fit import LagFit, identify_lag
+from wakewise.robot.thrusters.lag_fit import LagFit, identify_lag, read_step
 from wakewise.robot.thrusters.rotor_lag import FirstOrderLag, LagModel, RotorLag, SecondOrderLag, SplitLag
-from wakewise.robot.thrusters.step_file import read_step
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[4] / "shared" / "data"))
 DT_S = 0.005

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
-from wakewise.robot.thrusters.curve_library import curve_names, library_curve, load_curve
 from wakewise.robot.thrusters.thrust_curve import CurveSide, ThrustCurve
+from wakewise.robot.thrusters.thrust_table import curve_names, library_curve, load_curve
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[4] / "shared" / "data"))
 T200 = library_curve("t200")

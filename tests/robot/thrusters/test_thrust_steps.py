@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
 from wakewise.robot.thrusters import ThrustSteps, library_curve
-from wakewise.robot.thrusters.thrust_steps import nearest
+from wakewise.robot.thrusters.thrust_curve import nearest
 
 T200 = library_curve("t200")
 AT_16_V = ThrustSteps.of_curve(T200, 16.0)

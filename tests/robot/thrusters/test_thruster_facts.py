@@ -4,10 +4,9 @@ import json
 
 import numpy as np
 
-from wakewise.robot.thrusters.curve_library import library_curve
 from wakewise.robot.thrusters.lag_fit import identify_lag
 from wakewise.robot.thrusters.rotor_lag import SecondOrderLag
-from wakewise.robot.thrusters.thrust_table import parse_thrust_table
+from wakewise.robot.thrusters.thrust_table import library_curve, parse_thrust_table
 from wakewise.robot.thrusters.thruster_facts import curve_facts, lag_facts, usual_voltage
 
 

@@ -19,8 +19,8 @@ from wakewise.robot.vehicles import (
     plausible,
     vehicle_names,
 )
+from wakewise.robot.vehicles.draft import NEEDED_FIELDS
 from wakewise.robot.vehicles.library import parse_vehicle
-from wakewise.robot.vehicles.needs import NEEDED_FIELDS
 from wakewise.robot.vehicles.vehicle_file import VehicleFile
 
 BARE = VehicleDraft(name="x", title="X", source="nowhere", does_not_claim="Anything.")

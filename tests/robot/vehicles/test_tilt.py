@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import draft_yaml, load_draft, load_vehicle
 from wakewise.robot.vehicles.library import parse_vehicle
-from wakewise.robot.vehicles.tilt import TiltJoint
+from wakewise.robot.vehicles.vehicle import TiltJoint
 
 HEAVY = load_vehicle("bluerov2-heavy")
 JOINT = TiltJoint(low_rad=-0.8, high_rad=0.6, rate_rad_s=1.0, p_BJ_m=np.array([0.15, 0.0, 0.01]))

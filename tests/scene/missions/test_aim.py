@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import euler_from_quat, quat_integrate
 from wakewise.robot.vehicles import load_vehicle
-from wakewise.robot.vehicles.tilt import TiltJoint
+from wakewise.robot.vehicles.vehicle import TiltJoint
 from wakewise.scene.missions import CameraAim, MissionSettings, RoutePilot, aim_of, check_tilt, plan_route
 
 PAPER, HEAVY = load_vehicle("paper"), load_vehicle("bluerov2-heavy")

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from wakewise.core.geometry import Pose
-from wakewise.scene.missions import Coverage, coverage_gaps, patches_of
+from wakewise.scene.missions import Coverage, find_coverage_gaps, patches_of
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise.scene.targets import Mesh
 from wakewise.vision.imaging import PinholeCamera
@@ -33,15 +33,15 @@ def after(*poses: Pose) -> Coverage:
 def test_reasons_and_coverage_are_the_whole(poses: tuple[Pose, ...]) -> None:
     """What is seen well, in no photograph, shown poorly and shown too seldom are together the surface."""
     coverage = after(*poses)
-    why = coverage_gaps(coverage, poses, CAMERA)
+    why = find_coverage_gaps(coverage, poses, CAMERA)
     assert coverage.share + why.unseen + why.poorly + why.seldom == pytest.approx(1.0)
 
 
 def test_each_reason_is_given_where_it_holds() -> None:
     """Before the first photograph nothing is seen; from afar all is poor; one good photograph is too few."""
-    assert coverage_gaps(after(), (), CAMERA).unseen == 1.0
-    far = coverage_gaps(after(at(0, 2.0)), (at(0, 2.0),), CAMERA)
+    assert find_coverage_gaps(after(), (), CAMERA).unseen == 1.0
+    far = find_coverage_gaps(after(at(0, 2.0)), (at(0, 2.0),), CAMERA)
     assert (far.seldom, far.poorly > 0.3) == (0.0, True)
-    once = coverage_gaps(after(at(0)), (at(0),), CAMERA)
+    once = find_coverage_gaps(after(at(0)), (at(0),), CAMERA)
     assert once.seldom > 0.15
     assert once.poorly < once.seldom

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from wakewise.core.geometry import Pose, quat_from_matrix
 from wakewise.scene.missions import MissionSettings, Route, TankBounds, check_clearance, plan_route
-from wakewise.scene.missions.orbit import R_FC, layered_orbits
-from wakewise.scene.missions.order import LEAST_CURRENT_M_S, order_downstream_first
+from wakewise.scene.missions.orbit import LEAST_CURRENT_M_S, R_FC, layered_orbits, order_downstream_first
 
 CENTRE = np.array([0.0, 0.0, 1.43])
 PLAIN = MissionSettings()

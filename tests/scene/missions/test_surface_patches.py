@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from wakewise.core.errors import InputError
 from wakewise.scene.missions import patches_of
-from wakewise.scene.missions.surface_patches import CLEARANCE_M, REACH_M, SHIELD_CELLS
+from wakewise.scene.missions.visibility import CLEARANCE_M, REACH_M, SHIELD_CELLS
 from wakewise.scene.targets import Mesh, coral, place_on_bed
 from wakewise.vision.evaluation import Crop
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
 from wakewise.scene.targets import Mesh, load_mesh, read_marks, read_vertex_scores
-from wakewise.scene.targets.fragility_marks import FragilityMarks
+from wakewise.scene.targets.fragility import FragilityMarks
 
 HEADER = "x_m,y_m,z_m,radius_m,weight\n"
 place = st.floats(-1.0, 1.0)

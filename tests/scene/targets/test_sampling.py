@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
-from wakewise.scene.targets.sampling import (
+from wakewise.scene.targets.region import (
     LIKENESS_M,
     _likeness_sums,
     cell_middles,

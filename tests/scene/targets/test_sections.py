@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rods import rod_mesh, together
 
-from wakewise.scene.targets.sections import sections
+from wakewise.scene.targets.elasticity import sections
 
 HEIGHTS = np.array([0.013, 0.05, 0.2])
 

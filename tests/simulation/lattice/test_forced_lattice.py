@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError, StageError
-from wakewise.simulation.lattice.forced_lattice import ForcedLattice, disk_points
-from wakewise.simulation.lattice.forced_lattice_kernel import interpolated, share_out
+from wakewise.simulation.lattice.forced_lattice import ForcedLattice, disk_points, interpolated, share_out
 
 RHO = 1000.0
 NOTHING = np.zeros((0, 3))

@@ -8,8 +8,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.simulation.lattice import DiskJet, LatticeCase, LatticeRun, case_hash, find_case
-from wakewise.simulation.lattice.bounce_back import BounceBackLinks, solid_cells
-from wakewise.simulation.lattice.engines import make_engine
+from wakewise.simulation.lattice.engines import BounceBackLinks, make_engine, solid_cells
 from wakewise.simulation.lattice.run import Disk
 from wakewise.simulation.lattice.stencil import OPPOSITE, VELOCITIES, WALL, WEIGHTS, box, still_water
 

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from wakewise.simulation.lattice import MeanField, load_mean_field
-from wakewise.simulation.lattice.laws import (
+from wakewise.simulation.lattice.meanfield import (
     angular_flux,
     axis_speed,
     convergence,

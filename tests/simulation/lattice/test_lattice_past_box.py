@@ -7,7 +7,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.simulation.lattice import find_case, load_mean_field
-from wakewise.simulation.lattice.deflected_jet import load_past_box, past_field, past_figures, save_past_box
+from wakewise.simulation.lattice.crossing import load_past_box, past_field, past_figures, save_past_box
 from wakewise.simulation.lattice.run import LatticeRun
 
 SHIPPED = ("past-box", "grazing-box", "grazing-target")

@@ -23,7 +23,7 @@ from wakewise.simulation.lattice import (
     find_case,
 )
 from wakewise.simulation.lattice.crossing import crossing_figures
-from wakewise.simulation.lattice.laws import momentum_flux
+from wakewise.simulation.lattice.meanfield import momentum_flux
 from wakewise.simulation.lattice.run import Disk
 
 SMALL = LatticeCase(

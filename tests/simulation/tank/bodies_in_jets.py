@@ -8,7 +8,7 @@ import numpy as np
 
 from wakewise.scene.targets import Mesh, Target, coral, place_on_bed
 from wakewise.simulation.lattice import find_case
-from wakewise.simulation.lattice.deflected_jet import load_past_box, momentum, past_figures
+from wakewise.simulation.lattice.crossing import load_past_box, momentum, past_figures
 from wakewise.simulation.water.blockage import Blockage, _surface
 from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.simulation.water.water import Water

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from wakewise.simulation.tank.beds import SILT_RANGES, SILTS
 from wakewise.simulation.tank.grains import STRESS_INTENSITY
 from wakewise.simulation.tank.sediment import SiltProperties
-from wakewise.simulation.tank.settings import SiltSettings
+from wakewise.simulation.tank.settings import SILT_RANGES, SILTS, SiltSettings
 
 
 @pytest.mark.parametrize("kind", list(SILTS))

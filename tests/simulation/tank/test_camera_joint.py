@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.robot.vehicles.tilt import TiltJoint
-from wakewise.simulation.tank.camera_joint import CameraJoint
+from wakewise.robot.vehicles.vehicle import TiltJoint
+from wakewise.simulation.tank.sensors import CameraJoint
 from wakewise.simulation.tank.settings import SensorSettings
 
 JOINT = TiltJoint(low_rad=-0.8, high_rad=0.8, rate_rad_s=1.0)

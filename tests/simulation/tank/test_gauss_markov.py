@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.simulation.tank.gauss_markov import GaussMarkovProcess
+from wakewise.simulation.tank.sensors import GaussMarkovProcess
 
 
 def walks(every_s, *, sigma=0.004, lasts_s=20.0, seconds=100.0, many=300):

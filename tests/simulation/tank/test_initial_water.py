@@ -3,7 +3,7 @@
 import numpy as np
 
 from wakewise.operation import Scenario
-from wakewise.simulation.tank.initial_water import tank_water
+from wakewise.simulation.tank.ambient import tank_water
 from wakewise.simulation.tank.tank import tank_ambient
 
 

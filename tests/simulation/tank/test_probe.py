@@ -7,8 +7,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import coral, place_on_bed
-from wakewise.simulation.tank.probe import probe
-from wakewise.simulation.tank.probe_tables import ThrustHistory, read_points, regular_times
+from wakewise.simulation.tank.probe import ThrustHistory, probe, read_points, regular_times
 
 VEHICLE = load_vehicle("paper")
 AT_REST = Pose(np.zeros(3))

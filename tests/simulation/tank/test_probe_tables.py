@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
-from wakewise.simulation.tank.probe_tables import ThrustHistory, read_points, read_thrusts, regular_times
+from wakewise.simulation.tank.probe import ThrustHistory, read_points, read_thrusts, regular_times
 
 VEHICLE = load_vehicle("paper")
 NAMES = ",".join(f"thrust_{i + 1}_N" for i in range(8))

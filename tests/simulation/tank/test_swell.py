@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.simulation.tank.grains import friction_velocity_m_s
+from wakewise.simulation.tank.grains import Swell, friction_velocity_m_s, wave_friction_factor
 from wakewise.simulation.tank.sediment import Silt, SiltProperties
-from wakewise.simulation.tank.swell import Swell, wave_friction_factor
 from wakewise.simulation.water import AiryWave
 
 WAVE = AiryWave(amplitude_m=0.05, period_s=4.0, heading_rad=0.6, depth_m=1.5)

@@ -10,8 +10,8 @@ from wakewise.core.interfaces import BodyState, Plant
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Mesh, place_on_bed
 from wakewise.simulation.tank import Tank, TankSettings
-from wakewise.simulation.tank.probes import bed_points, surface_points, water_points
 from wakewise.simulation.tank.settings import SiltSettings
+from wakewise.simulation.tank.water_truth import bed_points, surface_points, water_points
 
 VEHICLE = load_vehicle("paper")
 # A pyramid of 0.15 m: four sides and a foot.

@@ -6,7 +6,7 @@ from pydantic import ValidationError
 
 from wakewise.core.errors import InputError
 from wakewise.simulation.tank import ThrusterFailure
-from wakewise.simulation.tank.thrust_losses import ADVANCE_OF_NO_THRUST, KT_STILL, FailingThrusters, inflow_factors
+from wakewise.simulation.tank.plant import ADVANCE_OF_NO_THRUST, KT_STILL, FailingThrusters, inflow_factors
 
 WANTED = np.array([1.0, -2.0, 3.0])
 MOTORS = np.array([0.5, 0.6, 0.7])

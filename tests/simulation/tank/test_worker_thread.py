@@ -10,8 +10,9 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Mesh, place_on_bed
-from wakewise.simulation.tank import Tank, TankSettings, worker_thread
-from wakewise.simulation.tank.worker_thread import WorkerThread
+from wakewise.simulation.tank import Tank, TankSettings
+from wakewise.simulation.tank import tank as module
+from wakewise.simulation.tank.tank import WorkerThread
 
 CORNERS = np.array([[0.07, 0.07, 0], [-0.07, 0.07, 0], [-0.07, -0.07, 0], [0.07, -0.07, 0], [0, 0, 0.15]])
 PYRAMID = place_on_bed(
@@ -22,7 +23,7 @@ PYRAMID = place_on_bed(
 @pytest.mark.parametrize("cores", [1, 2])
 def test_work_is_done_in_order(monkeypatch, cores):
     """Of many pieces each comes after the one before, on one core at once and on two on another thread."""
-    monkeypatch.setattr(worker_thread, "cores", lambda: cores)
+    monkeypatch.setattr(module, "cores", lambda: cores)
     done, where = [], set()
     beside = WorkerThread("order")
 
@@ -41,7 +42,7 @@ def test_work_is_done_in_order(monkeypatch, cores):
 @pytest.mark.parametrize("cores", [1, 2])
 def test_an_error_comes_out(monkeypatch, cores):
     """What a piece raises is raised to the one who asked, once, and no later piece hides it."""
-    monkeypatch.setattr(worker_thread, "cores", lambda: cores)
+    monkeypatch.setattr(module, "cores", lambda: cores)
     beside = WorkerThread("errors")
 
     def ask():
@@ -58,7 +59,7 @@ def test_a_tank_gives_the_same_bytes_on_one_core_and_on_two(monkeypatch):
     """State, water, silt and measures are the same whether water and silt run beside the vehicle or after it."""
     vehicle, records = load_vehicle("paper"), []
     for cores in (1, 2):
-        monkeypatch.setattr(worker_thread, "cores", lambda cores=cores: cores)
+        monkeypatch.setattr(module, "cores", lambda cores=cores: cores)
         start = BodyState(X_WB=Pose(np.array([0.0, 0.0, 1.0])))
         settings = TankSettings(silt={"load_kg_m2": 1.0})
         tank = Tank(vehicle, PYRAMID, settings, start, np.random.default_rng(3))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import erf, i0, i1
 
-from wakewise.simulation.water import blocked_sums
+from wakewise.simulation.water import induction
 from wakewise.simulation.water.bedjets import (
     LOG_WIDTH,
     WALL_JET_SPEED,
@@ -185,10 +185,10 @@ def test_rings_of_two_jets_on_the_same_ground_run_as_those_of_one():
 def test_threads_and_blocks_do_not_change_a_byte(monkeypatch):
     """One thread or four give the same velocities."""
     points = np.random.default_rng(4).uniform([-0.6, -0.6, 1.2], [0.6, 0.6, 1.5], (3001, 3))
-    monkeypatch.setattr(blocked_sums, "_THREADED_PAIRS", 10**12)
+    monkeypatch.setattr(induction, "_THREADED_PAIRS", 10**12)
     one = ring_velocity(points, _rings(), BED_Z_M)
-    monkeypatch.setattr(blocked_sums, "_THREADED_PAIRS", 1)
-    monkeypatch.setattr(blocked_sums, "cores", lambda: 4)
+    monkeypatch.setattr(induction, "_THREADED_PAIRS", 1)
+    monkeypatch.setattr(induction, "cores", lambda: 4)
     assert ring_velocity(points, _rings(), BED_Z_M).tobytes() == one.tobytes()
 
 

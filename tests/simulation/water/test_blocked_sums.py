@@ -7,15 +7,15 @@ import threading
 import numpy as np
 import pytest
 
-from wakewise.simulation.water import blocked_sums
-from wakewise.simulation.water.blocked_sums import over_points
+from wakewise.simulation.water import induction
+from wakewise.simulation.water.induction import over_points
 
 
 @pytest.mark.parametrize("n", [0, 1, 383, 384, 1000, 5003])
 @pytest.mark.parametrize("cores", [1, 2, 3])
 def test_every_point_is_taken_once(monkeypatch, n, cores):
     """Whatever the number of points and cores, each row is written exactly once, whole groups of 256 but the last."""
-    monkeypatch.setattr(blocked_sums, "cores", lambda: cores)
+    monkeypatch.setattr(induction, "cores", lambda: cores)
     points, out, lengths, lock = np.arange(3.0 * n).reshape(n, 3), np.zeros((n, 3)), [], threading.Lock()
 
     def kernel(some, result):
@@ -23,15 +23,15 @@ def test_every_point_is_taken_once(monkeypatch, n, cores):
         with lock:
             lengths.append(len(some))
 
-    over_points(kernel, points, out, blocked_sums._THREADED_PAIRS)
+    over_points(kernel, points, out, induction._THREADED_PAIRS)
     np.testing.assert_array_equal(out, 2.0 * points + 1.0)
     assert sum(lengths) == n
-    assert sum(length % blocked_sums._BLOCKS != 0 for length in lengths) <= 1
+    assert sum(length % induction._BLOCKS != 0 for length in lengths) <= 1
 
 
 def test_an_error_in_a_piece_is_told(monkeypatch):
     """What a kernel raises comes out of the call, whichever thread it happened on."""
-    monkeypatch.setattr(blocked_sums, "cores", lambda: 2)
+    monkeypatch.setattr(induction, "cores", lambda: 2)
 
     def kernel(some, result):
         if some[0, 0] > 0.5:
@@ -40,13 +40,13 @@ def test_an_error_in_a_piece_is_told(monkeypatch):
 
     points = np.linspace(0.0, 1.0, 3 * 2000).reshape(2000, 3)
     with pytest.raises(ValueError, match="no such point"):
-        over_points(kernel, points, np.zeros_like(points), blocked_sums._THREADED_PAIRS)
+        over_points(kernel, points, np.zeros_like(points), induction._THREADED_PAIRS)
 
 
 def _sum_in_child(queue):
     points = np.ones((5000, 3))
     out = np.zeros_like(points)
-    over_points(lambda some, result: np.copyto(result, 2.0 * some), points, out, blocked_sums._THREADED_PAIRS)
+    over_points(lambda some, result: np.copyto(result, 2.0 * some), points, out, induction._THREADED_PAIRS)
     queue.put(float(out.sum()))
 
 
@@ -54,7 +54,7 @@ def _sum_in_child(queue):
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
 def test_a_forked_child_has_threads_of_its_own(monkeypatch):
     """After sums on threads in the parent, a forked child sums as well instead of waiting for threads it has not."""
-    monkeypatch.setattr(blocked_sums, "cores", lambda: 3)
+    monkeypatch.setattr(induction, "cores", lambda: 3)
     forking = multiprocessing.get_context("fork")
     queue = forking.Queue()
     _sum_in_child(queue)

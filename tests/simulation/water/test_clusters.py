@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from wakewise.simulation.water import blocked_sums
+from wakewise.simulation.water import induction
 from wakewise.simulation.water.clusters import ImpulseField
 from wakewise.simulation.water.faces import TankFaces
-from wakewise.simulation.water.induction import impulse_velocity
-from wakewise.simulation.water.space_order import spatial_order
+from wakewise.simulation.water.induction import impulse_velocity, spatial_order
 
 
 def _jets():
@@ -46,10 +45,10 @@ def test_threads_do_not_change_a_byte(monkeypatch):
     sources = _jets()
     points = np.random.default_rng(1).uniform([-1, -1, 0.5], [1, 1, 1.5], (3000, 3))
     field = ImpulseField.of(*sources)
-    monkeypatch.setattr(blocked_sums, "_THREADED_PAIRS", 10**12)
+    monkeypatch.setattr(induction, "_THREADED_PAIRS", 10**12)
     alone = field.velocity(points)
-    monkeypatch.setattr(blocked_sums, "_THREADED_PAIRS", 1)
-    monkeypatch.setattr(blocked_sums, "cores", lambda: 4)
+    monkeypatch.setattr(induction, "_THREADED_PAIRS", 1)
+    monkeypatch.setattr(induction, "cores", lambda: 4)
     assert field.velocity(points).tobytes() == alone.tobytes()
 
 

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.simulation.water.bedjets import WallJetRings
+from wakewise.simulation.water.bedjets import JetPlanes, WallJetRings
 from wakewise.simulation.water.colliding_jets import deflect_colliding
 from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.parcels import Parcels
-from wakewise.simulation.water.walljets import JetPlanes
 
 ROOM = TankFaces.of(1.5, (math.inf, math.inf), surface=False)
 

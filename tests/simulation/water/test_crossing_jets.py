@@ -8,7 +8,7 @@ import pytest
 from wakewise.simulation.lattice import find_case, load_mean_field
 from wakewise.simulation.lattice.crossing import crossing_place, load_crossing
 from wakewise.simulation.lattice.meanfield import DATA
-from wakewise.simulation.water.crossing_jets import RAYS, ray_azimuths, spread_crossing_jets
+from wakewise.simulation.water.colliding_jets import RAYS, ray_azimuths, spread_crossing_jets
 from wakewise.simulation.water.parcels import Parcels
 from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.simulation.water.water import Water

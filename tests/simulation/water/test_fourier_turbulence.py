@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wakewise.simulation.water.fourier_turbulence import add_modes
+from wakewise.simulation.water.currents import add_modes
 
 
 def written(points, waves, turned, cosines, sines):

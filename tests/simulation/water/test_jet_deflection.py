@@ -9,8 +9,7 @@ from bodies_in_jets import box
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wakewise.simulation.water.blockage import Blockage
-from wakewise.simulation.water.jet_deflection import deflect_velocity, strike_body
+from wakewise.simulation.water.blockage import Blockage, deflect_velocity, strike_body
 from wakewise.simulation.water.water import Water
 
 SIDE = 0.3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from wakewise.simulation.water import blocked_sums
+from wakewise.simulation.water import induction
 from wakewise.simulation.water.parcels import Parcels, gusty_impulse_m4_s, parcel_velocity, row_widening
 from wakewise.simulation.water.round_jet_closure import first_sigma_m
 
@@ -85,9 +85,9 @@ def test_threads_do_not_change_a_byte(monkeypatch):
     """Whole on one thread and in pieces on four give identical bytes."""
     parcels = _some_parcels(200)
     points = np.random.default_rng(4).uniform([-1, -1, 0.1], [1, 1, 1.5], (1501, 3))
-    monkeypatch.setattr(blocked_sums, "_THREADED_PAIRS", 10**12)
+    monkeypatch.setattr(induction, "_THREADED_PAIRS", 10**12)
     one = parcel_velocity(points, *parcels, BED_Z_M)
-    monkeypatch.setattr(blocked_sums, "_THREADED_PAIRS", 1)
+    monkeypatch.setattr(induction, "_THREADED_PAIRS", 1)
     monkeypatch.setattr("os.cpu_count", lambda: 4)
     assert parcel_velocity(points, *parcels, BED_Z_M).tobytes() == one.tobytes()
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.simulation.water.space_order import curve, sorted_keys, spatial_order
+from wakewise.simulation.water.induction import curve, sorted_keys, spatial_order
 
 
 def test_the_curve_visits_neighbours():

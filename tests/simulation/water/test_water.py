@@ -12,7 +12,7 @@ import pytest
 
 from wakewise.simulation.tank.grains import friction_velocity_m_s
 from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M
-from wakewise.simulation.water import blocked_sums
+from wakewise.simulation.water import induction
 from wakewise.simulation.water.parcels import Parcels, merged
 from wakewise.simulation.water.round_jet_closure import travel
 from wakewise.simulation.water.water import Water
@@ -234,10 +234,10 @@ def test_threads_do_not_change_a_byte(monkeypatch):
         jets=[[0.3, 0.1, 0.95], [-0.6, 0.0, 0.8]],
     )
     points = np.random.default_rng(2).uniform([-0.9, -0.9, 0.4], [0.9, 0.9, 1.5], (1501, 3))
-    monkeypatch.setattr(blocked_sums, "_THREADED_PAIRS", 10**12)
+    monkeypatch.setattr(induction, "_THREADED_PAIRS", 10**12)
     alone = water.velocity(points)
-    monkeypatch.setattr(blocked_sums, "_THREADED_PAIRS", 1)
-    monkeypatch.setattr(blocked_sums, "cores", lambda: 4)
+    monkeypatch.setattr(induction, "_THREADED_PAIRS", 1)
+    monkeypatch.setattr(induction, "cores", lambda: 4)
     assert water.velocity(points).tobytes() == alone.tobytes()
     assert water.rings.count > 0
 

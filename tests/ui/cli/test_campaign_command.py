@@ -14,8 +14,8 @@ from typing import Any
 import polars as pl
 import pytest
 
-from wakewise.experiments.campaigns import definition, versions
-from wakewise.experiments.campaigns.plan import keep_plan
+from wakewise.experiments.campaigns import definition, task
+from wakewise.experiments.campaigns.definition import keep_plan
 from wakewise.experiments.campaigns.store import open_store
 from wakewise.ui.cli.main import run as command
 
@@ -239,4 +239,4 @@ def test_the_example_is_printed_alone(capsys: pytest.CaptureFixture[str]) -> Non
 def test_sources_are_known() -> None:
     """Parts of the package that a trial names are there."""
     for stage in ("fly", "model"):
-        assert len(versions.source_version(definition._SOURCES[stage])) == 64
+        assert len(task.source_version(definition._SOURCES[stage])) == 64

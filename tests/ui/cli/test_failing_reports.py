@@ -12,7 +12,7 @@ import pytest
 
 from wakewise.api import trials as api
 from wakewise.core.errors import InputError
-from wakewise.experiments.trials.reporting import report_attempt
+from wakewise.experiments.trials.stages import report_attempt
 from wakewise.ui.cli.main import run
 
 CLI = Path(__file__).parents[3] / "src" / "wakewise" / "cli"

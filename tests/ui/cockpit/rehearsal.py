@@ -19,7 +19,7 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cockpit.control_mailbox import ControlMailbox
-from wakewise.ui.cockpit.ground_station_listing import PAGE
+from wakewise.ui.cockpit.requests import PAGE
 from wakewise.ui.cockpit.server import CockpitServer
 from wakewise.ui.cockpit.view_model import CameraPicture, StatusMessage
 from wakewise.ui.web.files import StaticFiles

@@ -17,7 +17,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from wakewise.ui.cockpit.server import MOST_CLIENTS, CockpitServer
-from wakewise.ui.web.pending import PER_ADDRESS
+from wakewise.ui.web.origin_check import PER_ADDRESS
 
 ORIGIN = "http://rov.example"
 

@@ -7,7 +7,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from wakewise.ui.cockpit.control_lease import FORGET_S, INPUT_TIMEOUT_S, LEASE_TIMEOUT_S, ControlLease
+from wakewise.ui.cockpit.control_mailbox import FORGET_S, INPUT_TIMEOUT_S, LEASE_TIMEOUT_S, ControlLease
 
 FULL = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
 CLIENTS = st.sampled_from(["a", "b", "c"])

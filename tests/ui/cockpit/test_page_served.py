@@ -10,7 +10,7 @@ import pytest
 from browser import Browser, Page, until
 from rehearsal import Rehearsal
 
-from wakewise.ui.cockpit.ground_station_listing import page_files
+from wakewise.ui.cockpit.requests import page_files
 from wakewise.ui.cockpit.server import CockpitServer
 
 

@@ -6,8 +6,7 @@ import asyncio
 import time
 from typing import Any, cast
 
-from wakewise.ui.cockpit.client import SEEN_WITHIN_S, Client
-from wakewise.ui.cockpit.pictures import OLD_S, show_pictures
+from wakewise.ui.cockpit.client import OLD_S, SEEN_WITHIN_S, Client, show_pictures
 from wakewise.ui.cockpit.view_model import CameraPicture, ViewModel
 
 

@@ -8,8 +8,7 @@ import pytest
 from wakewise.allocation import min_norm_allocation
 from wakewise.operation import Parts, Scenario
 from wakewise.simulation.tank.water_truth import STILL_M_S
-from wakewise.ui.cockpit.state import StateEncoder
-from wakewise.ui.cockpit.wake_readout import WakeReadout
+from wakewise.ui.cockpit.state import StateEncoder, WakeReadout
 
 
 @pytest.fixture(scope="module")

@@ -23,15 +23,14 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, look_at
 from wakewise.core.interfaces import ScalarGrid
 from wakewise.operation import load_scenario, write_scenario
-from wakewise.operation.exposures import ExposureRecord, write_exposures
+from wakewise.operation.flight_log import ExposureRecord, write_exposures
 from wakewise.robot.vehicles import load_vehicle, vehicle_names
 from wakewise.simulation.water import Water
 from wakewise.ui.film import compared_trials, make, write_film, write_rows
 from wakewise.ui.film.encode import film_writer
-from wakewise.ui.film.external_view import FASTEST_M_S, speed_colours
+from wakewise.ui.film.external_view import FASTEST_M_S, choose_viewpoint, speed_colours
 from wakewise.ui.film.layout import FilmFrame, FilmOverview, FrameComposer, fill_frame
 from wakewise.ui.film.make import silt_at
-from wakewise.ui.film.viewpoint import choose_viewpoint
 from wakewise.ui.film.wash import STEP_S, TRAIL, RecordedMotion, replay, wash_of
 from wakewise.ui.reports.vehicle.hull import corner_normals, hull_of
 from wakewise.vision.imaging import PinholeCamera

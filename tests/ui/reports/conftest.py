@@ -178,7 +178,7 @@ def small_views() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("wakewise.ui.reports.model.VIEW_PIXELS", 48)
         patch.setattr("wakewise.ui.reports.compare.VIEW_PIXELS", 48)
-        patch.setattr("wakewise.ui.reports.coverage.PIXELS", 48)
+        patch.setattr("wakewise.ui.reports.model.PIXELS", 48)
         yield
 
 

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
+from wakewise.experiments.campaigns.definition import CampaignPlan, PlanEntry
 from wakewise.experiments.campaigns.pictures import MODEL
-from wakewise.experiments.campaigns.plan import CampaignPlan, PlanEntry
 from wakewise.experiments.campaigns.table import Results, TrialRecord
 from wakewise.ui.reports import write_campaign
 from wakewise.ui.reports.campaign import campaign_page

@@ -29,14 +29,13 @@ from wakewise.ui.reports.trial import read_trial
 from wakewise.ui.reports.vehicle import page as vehicle
 from wakewise.vision.reconstruction.photo_preview import PhotoPreview, PhotoQuality
 from wakewise_ardusub.reports.log import log_page
-from wakewise_paper.reports.operator_bench_plot import draw_operator
-from wakewise_paper.reports.photo_robustness import plot_degradation
+from wakewise_paper.reports.operator_bench_plot import draw_operator, plot_degradation
 from wakewise_paper.reports.reproduction import write_results
 from wakewise_paper.reports.reproduction.page import tables_page
 from wakewise_paper.reports.reproduction.plots import agreement, obedience
 from wakewise_paper.reports.wake import wake_page
 from wakewise_paper.reports.wash_bench_plot import LOOKS, draw_gentle
-from wakewise_paper.reproduction.acceptance import JUDGED
+from wakewise_paper.reproduction.claim import JUDGED
 
 SAID = re.compile(r"\bNone\b|\bnan\b|\binf\b")
 """What a page must not say where a figure is missing."""

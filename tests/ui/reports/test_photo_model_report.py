@@ -9,8 +9,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.ui.reports.photo_model import write_model_report
-from wakewise.ui.reports.photo_model.page import match_figure, model_page
-from wakewise.ui.reports.photo_model.scene import model_scene, model_up
+from wakewise.ui.reports.photo_model.page import match_figure, model_page, model_scene, model_up
 from wakewise.vision.reconstruction.photo_facts import ModelStatistics, PhotoStatistics
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from wakewise.ui.reports.coverage import coverage_html
-from wakewise.ui.reports.page_parts import PageParts
+from wakewise.ui.reports.model import coverage_html
+from wakewise.ui.reports.page import PageParts
 from wakewise.ui.reports.trial import Trial, read_trial
 
 

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from wakewise.ui.reports import begin_report, model, write_report
-from wakewise.ui.reports.page_parts import PageParts
+from wakewise.ui.reports.page import PageParts
 
 
 def test_a_part_is_made_once():

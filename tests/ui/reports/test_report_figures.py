@@ -19,7 +19,7 @@ from wakewise.ui.reports.figures import (
     thrust_columns,
     water_over_time,
 )
-from wakewise.ui.reports.photos import embedded_width, extremes
+from wakewise.ui.reports.media import embedded_width, extremes
 from wakewise.ui.reports.svg_style import inline_svg, new_figure, style_axes, thinned
 from wakewise.ui.reports.trial import read_trial
 

@@ -12,7 +12,7 @@ import yaml
 from wakewise.operation.worlds.makers import WORLDS
 from wakewise.simulation.tank.validation_limits import ABSENT, LIMITS
 from wakewise.ui.reports.compare import comparison_page
-from wakewise.ui.reports.limits import limits_section
+from wakewise.ui.reports.references import limits_section
 from wakewise.ui.reports.trial import Trial, read_trial
 
 

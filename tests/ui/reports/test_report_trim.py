@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 
 import wakewise as ww
-from wakewise.ui.reports.trim import trim_html
+from wakewise.ui.reports.report import trim_html
 
 
 @dataclass(frozen=True)

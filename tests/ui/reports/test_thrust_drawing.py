@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.robot.thrusters.curve_library import library_curve
-from wakewise.robot.thrusters.thrust_table import parse_thrust_table
+from wakewise.robot.thrusters.thrust_table import library_curve, parse_thrust_table
 from wakewise.ui.reports.vehicle.thrust_drawing import curve_svg
 
 SVG = "{http://www.w3.org/2000/svg}"

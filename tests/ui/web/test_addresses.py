@@ -1,4 +1,4 @@
-"""Where others find a page: addresses that can be typed into a phone."""
+"""Where others find a page: origin_check that can be typed into a phone."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from wakewise.ui.web import addresses
-from wakewise.ui.web.addresses import page_addresses
+from wakewise.ui.web import origin_check
+from wakewise.ui.web.origin_check import page_addresses
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1", "localhost", "rov.local", "192.168.2.1"])
@@ -22,8 +22,8 @@ def test_a_host_that_can_be_asked_for_is_given_as_it_is(host: str) -> None:
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", ""])
 def test_all_addresses_are_told_one_by_one(host: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The way out comes first, a tether without one after it; loopback names, which no phone reaches, do not count."""
-    monkeypatch.setattr(addresses, "_way_out", lambda version: ["10.0.0.5" if version == 4 else "2001:db8::5"])
-    monkeypatch.setattr(addresses, "_own", lambda: ["127.0.0.1", "10.0.0.5", "192.168.2.1"])
+    monkeypatch.setattr(origin_check, "_way_out", lambda version: ["10.0.0.5" if version == 4 else "2001:db8::5"])
+    monkeypatch.setattr(origin_check, "_own", lambda: ["127.0.0.1", "10.0.0.5", "192.168.2.1"])
     hosts = [urlsplit(one).hostname for one in page_addresses(host, 8765)]
     assert hosts == (["2001:db8::5"] if host == "::" else ["10.0.0.5", "192.168.2.1"])
 

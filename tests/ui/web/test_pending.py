@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from wakewise.ui.web.pending import PendingConnections
+from wakewise.ui.web.origin_check import PendingConnections
 
 
 class Line:

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.scene.targets import Mesh, coral
-from wakewise.vision.evaluation.cloud_to_surface import Crop
-from wakewise.vision.evaluation.extent import area_and_volume
+from wakewise.vision.evaluation.cloud_to_surface import Crop, area_and_volume
 
 
 def _box(low, high):

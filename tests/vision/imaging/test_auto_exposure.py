@@ -7,7 +7,7 @@ import pytest
 from imaging_helpers import coral_scene, view
 
 from wakewise.vision.imaging import ImagingSettings, SiltOptics, photograph
-from wakewise.vision.imaging.auto_exposure import (
+from wakewise.vision.imaging.photograph import (
     LUMINANCE,
     MOST_AMPLIFIED,
     TARGET,

@@ -7,7 +7,7 @@ from imaging_helpers import BED_Z, box_scene, view
 from wakewise.core.geometry import Pose, look_at
 from wakewise.vision.imaging import PinholeCamera
 from wakewise.vision.imaging.bed_view import draw_bed, project_bed
-from wakewise.vision.imaging.lens import DISTORTED
+from wakewise.vision.imaging.camera import DISTORTED
 
 CAMERA = PinholeCamera(240, 180, np.deg2rad(90))
 R_BC = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

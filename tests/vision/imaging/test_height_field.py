@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wakewise.vision.imaging.height_field import grid_faces, height_field, meet
+from wakewise.vision.imaging.bed_view import grid_faces, height_field, meet
 
 RNG = np.random.default_rng(4)
 LINES = np.cumsum(np.concatenate([[-0.7], RNG.uniform(0.02, 0.09, 30)]))

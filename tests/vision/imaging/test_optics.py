@@ -14,8 +14,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid
 from wakewise.vision.imaging import Lights, PinholeCamera, Render, SiltOptics, attenuate, haze_between, water_optics
-from wakewise.vision.imaging.grids import sample_grid
-from wakewise.vision.imaging.optics import BACKSCATTER_RATIO, exp_minus, water_types
+from wakewise.vision.imaging.optics import BACKSCATTER_RATIO, exp_minus, sample_grid, water_types
 
 DATA = pathlib.Path(os.environ.get("WAKEWISE_DATA", pathlib.Path(__file__).parents[4] / "shared" / "data"))
 CAMERA = PinholeCamera(64, 48, np.deg2rad(80))

@@ -9,7 +9,7 @@ from imaging_helpers import BED_Z, box, box_scene, coral_scene, view
 
 from wakewise.core.errors import InputError
 from wakewise.vision.imaging import FlatPort, LensCamera, Lights, PinholeCamera, render, texture
-from wakewise.vision.imaging.shading import needs_supersampling
+from wakewise.vision.imaging.renderer import needs_supersampling
 
 LIGHTS = Lights(lamps_C_m=np.array([[-0.2, -0.1, 0.0], [0.2, -0.1, 0.0]]))
 CAMERA = PinholeCamera(480, 360, np.deg2rad(90))

@@ -5,7 +5,7 @@ import pytest
 from imaging_helpers import coral_scene, view
 
 from wakewise.vision.imaging import FlatPort, LensCamera, PinholeCamera
-from wakewise.vision.imaging.tile_culling import TILE_PX, BoundingSpheres, tile_sphere_overlap
+from wakewise.vision.imaging.scene import TILE_PX, BoundingSpheres, tile_sphere_overlap
 
 
 def test_spheres_hold_all_faces():

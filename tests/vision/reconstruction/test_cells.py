@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wakewise.vision.reconstruction.cells import CellMeans
+from wakewise.vision.reconstruction.fusion import CellMeans
 
 
 def slow_means(rows, weights, cell_m):

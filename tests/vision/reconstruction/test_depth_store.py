@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from wakewise.vision.reconstruction import ReconstructionSettings, depth_store, reconstruct
-from wakewise.vision.reconstruction.depth_store import DepthStore
+from wakewise.vision.reconstruction import ReconstructionSettings, dense, reconstruct
+from wakewise.vision.reconstruction.dense import DepthStore
 from wakewise.vision.reconstruction.stereo import DepthMap
 
 
@@ -51,7 +51,7 @@ def test_a_cloud_from_maps_on_disk_is_the_same_to_the_byte(relief_photos, tmp_pa
         detector="opencv", max_features=1000, first_octave=0, agreeing_views=1, mesh=False, lens_check=False
     )
     for name, held in (("memory", 10**9), ("disk", 0)):
-        monkeypatch.setattr(depth_store.DepthStore.__init__, "__defaults__", (held,))
+        monkeypatch.setattr(dense.DepthStore.__init__, "__defaults__", (held,))
         reconstruct(folder, tmp_path / name, settings)
     assert (tmp_path / "memory" / "dense.ply").read_bytes() == (tmp_path / "disk" / "dense.ply").read_bytes()
     assert [p.name for p in (tmp_path / "disk").iterdir() if p.name.startswith(".")] == []

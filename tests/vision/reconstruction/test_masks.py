@@ -8,9 +8,9 @@ import pytest
 from relief import take_photos
 
 from wakewise.core.errors import InputError
+from wakewise.vision.reconstruction.features import Features, within
 from wakewise.vision.reconstruction.masks import masked, read_masks, write_for_colmap
 from wakewise.vision.reconstruction.photos import read_photos
-from wakewise.vision.reconstruction.sift import Features, within
 from wakewise.vision.reconstruction.stereo import DepthMap
 
 

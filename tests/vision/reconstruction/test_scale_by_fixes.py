@@ -10,8 +10,13 @@ from scipy.spatial.transform import Rotation
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.vision.reconstruction.registered_photos import camera_centres
-from wakewise.vision.reconstruction.scale.position_fixes import PositionFix, PositionFixes
-from wakewise.vision.reconstruction.scale.scale_from_positions import MOST_UNSURE_PCT, place_by_fixes, why_unused
+from wakewise.vision.reconstruction.scale.position_fixes import (
+    MOST_UNSURE_PCT,
+    PositionFix,
+    PositionFixes,
+    place_by_fixes,
+    why_unused,
+)
 from wakewise.vision.reconstruction.scale.stage import place_model
 
 SCALE = 0.137

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.vision.reconstruction.scale.fitting import BarMeasurement, fit_scale
+from wakewise.vision.reconstruction.scale.bars import BarMeasurement, fit_scale
 
 
 def measured(name, length, found, sigma=1e-4, found_sigma=0.0):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from analytic_views import straight
 
-from wakewise.vision.reconstruction.scale.places import place
+from wakewise.vision.reconstruction.scale.marks import place
 
 POINT = np.array([0.03, -0.02, 1.1])
 

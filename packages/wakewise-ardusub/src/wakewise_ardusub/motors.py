@@ -166,7 +166,7 @@ def _curve(vehicle: MotorDrivenVehicle) -> ThrustCurve | None:
     """The curve of a vehicle's motors, None without one."""
     if vehicle.curve is None or isinstance(vehicle.curve, ThrustCurve):
         return vehicle.curve
-    from wakewise.robot.thrusters.curve_library import library_curve  # its reader of tables needs SciPy
+    from wakewise.robot.thrusters.thrust_table import library_curve  # its reader of tables needs SciPy
 
     return library_curve(vehicle.curve.table)
 

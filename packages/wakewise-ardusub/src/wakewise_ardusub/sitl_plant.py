@@ -18,9 +18,8 @@ from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState, Plant, TruthProvider
 from wakewise.core.jit.precompile import compile_kernels
 from wakewise_ardusub.physics.datagrams import PhysicsState
-from wakewise_ardusub.physics.lowered_start import LoweringBody
 from wakewise_ardusub.physics.physics import SimulatedBody
-from wakewise_ardusub.physics.surface import WaterSurface
+from wakewise_ardusub.physics.surface import LoweringBody, WaterSurface
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -104,7 +104,7 @@ class VehicleSummary:
     @classmethod
     def of(cls, vehicle: Vehicle, wake: WakeModel) -> VehicleSummary:
         """The numbers of a vehicle and of the wake model that its jets are believed to follow."""
-        from wakewise.robot.thrusters.curve_library import library_curve
+        from wakewise.robot.thrusters.thrust_table import library_curve
 
         chosen = vehicle.curve
         return cls(

@@ -18,7 +18,7 @@ from wakewise import __version__
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
 from wakewise_ardusub.vehicle_summary import VehicleSummary, read_vehicle_summary
-from wakewise_ardusub.wash_meter.settings import MeterSettings
+from wakewise_ardusub.wash_meter.run import MeterSettings
 from wakewise_ardusub.wash_savings import WashSavingsCalculator
 
 ROOT = Path(__file__).parents[4]

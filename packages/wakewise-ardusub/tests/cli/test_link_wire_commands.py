@@ -19,13 +19,13 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.ui.cli.main import run
-from wakewise_ardusub.link.motor_results import MotorObservation, MotorResults, write_results
+from wakewise_ardusub.link.checks import MotorObservation, MotorResults, write_results
 from wakewise_ardusub.link.parameters import read_parameter_file
 from wakewise_ardusub.link.protocol import SCRIPT_VERSION
 from wakewise_ardusub.link.script import parameters_text, script_text
 from wakewise_ardusub.physics.datagrams import PhysicsState
-from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
+from wakewise_ardusub.physics.surface import FreeWater
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics, UdpEndpoint

@@ -12,8 +12,17 @@ from fake_autopilot import FakeAutopilot
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link import protocol
-from wakewise_ardusub.link.checks import CheckInputs, CheckResult, ReceivedTelemetry, check, verdict
-from wakewise_ardusub.link.motor_results import MotorObservation, MotorResults, read_results, write_results
+from wakewise_ardusub.link.checks import (
+    CheckInputs,
+    CheckResult,
+    MotorObservation,
+    MotorResults,
+    ReceivedTelemetry,
+    check,
+    read_results,
+    verdict,
+    write_results,
+)
 from wakewise_ardusub.link.parameters import read_parameter_file
 from wakewise_ardusub.link.vehicle_survey import await_autopilot, survey
 

@@ -6,7 +6,7 @@ import pytest
 
 from bottle import Bottle
 from wakewise_ardusub.link.engagement_fsm import EngagementInputs, EngagementLimits
-from wakewise_ardusub.link.freshness_margins import FreshnessMargins
+from wakewise_ardusub.link.output_gate import FreshnessMargins
 
 
 def test_ages_are_those_of_the_last_minute() -> None:

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
-from wakewise_ardusub.link.mavlink_codec import MavlinkCodec, RelayTransport
-from wakewise_ardusub.link.requests import RATES_HZ, interval_requests, parameter_request
+from wakewise_ardusub.link.protocol import RATES_HZ, interval_requests, parameter_request
+from wakewise_ardusub.link.transports import MavlinkCodec, RelayTransport
 
 
 class Line:

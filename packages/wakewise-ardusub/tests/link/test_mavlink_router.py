@@ -12,7 +12,7 @@ import pytest
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.ui.cli.main import run
 from wakewise_ardusub.link.connection import parse_connection
-from wakewise_ardusub.link.mavlink_router import MavlinkRouter
+from wakewise_ardusub.link.mavlink_relay import MavlinkRouter
 
 
 def opened(stack: ExitStack) -> socket.socket:

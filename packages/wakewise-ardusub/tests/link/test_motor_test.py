@@ -10,7 +10,7 @@ import pytest
 from fake_autopilot import FakeAutopilot
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.motor_results import Answer
+from wakewise_ardusub.link.checks import Answer
 from wakewise_ardusub.link.motor_test import COOL_S, MotorTestStep, planned_turns, run_motor_test
 from wakewise_ardusub.motors import thrusts_of_pulses
 

@@ -15,13 +15,13 @@ from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link import protocol
 from wakewise_ardusub.link.checks import check, verdict
 from wakewise_ardusub.link.connection import receive_kind, send_command
-from wakewise_ardusub.link.output import motor_output
+from wakewise_ardusub.link.motor_interface import motor_output
 from wakewise_ardusub.link.parameters import read_all_parameters, read_parameters, set_parameter
 from wakewise_ardusub.link.script import script_text
 from wakewise_ardusub.link.upload import start_script, upload_script
 from wakewise_ardusub.link.vehicle_survey import survey
-from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
+from wakewise_ardusub.physics.surface import FreeWater
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics

@@ -8,7 +8,7 @@ import pytest
 from script_bench import Bench, thrusts
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.output import MotorOutput, motor_output
+from wakewise_ardusub.link.motor_interface import MotorOutput, motor_output
 
 HEAVY = load_vehicle("bluerov2-heavy")
 DIRECTIONS = (-1, -1, 1, 1, -1, 1, 1, -1)

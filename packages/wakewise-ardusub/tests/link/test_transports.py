@@ -14,8 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise_ardusub.link.connection import Endpoint, parse_connection
-from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
-from wakewise_ardusub.link.transports import StreamTransport, UdpTransport, carrier_of
+from wakewise_ardusub.link.transports import MavlinkCodec, StreamTransport, UdpTransport, carrier_of
 
 
 def test_a_host_without_an_address_is_said():

@@ -13,10 +13,10 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
+from wakewise_ardusub.link.transports import MavlinkCodec
 from wakewise_ardusub.physics import FreeWater, SimulatedBody
 from wakewise_ardusub.physics.depth_monitor import APART_M, DepthMonitor
-from wakewise_ardusub.physics.lowered_start import LoweringBody
+from wakewise_ardusub.physics.surface import LoweringBody
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 
 HEAVY = load_vehicle("bluerov2-heavy")

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wakewise_ardusub.physics.frames import FrameCounter
+from wakewise_ardusub.physics.physics import FrameCounter
 
 ONE, TWO = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
 

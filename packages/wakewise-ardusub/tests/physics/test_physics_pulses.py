@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.robot.thrusters.curve_library import library_curve
+from wakewise.robot.thrusters.thrust_table import library_curve
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.physics.pulses import PulseTable
 

@@ -10,8 +10,7 @@ from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.physics import FreeWater
-from wakewise_ardusub.physics.lowered_start import LOWERED_M_S, LoweringBody
-from wakewise_ardusub.physics.surface import WaterSurface
+from wakewise_ardusub.physics.surface import LOWERED_M_S, LoweringBody, WaterSurface
 
 HEAVY = load_vehicle("bluerov2-heavy")
 SURFACE = WaterSurface.of(HEAVY)

@@ -8,7 +8,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.physics import FreeWater, PhysicsServer, PulseTable
-from wakewise_ardusub.physics.udp import LOOPBACK, open_socket, serve
+from wakewise_ardusub.physics.physics import LOOPBACK, open_socket, serve
 from wakewise_ardusub.sitl.udp_endpoints import UdpPhysics
 
 HEAVY = load_vehicle("bluerov2-heavy")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import quat_from_euler
-from wakewise.experiments.exports.frames import ros_body
+from wakewise.experiments.exports.records import ros_body
 from wakewise_ardusub.sensors import LinePoses, read_line
 
 Q = quat_from_euler(0.1, -0.2, 2.0)

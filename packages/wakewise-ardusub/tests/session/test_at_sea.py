@@ -13,15 +13,13 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.operation.flying import loop_of, recorder_of
 from wakewise.operation.scenario import Scenario
-from wakewise.operation.teleop.photo_trigger import PhotoTrigger
+from wakewise.operation.teleop.live import PhotoTrigger
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.message_state import attitude_of
 from wakewise_ardusub.link.protocol import ALT_HOLD, STABILIZE
 from wakewise_ardusub.link.session_log import SessionLog, read_journal
-from wakewise_ardusub.session.link_join import SEA, join_vehicle
-from wakewise_ardusub.session.protected_region import ProtectedRegion, ball, ball_points
-from wakewise_ardusub.session.session import VehicleSession
-from wakewise_ardusub.session.warm_up import run_warm_up
+from wakewise_ardusub.session.link_join import SEA, join_vehicle, run_warm_up
+from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession, ball, ball_points
 from wakewise_ardusub.sitl.companion_harness import CompanionHarness
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 

@@ -40,8 +40,8 @@ from wakewise_ardusub.link.protocol import (
 from wakewise_ardusub.link.script import script_text
 from wakewise_ardusub.physics import FreeWater, PhysicsServer, PulseTable, SimulatedBody
 from wakewise_ardusub.physics.datagrams import PORT
-from wakewise_ardusub.physics.lowered_start import LoweringBody
-from wakewise_ardusub.physics.udp import LOOPBACK, open_socket, serve
+from wakewise_ardusub.physics.physics import LOOPBACK, open_socket, serve
+from wakewise_ardusub.physics.surface import LoweringBody
 from wakewise_ardusub.sitl.companion_harness import CompanionHarness
 from wakewise_ardusub.sitl.inprocess_session import STATION, STATION_COMPONENT, THRUSTS, shipped_script
 from wakewise_ardusub.sitl.own_parameters import own_parameters

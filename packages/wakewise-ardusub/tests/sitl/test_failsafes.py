@@ -7,9 +7,9 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.protocol import ALT_HOLD
-from wakewise_ardusub.sitl.failsafes import ground_station, pilot_input
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession
-from wakewise_ardusub.sitl.parameters import ParameterTable
+from wakewise_ardusub.sitl.own_parameters import ParameterTable
+from wakewise_ardusub.sitl.simulated_autopilot import ground_station, pilot_input
 
 HEAVY = load_vehicle("bluerov2-heavy")
 

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession
-from wakewise_ardusub.sitl.motor_tests import COOL_S, SILENT_S
+from wakewise_ardusub.sitl.servos import COOL_S, SILENT_S
 
 HEAVY = load_vehicle("bluerov2-heavy")
 

@@ -17,8 +17,8 @@ import made_logs
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
-from wakewise_ardusub.logs import mavlink, tlog
-from wakewise_ardusub.logs.clock import LogClock
+from wakewise_ardusub.logs import mavlink
+from wakewise_ardusub.logs.channels import LogClock
 from wakewise_ardusub.logs.read import read_log
 from wakewise_ardusub.logs.replay_allocation import ReplayedAllocation, bow_points, replay_log
 from wakewise_ardusub.logs.table import LogTable, tabulate
@@ -51,7 +51,7 @@ def tape(file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Message]:
         found.append((clock.at(stamp_s, None if boot is None else 1e-3 * boot), system, component, name, fields))
         mavlink.record_message(gather, stamp_s, system, component, name, fields)
 
-    monkeypatch.setattr(tlog, "record_message", keep)
+    monkeypatch.setattr(mavlink, "record_message", keep)
     read_log(file)
     monkeypatch.undo()
     return found

@@ -16,8 +16,7 @@ import pytest
 from test_cockpit_extras import EXTRAS, SERVICE, WIDGET, fits
 
 from wakewise.core.errors import InputError
-from wakewise.ui.web.origin_check import TOKEN_HEADER, RequestOrigin
-from wakewise.ui.web.pending import PER_ADDRESS
+from wakewise.ui.web.origin_check import PER_ADDRESS, TOKEN_HEADER, RequestOrigin
 from wakewise_ardusub.wash_meter.server import MOST_KEPT, OFFER, PAGE, MeterServer
 
 WISHED: list[str] = []

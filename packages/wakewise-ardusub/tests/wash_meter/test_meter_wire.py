@@ -18,12 +18,9 @@ from loopback_vehicle import Vehicle, free_ends
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
 from wakewise_ardusub.vehicle_summary import VehicleSummary
-from wakewise_ardusub.wash_meter.history import KEPT_S, WashHistory
-from wakewise_ardusub.wash_meter.mavlink_socket import MavlinkSocket, TimedMessage
-from wakewise_ardusub.wash_meter.meter import MeterReading
-from wakewise_ardusub.wash_meter.record import DiveRecord
-from wakewise_ardusub.wash_meter.settings import MeterSettings
-from wakewise_ardusub.wash_meter.vehicle_listener import VehicleListener
+from wakewise_ardusub.wash_meter.meter import KEPT_S, DiveRecord, MeterReading, WashHistory
+from wakewise_ardusub.wash_meter.run import MeterSettings
+from wakewise_ardusub.wash_meter.vehicle_listener import MavlinkSocket, TimedMessage, VehicleListener
 from wakewise_ardusub.wash_savings import WashSavings
 
 

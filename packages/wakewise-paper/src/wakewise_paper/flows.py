@@ -2,6 +2,10 @@
 
 All are given in the jet's own frame J: origin at the middle of the disk, x along the jet. None of them is a wake model,
 and none has been adjusted to one.
+
+The lattice's mean fields as jets that wake models can be held against.
+
+Measured jets of the reference data: velocity fields of an air jet, and image pairs of another.
 """
 
 from __future__ import annotations
@@ -9,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -16,8 +21,13 @@ from scipy.interpolate import RegularGridInterpolator
 
 from wakewise.core.arrays import Array
 from wakewise.core.constants import FRESH_WATER_KG_M3 as WATER_DENSITY_KG_M3
+from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Flow
+from wakewise.simulation.lattice import load_mean_field
 from wakewise.simulation.water import Water
+from wakewise.wake.calibration import DataSplit
+from wakewise.wake.samples import CORE, JetSamples
+from wakewise.wake.scores import score_speeds
 
 DISK_DIAMETER_M = 0.06
 """Disk of the paper's vehicle."""
@@ -283,3 +293,138 @@ def table_jet(name: str, title: str, note: str, table: Mapping[str, Array]) -> T
         swirl=table["swirl"][ahead],
         rms=table["axial_rms"][ahead],
     )
+
+
+_CASES = {
+    "oracle-swirl": ("swirl", "lattice, propeller with swirl"),
+    "oracle": ("free", "lattice, jet without swirl"),
+}
+
+
+def oracle_jets() -> tuple[list[TableJet], dict[str, str]]:
+    """Jets of the lattice with and without swirl, and for what is not there, why."""
+    jets, missing = [], {}
+    for name, (case, title) in _CASES.items():
+        try:
+            field = load_mean_field(case)
+        except InputError as fault:
+            missing[name] = str(fault)
+            continue
+        note = (
+            f"lattice-Boltzmann, {field.cells_per_D} cells per disk diameter, actuator disk in open water, averaged "
+            "over time and angle; one run scaled to all thrusts, so the thrust law holds by construction"
+        )
+        if field.figures.get("preliminary"):
+            note += "; preliminary, on a coarser grid than is wanted"
+        tables = {key: getattr(field, key) for key in ("x_D", "r_D", "axial", "radial", "swirl", "axial_rms")}
+        jets.append(table_jet(name, title, note, tables))
+    return jets, missing
+
+
+def grid_convergence_pct() -> tuple[float | None, str]:
+    """Change of the speed on the axis 0.3 m from the disk between two grids, per cent; None with the reason.
+
+    Of the two cases, with swirl and without, the worse.
+    """
+    found, reasons = [], []
+    for case, _ in _CASES.values():
+        try:
+            value = load_mean_field(case).figures.get("grid_convergence_pct")
+        except InputError as fault:
+            reasons.append(str(fault))
+            continue
+        if value is None:
+            reasons.append(f"the stored mean field '{case}' of the lattice says nothing of a second grid")
+        else:
+            found.append(float(value))
+    if reasons:
+        return None, "; ".join(reasons)
+    return max(found), ""
+
+
+NOZZLE_DIAMETER_M = 0.15
+EXIT_SPEED_M_S = 12.0
+"""As the data's readme states (F. Moisy, Lab FAST, Univ. Paris-Sud, CNRS)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredJet:
+    """Samples of a real jet with the split into snapshots to fit on and snapshots to test on.
+
+    `half_width_m` is half the width at half the peak speed `peak_m_s`, both 0.1 m from the data's edge.
+    `snapshots_r2_core` is what the mean of the training snapshots itself scores on the test snapshot in region A:
+    with so few snapshots turbulence leaves little to any model of the mean.
+    """
+
+    samples: JetSamples
+    split: DataSplit
+    half_width_m: float
+    peak_m_s: float
+    snapshots_r2_core: float
+
+
+def read_air_jet(path: Path) -> MeasuredJet:
+    """Three snapshots of a 12 m/s air jet; fit on the first two, test on the third.
+
+    The nozzle's plane is taken at y = 0 of the data and the jet along +y, as the readme has it. The jet's axis is the
+    line through the centroids of speed squared of the two snapshots to fit on. Since models know T / (rho A) only, the
+    thrust is that which in water gives the same exit speed.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or holds other arrays.
+    """
+    try:
+        with np.load(path) as data:
+            across, along, x_mm, y_mm = (np.asarray(data[key], dtype=np.float64) for key in ("u", "v", "x_mm", "y_mm"))
+    except (OSError, KeyError, ValueError):
+        raise InputError(f"{path}: cannot be read, needs arrays u, v, x_mm and y_mm of the air jet") from None
+    x, y = 1e-3 * x_mm, 1e-3 * y_mm
+    known_twice = np.isfinite(along[:2]).all(axis=0)
+    mean = np.where(known_twice, np.nan_to_num(along[:2]).mean(axis=0), np.nan)
+    slope, offset = _axis(mean, x, y)
+    Y, X = np.meshgrid(y, x, indexing="ij")
+    off = X - (slope * Y + offset)
+    rows = []
+    for k in range(len(along)):
+        known = np.isfinite(along[k]) & np.isfinite(across[k]) & (Y > 0.0)
+        n = int(known.sum())
+        columns = [Y[known], np.abs(off[known]), along[k][known], np.abs(across[k][known]), np.full(n, float(k))]
+        rows.append(np.column_stack(columns))
+    table = np.concatenate(rows)
+    thrust_N = WATER_DENSITY_KG_M3 * 0.25 * math.pi * NOZZLE_DIAMETER_M**2 * EXIT_SPEED_M_S**2
+    samples = JetSamples(
+        x_m=table[:, 0],
+        r_m=table[:, 1],
+        thrust_N=np.full(len(table), thrust_N),
+        speed_m_s=table[:, 2],
+        across_m_s=table[:, 3],
+        disk_diameter_m=NOZZLE_DIAMETER_M,
+        title="air jet",
+    )
+    row = mean[np.argmin(np.abs(y - 0.1))]
+    both = samples.take(table[:, 4] == 2)
+    known = np.isfinite(along[2]) & np.isfinite(across[2]) & (Y > 0.0)
+    inside = CORE.holds(both) & np.isfinite(mean[known])
+    explained = score_speeds(mean[known][inside], both.take(inside)).r2_core
+    return MeasuredJet(
+        samples=samples,
+        split=DataSplit(
+            train=table[:, 4] < 2,
+            test=table[:, 4] == 2,
+            words="two snapshots to fit on, the third to test on; one speed",
+        ),
+        half_width_m=0.5 * float((row > 0.5 * np.nanmax(row)).sum() * abs(x[1] - x[0])),
+        peak_m_s=float(np.nanmax(row)),
+        snapshots_r2_core=float("nan") if explained is None else explained,
+    )
+
+
+def _axis(speed: Array, x: Array, y: Array) -> tuple[float, float]:
+    """Slope and offset of the line x = slope y + offset that the jet runs along; `speed` has a row for each y."""
+    weight = np.where(np.isfinite(speed), np.maximum(speed, 0.0), 0.0) ** 2
+    whole = np.isfinite(speed).mean(axis=1) > 0.9
+    centre = (weight @ x)[whole] / weight.sum(axis=1)[whole]
+    slope, offset = np.polyfit(y[whole], centre, 1)
+    return float(slope), float(offset)

@@ -26,8 +26,7 @@ from wakewise.experiments.trials.stages import ProgressListener, SilentProgress,
 from wakewise.operation import Scenario
 from wakewise.scene.targets import Target
 from wakewise.vision.imaging import Render
-from wakewise_paper.photo_model import judge
-from wakewise_paper.photo_sets import planned_views, render_clean, write_photos
+from wakewise_paper.photo_sets import judge, planned_views, render_clean, write_photos
 
 
 @dataclass(frozen=True, kw_only=True)

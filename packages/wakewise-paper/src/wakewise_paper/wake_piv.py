@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.vision.piv.correlation import averaged
 from wakewise.vision.piv.folder import PivFolder, read_pairs, samples_of_vectors
-from wakewise.vision.piv.images import CameraSettings, photograph_pair
+from wakewise.vision.piv.images import CameraSettings, LightSheet, TracerSettings, photograph_pair
 from wakewise.vision.piv.processing import Engine, displacements, has_openpiv
-from wakewise.vision.piv.tracers import LightSheet, TracerSettings
-from wakewise.vision.piv.vectors import averaged
 from wakewise.wake.samples import JetSamples, joined
 from wakewise_paper.flows import JetFlow, exit_speed_m_s
 

@@ -18,15 +18,20 @@ from wakewise.core.arrays import Array
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.wake.calibration import DataSplit, WakeCalibration, calibrate, split_samples
+from wakewise.wake.calibration import FAMILIES, DataSplit, WakeCalibration, WakeFamily, calibrate, split_samples
 from wakewise.wake.fit_file import fit_figures
-from wakewise.wake.fit_parameters import FAMILIES, WakeFamily
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.samples import CORE, WAKE, JetRegion, JetSamples, joined
 from wakewise.wake.scores import WakeScores, score
-from wakewise_paper.flows import BLAAUW_VAN_DE_KAA, FUEHRER_ROEMISCH, JetFlow, ParcelJet
-from wakewise_paper.lattice_reference import grid_convergence_pct, oracle_jets
-from wakewise_paper.piv_reference import read_air_jet
+from wakewise_paper.flows import (
+    BLAAUW_VAN_DE_KAA,
+    FUEHRER_ROEMISCH,
+    JetFlow,
+    ParcelJet,
+    grid_convergence_pct,
+    oracle_jets,
+    read_air_jet,
+)
 from wakewise_paper.wake_piv import RealPairs, RoundTrip, ShearFlow, piv_samples, process_real_pairs, round_trip
 
 TRAIN_THRUSTS_N = (0.25, 1.0, 4.0)

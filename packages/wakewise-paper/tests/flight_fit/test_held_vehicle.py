@@ -5,7 +5,7 @@ import numpy as np
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.vision.imaging import PinholeCamera
 from wakewise_paper.flight_fit.flake_likelihood import fit_flight
-from wakewise_paper.flight_fit.held_vehicle import ARRIVED_S, LEVELS_N, bow_jets, held_sightings
+from wakewise_paper.flight_fit.flake_tracks import ARRIVED_S, LEVELS_N, bow_jets, held_sightings
 from wakewise_paper.learned_wake.truth import SampledWater
 
 CAMERA = PinholeCamera(960, 720, float(np.radians(90.0)))

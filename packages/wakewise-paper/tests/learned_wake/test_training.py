@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.wake.learned import shape
-from wakewise.wake.network import Network
+from wakewise.wake.learned import Network, shape
 from wakewise_paper.learned_wake.training import Batch, loss_and_gradient, train
 from wakewise_paper.learned_wake.truth import even_lattice_rows
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.wake import wake_model
-from wakewise.wake.network import EDGES, Network
+from wakewise.wake.learned import EDGES, Network
 from wakewise_paper.learned_wake.evaluation import WakeModelScore, predictors, unit_f
 from wakewise_paper.learned_wake.truth import (
     FAR_D,

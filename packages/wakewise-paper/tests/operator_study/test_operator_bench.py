@@ -9,8 +9,8 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.experiments.trials import BenchOptions
 from wakewise_paper.cli.bench_operator import show_operator
 from wakewise_paper.operator_study import bench, paper
+from wakewise_paper.operator_study.bench import planned_trials, selected_w_tracks, selected_worlds
 from wakewise_paper.operator_study.flight import FIGURES, OperatorTrial
-from wakewise_paper.operator_study.plan import planned_trials, selected_w_tracks, selected_worlds
 
 SPEED, DEVIATION = "target_speed_mean_m_s", "velocity_deviation_pct"
 

@@ -6,7 +6,7 @@ import pytest
 from wakewise.core.geometry import Pose
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import find_target
-from wakewise_paper.operator_study.courses import (
+from wakewise_paper.operator_study.flight import (
     APPROACH_M,
     COURSES,
     LOOK_ARC_M,

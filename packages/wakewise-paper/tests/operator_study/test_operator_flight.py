@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from wakewise.control.receding import PlanState
-from wakewise_paper.operator_study.controller_probe import ControllerProbe, find_record
 from wakewise_paper.operator_study.flight import (
     DEVIATIONS,
     FIGURES,
+    ControllerProbe,
     OperatorTrial,
     course_of,
     deviations,
+    find_record,
     fly_trial,
     parts_of,
 )

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from wakewise_paper.reports.wake import main_flow, wake_page
-from wakewise_paper.reports.wake_plots import decays, profiles, scatters
+from wakewise_paper.reports.wake import decays, main_flow, profiles, scatters, wake_page
 from wakewise_paper.wake_validation import ValidationOptions, figures, validate
 
 

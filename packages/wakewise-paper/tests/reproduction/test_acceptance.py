@@ -1,6 +1,6 @@
 """What the paper's tables are judged by, and what of them is met."""
 
-from wakewise_paper.reproduction.acceptance import count_met, glances
+from wakewise_paper.reproduction.claim import count_met, glances
 
 
 def place(method, seed, rmse, energy=1.0, target="brain", world="pump-tank"):

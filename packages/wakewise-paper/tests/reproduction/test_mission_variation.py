@@ -6,16 +6,15 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.operation import Scenario
 from wakewise.operation.preflight import check_route
-from wakewise_paper.reproduction import mission_variation
-from wakewise_paper.reproduction.mission_variation import SPREAD, varied_mission
-from wakewise_paper.reproduction.worlds import water
+from wakewise_paper.reproduction import worlds
+from wakewise_paper.reproduction.worlds import SPREAD, varied_mission, water
 
 LOW = ("pump-tank", "plate", 3)
 """World, target and seed whose first draw comes up through the water surface."""
 
 
 def first_draw(seed):
-    return mission_variation._draw(np.random.default_rng([seed, 53]))
+    return worlds._draw(np.random.default_rng([seed, 53]))
 
 
 def parts(world, kind, mission, seed):
@@ -42,6 +41,6 @@ def test_a_draw_that_comes_too_near_to_the_surface_is_drawn_again():
 
 def test_water_that_no_draw_fits_is_refused_with_the_reason(monkeypatch):
     """After as many draws as are allowed."""
-    monkeypatch.setattr(mission_variation, "TRIES", 1)
+    monkeypatch.setattr(worlds, "TRIES", 1)
     with pytest.raises(InputError, match=r"no mission of 1 draws fits into pump-tank: .*water surface"):
         varied_mission.__wrapped__(*LOW)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.scene.targets import coral, place_on_bed
-from wakewise.vision.piv.tracers import LightSheet
+from wakewise.vision.piv.images import LightSheet
 from wakewise_paper.reproduction.piv_flights import FIGURES, NEAR_M, PivRecorder
 
 

@@ -12,18 +12,21 @@ from wakewise.experiments.trials import BenchOptions
 from wakewise_paper.cli.bench_wash import show_gentle
 from wakewise_paper.reports.wash_bench_plot import draw_gentle
 from wakewise_paper.wash_reduction import bench as gentle
-from wakewise_paper.wash_reduction.ablations import (
-    MECHANISMS,
-    NONE,
-    lever_settings,
-    only_name,
-    selected_mechanisms,
-    without_name,
-)
 from wakewise_paper.wash_reduction.figures import SPEED
 from wakewise_paper.wash_reduction.flight import FIGURES, parts_of
 from wakewise_paper.wash_reduction.paper import FIGURES as PAPER_FIGURES
-from wakewise_paper.wash_reduction.plan import METHODS, flown_methods, lever_trial, planned_trials
+from wakewise_paper.wash_reduction.plan import (
+    MECHANISMS,
+    METHODS,
+    NONE,
+    flown_methods,
+    lever_settings,
+    lever_trial,
+    only_name,
+    planned_trials,
+    selected_mechanisms,
+    without_name,
+)
 from wakewise_paper.wash_reduction.summary_table import WRONG
 
 ROW = dict.fromkeys(FIGURES, 1.0)

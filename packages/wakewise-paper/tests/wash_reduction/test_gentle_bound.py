@@ -16,20 +16,22 @@ from wakewise.robot.vehicles import load_vehicle
 from wakewise_paper.cli.bench_wash import show_gentle
 from wakewise_paper.wash_reduction import bench as gentle
 from wakewise_paper.wash_reduction import energy_optimum
-from wakewise_paper.wash_reduction.allocations import candidate_allocations, split
-from wakewise_paper.wash_reduction.energy_bound import choose_under_budget, sum_of
 from wakewise_paper.wash_reduction.energy_optimum import (
     ENERGIES,
     FRESH_GUSTS,
     AllocationJudge,
     BoundTrial,
     attained_reductions,
+    candidate_allocations,
     candidates,
+    choose_under_budget,
     fly_bound,
     fly_dp,
     smoothed,
+    split,
+    sum_of,
 )
-from wakewise_paper.wash_reduction.energy_optimum_tables import NAMED, bound_figures, reductions
+from wakewise_paper.wash_reduction.figures import NAMED, bound_figures, reductions
 from wakewise_paper.wash_reduction.flight import FIGURES
 
 VEHICLE = load_vehicle("paper")

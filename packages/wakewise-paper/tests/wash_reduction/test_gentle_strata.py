@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise_paper.wash_reduction.strata import HALF_SIDE_RAD, SIDES, current_W_m_s, stratum
+from wakewise_paper.wash_reduction.scenario_files import HALF_SIDE_RAD, SIDES, current_W_m_s, stratum
 
 TRIMS = ("heavy", "neutral", "light")
 

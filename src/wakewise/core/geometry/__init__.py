@@ -1,11 +1,12 @@
 """Rotations and poses; NumPy only. World W is NED, body B is FRD, camera C has OpenCV axes.
 
-`poses.py` has `Pose` (X_WB), `rotations.py` quaternions (w, x, y, z), Euler angles and rotation vectors.
+`rotations.py` has `Pose` (X_WB), `rotations.py` quaternions (w, x, y, z), Euler angles and rotation vectors.
 """
 
-from wakewise.core.geometry.poses import Pose, look_at
 from wakewise.core.geometry.rotations import (
+    Pose,
     euler_from_quat,
+    look_at,
     matrix_from_quat,
     quat_conjugate,
     quat_from_euler,

@@ -1,28 +1,105 @@
 """A campaign as people write it: methods x targets x worlds x vehicles x variations x seeds, as YAML.
 
 Every combination is a scenario, checked before the first trial is made, and a trial of its own.
+
+What of a scenario is not the package's own, and which version of it: files by their bytes, packages by number.
+
+It goes into a trial's key, so that a controller that was changed is flown anew.
+
+What a campaign's folder was made for: its trials by name, and the version that makes them.
 """
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
+from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator
 
+from wakewise.control import MAKERS
 from wakewise.core.errors import InputError
-from wakewise.core.files import name_fault
+from wakewise.core.files import name_fault, write_json
+from wakewise.core.plugins import find
 from wakewise.core.safe_yaml import yaml_file
 from wakewise.core.settings import Seed, Settings
-from wakewise.experiments.campaigns.provenance import check_loadable, external_parts
-from wakewise.experiments.campaigns.task import Task
-from wakewise.experiments.campaigns.versions import FLIES, PHOTOGRAPHS
+from wakewise.experiments.campaigns.store import read_store
+from wakewise.experiments.campaigns.task import FLIES, PHOTOGRAPHS, Task, source_version
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
 from wakewise.scene.targets import coral_kinds
+
+_LARGEST = 2**20  # bytes that are read at once
+
+
+def external_parts(scenario: Scenario) -> dict[str, str]:
+    """Parts that come from elsewhere, each with what says its version.
+
+    Raises
+    ------
+    InputError
+        If a controller or a file cannot be found or read.
+    """
+    found = dict(scenario.parts().from_outside)
+    if scenario.method not in MAKERS:
+        find("method", scenario.method, MAKERS)
+    for name, named in (
+        ("vehicle", scenario.vehicle),
+        ("target", scenario.target.kind),
+        ("controls", scenario.controls or ""),
+    ):
+        path = Path(named).expanduser()
+        if named and path.is_file():
+            found[f"{name} file"] = digest(path)
+    for name, named in (
+        ("method", scenario.method),
+        ("world", scenario.world),
+        ("flow", scenario.flow or ""),
+        ("pilot", scenario.pilot),
+        ("wake", scenario.control.wake.model),
+    ):
+        if ":" in named:
+            found[f"{name} source"] = module_digest(named.partition(":")[0])
+    return found
+
+
+def check_loadable(scenario: Scenario) -> None:
+    """Load vehicle and target, which takes a moment; raises InputError if there is none of that name or file."""
+    parts = scenario.parts()
+    _ = parts.vehicle, parts.target
+
+
+def digest(path: Path) -> str:
+    """Hash of a file."""
+    whole = hashlib.sha256()
+    try:
+        with path.open("rb") as file:
+            while block := file.read(_LARGEST):
+                whole.update(block)
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be read, {fault.strerror}") from None
+    return whole.hexdigest()
+
+
+def module_digest(module: str) -> str:
+    """Hash of a module's file, or of all Python files of the package that it is in."""
+    top = find_spec(module.partition(".")[0])
+    if top is None or top.origin is None:
+        return "unknown"
+    if not top.submodule_search_locations:
+        return digest(Path(top.origin))
+    folder = Path(top.origin).parent
+    whole = hashlib.sha256()
+    for file in sorted(folder.rglob("*.py")):
+        whole.update(f"{file.relative_to(folder).as_posix()} {digest(file)}\n".encode())
+    return whole.hexdigest()
+
 
 FACTORS = ("method", "target", "world", "vehicle", "variation", "seed")
 """What a trial of a campaign differs in, in the order of its name."""
@@ -247,3 +324,90 @@ def nearest_name_hint(name: str, known: list[str]) -> str:
     """A hint at the nearest of some names, for messages."""
     close = difflib.get_close_matches(name, known, 1)
     return f"did you mean {close[0]}? " if close else ""
+
+
+PLAN = "plan.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanEntry:
+    """A trial of the plan."""
+
+    key: str
+    name: str
+    factors: Mapping[str, str | int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CampaignPlan:
+    """What a campaign's folder was made for.
+
+    Parameters
+    ----------
+    name : str
+    campaign : mapping
+        The campaign file, resolved.
+    wakewise : str
+        Version of the package.
+    sources : str
+        Hash of the sources that matter.
+    trials : tuple of PlanEntry
+    """
+
+    name: str
+    campaign: Mapping[str, Any]
+    wakewise: str
+    sources: str
+    trials: tuple[PlanEntry, ...]
+
+
+def keep_plan(folder: Path, campaign: Campaign, trials: Sequence[PlannedTrial]) -> None:
+    """Write the plan into a campaign's folder, in place of an earlier one of the same version.
+
+    Raises
+    ------
+    InputError
+        If what is there was made by other sources: figures of two versions are no comparison.
+    """
+    sources = source_version(trials[0].task.sources)
+    if (folder / PLAN).exists():
+        before = read_plan(folder)
+        if before.sources != sources and before.campaign.get("stages") == campaign.stages:
+            raise InputError(
+                f"--out {folder}: holds trials of another version (Wakewise {before.wakewise}, sources "
+                f"{before.sources[:8]}; now {version('wakewise')}, {sources[:8]}); give another --out"
+            )
+    told = {
+        "name": campaign.name,
+        "campaign": campaign.model_dump(mode="json"),
+        "wakewise": version("wakewise"),
+        "sources": sources,
+        "trials": [{"key": one.task.key, "name": one.task.name, "factors": dict(one.factors)} for one in trials],
+    }
+    write_json(folder / PLAN, told, lasting=True)
+
+
+def read_plan(folder: Path) -> CampaignPlan:
+    """The plan of a campaign's folder.
+
+    Raises
+    ------
+    InputError
+        If there is no campaign, or one of another version.
+    """
+    read_store(folder)
+    path = folder / PLAN
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+        trials = tuple(PlanEntry(key=one["key"], name=one["name"], factors=one["factors"]) for one in told["trials"])
+        return CampaignPlan(
+            name=told["name"],
+            campaign=told["campaign"],
+            wakewise=told["wakewise"],
+            sources=told["sources"],
+            trials=trials,
+        )
+    except FileNotFoundError:
+        raise InputError(f"{folder}: no campaign file was run here, its {PLAN} is missing") from None
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(f"{path}: cannot be read; `wakewise campaign run` with the same file writes it anew") from None

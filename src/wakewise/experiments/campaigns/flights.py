@@ -17,8 +17,7 @@ import polars as pl
 
 from wakewise.core.files import whole_file
 from wakewise.experiments.campaigns.task import Figures, WorkProgress
-from wakewise.experiments.trials.metrics import UNITS, MetricsCollector
-from wakewise.experiments.trials.reference_values import add_reference_values
+from wakewise.experiments.trials.metrics import UNITS, MetricsCollector, add_reference_values
 from wakewise.operation import Scenario, fly
 from wakewise.operation.flight_log import timings_of
 from wakewise.operation.scenario import check_scenario

@@ -24,8 +24,7 @@ from wakewise.experiments.campaigns import attempt_log, trial_lock
 from wakewise.experiments.campaigns.engines import TrialExecutor, WorkerPool
 from wakewise.experiments.campaigns.index import listing
 from wakewise.experiments.campaigns.store import CampaignStore, open_store, report_full_disk
-from wakewise.experiments.campaigns.task import Task, TrialOutcome
-from wakewise.experiments.campaigns.versions import source_version
+from wakewise.experiments.campaigns.task import Task, TrialOutcome, source_version
 from wakewise.experiments.campaigns.worker import AttemptRequest
 from wakewise.experiments.campaigns.worker_process import AttemptReport, attempt
 

@@ -15,9 +15,8 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
 from wakewise.experiments.campaigns import trial_lock
 from wakewise.experiments.campaigns.attempt_log import FINAL, RETRIED, Attempts
-from wakewise.experiments.campaigns.definition import FACTORS
+from wakewise.experiments.campaigns.definition import FACTORS, CampaignPlan, PlanEntry, read_plan
 from wakewise.experiments.campaigns.index import listing
-from wakewise.experiments.campaigns.plan import CampaignPlan, PlanEntry, read_plan
 from wakewise.experiments.campaigns.run import active_drivers
 from wakewise.experiments.campaigns.statistics import stratified_bootstrap, wilson
 from wakewise.experiments.campaigns.store import CampaignStore, read_store

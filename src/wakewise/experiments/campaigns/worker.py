@@ -26,8 +26,7 @@ from wakewise.core.errors import FULL, EnvironmentFailure, environment_failure, 
 from wakewise.core.files import write_json
 from wakewise.experiments.campaigns import attempt_log, trial_lock
 from wakewise.experiments.campaigns.store import FIGURES, LOG, TRIAL, WORK, write_figures
-from wakewise.experiments.campaigns.task import Work, WorkProgress, function_named
-from wakewise.experiments.campaigns.versions import source_version
+from wakewise.experiments.campaigns.task import Work, WorkProgress, function_named, source_version
 
 _GRACE_S = 10.0
 """After its time a process ends itself, if nobody has ended it for so long."""

@@ -2,6 +2,8 @@
 
 The process is ended when it takes too long, takes too much memory, or is not wanted any more; the next attempt gets a
 new one. Engines differ only in where slots are: in threads of the driver, or in Dask's workers.
+
+How much memory a process and those that it started have, as the system tells it.
 """
 
 from __future__ import annotations
@@ -21,9 +23,29 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.experiments.campaigns import attempt_log, trial_lock
-from wakewise.experiments.campaigns.memory import memory_MB
 from wakewise.experiments.campaigns.store import LOG
 from wakewise.experiments.campaigns.worker import AttemptRequest
+
+_PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
+
+
+def memory_MB(pid: int) -> float:
+    """Resident memory of a process and its descendants, 10^6 bytes; 0 where the system does not say (no /proc).
+
+    Pages that they share count in each.
+    """
+    total, waiting = 0, [pid]
+    while waiting:
+        one = waiting.pop()
+        place = Path("/proc", str(one))
+        try:
+            total += int((place / "statm").read_text().split()[1]) * _PAGE
+            for thread in (place / "task").iterdir():
+                waiting += map(int, (thread / "children").read_text().split())
+        except (OSError, ValueError, IndexError):  # it has ended meanwhile
+            continue
+    return total / 1e6
+
 
 _LOOK_S = 0.1
 _ASK_S, _BEAT_S = 0.5, 10.0

@@ -1,7 +1,7 @@
 """Files that other tools open: trajectories, photographs with their poses, ROS 2 bags, missions, allocation matrices.
 
-Start reading in `records.py` (what comes in) and `frames.py` (how NED/FRD becomes ENU/FLU, z up, OpenGL); then a file
-per format: `tum.py`, `nerfstudio.py`, `colmap.py` (with `colmap_points.py`), `rosbag2.py`, `qgc_plan.py`,
+Start reading in `records.py` (what comes in) and `records.py` (how NED/FRD becomes ENU/FLU, z up, OpenGL); then a file
+per format: `colmap.py`, `colmap.py`, `colmap.py` (with `colmap.py`), `rosbag2.py`, `qgc_plan.py`,
 `auv_controllers.py`.
 """
 
@@ -11,13 +11,10 @@ from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.experiments.exports.auv_controllers import tam_yaml
-    from wakewise.experiments.exports.colmap import write_colmap
-    from wakewise.experiments.exports.colmap_points import read_points
-    from wakewise.experiments.exports.nerfstudio import write_nerfstudio
+    from wakewise.experiments.exports.colmap import read_points, write_colmap, write_nerfstudio, write_tum
     from wakewise.experiments.exports.qgc_plan import GeodeticOrigin, write_plan
     from wakewise.experiments.exports.records import Photographs, SparsePoints, ThrustRecord, Trajectory
     from wakewise.experiments.exports.rosbag2 import write_bag
-    from wakewise.experiments.exports.tum import write_tum
 
 __all__ = [
     "GeodeticOrigin",

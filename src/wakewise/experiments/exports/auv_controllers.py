@@ -17,7 +17,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-from wakewise.experiments.exports.frames import flu_of
+from wakewise.experiments.exports.records import flu_of
 
 FRAMES = {
     "flu": "forward, left, up (FLU), as a wrench of ROS; auv_controllers' own controllers want --frame fsd",

@@ -2,10 +2,23 @@
 
 Format: https://colmap.github.io/format.html. Poses there are world-to-camera; camera axes and pixel centres are ours,
 and the world stays NED. The binary model holds every number exactly.
+
+The points of a sparse model (COLMAP's points3D.bin and images.bin), read without COLMAP.
+
+Photographs with their poses as nerfstudio's `transforms.json`, which trainers of radiance fields and splats read.
+
+Format: https://docs.nerf.studio/quickstart/data_conventions.html. Poses are camera-to-world with OpenGL's axes; pixel
+centres are at +0.5 there as here. Poses and points stand in one world, x north, y west, z up: `applied_transform` is
+left out, since readers of different age apply it to the points or do not.
+
+A trajectory as text lines `timestamp tx ty tz qx qy qz qw`, which evo and the TUM RGB-D tools read.
+
+Format: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats
 """
 
 from __future__ import annotations
 
+import json
 import shutil
 import struct
 from dataclasses import dataclass
@@ -14,9 +27,70 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
+from wakewise.core.errors import InputError
+from wakewise.core.files import write_text
 from wakewise.core.geometry import Pose
-from wakewise.experiments.exports.colmap_points import OBSERVATION
-from wakewise.experiments.exports.records import Photographs, SparsePoints
+from wakewise.experiments.exports.records import Photographs, SparsePoints, Trajectory, flu_of, opengl_camera
+
+_POINT = struct.Struct("<Q3d3BdQ")
+_IMAGE = struct.Struct("<I7dI")
+OBSERVATION = np.dtype([("pixel", "<f8", 2), ("point", "<u8")])
+"""What images.bin holds of each observation; its point is the largest number where it belongs to none."""
+
+
+def read_points(path: Path) -> SparsePoints:
+    """Points, colours and errors of a points3D.bin, and where photographs saw them if images.bin lies beside it.
+
+    Raises
+    ------
+    InputError
+        If a file holds less than it promises.
+    """
+    data = path.read_bytes()
+    at, numbers, points, colours, errors = 8, [], [], [], []
+    try:
+        (count,) = struct.unpack_from("<Q", data)
+        for _ in range(count):
+            number, *values, error, track = _POINT.unpack_from(data, at)
+            numbers.append(number)
+            points.append(values[:3])
+            colours.append(values[3:])
+            errors.append(error)
+            at += _POINT.size + 8 * track
+    except struct.error:
+        raise InputError(f"{path}: ends before the points that it promises; reconstruct the trial anew") from None
+    beside = path.with_name("images.bin")
+    return SparsePoints(
+        points_W_m=np.array(points, dtype=np.float64).reshape(-1, 3),
+        colours=np.array(colours, dtype=np.uint8).reshape(-1, 3),
+        errors_px=np.array(errors, dtype=np.float64),
+        seen=_observations(beside, np.array(numbers, dtype=np.uint64)) if beside.is_file() else {},
+    )
+
+
+def _observations(path: Path, numbers: IntArray) -> dict[str, tuple[Array, IntArray]]:
+    """By photograph: pixels, and which of the points by their `numbers` was seen at each; the rest is left out."""
+    data = path.read_bytes()
+    order = np.argsort(numbers)
+    ascending = numbers[order]
+    seen: dict[str, tuple[Array, IntArray]] = {}
+    at = 8
+    try:
+        (count,) = struct.unpack_from("<Q", data)
+        for _ in range(count):
+            _IMAGE.unpack_from(data, at)
+            end = data.index(b"\0", at + _IMAGE.size)
+            name = data[at + _IMAGE.size : end].decode("utf-8")
+            (held,) = struct.unpack_from("<Q", data, end + 1)
+            rows = np.frombuffer(data, OBSERVATION, held, end + 9)
+            at = end + 9 + rows.nbytes
+            place = np.minimum(np.searchsorted(ascending, rows["point"]), max(len(ascending) - 1, 0))
+            found = ascending[place] == rows["point"] if len(ascending) else np.zeros(held, dtype=np.bool_)
+            seen[name] = (rows["pixel"][found].astype(np.float64), order[place[found]].astype(np.int64))
+    except (struct.error, ValueError):
+        raise InputError(f"{path}: ends before the images that it promises; reconstruct the trial anew") from None
+    return seen
+
 
 _OPENCV = 4  # COLMAP's number of the camera model
 _NONE = (np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
@@ -127,3 +201,56 @@ def _write_text(folder: Path, photographs: Photographs, model: _Model, cloud: Sp
 
 def _numbers(values: Array) -> str:
     return " ".join(f"{value:.17g}" for value in values)
+
+
+_NAMES = ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2")
+
+
+def write_nerfstudio(folder: Path, photographs: Photographs, cloud: SparsePoints | None = None) -> None:
+    """Write transforms.json, images/ and, with a cloud, sparse_pc.ply into a folder that is there and empty."""
+    (folder / "images").mkdir()
+    frames = []
+    matrices = opengl_camera(photographs.track.p_W_m, photographs.track.q)
+    for file, matrix in zip(photographs.files, matrices, strict=True):
+        shutil.copyfile(file, folder / "images" / file.name)
+        frames.append({"file_path": f"images/{file.name}", "transform_matrix": matrix.tolist()})
+    head = {
+        "camera_model": "OPENCV",
+        "w": photographs.width,
+        "h": photographs.height,
+        **dict(zip(_NAMES, photographs.params.tolist(), strict=True)),
+    }
+    if cloud is not None:
+        _write_ply(folder / "sparse_pc.ply", cloud)
+        head["ply_file_path"] = "sparse_pc.ply"
+    text = json.dumps({**head, "frames": frames}, indent=2, allow_nan=False)
+    (folder / "transforms.json").write_text(text + "\n", encoding="utf-8")
+
+
+def _write_ply(path: Path, cloud: SparsePoints) -> None:
+    row = np.dtype([("p", "<f8", 3), ("c", "u1", 3)])
+    rows = np.empty(len(cloud.points_W_m), row)
+    rows["p"], rows["c"] = flu_of(cloud.points_W_m), cloud.colours
+    properties = [f"property double {axis}" for axis in "xyz"] + [
+        f"property uchar {c}" for c in ("red", "green", "blue")
+    ]
+    head = "\n".join(
+        ["ply", "format binary_little_endian 1.0", f"element vertex {len(rows)}", *properties, "end_header"]
+    )
+    path.write_bytes(head.encode("ascii") + b"\n" + rows.tobytes())
+
+
+def write_tum(path: Path, track: Trajectory, note: str) -> None:
+    """Write a trajectory; the format states no axes, so they stay ours (NED), and the first line says so.
+
+    Parameters
+    ----------
+    path : Path
+    track : Trajectory
+    note : str
+        What moved, and its axes; goes into the first line.
+    """
+    rows = np.column_stack([track.times_s, track.p_W_m, track.q[:, [1, 2, 3, 0]]])
+    lines = [" ".join(f"{value:.17g}" for value in row) for row in rows.tolist()]
+    head = f"# {note}, in a world north-east-down\n# timestamp tx ty tz qx qy qz qw\n"
+    write_text(path, head + "\n".join(lines) + "\n")

@@ -2,13 +2,20 @@
 
 Terms, required properties and the context are those of the specification
 (https://docs.mlcommons.org/croissant/docs/croissant-spec.html, http://mlcommons.org/croissant/1.0).
+
+Check sums of a folder's files, as `sha256sum -c` reads them, and whether the folder is still as they say.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import hashlib
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
+
+from wakewise.core.errors import InputError
 
 CONFORMS_TO = "http://mlcommons.org/croissant/1.0"
 Kind = Literal["sc:Float", "sc:Integer", "sc:Boolean", "sc:Text"]
@@ -188,3 +195,76 @@ def _table(table: RecordSet) -> dict[str, Any]:
             for column in table.columns
         ],
     }
+
+
+SUMS = "SHA256SUMS"
+_LINE = re.compile(r"([0-9a-f]{64})  ([^\0\n]+)\Z")
+_CHUNK = 1 << 20
+
+
+@dataclass(frozen=True)
+class ChecksumMismatch:
+    """A file that is not as it was, and in what."""
+
+    path: str
+    what: str
+
+
+def sha256_of(path: Path) -> str:
+    """Check sum of a file, as 64 hexadecimal digits."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while chunk := file.read(_CHUNK):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+def copied(source: Path, target: Path) -> str:
+    """Copy a file and return its check sum, of the very bytes that were read."""
+    digest = hashlib.sha256()
+    with source.open("rb") as reading, target.open("wb") as writing:
+        while chunk := reading.read(_CHUNK):
+            digest.update(chunk)
+            writing.write(chunk)
+    return digest.hexdigest()
+
+
+def sums_text(sums: Mapping[str, str]) -> str:
+    """Text of SHA256SUMS for check sums by path, in the order of paths."""
+    return "".join(f"{sums[path]}  {path}\n" for path in sorted(sums))
+
+
+def read_sums(path: Path) -> dict[str, str]:
+    """Check sums by path.
+
+    Raises
+    ------
+    InputError
+        If a line is none, a path leads out of the folder, or stands there twice.
+    """
+    found: dict[str, str] = {}
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+        match = _LINE.match(line)
+        if match is None:
+            raise InputError(f"{path}: line {number} is no check sum; the file was changed")
+        name = match[2]
+        if name.startswith("/") or ".." in Path(name).parts or name in found:
+            raise InputError(f"{path}: line {number} names {name}, which lies outside or stands there twice")
+        found[name] = match[1]
+    return found
+
+
+def differences(
+    folder: Path, sums: Mapping[str, str], known: frozenset[str], progress: Callable[[int, int, str], None]
+) -> list[ChecksumMismatch]:
+    """Files that are missing, changed, or there without a check sum; `known` ones need none."""
+    found = []
+    for number, (name, wanted) in enumerate(sorted(sums.items())):
+        progress(number, len(sums), name)
+        path = folder / name
+        if not path.is_file():
+            found.append(ChecksumMismatch(name, "missing"))
+        elif sha256_of(path) != wanted:
+            found.append(ChecksumMismatch(name, "changed"))
+    here = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()}
+    return found + [ChecksumMismatch(name, "not in the list") for name in sorted(here - set(sums) - known)]

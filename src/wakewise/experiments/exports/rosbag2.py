@@ -20,8 +20,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.exports.frames import flu_of, ros_body, ros_optical
-from wakewise.experiments.exports.records import Photographs, ThrustRecord, Trajectory
+from wakewise.experiments.exports.records import Photographs, ThrustRecord, Trajectory, flu_of, ros_body, ros_optical
 
 _NS = 1_000_000_000
 _BAG_VERSION = 8

@@ -22,8 +22,7 @@ from wakewise.core.geometry import Pose
 from wakewise.operation import Parts, read_scenario
 from wakewise.scene.missions import Coverage, patches_of
 from wakewise.scene.missions.coverage import HALF
-from wakewise.scene.missions.surface_patches import NORMAL_SHARE, REACH_M
-from wakewise.scene.missions.visibility import CameraIntrinsics
+from wakewise.scene.missions.visibility import NORMAL_SHARE, REACH_M, CameraIntrinsics
 from wakewise.scene.targets import Target
 from wakewise.vision.evaluation import Crop, compare_surface, sample_surface
 from wakewise.vision.reconstruction import read_cloud

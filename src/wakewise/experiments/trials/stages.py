@@ -1,16 +1,21 @@
-"""Stages of a trial: who watches them, what they cost, and what is already done."""
+"""Stages of a trial: who watches them, what they cost, and what is already done.
+
+A report beside a result: should it fail, the result is there all the same, and what failed is told in one line.
+"""
 
 from __future__ import annotations
 
 import json
 import os
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from wakewise.core.errors import WakewiseError
 from wakewise.core.files import write_json
 from wakewise.core.interfaces import no_progress
 
@@ -89,3 +94,34 @@ def cpu_s() -> float:
 def of_the_computer(failure: str | None) -> bool:
     """Whether a failure kept by versions up to 0.1.0 tells of the disk or a file, not of the photographs."""
     return failure is not None and any(words in failure for words in _NOT_MEASURED)
+
+
+@dataclass
+class ReportAttempt:
+    """Whether a report came about; `fault` says in one line what failed, None where nothing did."""
+
+    fault: str | None = None
+
+
+@contextmanager
+def report_attempt() -> Iterator[ReportAttempt]:
+    """Run the block that writes a report and keep what fails in it; Ctrl-C goes through, whatever was made of it."""
+    attempt = ReportAttempt()
+    try:
+        yield attempt
+    except Exception as fault:
+        cause: BaseException | None = fault
+        while cause is not None:
+            if isinstance(cause, KeyboardInterrupt):
+                raise
+            cause = cause.__cause__
+        attempt.fault = _in_a_line(fault)
+
+
+def _in_a_line(fault: Exception) -> str:
+    said = " ".join(str(fault).split())
+    if isinstance(fault, (WakewiseError, OSError)):
+        return said
+    # A fault of the program: whoever mends it wants to know where.
+    last = traceback.extract_tb(fault.__traceback__)[-1]
+    return f"{type(fault).__name__}: {said} ({Path(last.filename).name}:{last.lineno})"

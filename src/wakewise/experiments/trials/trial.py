@@ -1,4 +1,10 @@
-"""One trial in one folder: fly, photograph, reconstruct, evaluate. Each stage leaves files and is skipped when done."""
+"""One trial in one folder: fly, photograph, reconstruct, evaluate. Each stage leaves files and is skipped when done.
+
+How far the size of a model is from the truth's, and what is left of its error once that is taken out.
+
+A model's scale comes from the vehicle's own estimates of where it was. Where these are off by millimetres for seconds,
+the model is too large or too small, and no alignment that is honest may mend it; the figures say how much it costs.
+"""
 
 from __future__ import annotations
 
@@ -20,28 +26,68 @@ from wakewise.core.jit.precompile import compile_kernels, is_warm
 from wakewise.core.optional_dependencies import need
 from wakewise.core.run_lock import exclusive_run
 from wakewise.experiments.trials.coverage import FROM_MODEL, coverage_figures
-from wakewise.experiments.trials.metrics import Figures, MetricsCollector, comparison
-from wakewise.experiments.trials.reference_values import add_reference_values
-from wakewise.experiments.trials.size import SIZE_FIGURES, size_figures
+from wakewise.experiments.trials.metrics import Figures, MetricsCollector, add_reference_values, comparison
 from wakewise.experiments.trials.stages import ProgressListener, SilentProgress, StageCosts, of_the_computer
 from wakewise.experiments.trials.surface import SurfaceMaker
-from wakewise.operation import (
-    BackgroundRenderer,
-    Parts,
-    Scenario,
-    fly_trial,
-    photograph_flight,
-    read_exposures,
-)
+from wakewise.operation import BackgroundRenderer, Parts, Scenario, fly_trial, photograph_flight, read_exposures
 from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS, parts_of
-from wakewise.operation.teleop.live_folder import collect_flight
+from wakewise.operation.teleop.live import collect_flight
 from wakewise.operation.teleop.replay import replay_input
 from wakewise.operation.trial_folder import BY_HAND, check_place, resolved_scenario, write_or_check_scenario, write_plan
 from wakewise.scene.missions import SETTLING
 from wakewise.scene.targets import Mesh, MeshDistance, coral_kinds
 from wakewise.vision.evaluation import SWAY_FIGURES, Crop, compare_surface, evaluate_surface, flight_figures
+from wakewise.vision.evaluation.alignment import umeyama
+from wakewise.vision.evaluation.cloud_to_surface import MeshArrays
 from wakewise.vision.reconstruction import read_cloud, read_lens, reconstruct
+
+SIZE_FIGURES = ("scale_error_pct", "rmse_scaled_mm")
+SAMPLES = 5_000
+"""Samples of the true surface, which the error of the cloud hardly hangs on: they carry the alignment alone."""
+
+
+def size_figures(
+    cloud_W_m: Array,
+    mesh: MeshArrays,
+    crop: Crop,
+    model_centres: Mapping[str, Array],
+    true_centres: Mapping[str, Array],
+    distance: MeshDistance | None = None,
+) -> dict[str, float]:
+    """`scale_error_pct` and `rmse_scaled_mm` of a model.
+
+    Parameters
+    ----------
+    cloud_W_m : ndarray, shape (n, 3)
+        The model's points in its own frame.
+    mesh, crop
+        The truth and what counts of it.
+    model_centres, true_centres : mapping
+        Where each photograph was taken from, by the model in its own frame and in truth, shape (3,).
+    distance : MeshDistance, optional
+        That of the mesh, where it is there already.
+
+    Returns
+    -------
+    dict
+        By how much the model is too large, from the spread of its camera centres; and `rmse_mm` of the model brought to
+        the truth's frame and size by them.
+
+    Raises
+    ------
+    InputError
+        If fewer than three photographs are in both, or they were taken from one line.
+    StageError
+        If the model so brought does not lie about the truth.
+    """
+    names = sorted(model_centres.keys() & true_centres.keys())
+    if len(names) < 3:
+        raise InputError(f"scale: {len(names)} photographs are in model and truth, needs at least 3")
+    to_truth = umeyama(np.array([model_centres[n] for n in names]), np.array([true_centres[n] for n in names]))
+    score = evaluate_surface(to_truth.apply(cloud_W_m), mesh, crop=crop, samples=SAMPLES, distance=distance)
+    return {"scale_error_pct": 100.0 * (1.0 / to_truth.scale - 1.0), "rmse_scaled_mm": score.rmse_mm}
+
 
 JOBS = (*FLIGHT_JOBS, "photograph", "reconstruct")
 """What is compiled before a trial, if it is not yet: photographs are rendered while the vehicle flies."""

@@ -22,8 +22,13 @@ from wakewise.control.intent import PAPER_W_TRACK
 from wakewise.control.switching import Switched
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Controller, Goal
-from wakewise.operation.teleop.arbitration import BRAKING_M_S2, StickFrame, steer_attitude, steer_position
-from wakewise.operation.teleop.collision_limiter import CollisionLimiter
+from wakewise.operation.teleop.arbitration import (
+    BRAKING_M_S2,
+    CollisionLimiter,
+    StickFrame,
+    steer_attitude,
+    steer_position,
+)
 from wakewise.operation.teleop.input import CENTRED, Controls, ControlSource
 from wakewise.operation.teleop.input.control_log import ControlLogWriter
 from wakewise.operation.teleop.motion import MotionReference

@@ -2,13 +2,21 @@
 
 The loop, the parts and the record are those of every flight; what differs is who says when a photograph is taken and
 when it is over. What it leaves is a trial folder like any other.
+
+From the parts that a flight by hand left to the folder of a trial: at its end, or after it was cut off.
+
+When photographs are taken in a flight by hand: when somebody asks.
+
+The clock of a flight that a person is in: steps wait for their time, and how late they come is known.
 """
 
 from __future__ import annotations
 
 import gc
+import math
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -16,21 +24,200 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 
+from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
+from wakewise.core.files import whole_file
+from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid, TruthProvider
 from wakewise.core.jit.precompile import compile_kernels
+from wakewise.core.optional_dependencies import has
 from wakewise.core.run_lock import exclusive_run
-from wakewise.operation.exposures import ExposureRecord
-from wakewise.operation.flight_log import PARTS, FlightLog, hands_part, has_parts
+from wakewise.operation.flight_log import (
+    PARTS,
+    ExposureRecord,
+    FlightLog,
+    drop_parts,
+    hands_part,
+    has_parts,
+    parts_exposures,
+    parts_hands,
+    parts_table,
+    steps_of,
+)
 from wakewise.operation.flying import FLIGHT_JOBS, WATER_EVERY_S, loop_of, name_external_parts, recorder_of
 from wakewise.operation.loop import Step
 from wakewise.operation.parts import Parts
-from wakewise.operation.teleop.input.control_log import ControlLogWriter
-from wakewise.operation.teleop.live_folder import collect_flight
-from wakewise.operation.teleop.photo_trigger import PhotoTrigger
-from wakewise.operation.teleop.realtime_pacer import RealTimePacer
-from wakewise.operation.trial_folder import flown_by_hand, write_or_check_scenario, write_truth
+from wakewise.operation.recorder import write_record
+from wakewise.operation.teleop.input.control_log import TRACE_FILE, ControlLogWriter
+from wakewise.operation.trial_folder import flown_by_hand, write_or_check_scenario, write_truth, write_views
+
+_SEEN = ("time_s", *(f"goal_{axis}_m" for axis in "xyz"), *(f"goal_q{axis}" for axis in "wxyz"), "goal_tilt_deg")
+
+
+def collect_flight(parts: Parts, folder: Path) -> bool:
+    """Make of a flight's parts what a trial's flight leaves; False where there are none, or the flight is whole.
+
+    Of planned.csv: a flight by hand has no plan, so it says where the camera was wished to be at each photograph. Rows
+    and photographs are as many as both were kept of, so a flight that was cut off ends a moment early.
+    """
+    if (folder / "steps.parquet").exists() or not has_parts(folder):
+        drop_parts(folder)
+        return False
+    table = parts_table(folder)
+    seen = table.filter("exposing").select(_SEEN).collect()
+    exposures = list(parts_exposures(folder, seen.height))
+    write_views(parts, folder, [(parts.route.photo(k), *_view(parts, seen, k)) for k in range(seen.height)])
+    hands = parts_hands(folder)
+    if hands is not None:
+        with whole_file(folder / TRACE_FILE) as path:
+            hands.write_parquet(path)
+    if has("logs"):
+        from wakewise.operation.telemetry import write_mcap
+
+        write_mcap(steps_of(table), folder / "log.mcap")
+    write_record(folder, table, exposures, parts.scenario.imaging.window_s)
+    drop_parts(folder)
+    return True
+
+
+def _view(parts: Parts, seen: pl.DataFrame, k: int) -> tuple[float, Pose]:
+    """When photograph k was taken and the camera's wished pose then."""
+    time_s, *place, tilt_deg = (float(value) for value in seen.row(k))
+    joint, X_BC = parts.vehicle.tilt, parts.vehicle.X_BC
+    mount = X_BC if joint is None else joint.mount(X_BC, math.radians(tilt_deg))
+    return time_s, Pose(np.array(place[:3]), np.array(place[3:])) @ mount
+
+
+BETWEEN_S = 0.2
+"""Time between two photographs at least; who asks more often is served then."""
+BY_HAND = "by hand"
+"""What a stretch of flight is called where the pilot has no name for it."""
+
+
+class PhotoTrigger:
+    """A `Timetable` that opens when asked, from any thread or by the pilot's own hands.
+
+    A pilot may have a method `taken()`, which gives and clears what hands asked for since: "capture" is a photograph in
+    the same step, "stop" the end of the flight. So both belong to the flight's time, and a flight that is flown again
+    from its record has them where they were. It may also say in `leg` what it does now.
+    """
+
+    def __init__(self, parts: Parts) -> None:
+        self._parts = parts
+        self._asked = threading.Event()
+        self._last_s = -math.inf
+        self.time_s = 0.0
+        self.over = False
+
+    def ask(self) -> None:
+        """Have a photograph taken at the next step."""
+        self._asked.set()
+
+    def leg_name(self, time_s: float) -> str:  # noqa: ARG002  (of the moment that the pilot knows)
+        """What the pilot says that it does."""
+        return str(getattr(self._parts.pilot, "leg", BY_HAND))
+
+    def heed(self) -> None:
+        """Take in what hands asked for since."""
+        for what in getattr(self._parts.pilot, "taken", tuple)():
+            if what == "capture":
+                self._asked.set()
+            self.over |= what == "stop"
+
+    def shutter_s(self, number: int, time_s: float, dt_s: float) -> float | None:  # noqa: ARG002
+        """Now, if a photograph was asked for and the last one is long enough ago."""
+        self.time_s = time_s
+        self.heed()
+        if not self._asked.is_set() or time_s < self._last_s + BETWEEN_S - 1e-9:
+            return None
+        self._asked.clear()
+        self._last_s = time_s
+        return time_s
+
+
+MOST_CATCHING_UP_S = 0.25
+"""How much lost time is flown again in a hurry. A world that runs fast under a person's hands is worse than one that
+lost a moment, so what is more than this is let go."""
+KEPT = 3000
+"""Steps that percentiles are taken over: the last minute at 50 Hz."""
+
+
+class RealTimePacer:
+    """Holds each step of `run_loop` back until its time has come; one thread steps, any may read.
+
+    Parameters
+    ----------
+    wait : callable
+        Waits so many seconds, or less where there is nothing to wait for any more.
+    paced : bool
+        Without it no step waits; the reaction is measured all the same.
+    clock : callable
+        The time in s, never set back.
+
+    Attributes
+    ----------
+    behind_s : float
+        How late the last step came.
+    lost_s : float
+        Time let go in all.
+    """
+
+    def __init__(
+        self, wait: Callable[[float], object], paced: bool = True, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._wait, self._paced, self._clock = wait, paced, clock
+        self._origin_s: float | None = None
+        self._read_at_s = 0.0
+        self._behind, self._reaction = np.zeros(KEPT), np.zeros(KEPT)
+        self._steps = 0
+        self.behind_s = self.lost_s = 0.0
+
+    def pace(self, time_s: float) -> None:
+        """Wait until this time of the flight; the first call says when the flight began."""
+        now_s = self._clock()
+        if self._origin_s is None:
+            self._origin_s = now_s - time_s
+        if self._paced:
+            if (early_s := self._origin_s + time_s - now_s) > 0.0:
+                self._wait(early_s)
+                now_s = self._clock()
+            late_s = max(now_s - self._origin_s - time_s, 0.0)
+            if late_s > MOST_CATCHING_UP_S:
+                self._origin_s += late_s
+                self.lost_s += late_s
+            self.behind_s = late_s
+        self._read_at_s = now_s
+
+    def due_s(self, time_s: float) -> float:
+        """When this time of the flight has come, by the clock; before the first step the flight begins now."""
+        return (self._clock() if self._origin_s is None else self._origin_s) + time_s
+
+    def sent(self, time_s: float) -> None:  # noqa: ARG002  (run_loop hands it over)
+        """Take note that the thrusts which answer what was read at `pace` go to the plant."""
+        k = self._steps % KEPT
+        self._reaction[k] = self._clock() - self._read_at_s
+        self._behind[k] = self.behind_s
+        self._steps += 1
+
+    @property
+    def reaction_s(self) -> float:
+        """From reading the controls to the plant's thrusts, at the last step."""
+        return float(self._reaction[(self._steps - 1) % KEPT]) if self._steps else 0.0
+
+    def late_s(self, share: float = 0.99) -> float:
+        """How late this share of the last steps came at most; 0 before the first."""
+        return _quantile(self._behind, self._steps, share)
+
+    def answered_s(self, share: float = 0.99) -> float:
+        """Within what time this share of the last steps turned controls into thrusts, lateness included."""
+        return _quantile(self._behind + self._reaction, self._steps, share)
+
+
+def _quantile(ring: Array, steps: int, share: float) -> float:
+    return float(np.quantile(ring[: min(steps, KEPT)], share)) if steps else 0.0
+
 
 SWITCH_S = 2e-4
 """How long another thread may keep the interpreter when the flying one wants it back."""

@@ -12,11 +12,9 @@ from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario, read_scenario
 from wakewise.operation.teleop.assisted import assisted
 from wakewise.operation.teleop.input.control_log import TRACE_FILE, ControlLog, read_trace
-from wakewise.operation.teleop.input.script import ScriptedInput
-from wakewise.operation.teleop.input.sources import read_input
-from wakewise.operation.teleop.live import LiveFlight
+from wakewise.operation.teleop.input.script import ScriptedInput, read_input
+from wakewise.operation.teleop.live import LiveFlight, PhotoTrigger
 from wakewise.operation.teleop.operator_state import OperatorState
-from wakewise.operation.teleop.photo_trigger import PhotoTrigger
 
 AFTER_S = 3.0
 """How long a flight goes on after the last entry of a script; estimate: from full stick to rest takes 1.5 s."""

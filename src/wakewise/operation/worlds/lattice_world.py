@@ -29,8 +29,8 @@ from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
 from wakewise.simulation.lattice.forced_lattice import ForcedLattice, disk_points
 from wakewise.simulation.tank import Sensors, TankSettings, VehiclePlant
-from wakewise.simulation.tank.camera_joint import CameraJoint
 from wakewise.simulation.tank.sediment import SiltProperties
+from wakewise.simulation.tank.sensors import CameraJoint
 from wakewise.simulation.tank.settings import PLANT_STEP_S
 from wakewise.simulation.tank.water_truth import TargetProbes
 from wakewise.simulation.water import AmbientSum, SteadyCurrent

@@ -37,9 +37,9 @@ from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
 from wakewise.simulation.lattice import LatticeFlow, MeanField, load_mean_field
 from wakewise.simulation.tank import Sensors, TankSettings, VehiclePlant, build_ambient
-from wakewise.simulation.tank.camera_joint import CameraJoint
-from wakewise.simulation.tank.probes import surface_points
+from wakewise.simulation.tank.sensors import CameraJoint
 from wakewise.simulation.tank.settings import PLANT_STEP_S
+from wakewise.simulation.tank.water_truth import surface_points
 from wakewise.wake import wake_model
 
 _TOLERANCE_S = 1e-9

@@ -4,14 +4,14 @@ Nothing of a file is executed, and nothing outside what it names is read. What c
 never guessed.
 
 Start reading in `read.py` (`import_vehicle`: which reader takes a file) and `find.py` (a vehicle by library name, by
-path, by format). Readers: `urdf.py`, `sdf.py`, `stonefish.py` with `stonefish_thrusters.py`, `matrices.py` and
+path, by format). Readers: `urdf.py`, `sdf.py`, `stonefish.py` with `stonefish.py`, `matrices.py` and
 `safe_yaml_nodes.py` with `yaml_parameters.py`; formats from outside are found through the entry points
-`wakewise.vehicle_formats`. Their helpers: `layouts.py` and `thruster_lists.py` (thrusters in lists, with
-`angles.py`), `wrench_rows.py` (what the rows of a matrix are), `names.py` (what thrusters' names say), `unused_keys.py`
-(keys that no reader took) and `thruster_checks.py` (what any vehicle must fulfil), `xacro*.py`, `expressions.py` and
-`scopes.py` expand macros, `xml.py` and `packages.py` find files, `robot_description.py`, `gazebo_thrusters.py` with
-`gazebo_thruster_models.py`, `water.py`, `hull_and_camera.py` and `parsed_vehicle.py` put a vehicle together,
-`stated_matrix.py` reads the matrix that a file states, to be held against its geometry.
+`wakewise.vehicle_formats`. Their helpers: `thruster_lists.py` and `thruster_lists.py` (thrusters in lists, with
+`angles.py`), `wrench_rows.py` (what the rows of a matrix are), `thruster_checks.py` (what thrusters' names say),
+`matrices.py` (keys that no reader took) and `thruster_checks.py` (what any vehicle must fulfil), `xacro*.py`,
+`expressions.py` and `xacro_text.py` expand macros, `xml.py` and `packages.py` find files, `robot_description.py`,
+`gazebo_thrusters.py` with `gazebo_thrusters.py`, `yaml_parameters.py`, `robot_description.py` and `parsed_vehicle.py`
+put a vehicle together, `find.py` reads the matrix that a file states, to be held against its geometry.
 """
 
 from wakewise.robot.importers.find import any_vehicle, compare_with, find_vehicle

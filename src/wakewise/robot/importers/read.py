@@ -11,9 +11,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-from wakewise.robot.importers.gazebo_thruster_models import words
-from wakewise.robot.importers.gazebo_thrusters import read_thrusters
-from wakewise.robot.importers.hull_and_camera import read_outline
+from wakewise.robot.importers.gazebo_thrusters import read_thrusters, words
 from wakewise.robot.importers.matrices import read_matrix_only, read_yaml
 from wakewise.robot.importers.packages import PackagePaths
 from wakewise.robot.importers.parsed_vehicle import (
@@ -24,7 +22,13 @@ from wakewise.robot.importers.parsed_vehicle import (
     make_draft,
     wrench_rows_to_frd,
 )
-from wakewise.robot.importers.robot_description import RobotDescription, read_camera, read_displacement, read_mass
+from wakewise.robot.importers.robot_description import (
+    RobotDescription,
+    read_camera,
+    read_displacement,
+    read_mass,
+    read_outline,
+)
 from wakewise.robot.importers.safe_yaml_nodes import parse_yaml
 from wakewise.robot.importers.sdf import left_out, read_sdf
 from wakewise.robot.importers.stonefish import read_stonefish
@@ -36,7 +40,6 @@ from wakewise.robot.importers.thruster_checks import (
     require_force_columns,
 )
 from wakewise.robot.importers.urdf import read_urdf
-from wakewise.robot.importers.water import read_water
 from wakewise.robot.importers.wrench_rows import (
     ARDUSUB,
     FORCES_FIRST,
@@ -48,6 +51,7 @@ from wakewise.robot.importers.wrench_rows import (
 )
 from wakewise.robot.importers.xacro import XacroExpander
 from wakewise.robot.importers.xml import Element, PlacedError, parse_xml, read_text
+from wakewise.robot.importers.yaml_parameters import read_water
 from wakewise.robot.vehicles.draft import VehicleDraft
 from wakewise.robot.vehicles.vehicle import Provenance
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from wakewise.core.errors import InputError
 from wakewise.robot.importers.packages import MissingFileError, PackagePaths
-from wakewise.robot.importers.scopes import Macro, Scope, literal, parse_parameters
-from wakewise.robot.importers.xacro_text import TextSubstitution
+from wakewise.robot.importers.xacro_text import Macro, Scope, TextSubstitution, literal, parse_parameters
 from wakewise.robot.importers.xml import MAX_ELEMENTS, Element, PlacedError, SourceLocation, parse_xml, read_text
 
 _TRUE, _FALSE = frozenset({"true", "1", "yes"}), frozenset({"false", "0", "no", ""})

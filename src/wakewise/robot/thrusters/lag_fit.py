@@ -1,20 +1,66 @@
-"""Identify a thruster's lag from a measured step of thrust."""
+"""Identify a thruster's lag from a measured step of thrust.
+
+What readings that are correlated in time are worth.
+
+Read a measured step of a thruster.
+"""
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from wakewise.core.arrays import Array, frozen
+from wakewise.core.csv_separators import other_separator
 from wakewise.core.errors import InputError
-from wakewise.robot.thrusters.correlated import newey_west_errors, samples_per_reading
 from wakewise.robot.thrusters.rotor_lag import FirstOrderLag, LagModel, RotorLag, SecondOrderLag, SplitLag
+
+
+def samples_per_reading(residual: Array) -> float:
+    """Samples of a series, shape (m,), that count as one independent reading, at least 1.
+
+    1 + 2 x the sum of autocorrelations over a window of the root of m, with Bartlett's weights.
+    """
+    window = max(1, round(math.sqrt(residual.size)))
+    centred = residual - residual.mean()
+    variance = float(centred @ centred)
+    if variance == 0.0:
+        return 1.0
+    total = sum(
+        (1.0 - lag / (window + 1)) * float(centred[lag:] @ centred[:-lag]) / variance for lag in range(1, window + 1)
+    )
+    return max(1.0, 1.0 + 2.0 * total)
+
+
+def newey_west_errors(jacobian: Array, residual: Array) -> Array:
+    """Standard errors, shape (p,), of least squares with Jacobian, shape (m, p), and residuals, shape (m,), in time.
+
+    W. Newey, K. West, Econometrica 55, 1987, 703, with a window of the root of m; infinite where nothing depends on a
+    parameter.
+    """
+    scores = jacobian * residual[:, None]
+    middle = scores.T @ scores
+    window = max(1, round(math.sqrt(residual.size)))
+    for lag in range(1, window + 1):
+        cross = scores[lag:].T @ scores[:-lag]
+        middle += (1.0 - lag / (window + 1)) * (cross + cross.T)
+    # Columns differ by orders of magnitude; scaled, the inverse keeps its digits.
+    size = np.linalg.norm(jacobian, axis=0)
+    size[size == 0.0] = math.inf
+    bread = np.linalg.pinv((jacobian / size).T @ (jacobian / size))
+    covariance = bread @ (middle / np.outer(size, size)) @ bread
+    spare = max(residual.size - jacobian.shape[1], 1)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0) * residual.size / spare) / size
+    return np.where(np.isinf(size), math.inf, errors)
+
 
 FEWEST_SAMPLES = 20
 MOST_SAMPLES = 20_000
@@ -382,3 +428,46 @@ def _measured_delay(record: _Record) -> tuple[float | None, float | None]:
     area_s = float(np.sum(wanted[:-1]) - np.sum(0.5 * (risen[:-1] + risen[1:]))) * record.dt_s
     variance = sum(float(np.var(level)) * samples_per_reading(level) / level.size for level in (before, after))
     return area_s, math.sqrt(variance) / abs(height) * risen.size * record.dt_s
+
+
+COLUMNS = ("time_s", "command", "thrust_N")
+LARGEST_FILE_BYTES = 200_000_000
+
+
+def read_step(path: Path | str) -> tuple[Array, Array, Array]:
+    """Read a measured step from a CSV with the columns `time_s`, `command` and `thrust_N`; others are not read.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a column is missing or a cell is no finite number; the message names the line.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"step {path}: no such file")
+    if path.stat().st_size > LARGEST_FILE_BYTES:
+        raise InputError(f"step {path}: {path.stat().st_size} bytes, at most {LARGEST_FILE_BYTES}")
+    rows = []
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.DictReader(file)
+            missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
+            if missing:
+                how = other_separator(reader.fieldnames)
+                raise InputError(f"step {path}: no column {', '.join(missing)}, needs {', '.join(COLUMNS)}{how}")
+            for row in reader:
+                try:
+                    values = [float(row[name]) for name in COLUMNS]
+                except (TypeError, ValueError):
+                    values = [math.nan]
+                if not all(map(math.isfinite, values)):
+                    raise InputError(
+                        f"step {path}: line {reader.line_num}: {', '.join(COLUMNS)} must be finite numbers"
+                    )
+                rows.append(values)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"step {path}: not readable as CSV ({error})") from error
+    if not rows:
+        raise InputError(f"step {path}: no rows")
+    time_s, command, thrust_N = np.array(rows).T
+    return time_s, command, thrust_N

@@ -3,13 +3,13 @@
 Body frame B is FRD. A positive thrust pushes the vehicle along the thruster's axis and sends the jet the other way.
 
 Start reading in `vehicle.py` (the record, with `hydrodynamics.py`) and `library.py` with `library_data/` (one file
-per cited source; `vehicle_file.py` and `draft.py` read them, `file_writing.py` writes them; `needs.py` and
+per cited source; `vehicle_file.py` and `draft.py` read them, `library.py` writes them; `draft.py` and
 `completion.py` say what one lacks and estimate it after another vehicle). `dynamics.py` has the equations of motion and
-the steps (`fossen.py` the readable matrices, `kernels.py`, `runge_kutta.py`, `semi_implicit.py` the compiled steps,
+the steps (`fossen.py` the readable matrices, `kernels.py`, `semi_implicit.py`, `semi_implicit.py` the compiled steps,
 `jacobians.py` their derivatives, `batch.py` many vehicles at once), `check.py` and `mixing.py` rank, null space and
-wrong signs in shipped matrices, `describe.py` and `parameters.py` all of it in words, `perturbation.py` the vehicle
-that the tank flies, `drag.py` its drag as other sources have it, `tilt.py` the joint of its camera, `ballast.py` floats
-and lead on it. Thrusters are a room below, files of other projects the room `importers`.
+wrong signs in shipped matrices, `describe.py` and `describe.py` all of it in words, `perturbation.py` the vehicle
+that the tank flies, `perturbation.py` its drag as other sources have it, `vehicle.py` the joint of its camera,
+`ballast.py` floats and lead on it. Thrusters are a room below, files of other projects the room `importers`.
 """
 
 from wakewise.robot.vehicles.batch import pack_bodies, step_batch
@@ -22,9 +22,8 @@ from wakewise.robot.vehicles.check import (
     null_space_names,
 )
 from wakewise.robot.vehicles.completion import blank_fields, completed, plausible, unit_of
-from wakewise.robot.vehicles.describe import check_report, describe, summary_line
+from wakewise.robot.vehicles.describe import ParameterRow, check_report, describe, parameters, summary_line
 from wakewise.robot.vehicles.draft import ThrusterDraft, VehicleDraft
-from wakewise.robot.vehicles.drag import drag_coefficients, possible_drags, with_drag, with_each_drag
 from wakewise.robot.vehicles.dynamics import (
     RigidBody,
     acceleration,
@@ -35,10 +34,9 @@ from wakewise.robot.vehicles.dynamics import (
     step_rk4,
     step_semi_implicit,
 )
-from wakewise.robot.vehicles.file_writing import draft_yaml
 from wakewise.robot.vehicles.hydrodynamics import DragCase, Hydrodynamics
 from wakewise.robot.vehicles.jacobians import acceleration_jacobians, step_rk4_jacobians, step_semi_implicit_jacobians
-from wakewise.robot.vehicles.library import draft_names, load_draft, load_vehicle, vehicle_names
+from wakewise.robot.vehicles.library import draft_names, draft_yaml, load_draft, load_vehicle, vehicle_names
 from wakewise.robot.vehicles.mixing import (
     ARDUSUB_VECTORED,
     ARDUSUB_VECTORED_6DOF,
@@ -46,10 +44,8 @@ from wakewise.robot.vehicles.mixing import (
     compare_with_ardusub,
     mixing_disagreements,
 )
-from wakewise.robot.vehicles.parameters import ParameterRow, parameters
-from wakewise.robot.vehicles.perturbation import perturbed
-from wakewise.robot.vehicles.tilt import TiltJoint
-from wakewise.robot.vehicles.vehicle import Vehicle
+from wakewise.robot.vehicles.perturbation import drag_coefficients, perturbed, possible_drags, with_drag, with_each_drag
+from wakewise.robot.vehicles.vehicle import TiltJoint, Vehicle
 
 __all__ = [
     "ARDUSUB_VECTORED",

@@ -17,10 +17,8 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.robot.vehicles.draft import ThrusterDraft, VehicleDraft
-from wakewise.robot.vehicles.file_writing import groups_of
-from wakewise.robot.vehicles.library import load_draft, vehicle_names
-from wakewise.robot.vehicles.needs import THRUSTER_FIELDS
+from wakewise.robot.vehicles.draft import THRUSTER_FIELDS, ThrusterDraft, VehicleDraft
+from wakewise.robot.vehicles.library import groups_of, load_draft, vehicle_names
 from wakewise.robot.vehicles.vehicle import Provenance
 from wakewise.robot.vehicles.vehicle_file import VehicleFile
 

@@ -12,11 +12,9 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.core.settings import Faults, Settings
-from wakewise.robot.vehicles.draft import ThrusterDraft, VehicleDraft
+from wakewise.robot.vehicles.draft import ThrusterDraft, VehicleDraft, required
 from wakewise.robot.vehicles.hydrodynamics import DragCase
-from wakewise.robot.vehicles.needs import required
-from wakewise.robot.vehicles.tilt import TiltJoint
-from wakewise.robot.vehicles.vehicle import CurveChoice, LeastThrust, Provenance
+from wakewise.robot.vehicles.vehicle import CurveChoice, LeastThrust, Provenance, TiltJoint
 
 R_BODY_CAMERA = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Axes of a camera (OpenCV) that looks along the body's x axis with its image upright, expressed in B."""

@@ -12,8 +12,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.robot.vehicles.tilt import TiltJoint
-from wakewise.robot.vehicles.vehicle import Vehicle
+from wakewise.robot.vehicles.vehicle import TiltJoint, Vehicle
 
 AimBy = Literal["auto", "pitch", "tilt", "both"]
 

@@ -3,12 +3,19 @@
 A camera place is given by azimuth (from north towards east), elevation (above the horizontal) and range:
 p_WC = centre + range * (cos el cos az, cos el sin az, -sin el), NED. The view axis points at the centre without roll,
 so as Euler angles of a forward-right-down frame: roll 0, pitch -el, yaw az + pi.
+
+Where orbits are begun: as they are listed, or each at its view downstream of the target.
+
+A vehicle that waits, approaches or climbs upstream of the target has its wash carried on to it, and what was blown
+there is still felt a quarter of a minute later, on the far side of the orbit (docs/research-log/0040). Settling,
+approach, climbs and the first half of each orbit, which goes up against the current, then lie where the wash is carried
+away. Views are the same; only which of a circle's views is its first changes.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -84,3 +91,33 @@ def camera_twist(
     # Right axis of the level view frame with yaw az + pi: (-sin yaw, cos yaw, 0) = (sin az, -cos az, 0).
     omega_W = np.array([-elevation_rate_rad_s * sa, elevation_rate_rad_s * ca, azimuth_rate_rad_s])
     return v_W, omega_W
+
+
+LEAST_CURRENT_M_S = 0.01
+"""A slower current has no order: it needs the better part of a minute from the camera to the target, longer than wash
+is felt."""
+
+
+def order_downstream_first(orbits: tuple[Orbit, ...], current_W_m_s: Array) -> tuple[Orbit, ...]:
+    """The same orbits, each begun at the first of its views from downstream on, in the direction in which it is listed.
+
+    Parameters
+    ----------
+    orbits : tuple of Orbit
+    current_W_m_s : ndarray, shape (3,)
+        Of which the level part counts; below `LEAST_CURRENT_M_S` orbits begin as listed.
+
+    Returns
+    -------
+    tuple of Orbit
+        With the orbits' own azimuths, but for whole turns; each goes on from where the one before ended.
+    """
+    north, east = float(current_W_m_s[0]), float(current_W_m_s[1])
+    if math.hypot(north, east) < LEAST_CURRENT_M_S:
+        return orbits
+    downstream = math.atan2(east, north)
+    begun = []
+    for turns, orbit in enumerate(orbits):
+        on = np.sort(np.mod(orbit.azimuths_rad - downstream, 2 * math.pi))
+        begun.append(replace(orbit, azimuths_rad=downstream + 2 * math.pi * turns + on))
+    return tuple(begun)

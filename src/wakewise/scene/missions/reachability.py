@@ -13,8 +13,7 @@ from wakewise.core.geometry import Pose
 from wakewise.scene.missions.aim import CameraAim
 from wakewise.scene.missions.clearance import TankBounds, gaps_of
 from wakewise.scene.missions.orbit import camera_pose
-from wakewise.scene.missions.surface_patches import SurfacePatches
-from wakewise.scene.missions.visibility import CameraIntrinsics, VisibilityCriteria, well_visible
+from wakewise.scene.missions.visibility import CameraIntrinsics, SurfacePatches, VisibilityCriteria, well_visible
 
 AZIMUTHS = 24
 ELEVATIONS_DEG = (10.0, 25.0, 40.0, 55.0, 70.0)

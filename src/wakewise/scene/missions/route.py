@@ -13,8 +13,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_conjugate, quat_multiply
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.scene.missions.aim import CameraAim
-from wakewise.scene.missions.orbit import camera_pose, camera_twist, layered_orbits
-from wakewise.scene.missions.order import order_downstream_first
+from wakewise.scene.missions.orbit import camera_pose, camera_twist, layered_orbits, order_downstream_first
 from wakewise.scene.missions.settings import MissionSettings
 
 SETTLING = "settle"

@@ -2,23 +2,19 @@
 
 Delicate features are found from the mesh or marked by a person, and may count more in the region than the rest.
 
-Start reading in `target.py` (a mesh on its bed), `find.py` (a target by name) and `region.py` (points that stand for
-its water). `corals.py` and `soft.py` with `fields.py` grow corals, `mesh.py` reads files, `sampling.py` spreads points,
-`distance.py` and `rays.py` measure, `fragility.py` and `fragility_marks.py` say what is delicate. `elasticity.py` with
-`sections.py` says how a soft one bends, `tissues.py` what it is made of.
+Start reading in `target.py` (a mesh on its bed), `target.py` (a target by name) and `region.py` (points that stand for
+its water). `corals.py` and `corals.py` with `fields.py` grow corals, `mesh.py` reads files, `region.py` spreads points,
+`distance.py` and `rays.py` measure, `fragility.py` and `fragility.py` say what is delicate. `elasticity.py` with
+`elasticity.py` says how a soft one bends, `elasticity.py` what it is made of.
 """
 
 from wakewise.scene.targets.corals import coral, coral_kinds, soft_kinds, stony_kinds
 from wakewise.scene.targets.distance import MeshDistance
-from wakewise.scene.targets.elasticity import BendingModes, TissueProperties, turned_normals
-from wakewise.scene.targets.find import find_mesh, find_target, is_mesh_file
-from wakewise.scene.targets.fragility import Fragility, find_fragility
-from wakewise.scene.targets.fragility_marks import FragilityMarks, read_marks, read_vertex_scores
+from wakewise.scene.targets.elasticity import TISSUES, BendingModes, TissueProperties, turned_normals
+from wakewise.scene.targets.fragility import Fragility, FragilityMarks, find_fragility, read_marks, read_vertex_scores
 from wakewise.scene.targets.mesh import Mesh, load_mesh, read_mesh, write_mesh
-from wakewise.scene.targets.region import DenseQuadrature, Region, region_measure, sample_region
-from wakewise.scene.targets.sampling import sampling_error_pct
-from wakewise.scene.targets.target import Target, place_on_bed
-from wakewise.scene.targets.tissues import TISSUES
+from wakewise.scene.targets.region import DenseQuadrature, Region, region_measure, sample_region, sampling_error_pct
+from wakewise.scene.targets.target import Target, find_mesh, find_target, is_mesh_file, place_on_bed
 
 __all__ = [
     "TISSUES",

@@ -11,6 +11,24 @@ Bending keeps the length of the axis: what moves aside comes down, and the stiff
 order (M. R. M. Crespo da Silva and C. C. Glynn 1978, J. Struct. Mech. 6, 437). Sections stay level. That holds while a
 tip moves by about half of the height, `MAX_DEFLECTION_SHARE`; higher modes, torsion, and branches that swing apart are
 left out.
+
+Level sections of a closed surface: area, stiffness against bending, and the water that moves along with it.
+
+What soft targets are made of, by name, and where each number comes from.
+
+Measured moduli of such tissue spread over a decade between species, seasons and rates of loading, so each is one
+plausible individual; `target.stiffness_Pa` and its like give another. Where a source gives no number that fits the
+mesh, the number is an estimate, and its reasoning is stated.
+
+Drag. Branches of 3 to 20 mm in 0.04 to 0.2 m/s have Reynolds numbers of 100 to 4000, where the coefficient of a
+circular cylinder is 1.0 to 1.4 (D. J. Tritton 1959, J. Fluid Mech. 6, 547, doi 10.1017/S0022112059000829, up to 100;
+the plateau of 1.0 to 1.2 beyond is in every textbook): 1.2. Blades are flat plates across the stream: 1.95, as M. Luhar
+and H. M. Nepf 2011 use it for seagrass (Limnol. Oceanogr. 56, 2003, doi 10.4319/lo.2011.56.6.2003). Branches do not
+shelter each other here, which overstates the drag of a dense bush.
+
+Damping. In tension tests of four seaweeds 42 to 52 % of the work of loading was lost (D. L. Harder, C. L. Hurd and T.
+Speck 2006, Am. J. Bot. 93, 1426). A linear tissue that is loaded and let go loses pi / 2 tan(delta) of it, so
+tan(delta) is about 0.3 and the damping half of that, 0.15 of critical: by analogy for all kinds, an estimate.
 """
 
 from __future__ import annotations
@@ -25,8 +43,124 @@ from scipy.sparse.csgraph import connected_components
 from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
-from wakewise.scene.targets.sections import sections
 from wakewise.scene.targets.target import Target
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sections:
+    """Level sections through a body, which may consist of several loops (branches, fingers, tentacles).
+
+    `area_m2` (n,) is that of all loops. `second_m4` (n, 2, 2) is the sum over loops of the integral of r r^T over the
+    loop, r from its own middle: times Young's modulus the stiffness against bending of branches that bend side by side.
+    `displaced_m2` (n, 2, 2) times the water's density is the added mass per height of loops that move sideways, each
+    taken as the ellipse of its second moments: pi b^2 across a half axis b (J. N. Newman, Marine Hydrodynamics, MIT
+    Press 1977, table 4.3). `reach_m2` (n, 2, 2) is that of the thickest loop: e . reach . e is the square of half its
+    width along e.
+    """
+
+    area_m2: Array
+    second_m4: Array
+    displaced_m2: Array
+    reach_m2: Array
+
+
+def sections(places_m: Array, faces: IntArray, heights_m: Array) -> Sections:
+    """Cut a closed surface at some heights.
+
+    Parameters
+    ----------
+    places_m : ndarray, shape (n, 3)
+        Vertices; the third coordinate is the height.
+    faces : ndarray, shape (m, 3)
+        Turned alike.
+    heights_m : ndarray, shape (k,)
+
+    Returns
+    -------
+    Sections
+        Zero where nothing is cut.
+    """
+    k = len(heights_m)
+    area, second, displaced = np.zeros(k), np.zeros((k, 2, 2)), np.zeros((k, 2, 2))
+    reach = np.zeros((k, 2, 2))
+    if not len(faces):
+        return Sections(area_m2=area, second_m4=second, displaced_m2=displaced, reach_m2=reach)
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edge = np.unique(ends[:, 0] * len(places_m) + ends[:, 1], return_inverse=True)[1].reshape(-1, 3)
+    middle = places_m[np.unique(faces), :2].mean(axis=0)
+    plan, height = places_m[:, :2] - middle, places_m[:, 2]
+    low, high = height[faces].min(axis=1), height[faces].max(axis=1)
+    for i, level in enumerate(heights_m):
+        cut = np.nonzero((low <= level) & (high > level))[0]
+        if not len(cut):
+            continue
+        start, end, loop = _loops(plan, height, faces[cut], edge[cut], float(level))
+        whole, moments = _moments(start, end, loop)
+        kept = np.abs(whole) > 1e-12
+        whole, moments = whole[kept], moments[kept]
+        if not len(whole):
+            continue
+        turned = np.sign(whole.sum())  # a section seen from below runs the other way round
+        trace = np.trace(moments, axis1=1, axis2=2)
+        around = 4.0 * np.pi / whole[:, None, None] * (trace[:, None, None] * np.eye(2) - moments)
+        solid = whole * turned > 0.0  # not a cavity
+        area[i] = turned * whole.sum()
+        second[i] = turned * moments.sum(axis=0)
+        displaced[i] = around[solid].sum(axis=0)
+        thickest = np.argmax(np.where(solid, trace / whole, -np.inf))
+        reach[i] = 4.0 * moments[thickest] / whole[thickest]
+    return Sections(area_m2=area, second_m4=second, displaced_m2=displaced, reach_m2=reach)
+
+
+def _loops(plan: Array, height: Array, faces: IntArray, edge: IntArray, level: float) -> tuple[Array, Array, IntArray]:
+    """Segments in which faces are cut, start and end (m, 2) with the body on one side, and the loop of each (m,)."""
+    here = height[faces]
+    above = here > level
+    m = len(faces)
+    rows = np.arange(m)
+    # The two edges that cross the level leave the one corner that is alone on its side.
+    alone = np.where(above.sum(axis=1) == 1, np.argmax(above, axis=1), np.argmin(above, axis=1))
+    after, before = (alone + 1) % 3, (alone + 2) % 3
+
+    def crossing(other: IntArray) -> Array:
+        a, b = faces[rows, alone], faces[rows, other]
+        share = (level - height[a]) / (height[b] - height[a])
+        place: Array = plan[a] + share[:, None] * (plan[b] - plan[a])
+        return place
+
+    one, two = crossing(after), crossing(before)
+    first, second = edge[rows, alone], edge[rows, before]
+    upward = above[rows, alone][:, None]
+    start, end = np.where(upward, one, two), np.where(upward, two, one)
+    names, ends = np.unique(np.concatenate([first, second]), return_inverse=True)
+    n = len(names)
+    joined = coo_array((np.ones(m, dtype=np.int8), (ends[:m], ends[m:])), (n, n))
+    piece = connected_components(joined, directed=False)[1]
+    return start, end, piece[ends[:m]].astype(np.int64)
+
+
+def _moments(start: Array, end: Array, loop: IntArray) -> tuple[Array, Array]:
+    """Signed area (l,) of each loop and signed second moments about its middle (l, 2, 2), by Green's theorem."""
+    count = int(loop.max()) + 1
+
+    def total(values: Array) -> Array:
+        return np.asarray(np.bincount(loop, values, count), dtype=np.float64)
+
+    # From a place on each loop: far from the origin, differences of large numbers would spoil thin branches.
+    anchor = np.zeros((count, 2))
+    anchor[loop] = start
+    a, b = start - anchor[loop], end - anchor[loop]
+    cross = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
+    area = 0.5 * total(cross)
+    safe = np.where(np.abs(area) > 1e-30, area, 1.0)
+    middle = np.stack([total((a[:, i] + b[:, i]) * cross) for i in range(2)], axis=1) / (6.0 * safe[:, None])
+    moments = np.empty((count, 2, 2))
+    for i in range(2):
+        for j in range(2):
+            both = 2.0 * a[:, i] * a[:, j] + 2.0 * b[:, i] * b[:, j] + a[:, i] * b[:, j] + b[:, i] * a[:, j]
+            moments[:, i, j] = total(both * cross) / 24.0 - safe * middle[:, i] * middle[:, j]
+    return area, moments
+
 
 MAX_DEFLECTION_SHARE = 0.5
 """Share of a stem's height by which its tip may move for the theory to hold."""
@@ -41,7 +175,7 @@ _TIP_SHARE = 0.92  # a rounded tip has no stiffness at its very end: above this 
 
 @dataclass(frozen=True, kw_only=True)
 class TissueProperties:
-    """What a soft target is made of; where the numbers come from is in `wakewise.scene.targets.tissues`.
+    """What a soft target is made of; where the numbers come from is in `wakewise.scene.targets.elasticity`.
 
     `stiffness_Pa` is Young's modulus of the section as it is drawn, `density_kg_m3` that of the tissue, `drag` the
     coefficient on the area that a branch or blade turns to the stream, and `damping` the tissue's own, relative to
@@ -280,3 +414,44 @@ _COLUMNS = (
     "axes_W", "shape", "slope", "drop", "mass_kg", "stiffness_N_m", "hardening_N_m3", "damping_N_s_m",
     "moved_water_kg", "stress_Pa_m",
 )  # fmt: skip
+
+
+_DAMPING = 0.15
+
+# Anemone. Mesogloea creeps to ten times its first strain in hours (R. McN. Alexander 1962, as told by S. Vogel,
+# Comparative Biomechanics, Princeton 2003); its modulus then is about 0.01 MPa (O. Betz et al. in Biomimetic Research
+# for Architecture and Building Construction, Springer 2016, after S. A. Wainwright et al. 1976), so that for the
+# seconds of a passing wake it is about 0.1 MPa. The column is a tube of water: with a wall of a fifth of its radius, an
+# estimate, its section has 1 - 0.8^4 = 0.59 of a full one's stiffness: 0.06 MPa. Flow forces on such anemones: M. A. R.
+# Koehl 1977, J. Exp. Biol. 69, 87, doi 10.1242/jeb.69.1.87. Density: 98 % sea water, an estimate.
+ANEMONE = TissueProperties(stiffness_Pa=6e4, density_kg_m3=1030.0, drag=1.2, damping=_DAMPING)
+
+# Soft coral (Sinularia flexibilis and its like): mesogloea as above, made stiffer by sclerites, which does not tell its
+# species apart (M.-C. Lin and C.-F. Dai 1997, Zool. Stud. 36, 58: flexible colonies bend down in flow). 0.3 MPa, three
+# times the bare mesogloea, is an estimate. Density: a tenth of the volume is calcite of 2700 kg/m3, an estimate.
+SOFT_CORAL = TissueProperties(stiffness_Pa=3e5, density_kg_m3=1200.0, drag=1.2, damping=_DAMPING)
+
+# Gorgonian: a horny axis in a soft rind. The axis is a tanned collagen whose stiffness varies with sclerotization and
+# calcification (K. Jeyasuria and J. C. Lewis 1987, Coral Reefs 5, 213, as told by J. C. Lewis et al. 1992, Biol. Bull.
+# 183, 278). 1 GPa, the order of tanned proteins such as horn, in an axis of a third of the branch's diameter, both
+# estimates, gives 1/81 of it over the whole section: 12 MPa. Density of rind and axis together: an estimate. That such
+# colonies bend over and sway with the swell, at a low frequency, is observed (M. Boudina, F. P. Gosselin and S. Etienne
+# 2021, J. Fluid Mech., doi 10.1017/jfm.2021.252).
+GORGONIAN = TissueProperties(stiffness_Pa=1.2e7, density_kg_m3=1200.0, drag=1.2, damping=_DAMPING)
+
+# Seagrass (eelgrass, turtle grass). Strips of low-density polyethylene, whose modulus is 0.3 GPa, stand for eelgrass in
+# flumes as they bend alike (J. Lei and H. Nepf 2019, J. Fluids Struct. 87, 137); leaves of cold regions are ten times
+# as flexible as those of warm ones (M. Paul and C. B. de los Santos 2019, Mar. Biol. 166, doi
+# 10.1007/s00227-019-3577-2). A leaf 0.3 mm thick has 1/38 of the second moment of the lens of 1.2 mm that the
+# procedural blades are drawn with, and 0.32 of its area: 8 MPa, and 0.32 of the buoyancy of a leaf of 850 kg/m3 with
+# its air, an estimate. Such a blade lies down in the current of an open meadow; it is for still tanks and light
+# currents.
+SEAGRASS = TissueProperties(stiffness_Pa=8e6, density_kg_m3=952.0, drag=1.95, damping=_DAMPING)
+
+TISSUES: dict[str, TissueProperties] = {
+    "anemone": ANEMONE,
+    "gorgonian": GORGONIAN,
+    "seagrass": SEAGRASS,
+    "soft-coral": SOFT_CORAL,
+}
+"""Tissues by the names of `target.sway`; a procedural target of the same name has the shape that goes with it."""

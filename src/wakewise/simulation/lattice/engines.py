@@ -1,18 +1,150 @@
-"""What advances a lattice: the processor's cores, or a graphics card that CUDA can use; the same scheme on both."""
+"""What advances a lattice: the processor's cores, or a graphics card that CUDA can use; the same scheme on both.
+
+Time averages of a lattice run, and their averages around the axis.
+
+Solid bodies among the cells of a lattice: what leaves the water towards them comes back half-way.
+
+The wall lies between a cell of water and a cell of the body, as a wall does on a face of the box (`faces`). Before a
+step each population that would go into the body is put, turned round, where the water will pull it from. Cells of the
+body keep nothing: the step computes them as any other, and then they are emptied.
+"""
 
 from __future__ import annotations
 
 from typing import Protocol
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
+from wakewise.core.jit.njit import njit, prange
 from wakewise.core.optional_dependencies import has, how_to_install
-from wakewise.simulation.lattice.averages import MOMENTS, accumulate
-from wakewise.simulation.lattice.bounce_back import BounceBackLinks
+from wakewise.simulation.lattice.cases import LatticeCase
 from wakewise.simulation.lattice.kernel import push, step, velocity
-from wakewise.simulation.lattice.stencil import Lattice, box, plane_row, still_water
+from wakewise.simulation.lattice.stencil import (
+    OPPOSITE,
+    VELOCITIES,
+    Lattice,
+    box,
+    origin,
+    plane_row,
+    plane_size,
+    still_water,
+)
+
+MOMENTS = 8
+"""What is averaged in every cell: p, u, v, w, uu, vv, ww, vw."""
+
+
+@njit(parallel=True)
+def accumulate(field: np.ndarray, sums: Array) -> None:
+    """Add the moments of one instant, `field` of shape (4, nx, ny, nz), to `sums`, shape (MOMENTS, nx, ny, nz)."""
+    for x in prange(field.shape[1]):
+        for y in range(field.shape[2]):
+            for z in range(field.shape[3]):
+                u, v, w = field[1, x, y, z], field[2, x, y, z], field[3, x, y, z]
+                sums[0, x, y, z] += field[0, x, y, z]
+                sums[1, x, y, z] += u
+                sums[2, x, y, z] += v
+                sums[3, x, y, z] += w
+                sums[4, x, y, z] += u * u
+                sums[5, x, y, z] += v * v
+                sums[6, x, y, z] += w * w
+                sums[7, x, y, z] += v * w
+
+
+def around_axis(means: Array, y: Array, z: Array, radii: Array, angles: int = 96) -> dict[str, Array]:
+    """Average over circles about y = z = 0.
+
+    Parameters
+    ----------
+    means : ndarray, shape (MOMENTS, nx, ny, nz)
+    y, z : ndarray
+        Cell centres across the axis, evenly spaced.
+    radii : ndarray, shape (m,)
+    angles : int
+        Points on each circle; values there by cubic splines.
+
+    Returns
+    -------
+    dict of ndarray, shape (nx, m)
+        pressure, axial, radial, swirl (positive from y to z) and axial_rms, radial_rms, swirl_rms.
+    """
+    turn = 2 * np.pi * (np.arange(angles) + 0.5) / angles
+    cos, sin = np.cos(turn), np.sin(turn)
+    at = np.stack(
+        [
+            (np.outer(radii, cos) - y[0]).ravel() / (y[1] - y[0]),
+            (np.outer(radii, sin) - z[0]).ravel() / (z[1] - z[0]),
+        ]
+    )
+    out = np.empty((7, means.shape[1], len(radii)))
+    for x in range(means.shape[1]):
+        p, u, v, w, uu, vv, ww, vw = (
+            map_coordinates(plane, at, order=3, mode="nearest").reshape(len(radii), angles) for plane in means[:, x]
+        )
+        radial, swirl = cos * v + sin * w, cos * w - sin * v
+        rr = cos**2 * vv + sin**2 * ww + 2 * sin * cos * vw
+        tt = sin**2 * vv + cos**2 * ww - 2 * sin * cos * vw
+        out[:4, x] = [q.mean(1) for q in (p, u, radial, swirl)]
+        # The scatter of a time average around its circle is error of averaging, and belongs to the fluctuations.
+        out[4:, x] = [q.mean(1) for q in (uu, rr, tt)]
+    out[4:] = np.sqrt(np.maximum(out[4:] - out[1:4] ** 2, 0))
+    names = ("pressure", "axial", "radial", "swirl", "axial_rms", "radial_rms", "swirl_rms")
+    return dict(zip(names, out, strict=True))
+
+
+def solid_cells(case: LatticeCase) -> BoolArray:
+    """Cells of a case, shape (nx, ny, nz), whose middles lie in its solid boxes."""
+    solid = np.zeros(case.cells, np.bool_)
+    for low, high in case.boxes_D:
+        inside = [
+            (start + (np.arange(n) + 0.5) / case.cells_per_D > a)
+            & (start + (np.arange(n) + 0.5) / case.cells_per_D < b)
+            for start, n, a, b in zip(case.low_D, case.cells, low, high, strict=True)
+        ]
+        solid |= inside[0][:, None, None] & inside[1][:, None] & inside[2]
+    return solid
+
+
+class BounceBackLinks:
+    """Where the populations lie that meet solid cells, in a lattice made by `still_water`.
+
+    Parameters
+    ----------
+    solid : ndarray of bool, shape (nx, ny, nz)
+        None of them beside a face of the box.
+    """
+
+    def __init__(self, solid: BoolArray) -> None:
+        nx, ny, nz = solid.shape
+        size, start = plane_size(ny, nz), origin(nz)
+        padded = np.pad(solid, 1)
+        leaving, arriving, skin = [], [], np.zeros_like(padded)
+
+        def slots(i: int, cells: np.ndarray) -> np.ndarray:
+            return np.asarray((i * (nx + 2) + cells[:, 0]) * size + start + cells[:, 1] * (nz + 2) + cells[:, 2])
+
+        bodies = np.argwhere(padded)
+        for i in range(1, 19):
+            water = bodies - VELOCITIES[i]
+            beside = ~padded[tuple(water.T)]
+            leaving.append(slots(i, water[beside]))
+            arriving.append(slots(int(OPPOSITE[i]), bodies[beside]))
+            skin[tuple(bodies[beside].T)] = True
+        self._leaving, self._arriving = np.concatenate(leaving), np.concatenate(arriving)
+        self._skin = np.concatenate([slots(i, np.argwhere(skin)) for i in range(19)])
+
+    def turn_back(self, now: Lattice) -> None:
+        """Before a step: put what leaves the water towards bodies, turned round, where it will be pulled from."""
+        flat = now.reshape(-1)
+        flat[self._arriving] = flat[self._leaving]
+
+    def empty(self, after: Lattice) -> None:
+        """After a step: nothing is in the bodies; their inner cells, which no water reaches, never had anything."""
+        after.reshape(-1)[self._skin] = 0.0
+
 
 DEVICES = ("cpu", "cuda", "auto")
 

@@ -13,9 +13,8 @@ from scipy.ndimage import map_coordinates
 from wakewise.core.arrays import Array, IntArray, frozen
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_file
-from wakewise.simulation.lattice.bounce_back import solid_cells
 from wakewise.simulation.lattice.cases import AXES, DiskJet, LatticeCase, case_hash
-from wakewise.simulation.lattice.engines import make_engine
+from wakewise.simulation.lattice.engines import make_engine, solid_cells
 from wakewise.simulation.lattice.stencil import OPEN, WALL, smagorinsky_factor
 
 DISK_THICKNESS_D = 0.2

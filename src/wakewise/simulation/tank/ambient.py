@@ -1,4 +1,7 @@
-"""The water's own motion as a tank's settings ask for it, put together from `wakewise.simulation.water`."""
+"""The water's own motion as a tank's settings ask for it, put together from `wakewise.simulation.water`.
+
+A tank's water as its settings say, before anything has moved in it.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,9 @@ import numpy as np
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Current
 from wakewise.core.plugins import find, offered
-from wakewise.simulation.tank.settings import EDDY_M, TankSettings
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Target
+from wakewise.simulation.tank.settings import EDDY_M, MAX_PARCELS, TankSettings
 from wakewise.simulation.water import (
     AiryWave,
     AmbientSum,
@@ -20,7 +25,10 @@ from wakewise.simulation.water import (
     SteadyCurrent,
     read_current_series,
 )
+from wakewise.simulation.water.blockage import Blockage
 from wakewise.simulation.water.current_series import CurrentSeries
+from wakewise.simulation.water.round_jet_closure import SWIRLING, JetSpreading
+from wakewise.simulation.water.water import Water
 
 
 def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum:
@@ -83,4 +91,24 @@ def _series(settings: TankSettings) -> CurrentSeries:
         stop_s=settings.current.to_s,
         gain=settings.current.gain,
         longest_gap_s=settings.current.gap_s,
+    )
+
+
+def tank_water(
+    vehicle: Vehicle, target: Target, settings: TankSettings, ambient: AmbientSum, rng: np.random.Generator
+) -> Water:
+    """Water of a tank before anything has moved in it; `rng` is the source of its jets' turbulence."""
+    length, width, depth = settings.size_m
+    return Water(
+        vehicle.disk_areas_m2,
+        density_kg_m3=settings.density_kg_m3,
+        bed_z_m=depth,
+        rng=rng,
+        ambient=ambient,
+        half_size_m=(length / 2, width / 2),
+        turbulence=settings.jets.turbulence,
+        max_parcels=MAX_PARCELS,
+        spreading=SWIRLING if settings.jets.swirl else JetSpreading.of_width(settings.jets.half_width_growth),
+        body=Blockage.of(target),
+        wake_life=settings.jets.wake_life,
     )

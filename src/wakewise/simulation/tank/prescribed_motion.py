@@ -17,7 +17,7 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.geometry import matrix_from_quat
 from wakewise.robot.vehicles import Vehicle, compile_body
 from wakewise.scene.targets import Target
-from wakewise.simulation.tank.initial_water import tank_water
+from wakewise.simulation.tank.ambient import tank_water
 from wakewise.simulation.tank.settings import TankSettings
 from wakewise.simulation.tank.water_truth import lengths
 from wakewise.simulation.water import AmbientSum

@@ -20,6 +20,7 @@ from wakewise.core.interfaces import Flow, ScalarGrid
 from wakewise.simulation.tank.grains import (
     SAND_M,
     VON_KARMAN,
+    Swell,
     erosion_rates_kg_m2_s,
     friction_table_m_s,
     least_mean,
@@ -40,7 +41,6 @@ from wakewise.simulation.tank.sediment_motion import (
     stirred_cells,
     update_friction,
 )
-from wakewise.simulation.tank.swell import Swell
 
 CELL_M = 0.05
 SHEAR_HEIGHT_M = 0.01  # where the log law takes the water's speed from; the wall jets' slip speed stands for it
@@ -51,7 +51,7 @@ _MIXING = np.array([VON_KARMAN, MIXING_HEIGHT_M, BACKGROUND_DIFFUSIVITY_M2_S])
 # A particle keeps the water's velocity until it has gone this far or this long, whichever is sooner.
 _HELD_M, _HELD_S, _NEVER_S = 0.015, 0.3, 1e9
 _FIRST_HEIGHT_M = 0.005  # silt that leaves the bed starts evenly spread below this
-_FIRMER = 10.0  # threshold of a firm layer over that of the fluff on it (see `wakewise.simulation.tank.beds`)
+_FIRMER = 10.0  # threshold of a firm layer over that of the fluff on it (see `wakewise.simulation.tank.settings`)
 _FINEST_LOAD_KG_M2 = 0.1  # thicker beds give up particles as fine as those of this load: they are never stripped whole
 
 

@@ -14,6 +14,10 @@ A camera sees its marks by their contrast, which over
 a path d in water of beam attenuation c falls as exp(-c d) (S. Q. Duntley, Light in the sea, J. Opt. Soc. Am. 53 (1963)
 214, doi 10.1364/JOSA.53.000214); poses begin to fail where less than `LEAST_CONTRAST` of it is left and are lost for
 good at half of that.
+
+An error that lasts for a while: a stationary first-order Gauss-Markov process per axis.
+
+The joint of the simulated camera: it turns towards what is wished at its own rate, and says where it stands.
 """
 
 from __future__ import annotations
@@ -27,8 +31,30 @@ from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import Measurement
 from wakewise.core.jit.njit import njit
-from wakewise.simulation.tank.gauss_markov import GaussMarkovProcess
+from wakewise.robot.vehicles.vehicle import TiltJoint
 from wakewise.simulation.tank.settings import SensorSettings, Span
+
+
+class GaussMarkovProcess:
+    """Three independent processes of standard deviation `sigma` whose values forget themselves within `lasts_s`.
+
+    Exact between any two times: x(t + dt) = a x(t) + sigma sqrt(1 - a^2) n with a = exp(-dt / lasts_s), so that the
+    spread is `sigma` from the first value on, however often it is asked for.
+    """
+
+    def __init__(self, sigma: float, lasts_s: float, rng: np.random.Generator) -> None:
+        self._sigma, self._lasts_s, self._rng = sigma, lasts_s, rng
+        self._time_s = 0.0
+        self._value = rng.normal(0.0, sigma, 3)
+
+    def at(self, time_s: float) -> Array:
+        """The error at a time, not before the last one asked for, shape (3,)."""
+        kept = math.exp((self._time_s - time_s) / self._lasts_s)
+        spread = self._sigma * math.sqrt(max(1.0 - kept * kept, 0.0))
+        self._value = kept * self._value + spread * self._rng.standard_normal(3)
+        self._time_s = time_s
+        return self._value
+
 
 OUTLIER_M, OUTLIER_RAD = 0.1, 0.2
 """How far off a pose is that is far off, one sigma per axis."""
@@ -171,3 +197,40 @@ def _turned(q: Array, turn_rad: Array) -> Array:
     out[2] = q[0] * y - q[1] * z + q[2] * w + q[3] * x
     out[3] = q[0] * z + q[1] * y - q[2] * x + q[3] * w
     return out
+
+
+class CameraJoint:
+    """A tilt joint with its encoder; a camera without a joint stays at zero and measures nothing.
+
+    Parameters
+    ----------
+    joint : TiltJoint or None
+    tilt_rad : float
+        Where it stands at the start; its stops hold it.
+    settings : SensorSettings
+        Bias and noise of what it measures.
+    rng : numpy Generator
+        Draws both.
+    """
+
+    def __init__(
+        self, joint: TiltJoint | None, tilt_rad: float, settings: SensorSettings, rng: np.random.Generator
+    ) -> None:
+        self._joint, self._rng, self._noise_rad = joint, rng, settings.tilt_noise_rad
+        self._bias_rad = float(rng.normal(0.0, settings.tilt_bias_rad))
+        self.tilt_rad = 0.0 if joint is None else joint.within(tilt_rad)
+        """Where it truly stands."""
+        self._wished_rad = self.tilt_rad
+
+    def aim(self, tilt_rad: float) -> None:
+        """Wish an angle; one that is not finite leaves the wish as it was."""
+        if np.isfinite(tilt_rad):
+            self._wished_rad = tilt_rad
+
+    def turn(self, time_s: float, dt_s: float) -> tuple[Measurement, ...]:
+        """Turn for `dt_s` until `time_s`; what the encoder then says, nothing where there is no joint."""
+        if self._joint is None:
+            return ()
+        self.tilt_rad = self._joint.towards(self.tilt_rad, self._wished_rad, dt_s)
+        read = self.tilt_rad + self._bias_rad + float(self._rng.normal(0.0, self._noise_rad))
+        return (Measurement(time_s=time_s, tilt_rad=read),)

@@ -28,14 +28,14 @@ from wakewise.core.interfaces import Current, TargetDeformation
 from wakewise.core.jit.njit import njit
 from wakewise.scene.targets import BendingModes, Target
 from wakewise.scene.targets.elasticity import MAX_DEFLECTION_SHARE, ways_m
-from wakewise.simulation.tank.probes import surface_samples
+from wakewise.simulation.tank.water_truth import surface_samples
 from wakewise.simulation.water.water_snapshot import WaterSnapshot
 
 _POINTS = 300
 _PER_RADIAN = 4.0
 """Steps that the motion takes while its phase goes on by one radian."""
 DRAG = 1.2
-"""Drag coefficient of what is no soft tissue: a cylinder's (see `wakewise.scene.targets.tissues`)."""
+"""Drag coefficient of what is no soft tissue: a cylinder's (see `wakewise.scene.targets.elasticity`)."""
 STOPS_AT = 0.8
 """Share of a stem's height at which a tip stops, beyond all that the theory of its bending holds for."""
 _LEAST_KEPT = 0.1  # share of its height that a piece of a stem keeps at least

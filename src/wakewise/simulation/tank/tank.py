@@ -1,40 +1,93 @@
-"""The simulated tank: vehicle, water, silt and sensors on one clock, and what the water does at the target."""
+"""The simulated tank: vehicle, water, silt and sensors on one clock, and what the water does at the target.
+
+Work done beside the one who asked for it, on a second core where there is one.
+
+The tank as a world that a flight can begin in.
+"""
 
 from __future__ import annotations
 
 import logging
 import math
-from dataclasses import replace
+import os
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import BodyState, FlakeCloud, Measurement, ScalarGrid, TargetDeformation, WaterTruth
+from wakewise.core.interfaces import (
+    BodyState,
+    FlakeCloud,
+    Measurement,
+    Plant,
+    ScalarGrid,
+    TargetDeformation,
+    Truth,
+    TruthProvider,
+    WaterTruth,
+)
 from wakewise.robot.thrusters import electrical_power_W
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
-from wakewise.simulation.tank.ambient import build_ambient
-from wakewise.simulation.tank.camera_joint import CameraJoint
+from wakewise.simulation.tank.ambient import build_ambient, tank_water
 from wakewise.simulation.tank.flakes import Flakes
-from wakewise.simulation.tank.grains import STRESS_INTENSITY, speed_at_stress_m_s
-from wakewise.simulation.tank.initial_water import tank_water
+from wakewise.simulation.tank.grains import STRESS_INTENSITY, Swell, speed_at_stress_m_s
 from wakewise.simulation.tank.plant import VehiclePlant
-from wakewise.simulation.tank.probes import surface_points
 from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltProperties
-from wakewise.simulation.tank.sensors import Sensors
+from wakewise.simulation.tank.sensors import CameraJoint, Sensors
 from wakewise.simulation.tank.settings import MAX_SILT_PARTICLES, TankSettings
 from wakewise.simulation.tank.soft_body import TargetCompliance, TargetMotion
-from wakewise.simulation.tank.swell import Swell
 from wakewise.simulation.tank.tether import Tether
-from wakewise.simulation.tank.water_truth import TargetProbes
-from wakewise.simulation.tank.worker_thread import WorkerThread
+from wakewise.simulation.tank.water_truth import TargetProbes, surface_points
 from wakewise.simulation.water import AiryWave, AmbientSum
 from wakewise.simulation.water.hullwake import HullPush
-from wakewise.simulation.water.induction import impulse_velocity
+from wakewise.simulation.water.induction import cores, impulse_velocity
 from wakewise.simulation.water.water import Water
 from wakewise.simulation.water.water_snapshot import WaterSnapshot
+
+
+class WorkerThread:
+    """Does one piece of work after another, in the order in which they were given, on a thread of its own.
+
+    Where there is one core only, or nothing is to be done `beside` who asked, each is done at once. Threads are shared
+    by all lanes of a name, and the order of a lane's own pieces is kept among those of others; what a piece does must
+    not depend on what others do meanwhile.
+    """
+
+    def __init__(self, name: str, beside: bool = True) -> None:
+        self._name, self._beside = name, beside
+        self._under_way: deque[Future[None]] = deque()
+
+    def do(self, work: Callable[[], None]) -> None:
+        """Take on a piece of work; what an earlier one raised is raised here or by `wait`."""
+        while self._under_way and self._under_way[0].done():
+            self._under_way.popleft().result()
+        if cores() == 1 or not self._beside:
+            work()
+        else:
+            self._under_way.append(_thread(self._name).submit(work))
+
+    def wait(self) -> None:
+        """Return once all of it is done; raise what a piece raised."""
+        while self._under_way:
+            self._under_way.popleft().result()
+
+
+@cache
+def _thread(name: str) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(1, thread_name_prefix=name)
+
+
+# Threads do not survive a fork, where there is such a thing; the child starts its own.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_thread.cache_clear)
+
 
 GRID_SPACING_M = 0.05
 _GRID_HALF_M = 0.8
@@ -389,3 +442,89 @@ def _say_when_it_clears(settings: TankSettings, laws: SiltProperties) -> None:
             1e3 * laws.settling_m_s,
             clears_s,
         )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TankTruth:
+    """Reads the truth from the simulated tank, for the record."""
+
+    tank: Tank
+
+    def observe(self) -> Truth:
+        """Vehicle, thrusters and collisions now."""
+        tank = self.tank
+        return Truth(
+            state=tank.state,
+            thrusts_N=tank.thrusts_N,
+            power_W=tank.power_W,
+            collision=tank.collision,
+            tilt_rad=tank.tilt_rad,
+        )
+
+    def water(self) -> WaterTruth:
+        """Water at the target now."""
+        return self.tank.measure()
+
+    def excess_velocity(self, points_W_m: Array) -> Array:
+        """What the thrusters add to the water's velocity at points now, both shape (n, 3)."""
+        return self.tank.excess_velocity(points_W_m)
+
+    def silt(self) -> ScalarGrid:
+        """Silt around the target now."""
+        return self.tank.concentration_grid()
+
+    def flakes(self, X_WC: Pose) -> FlakeCloud:
+        """Visible flakes before a camera now."""
+        return self.tank.flakes(X_WC)
+
+    def posture(self) -> TargetDeformation | None:
+        """How a soft or a loose target stands now; None of one that nothing moves."""
+        return self.tank.posture()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TankWorld:
+    """A tank that begins alike each time; implements `wakewise.core.interfaces.World`.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        True parameters, known to nobody else.
+    target : Target
+    settings : TankSettings
+    start : BodyState
+        Where the vehicle really is when the flight begins.
+    draw : callable
+        Gives the generator of all draws, a fresh one of the same seed at each call.
+    tilt_rad : float
+        Where the camera's joint stands when the flight begins.
+    yielding : Yielding, optional
+        How the target gives way; None of one that nothing moves.
+    """
+
+    vehicle: Vehicle
+    target: Target
+    settings: TankSettings
+    start: BodyState
+    draw: Callable[[], np.random.Generator]
+    name: str = "tank"
+    tilt_rad: float = 0.0
+    yielding: TargetCompliance | None = None
+
+    def tank(self, beside: bool = True) -> Tank:
+        """A fresh tank at its start, with all that it knows; its water moves `beside` the vehicle, or after it."""
+        return Tank(
+            self.vehicle,
+            self.target,
+            self.settings,
+            self.start,
+            self.draw(),
+            self.tilt_rad,
+            self.yielding,
+            beside,
+        )
+
+    def begin(self) -> tuple[Plant, TruthProvider | None]:
+        """A fresh tank at its start, as plant and witness."""
+        tank = self.tank(beside=False)  # a flight has a controller
+        return tank, TankTruth(tank=tank)

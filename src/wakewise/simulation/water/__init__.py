@@ -6,10 +6,10 @@ and run out along it.
 
 Start reading in `water.py` (what callers see), `stepping.py` (one compiled step of all of it) and `water_snapshot.py`
 (the velocity at any points, now). `parcels.py`, `round_jet_closure.py` and `parcel_advection.py` are a free jet,
-`crossing_jets.py` and `colliding_jets.py` jets that cross and meet, `hullwake.py` what a hull leaves, `walljets.py` and
-`bedjets*.py` jets on the bed, `blockage.py` and `jet_deflection.py` the target and jets that come up to it, `faces.py`
-walls, `clusters.py`, `induction.py`, `space_order.py` and `blocked_sums.py` fast sums, `currents.py` (its turbulence
-summed by `fourier_turbulence.py`) and `current_series.py` what moves without thrusters. Laws and their sources stand
+`colliding_jets.py` and `colliding_jets.py` jets that cross and meet, `hullwake.py` what a hull leaves, `bedjets.py` and
+`bedjets*.py` jets on the bed, `blockage.py` and `blockage.py` the target and jets that come up to it, `faces.py`
+walls, `clusters.py`, `induction.py`, `induction.py` and `induction.py` fast sums, `currents.py` (its turbulence
+summed by `currents.py`) and `current_series.py` what moves without thrusters. Laws and their sources stand
 beside the equations.
 """
 

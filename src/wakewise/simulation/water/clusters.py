@@ -20,9 +20,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import njit
-from wakewise.simulation.water.blocked_sums import over_points
-from wakewise.simulation.water.induction import SINGLE, impulse_velocity
-from wakewise.simulation.water.space_order import FEW_POINTS, sorted_keys
+from wakewise.simulation.water.induction import FEW_POINTS, SINGLE, impulse_velocity, over_points, sorted_keys
 
 _CELL_M = 0.35
 _SMALL_M = 0.07  # sigmas below this and above it are never in one cluster

@@ -2,7 +2,7 @@
 
 By symmetry two equal jets that blow at each other are each a jet that strikes a wall without friction, so what they
 lose on meeting becomes rings of a radial jet (`wakewise.simulation.water.bedjets`) on both sides of that plane (those
-that cross at 20 to 120 degrees: `wakewise.simulation.water.crossing_jets`). Of unequal jets the weaker one's share
+that cross at 20 to 120 degrees: `wakewise.simulation.water.colliding_jets`). Of unequal jets the weaker one's share
 turns aside and the rest goes on. The radial jet of two that strike each other spreads about three times as fast as one
 that is led out between walls: P. O. Witze and H. A. Dwyer 1976, J. Fluid Mech. 75, 401, doi 10.1017/S0022112076000293
 (from memory, not looked up again).
@@ -10,6 +10,30 @@ that is led out between walls: P. O. Witze and H. A. Dwyer 1976, J. Fluid Mech. 
 The plane, a sheet, is as thick as the jets' sigma where they met: the plane of two turbulent jets swings to and fro by
 about as much, so their radial jet is no thinner on average. In the lattice (`head-on` case) it is 5 to 6 cm thick 7 cm
 from the axis of jets with sigma 2.7 cm.
+
+Jets that cross: what of them is opposed turns into a fan across their plane.
+
+Where two jets meet at an angle, what they carry along the bisector of their directions adds up. What they carry
+against each other is stopped by the pressure between them, and that pressure drives water out of the plane that both
+lie in: by symmetry each jet strikes the plane midway between them at a slant, and runs out in it. Of two equal round
+jets that meet at the angle 2 alpha, free of friction, the azimuth phi from the bisector takes the share
+
+    w(phi) = sin^3 alpha / (1 - cos alpha cos phi)^2        (its mean over all azimuths is 1)
+
+(D. Hasson and R. E. Peck 1964, AIChE J. 10, 752, doi 10.1002/aic.690100533, for sheets of colliding liquid jets, as
+G. I. Taylor 1960, Proc. R. Soc. A 259, 1, had measured them; both from memory). Mass and momentum agree with it: its
+mean is 1 and its mean cosine cos alpha, so what runs out has just the momentum of the two. That is for jets in air; a
+jet in water goes on to entrain, which the parcels' own closure does.
+
+So two parcels of different thrusters that meet become `RAYS` parcels with equal shares of their impulse. They begin as
+far from the place between the two as a wall jet does from where a jet strikes, each in a direction within its own equal
+share of w, another one at every second meeting (steps of the golden section cover a share evenly), so that the mean is
+smooth; a correction, the same for all, keeps momentum exact. Each ray is a jet of its own, which spreads, bends,
+strikes and merges as any other. Equal shares of w are equal areas swept about the focus of an ellipse of eccentricity
+cos alpha: Kepler's equation gives the directions.
+
+What it does not hold: of unequal jets the weaker one's share fans out, in the plane midway between both directions, and
+the rest of the stronger goes straight on. What has met once does not meet again. The two jets' plane does not sway.
 """
 
 from __future__ import annotations
@@ -20,10 +44,171 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import assign, njit
-from wakewise.simulation.water.bedjets import STRIKE_HEIGHT, RingBuffers
-from wakewise.simulation.water.crossing_jets import LEAST_SPEED_M_S, WIDEST
+from wakewise.simulation.water.bedjets import SPREADS_FASTER, STRIKE_HEIGHT, JetPlanes, RingBuffers, start_ring
 from wakewise.simulation.water.parcels import CENTRE_SPEED, ParcelBuffers, kept_only
-from wakewise.simulation.water.walljets import SPREADS_FASTER, JetPlanes, start_ring
+
+RAYS = 4
+"""Into so many parcels two turn: an even number, so that none keeps to the bisector."""
+HELD = 2
+"""For so many meetings each ray keeps its direction, so that its parcels may become one: fewer to carry."""
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+WIDEST = -0.5  # cosine of 120 degrees: wider ones meet head-on, see `wakewise.simulation.water.colliding_jets`
+NARROWEST = math.cos(math.radians(20))  # jets that cross at less merge
+LEAST_SPEED_M_S = 0.03  # of a parcel alone at its centre; meetings of weaker ones are let be
+
+
+@njit(nogil=True)
+def ray_azimuths(lean: float, phase: float, out: Array) -> None:
+    """Write cosine and sine of the rays' azimuths from the bisector, shape (rays, 2); `lean` is cos alpha.
+
+    Each ray lies within its own equal share of w, at `phase` of it, from 0 to 1.
+    """
+    rays = out.shape[0]
+    flat = math.sqrt(1.0 - lean * lean)
+    for k in range(rays):
+        mean = 2.0 * math.pi * (k + phase) / rays
+        E = math.pi
+        for _ in range(20):
+            E -= (E - lean * math.sin(E) - mean) / (1.0 - lean * math.cos(E))
+        near = 1.0 - lean * math.cos(E)
+        # Seen from the focus the far end of the ellipse is the bisector.
+        out[k, 0], out[k, 1] = (lean - math.cos(E)) / near, -flat * math.sin(E) / near
+
+
+@njit(nogil=True)
+def spread_crossing_jets(jets: ParcelBuffers, count: int, streams: int, met: int) -> tuple[int, int]:
+    """Turn what crosses among the first `count` parcels into rays behind them; parcels and meetings there are then.
+
+    Streams below `streams` are the thrusters' own; only those meet. `met` is how many meetings there were before.
+    Without room for its rays a meeting waits.
+    """
+    X, m, sigma = jets.position, jets.impulse, jets.sigma
+    some, unit = np.empty(count, np.int64), np.empty((count, 3))
+    many = 0
+    for i in range(count):
+        size = math.sqrt(m[i, 0] ** 2 + m[i, 1] ** 2 + m[i, 2] ** 2)
+        if jets.stream[i] < streams and CENTRE_SPEED * size > LEAST_SPEED_M_S * sigma[i] ** 3:
+            some[many] = i
+            for k in range(3):
+                unit[many, k] = m[i, k] / size
+            many += 1
+    pairs = _crossing_pairs(X, sigma, jets.stream, some[:many], unit)
+    if pairs.shape[0] == 0:
+        return count, met
+    keep, azimuths = np.ones(jets.sigma.shape[0], np.bool_), np.empty((RAYS, 2))
+    before = count
+    for p in range(pairs.shape[0]):
+        a, b = pairs[p, 0], pairs[p, 1]
+        one = math.sqrt(m[a, 0] ** 2 + m[a, 1] ** 2 + m[a, 2] ** 2)
+        two = math.sqrt(m[b, 0] ** 2 + m[b, 1] ** 2 + m[b, 2] ** 2)
+        share = min(one, two)
+        if share <= 1e-3 * max(one, two):
+            continue
+        if count + RAYS > jets.sigma.shape[0]:
+            break
+        _rays(jets, count, a, b, one, two, share, streams, (GOLDEN * (met // HELD)) % 1.0, azimuths)
+        count, met = count + RAYS, met + 1
+        for k in range(3):
+            m[a, k] *= 1.0 - share / one
+            m[b, k] *= 1.0 - share / two
+        # What is left of one that turned wholly is rounding.
+        keep[a], keep[b] = one - share > 1e-6 * one, two - share > 1e-6 * two
+    return kept_only(jets, count, keep[:count]) if count > before else count, met
+
+
+@njit(nogil=True)
+def _rays(
+    jets: ParcelBuffers,
+    count: int,
+    a: int,
+    b: int,
+    one: float,
+    two: float,
+    share: float,
+    streams: int,
+    phase: float,
+    azimuths: Array,
+) -> None:
+    """Write the rays of one meeting behind the first `count`: of impulses of lengths one and two a share of each."""
+    along, normal, across = np.empty(3), np.empty(3), np.empty(3)
+    both = apart = 0.0
+    for k in range(3):
+        p, q = jets.impulse[a, k] / one, jets.impulse[b, k] / two
+        along[k], normal[k] = p + q, p - q
+        both, apart = both + along[k] ** 2, apart + normal[k] ** 2
+    both, apart = math.sqrt(both), math.sqrt(apart)
+    lean = 0.5 * both
+    for k in range(3):
+        along[k] /= both
+        normal[k] /= apart
+    for k in range(3):
+        across[k] = normal[(k + 1) % 3] * along[(k + 2) % 3] - normal[(k + 2) % 3] * along[(k + 1) % 3]
+    ray_azimuths(lean, phase, azimuths)
+    # What the rays' mean lacks of the bisector's share, and has too much across it.
+    more, less = lean, 0.0
+    for r in range(RAYS):
+        more, less = more - azimuths[r, 0] / RAYS, less + azimuths[r, 1] / RAYS
+    first, second = min(jets.stream[a], jets.stream[b]), max(jets.stream[a], jets.stream[b])
+    each = 2.0 * share / RAYS
+    for r in range(RAYS):
+        n = count + r
+        jets.stream[n] = streams + 1 + (first * streams + second) * RAYS + r
+        jets.sigma[n] = 0.5 * (jets.sigma[a] + jets.sigma[b])
+        jets.diameter[n] = 0.5 * (jets.diameter[a] + jets.diameter[b])
+        jets.share[n], jets.held[n] = 0.5 * (jets.share[a] + jets.share[b]), np.inf
+        # A row of less momentum is slower by the root.
+        jets.start[n] = 0.5 * (jets.start[a] + jets.start[b]) * math.sqrt(2.0 / RAYS)
+        like = a if r % 2 == 0 else b
+        for k in range(3):
+            out, middle = (
+                azimuths[r, 0] * along[k] + azimuths[r, 1] * across[k],
+                jets.position[a, k] + jets.position[b, k],
+            )
+            jets.position[n, k] = 0.5 * middle + STRIKE_HEIGHT * jets.sigma[n] * out
+            jets.impulse[n, k] = each * (out + more * along[k] - less * across[k])
+            jets.gust[n, k] = jets.gust[like, (k + r // 2) % 3]
+            jets.disk[n, k] = 0.5 * (jets.disk[a, k] + jets.disk[b, k])
+            jets.flow[n, k] = 0.0
+
+
+@njit(nogil=True)
+def _crossing_pairs(X: Array, sigma: Array, stream: IntArray, some: IntArray, unit: Array) -> IntArray:
+    """Pairs whose ways cross ahead of both, as near to the plane midway as a jet is to the wall that it strikes.
+
+    Of those that one may meet, the one that comes to the crossing at the most nearly equal distance.
+    """
+    n = some.shape[0]
+    found, used = np.empty((n, 2), np.int64), np.zeros(n, np.bool_)
+    count = 0
+    for p in range(n):
+        if used[p]:
+            continue
+        i, best, least = some[p], -1, np.inf
+        for q in range(p + 1, n):
+            j = some[q]
+            c = unit[p, 0] * unit[q, 0] + unit[p, 1] * unit[q, 1] + unit[p, 2] * unit[q, 2]
+            if c > NARROWEST or c <= WIDEST or stream[i] == stream[j] or used[q]:
+                continue
+            dx, dy, dz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
+            ahead = dx * unit[p, 0] + dy * unit[p, 1] + dz * unit[p, 2]
+            back = dx * unit[q, 0] + dy * unit[q, 1] + dz * unit[q, 2]
+            s, t = ahead - c * back, c * ahead - back
+            if s <= 0.0 or t <= 0.0:  # as of all but one in a hundred: nothing need be divided for them
+                continue
+            s, t = s / (1.0 - c * c), t / (1.0 - c * c)
+            slant = math.sqrt(0.5 * (1.0 - c))  # sin alpha
+            if slant * s > STRIKE_HEIGHT * sigma[i] or slant * t > STRIKE_HEIGHT * sigma[j]:
+                continue
+            gap2 = dx * dx + dy * dy + dz * dz + s * s + t * t + 2.0 * (t * back - s * ahead - s * t * c)
+            if gap2 > (0.5 * (sigma[i] + sigma[j])) ** 2 or abs(s - t) >= least:
+                continue
+            best, least = q, abs(s - t)
+        if best >= 0:
+            used[p] = used[best] = True
+            found[count, 0], found[count, 1] = i, some[best]
+            count += 1
+    return found[:count]
+
 
 _SAME_PLACE = 1.0  # sheets of the same two jets closer than this many sigma are one
 _SAME_NORMAL = math.cos(math.radians(15))

@@ -16,18 +16,90 @@ Q (m3/s) of the same shape induces u = Q A d / sigma^2.
 
 The sums run in single precision over one array per quantity, so that the compiler works on several terms at once; each
 point is summed by one thread in one order.
+
+Long sums over points, split among threads without changing a byte.
+
+In which order points are taken, so that those that follow each other are mostly neighbours in space.
+
+Along Hilbert's curve through the cells of a cube: J. Skilling 2004, Programming the Hilbert curve, AIP Conf. Proc. 707,
+381, doi 10.1063/1.1751381. Where on the curve each cell lies is worked out once.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+import os
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
+from functools import cache
+from typing import Any, TypeVar
 
 import numpy as np
 
-from wakewise.core.arrays import Array
+from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import njit
-from wakewise.simulation.water.blocked_sums import over_points
+
+A = TypeVar("A", Array, IntArray)
+
+_CHUNK = 256  # least points of a piece
+_BLOCKS = 256
+_THREADED_PAIRS = 700_000  # about 0.7 ms of work; below it threads cost more than they save
+_MOST = 8  # threads
+_PIECES = 4  # per thread: they are not all as long
+
+
+def over_points(kernel: Callable[[A, A], None], points: A, out: A, pairs: int) -> None:
+    """Call `kernel(points, out)` on all points or indices, in pieces on several threads if there are many pairs.
+
+    The kernel must release the interpreter's lock and compute each row of `out` from its own point alone, or from its
+    own group of successive points whose length divides 256; then the result does not depend on the pieces. The caller
+    takes pieces, too: a thread that only waited would leave its core to the one that it has just woken, and the others
+    idle for the milliseconds that all this takes.
+    """
+    if pairs < _THREADED_PAIRS or len(points) < 2 * _CHUNK or (workers := min(cores(), _MOST)) == 1:
+        kernel(points, out)
+        return
+    # Whole blocks: kernels may look up to `_BLOCKS` successive points up together.
+    size = max(_CHUNK, -(-len(points) // (_PIECES * workers * _BLOCKS)) * _BLOCKS)
+    starts = deque(range(0, len(points), size))
+
+    def take_pieces() -> None:
+        while True:
+            try:
+                s = starts.popleft()
+            except IndexError:
+                return
+            kernel(points[s : s + size], out[s : s + size])
+
+    others = [_helpers().submit(take_pieces) for _ in range(workers - 1)]
+    try:
+        take_pieces()
+    finally:
+        # One that has not begun has nothing left to do.
+        begun = [other for other in others if not other.cancel()]
+        wait(begun)
+    for other in begun:
+        other.result()
+
+
+@cache
+def cores() -> int:
+    """How many cores this process may use."""
+    there = os.cpu_count() or 1
+    return min(there, len(os.sched_getaffinity(0))) if hasattr(os, "sched_getaffinity") else there
+
+
+@cache
+def _helpers() -> ThreadPoolExecutor:
+    """Threads that sleep until there is work: waiting by spinning would take the cores from other trials."""
+    return ThreadPoolExecutor(_MOST - 1, thread_name_prefix="sums")
+
+
+# Threads do not survive a fork, where there is such a thing; the child starts its own.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_helpers.cache_clear)
+
 
 _SCALE = 12.0
 _FAR = _SCALE**-1.5 / (4 * math.pi)
@@ -145,3 +217,78 @@ def sum_sources(points: Array, X: Array, Y: Array, Z: Array, Q: Array, S: Array,
             v += a * dy
             up += a * dz
         out[i, 0], out[i, 1], out[i, 2] = u, v, up
+
+
+FEW_POINTS = 40
+"""Fewer are taken as they come."""
+_BITS = 5
+_SIDE = 2**_BITS  # cells along each side of the cube
+
+
+def spatial_order(points_W_m: Array) -> IntArray:
+    """Order, shape (n,), in which points, shape (n, 3), that follow each other are mostly neighbours in space."""
+    if len(points_W_m) < FEW_POINTS:
+        return np.arange(len(points_W_m))
+    order: IntArray = ordered(np.ascontiguousarray(points_W_m, dtype=np.float64), curve())
+    return order
+
+
+@cache
+def curve() -> np.ndarray:
+    """Place on the curve of each cell of the cube, shape (32768,), cells counted along z, then y, then x."""
+    cells = np.arange(_SIDE)
+    x = [axis.ravel() for axis in np.meshgrid(cells, cells, cells, indexing="ij")]
+    for bit in (1 << k for k in range(_BITS - 1, 0, -1)):
+        for k in range(3):
+            flip = (x[k] & bit) != 0
+            swapped = np.where(flip, 0, (x[0] ^ x[k]) & (bit - 1))
+            x[0] = np.where(flip, x[0] ^ (bit - 1), x[0] ^ swapped)
+            if k:
+                x[k] = x[k] ^ swapped
+    x[1] = x[1] ^ x[0]
+    x[2] = x[2] ^ x[1]
+    turn = np.zeros_like(x[0])
+    for bit in (1 << k for k in range(_BITS - 1, 0, -1)):
+        turn ^= np.where((x[2] & bit) != 0, bit - 1, 0)
+    place = np.zeros_like(x[0])
+    for bit in (1 << k for k in range(_BITS - 1, -1, -1)):
+        for k in range(3):
+            place = 2 * place + (((x[k] ^ turn) & bit) != 0)
+    return place.astype(np.uint16)
+
+
+@njit(apart=True, nogil=True)
+def ordered(points: Array, places: np.ndarray) -> IntArray:
+    """Order of points, shape (n, 3), by the places of their cells on the curve."""
+    n = points.shape[0]
+    low, high = points[0].copy(), points[0].copy()
+    for p in range(n):
+        for k in range(3):
+            low[k], high[k] = min(low[k], points[p, k]), max(high[k], points[p, k])
+    size = max(high[0] - low[0], high[1] - low[1], high[2] - low[2], 1e-9) * (1.0 + 1e-9)
+    per_cell = _SIDE / size
+    key = np.empty(n, np.uint16)
+    for p in range(n):
+        i, j = int((points[p, 0] - low[0]) * per_cell), int((points[p, 1] - low[1]) * per_cell)
+        key[p] = places[(i * _SIDE + j) * _SIDE + int((points[p, 2] - low[2]) * per_cell)]
+    return sorted_keys(key)
+
+
+@njit(apart=True, nogil=True)
+def sorted_keys(key: np.ndarray) -> IntArray:
+    """Order that sorts keys of two bytes, shape (n,): byte by byte, and like ones as they come."""
+    n = key.shape[0]
+    order, other = np.arange(n), np.empty(n, np.int64)
+    for digit in range(2):
+        shift = 8 * digit
+        starts = np.zeros(257, np.int64)
+        for p in range(n):
+            starts[((key[p] >> shift) & 255) + 1] += 1
+        for v in range(256):
+            starts[v + 1] += starts[v]
+        for q in range(n):
+            v = (key[order[q]] >> shift) & 255
+            other[starts[v]] = order[q]
+            starts[v] += 1
+        order, other = other, order
+    return order

@@ -13,14 +13,22 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import assign, assign_rows, njit
-from wakewise.simulation.water.bedjets import STRIKE_HEIGHT, RingBuffers
+from wakewise.simulation.water.bedjets import (
+    STRIKE_HEIGHT,
+    JetPlanes,
+    RingBuffers,
+    grow_rings,
+    ring_places,
+    start_ring,
+    thin_rings,
+    wall_rows,
+)
 from wakewise.simulation.water.bedjets_sums import sum_planes
-from wakewise.simulation.water.blockage import PackedBlockage, add_body, answer
+from wakewise.simulation.water.blockage import PackedBlockage, add_body, answer, deflect_velocity, strike_body
 from wakewise.simulation.water.clusters import clustered, sum_field
-from wakewise.simulation.water.colliding_jets import deflect_colliding
-from wakewise.simulation.water.crossing_jets import spread_crossing_jets
+from wakewise.simulation.water.colliding_jets import deflect_colliding, spread_crossing_jets
 from wakewise.simulation.water.faces import mirrored
-from wakewise.simulation.water.jet_deflection import deflect_velocity, strike_body
+from wakewise.simulation.water.induction import ordered
 from wakewise.simulation.water.parcel_advection import (
     advect_parcels,
     emit_parcels,
@@ -29,8 +37,6 @@ from wakewise.simulation.water.parcel_advection import (
     slugs,
 )
 from wakewise.simulation.water.parcels import MERGE_SPACING, ParcelBuffers, kept_only, merge_across, merge_rows
-from wakewise.simulation.water.space_order import ordered
-from wakewise.simulation.water.walljets import JetPlanes, grow_rings, ring_places, start_ring, thin_rings, wall_rows
 
 _MANY = 800  # parcels; with more, old ones of different jets merge over distances that grow in proportion
 # Steps after which different jets and rings are looked through for what may become one, and after which the body's

@@ -25,18 +25,16 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import Current
-from wakewise.simulation.water.bedjets import RingBuffers, WallJetRings
+from wakewise.simulation.water.bedjets import JetPlanes, PackedRings, RingBuffers, WallJetRings, wall_rows
 from wakewise.simulation.water.blockage import Blockage, PackedBlockage
-from wakewise.simulation.water.crossing_jets import RAYS
+from wakewise.simulation.water.colliding_jets import RAYS
 from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.hullwake import HullPush, HullWake
-from wakewise.simulation.water.induction import SINGLE
+from wakewise.simulation.water.induction import SINGLE, curve
 from wakewise.simulation.water.parcel_advection import EMISSION_SPACING, count_sent
 from wakewise.simulation.water.parcels import GUST_PER_TURBULENCE, MERGE_SPACING, Parcels, merged, merged_across
 from wakewise.simulation.water.round_jet_closure import PLAIN, PUFF_SPREAD, JetSpreading, first_sigma_m
-from wakewise.simulation.water.space_order import curve
 from wakewise.simulation.water.stepping import JetSources, StepCounters, WaterConstants, advance, places_of
-from wakewise.simulation.water.walljets import JetPlanes, PackedRings, wall_rows
 from wakewise.simulation.water.water_snapshot import WaterSnapshot
 
 _ROOM = 512  # parcels and rings to begin with; there is always room for a ring of each parcel

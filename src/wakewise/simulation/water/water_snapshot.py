@@ -15,17 +15,14 @@ from scipy.special import i0
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.interfaces import Current
 from wakewise.core.jit.njit import njit
-from wakewise.simulation.water.bedjets import WallJetRings, layer_speed
+from wakewise.simulation.water.bedjets import PackedRings, WallJetRings, layer_speed
 from wakewise.simulation.water.bedjets_sums import LOG_WIDTH, REACH
 from wakewise.simulation.water.blockage import Blockage
-from wakewise.simulation.water.blocked_sums import over_points
 from wakewise.simulation.water.clusters import ImpulseField
 from wakewise.simulation.water.faces import TankFaces
-from wakewise.simulation.water.induction import SINGLE
+from wakewise.simulation.water.induction import SINGLE, over_points, spatial_order
 from wakewise.simulation.water.parcels import CENTRE_SPEED, Parcels, gusty_impulse_m4_s
-from wakewise.simulation.water.space_order import spatial_order
 from wakewise.simulation.water.stepping import flow_at
-from wakewise.simulation.water.walljets import PackedRings
 
 
 class WaterSnapshot:

@@ -108,7 +108,7 @@ def run_campaign(
     from wakewise.core.jit.precompile import compile_kernels
     from wakewise.core.optional_dependencies import need
     from wakewise.experiments.campaigns import load_campaign, planned_trials, run
-    from wakewise.experiments.campaigns.plan import keep_plan
+    from wakewise.experiments.campaigns.definition import keep_plan
     from wakewise.experiments.campaigns.run import check_bounds
     from wakewise.experiments.campaigns.store import RESUME_HINT, open_store
     from wakewise.experiments.campaigns.table import group_table, results, status
@@ -205,7 +205,7 @@ def make_page(folder: Folder, compare: Compare = "", out: PageOut = None, json: 
     from dataclasses import asdict
 
     from wakewise.core.optional_dependencies import need
-    from wakewise.experiments.campaigns.contrasts import method_contrasts, paired_groups
+    from wakewise.experiments.campaigns.summary import method_contrasts, paired_groups
     from wakewise.experiments.campaigns.table import results
 
     need("the page of a campaign", "reports")
@@ -242,7 +242,7 @@ def _engine(name: str, scheduler: str | None, workers: int | None) -> TrialExecu
     from wakewise.experiments.campaigns.engines import ProcessExecutor
 
     if name == "dask":
-        from wakewise.experiments.campaigns.cluster import DaskExecutor
+        from wakewise.experiments.campaigns.engines import DaskExecutor
 
         return DaskExecutor(scheduler, workers)
     if name != "processes":

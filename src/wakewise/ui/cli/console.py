@@ -110,7 +110,7 @@ def write_page(name: str, write: Callable[[], Any]) -> bool:
 
     A report that fails is told in one line, and costs neither the result nor the exit code.
     """
-    from wakewise.experiments.trials.reporting import report_attempt
+    from wakewise.experiments.trials.stages import report_attempt
 
     with report_attempt() as attempt, ProgressBars().stage(name):
         write()

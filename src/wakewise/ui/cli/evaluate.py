@@ -117,8 +117,7 @@ def evaluate(
 
 def _remark(figures: dict[str, Any]) -> None:
     """Faults of the meshes, and thresholds that say nothing of so small a thing, on standard error."""
-    from wakewise.vision.evaluation.soundness import MeshFaults
-    from wakewise.vision.evaluation.thresholds import TELLING_PCT
+    from wakewise.vision.evaluation.cloud_to_surface import TELLING_PCT, MeshFaults
 
     for key, name in (("reference_faults", "reference"), ("model_faults", "model")):
         for words in MeshFaults(**figures[key]).words() if figures.get(key) else ():

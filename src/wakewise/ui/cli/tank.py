@@ -99,8 +99,7 @@ def probe_command(
     from wakewise.core.errors import InputError
     from wakewise.robot.vehicles import load_vehicle
     from wakewise.simulation.tank import TankSettings
-    from wakewise.simulation.tank.probe import probe
-    from wakewise.simulation.tank.probe_tables import read_points, read_thrusts, regular_times
+    from wakewise.simulation.tank.probe import probe, read_points, read_thrusts, regular_times
 
     if out is not None and out.suffix not in (".json", ".npz"):
         raise InputError(f"--out {out}: must end in .json or .npz")

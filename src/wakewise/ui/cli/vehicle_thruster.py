@@ -55,7 +55,7 @@ def thruster(
 ) -> None:
     """Show a thrust curve: limits, deadband, and pulses, thrusts, speed and power both ways."""
     from wakewise.core.files import write_text
-    from wakewise.robot.thrusters.curve_library import load_curve
+    from wakewise.robot.thrusters.thrust_table import load_curve
     from wakewise.robot.thrusters.thruster_facts import curve_facts, usual_voltage
     from wakewise.ui.reports.vehicle.thrust_drawing import curve_svg
 
@@ -86,8 +86,7 @@ def thruster(
 
 def lag(data: Data, average_s: Average = None, json: Json = False) -> None:
     """Identify a thruster's lag and dead time from a measured step."""
-    from wakewise.robot.thrusters.lag_fit import identify_lag
-    from wakewise.robot.thrusters.step_file import read_step
+    from wakewise.robot.thrusters.lag_fit import identify_lag, read_step
     from wakewise.robot.thrusters.thruster_facts import lag_facts
 
     facts = lag_facts(identify_lag(*read_step(data), average_s=average_s))

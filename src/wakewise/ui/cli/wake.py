@@ -68,10 +68,8 @@ def fit(
     import numpy as np
 
     from wakewise.core.errors import InputError
-    from wakewise.wake.calibration import calibrate, split_samples
+    from wakewise.wake.calibration import calibrate, family, momentum_law, split_samples
     from wakewise.wake.fit_file import fit_figures, write_fit
-    from wakewise.wake.fit_parameters import family
-    from wakewise.wake.momentum import momentum_law
     from wakewise.wake.samples import read_samples
 
     chosen = family(model)

@@ -223,9 +223,8 @@ class PictureRenderer:
 
     def draw(self, view: CameraState) -> Any:
         """The picture, RGB, shape (h, w, 3), uint8."""
-        from wakewise.vision.imaging.auto_exposure import brightness, converged_gain, split_gain
         from wakewise.vision.imaging.optics import attenuate, haze_between
-        from wakewise.vision.imaging.photograph import white_balance
+        from wakewise.vision.imaging.photograph import brightness, converged_gain, split_gain, white_balance
         from wakewise.vision.imaging.renderer import render
         from wakewise.vision.imaging.sensor import expose
         from wakewise.vision.imaging.settings import ELECTRONS_PER_S, READ_NOISE_E

@@ -23,10 +23,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cockpit.client import Client
-from wakewise.ui.cockpit.connection import PageConnection
+from wakewise.ui.cockpit.client import Client, show_pictures
 from wakewise.ui.cockpit.control_mailbox import DEVICE, ControlOwnership
-from wakewise.ui.cockpit.ground_station_listing import page_files
 from wakewise.ui.cockpit.messages import (
     MOST_BYTES,
     ButtonPress,
@@ -40,13 +38,10 @@ from wakewise.ui.cockpit.messages import (
     StickMessage,
     read_message,
 )
-from wakewise.ui.cockpit.pictures import show_pictures
-from wakewise.ui.cockpit.requests import SUBPROTOCOL, respond, wrong
+from wakewise.ui.cockpit.requests import SUBPROTOCOL, PageConnection, page_files, respond, wrong
 from wakewise.ui.cockpit.view_model import StatusMessage, ViewModel, as_json
-from wakewise.ui.web.addresses import page_addresses
 from wakewise.ui.web.files import StaticFiles
-from wakewise.ui.web.origin_check import OriginCheck, equal_secrets, is_loopback
-from wakewise.ui.web.pending import PendingConnections
+from wakewise.ui.web.origin_check import OriginCheck, PendingConnections, equal_secrets, is_loopback, page_addresses
 
 PROTOCOL = 1
 STATE_EVERY_S = 0.1

@@ -35,9 +35,15 @@ from wakewise.ui.cockpit.flight_snapshot import SnapshotRecorder
 from wakewise.ui.cockpit.live_camera import CameraState, LiveCamera
 from wakewise.ui.cockpit.live_coverage import LiveCoverage
 from wakewise.ui.cockpit.scene import ViserScene, open_scene
-from wakewise.ui.cockpit.state import StateEncoder, number, rounded, scenario_description, static_description
+from wakewise.ui.cockpit.state import (
+    StateEncoder,
+    WakeReadout,
+    number,
+    rounded,
+    scenario_description,
+    static_description,
+)
 from wakewise.ui.cockpit.view_model import CameraPicture, StatusMessage
-from wakewise.ui.cockpit.wake_readout import WakeReadout
 
 TENDED_S, SCENE_EVERY_S = 0.05, 0.2
 _MOST_NOTES = 200

@@ -20,12 +20,11 @@ from wakewise.core.files import whole_file
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid, no_progress
 from wakewise.operation import Scenario, read_exposures, read_scenario
-from wakewise.operation.exposures import ExposureRecord
+from wakewise.operation.flight_log import ExposureRecord
 from wakewise.scene.targets import stony_kinds
 from wakewise.ui.film.encode import check_film_name, film_writer
-from wakewise.ui.film.external_view import FOV_RAD, ExternalView
+from wakewise.ui.film.external_view import FOV_RAD, ExternalView, choose_viewpoint
 from wakewise.ui.film.layout import HEIGHT, VIEWS, WIDTH, FilmFrame, FilmOverview, FrameComposer, View
-from wakewise.ui.film.viewpoint import choose_viewpoint
 from wakewise.ui.film.wash import RecordedMotion, Tracers, wash_of
 from wakewise.ui.reports import figures
 from wakewise.ui.reports.trial import Trial, read_trial

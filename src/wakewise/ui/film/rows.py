@@ -23,11 +23,9 @@ from wakewise.core.files import whole_file
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import no_progress
 from wakewise.operation import Scenario, read_exposures, read_scenario
-from wakewise.ui.film.drawing import INK, MUTED, PAPER, paste, write
-from wakewise.ui.film.external_view import FOV_RAD, ExternalView
-from wakewise.ui.film.layout import fill_frame
+from wakewise.ui.film.external_view import FOV_RAD, ExternalView, choose_viewpoint
+from wakewise.ui.film.layout import INK, MUTED, PAPER, fill_frame, paste, write
 from wakewise.ui.film.make import silt_at
-from wakewise.ui.film.viewpoint import choose_viewpoint
 from wakewise.ui.film.wash import RecordedMotion, wash_of
 from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Trial, read_trial

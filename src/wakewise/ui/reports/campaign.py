@@ -9,14 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.core.files import write_text
-from wakewise.experiments.campaigns.contrasts import comparable, measures, method_contrasts, paired_groups
-from wakewise.experiments.campaigns.summary import FEWEST, ComparisonMetric, MethodSummary, Place
+from wakewise.experiments.campaigns.summary import (
+    FEWEST,
+    ComparisonMetric,
+    MethodSummary,
+    Place,
+    comparable,
+    measures,
+    method_contrasts,
+    paired_groups,
+)
 from wakewise.experiments.campaigns.table import Results, failures, group_table
 from wakewise.experiments.trials import UNITS
-from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, winner_text
+from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, winner_text, worst_panels
 from wakewise.ui.reports.page import collapsible_section, missing, plot, section, whole_page
 from wakewise.ui.reports.text import duration, number
-from wakewise.ui.reports.trial_pictures import worst_panels
 
 PAGE = "campaign.html"
 _DRAWN = ("rmse_mm", "target_speed_mean_m_s", "energy_kJ")

@@ -13,8 +13,7 @@ from wakewise.core.files import write_text
 from wakewise.experiments.trials.metrics import BETTER
 from wakewise.ui.reports import figures
 from wakewise.ui.reports.errors import ModelErrors, model_errors
-from wakewise.ui.reports.limits import limits_section
-from wakewise.ui.reports.media import coloured_model
+from wakewise.ui.reports.media import coloured_model, embed
 from wakewise.ui.reports.page import (
     collapsible_section,
     error_scale,
@@ -26,7 +25,7 @@ from wakewise.ui.reports.page import (
     section,
     whole_page,
 )
-from wakewise.ui.reports.photos import embed
+from wakewise.ui.reports.references import limits_section
 from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, data_uri, error_colours
 from wakewise.ui.reports.text import grouped, number, shown, unit, verdict
 from wakewise.ui.reports.trial import Trial, read_trial

@@ -1,4 +1,7 @@
-"""The report of one trial: a single HTML page for people who fly and people who measure."""
+"""The report of one trial: a single HTML page for people who fly and people who measure.
+
+What a flight proposes for the ballast of the next one, on its page.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +9,40 @@ import shlex
 from html import escape
 from pathlib import Path
 
+from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
+from wakewise.operation.flight_trim import ballast_proposal
 from wakewise.ui.reports import figures
-from wakewise.ui.reports.coverage import coverage_html
-from wakewise.ui.reports.limits import limits_section
-from wakewise.ui.reports.media import colours_html, film_html
-from wakewise.ui.reports.model import before_colours, before_mesh, model_section
-from wakewise.ui.reports.page import collapsible_section, missing, missing_text, plot, prose, section, tile, whole_page
-from wakewise.ui.reports.page_parts import PageParts
-from wakewise.ui.reports.photos import contact_sheet
-from wakewise.ui.reports.references import yardstick_html
+from wakewise.ui.reports.media import colours_html, contact_sheet, film_html
+from wakewise.ui.reports.model import before_colours, before_mesh, coverage_html, model_section
+from wakewise.ui.reports.page import (
+    PageParts,
+    collapsible_section,
+    missing,
+    missing_text,
+    plot,
+    prose,
+    section,
+    tile,
+    whole_page,
+)
+from wakewise.ui.reports.references import limits_section, yardstick_html
 from wakewise.ui.reports.scene3d import vehicle_of
 from wakewise.ui.reports.text import grouped, number, shown, unit, verdict
 from wakewise.ui.reports.trial import Trial, read_trial
-from wakewise.ui.reports.trim import trim_html
 from wakewise.vision.evaluation.cloud_to_surface import SUCCESS_COMPLETENESS_PCT, SUCCESS_RMSE_MM
+
+
+def trim_html(trial: Trial) -> str:
+    """A sentence, or nothing where the hover says nothing or there is nothing to change."""
+    if trial.settings is None or trial.steps is None:
+        return ""
+    try:
+        said = ballast_proposal(trial.settings.parts().vehicle, trial.steps)
+    except InputError:  # the vehicle was given in Python
+        return ""
+    return "" if said is None else f"<p>Before the next flight: {escape(said)}.</p>"
+
 
 PARTS = (
     ("yardstick", "Yardstick"),

@@ -3,14 +3,28 @@
 A page of another site can have a browser talk to a port of this computer: by a name of its own that it points here (DNS
 rebinding; the Host header tells), or straight (the Origin header tells). Both are refused. From this computer by its
 loopback names nothing more is asked; anybody else must show the token.
+
+Under which addresses others reach a server: those of this computer's networks where it listens at all of them.
+
+Connections that have not said who they are yet: how many a server keeps, and which it closes for one more.
+
+Whoever connects costs a descriptor, and often a thread, before the first word. They are bounded here, by address and in
+all. One too many is never refused: it might be the pilot. The one that has been silent for longest is closed instead,
+of the same address, or of the address that has most.
 """
 
 from __future__ import annotations
 
 import hmac
 import re
+import socket
+import struct
+import threading
+from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
-from ipaddress import ip_address
+from ipaddress import IPv6Address, ip_address
 from urllib.parse import urlsplit
 
 from wakewise.core.errors import InputError
@@ -148,3 +162,122 @@ def page_headers(host: str, origins: tuple[str, ...] = ()) -> dict[str, str]:
 
 def _short(text: str) -> str:
     return ascii(text[:60])
+
+
+_EVERYWHERE = {4: "192.0.2.1", 6: "2001:db8::1"}
+"""Addresses for documentation, where nobody is: the way to them is the way to the net. Nothing is sent."""
+_GET_ADDRESS = 0x8915  # Linux: SIOCGIFADDR
+
+
+def page_addresses(host: str, port: int, fragment: str = "") -> tuple[str, ...]:
+    """Where a browser finds a page that is served at `host`, best first: addresses that can be typed on a phone.
+
+    A host of all addresses ("0.0.0.0", "::") is no address: each of this computer's own is given in its place.
+    """
+    return tuple(f"http://{f'[{one}]' if ':' in one else one}:{port}/{fragment}" for one in _hosts(host))
+
+
+def _hosts(host: str) -> tuple[str, ...]:
+    try:
+        listens = ip_address(host or "0.0.0.0")
+    except ValueError:
+        return (host,)
+    if not listens.is_unspecified:
+        return (host,)
+    found = dict.fromkeys([*_way_out(listens.version), *(_own() if listens.version == 4 else ())])
+    usable = tuple(one for one in found if not ip_address(one).is_loopback)
+    return usable or ("127.0.0.1" if listens.version == 4 else "::1",)
+
+
+def _way_out(version: int) -> list[str]:
+    """Address of this computer on the network that leads to all others."""
+    with (
+        suppress(OSError),
+        socket.socket(socket.AF_INET if version == 4 else socket.AF_INET6, socket.SOCK_DGRAM) as way,
+    ):
+        way.connect((_EVERYWHERE[version], 9))
+        return [str(way.getsockname()[0])]
+    return []
+
+
+def _own() -> list[str]:
+    """IPv4 addresses of this computer's network interfaces, such as a tether's, to which no way out leads."""
+    found: list[str] = []
+    try:
+        from fcntl import ioctl
+
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
+            for _, name in socket.if_nameindex():
+                with suppress(OSError):  # an interface without an address
+                    told = ioctl(any_socket.fileno(), _GET_ADDRESS, struct.pack("256s", name.encode()[:15]))
+                    found.append(socket.inet_ntoa(told[20:24]))
+    except (ImportError, OSError):  # not Linux
+        pass
+    with suppress(OSError):
+        found += [str(one[4][0]) for one in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)]
+    return found
+
+
+PER_ADDRESS, IN_ALL = 128, 384
+"""A page asks for its thirty files over at most six connections at a time; several pages may share an address."""
+
+
+class PendingConnections:
+    """Connections without a name, oldest first; safe to use from any thread.
+
+    Parameters
+    ----------
+    per_address, in_all : int
+        How many are kept.
+    """
+
+    def __init__(self, per_address: int = PER_ADDRESS, in_all: int = IN_ALL) -> None:
+        self._per_address, self._in_all = per_address, in_all
+        self._lock = threading.Lock()
+        self._kept: dict[int, tuple[str, Callable[[], None]]] = {}
+        self._count = 0
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    def enter(self, address: str, close: Callable[[], None]) -> int:
+        """Keep a connection from `address`, which `close` would end; returns its number for `leave`."""
+        with self._lock:
+            self._count += 1
+            number, own = self._count, _network(address)
+            self._kept[number] = (own, close)
+            counts = Counter(network for network, _ in self._kept.values())
+            most = max(counts.values())
+            over = None
+            if counts[own] > self._per_address:
+                over = own
+            elif len(self._kept) > self._in_all:
+                over = next(network for network, _ in self._kept.values() if counts[network] == most)
+            oldest = next((one for one, (network, _) in self._kept.items() if network == over), None)
+            closed = None if oldest is None else self._kept.pop(oldest)[1]
+        if closed is not None:
+            closed()
+        return number
+
+    def leave(self, number: int) -> None:
+        """A connection has said who it is, or is gone."""
+        with self._lock:
+            self._kept.pop(number, None)
+
+    def close(self) -> None:
+        """End all that still wait."""
+        with self._lock:
+            kept, self._kept = list(self._kept.values()), {}
+        for _, close in kept:
+            close()
+
+
+def _network(address: str) -> str:
+    """What one computer can call itself: an IPv4 address, or the first half of an IPv6 one."""
+    try:
+        known = ip_address(address.partition("%")[0])
+    except ValueError:
+        return address
+    if not isinstance(known, IPv6Address):
+        return str(known)
+    return str(known.ipv4_mapped) if known.ipv4_mapped is not None else known.exploded[:19]

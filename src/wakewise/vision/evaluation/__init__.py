@@ -2,9 +2,9 @@
 
 Pure functions whose results carry their unit in their name. Start reading in `cloud_to_surface.py` (a cloud against the
 true surface) and `flight.py` (a flight's figures from its steps). `alignment.py` brings a model into the truth's frame
-(Umeyama, ICP), `thresholds.py` counts what lies within, `extent.py` measures area and volume, `depth_maps.py` and
-`cloud_to_cloud.py` judge against laser scans, `soundness.py` counts a mesh's faults, `definitions.py` says what each
-figure is.
+(Umeyama, ICP), `cloud_to_surface.py` counts what lies within, `cloud_to_surface.py` measures area and volume,
+`depth_maps.py` and `cloud_to_cloud.py` judge against laser scans, `cloud_to_surface.py` counts a mesh's faults,
+`definitions.py` says what each figure is.
 """
 
 from typing import TYPE_CHECKING
@@ -16,14 +16,19 @@ if TYPE_CHECKING:
     from wakewise.vision.evaluation.cloud_to_cloud import CLOUD_DEFINITIONS, CloudComparison, compare_clouds, extent_m
     from wakewise.vision.evaluation.cloud_to_surface import (
         Crop,
+        MeshFaults,
         SurfaceComparison,
         SurfaceSamples,
         SurfaceScore,
+        ThresholdScore,
         compare_surface,
         count_views,
         error_colours,
         evaluate_surface,
+        mesh_faults,
+        read_thresholds,
         sample_surface,
+        shares,
         suspicious_scale,
         voxel_downsample,
     )
@@ -37,8 +42,6 @@ if TYPE_CHECKING:
         read_depth_views,
     )
     from wakewise.vision.evaluation.flight import SWAY_FIGURES, attitude_rmse_deg, flight_figures
-    from wakewise.vision.evaluation.soundness import MeshFaults, mesh_faults
-    from wakewise.vision.evaluation.thresholds import ThresholdScore, read_thresholds, shares
 
 __all__ = [
     "CLOUD_DEFINITIONS",

@@ -10,9 +10,14 @@ from scipy.spatial import KDTree
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError, StageError
 from wakewise.vision.evaluation.alignment import IcpRefinement, refine_icp
-from wakewise.vision.evaluation.cloud_to_surface import Crop, suspicious_extent, voxel_downsample
+from wakewise.vision.evaluation.cloud_to_surface import (
+    Crop,
+    ThresholdScore,
+    shares,
+    suspicious_extent,
+    voxel_downsample,
+)
 from wakewise.vision.evaluation.definitions import DTU, TANKS_AND_TEMPLES
-from wakewise.vision.evaluation.thresholds import ThresholdScore, shares
 
 LEAST_POINTS = 100
 ICP_SHARES, ICP_LIMIT, ICP_CELL = (0.04, 0.02), 0.1, 0.005

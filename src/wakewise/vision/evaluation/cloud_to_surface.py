@@ -4,6 +4,12 @@
 Large-scale data for multiple-view stereopsis, IJCV 120, 2016, doi 10.1007/s11263-016-0902-9). As shares within a
 threshold they are *precision* and *recall*, and their harmonic mean the *F-score* (Tanks and Temples: A. Knapitsch et
 al., ACM TOG 36(4), 2017, doi 10.1145/3072959.3073599).
+
+Shares of a model and of the truth within thresholds that suit the object's size, or that were asked for.
+
+Area and volume of what of a mesh stands clear of the bed: what biologists ask of a coral, and ask to repeat.
+
+Faults of a mesh that figures suffer from: faces that come twice, edges of many faces, faces without area.
 """
 
 from __future__ import annotations
@@ -20,7 +26,65 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.core.optional_dependencies import need
 from wakewise.scene.targets import MeshDistance
 from wakewise.vision.evaluation.alignment import IcpRefinement, refine_icp
-from wakewise.vision.evaluation.thresholds import ThresholdScore, shares
+
+RELATIVE_PCT = (0.25, 0.5, 1.0)
+"""Thresholds in percent of the diagonal of the truth's box where none are given: 1 to 4 mm of a thing of 0.4 m."""
+TELLING_PCT = 2.0
+"""A threshold above this share of the object says little: nearly everything about it is within."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThresholdScore:
+    """Precision and recall at one threshold.
+
+    accuracy_pct: share of the model nearer to the truth than the threshold; completeness_pct: of the truth nearer to
+    the model; f_score: their harmonic mean, 0 to 100.
+    """
+
+    threshold_mm: float
+    accuracy_pct: float
+    completeness_pct: float
+    f_score: float
+
+
+def shares(to_truth_mm: Array, to_model_mm: Array, thresholds_mm: tuple[float, ...]) -> tuple[ThresholdScore, ...]:
+    """Shares at each threshold, of distances, shape (n,) and (m,)."""
+    out = []
+    for threshold in thresholds_mm:
+        precision = 100.0 * float((to_truth_mm < threshold).mean())
+        recall = 100.0 * float((to_model_mm < threshold).mean())
+        both = precision + recall
+        out.append(
+            ThresholdScore(
+                threshold_mm=threshold,
+                accuracy_pct=precision,
+                completeness_pct=recall,
+                f_score=2.0 * precision * recall / both if both > 0.0 else 0.0,
+            )
+        )
+    return tuple(out)
+
+
+def read_thresholds(words: str | None, extent_mm: float) -> tuple[float, ...]:
+    """Thresholds in mm from `0.5,1` (mm) or `0.5%,1%` (of the extent); by the object's size if none are given.
+
+    Raises
+    ------
+    InputError
+        If one is no number above 0.
+    """
+    parts = [f"{share}%" for share in RELATIVE_PCT] if words is None else [part.strip() for part in words.split(",")]
+    out = []
+    for part in parts:
+        try:
+            value = float(part.removesuffix("%"))
+        except ValueError:
+            value = 0.0
+        if not 0.0 < value < 1e6:
+            raise InputError(f"--thresholds '{part}': must be lengths above 0 in mm, or shares such as 0.5%,1%")
+        out.append(0.01 * value * extent_mm if part.endswith("%") else value)
+    return tuple(sorted(set(out)))
+
 
 SAMPLES = 60_000
 """Samples of the true surface. A share p of them is off by at most sqrt(p (1 - p) / 60,000), one standard deviation:
@@ -361,3 +425,73 @@ def _share(distance_mm: Array, threshold_mm: float) -> float:
 def _visible_share(distance_mm: Array, seen: BoolArray | None, threshold_mm: float) -> float | None:
     """The same over what was seen; None where that is not known or nothing."""
     return _share(distance_mm[seen], threshold_mm) if seen is not None and seen.any() else None
+
+
+def area_and_volume(mesh: MeshArrays, crop: Crop) -> tuple[float, float]:
+    """Area in m2 and volume in m3 of the part of a mesh that counts; zeros where none does.
+
+    The volume is the flux of (0, 0, z - z0) through the surface, z0 the height at which it is cut: of that field the
+    divergence is 1 and the flux through the cut is zero, so a mesh that is open there needs no lid. A mesh that is
+    closed is cut likewise. Faces are counter-clockwise seen from outside; without a bed z0 is the lowest corner.
+
+    Parameters
+    ----------
+    mesh : MeshArrays
+        In the world, z down.
+    crop : Crop
+        Its bed says what counts; its box does not cut.
+    """
+    corners = mesh.vertices_m[mesh.faces]
+    if crop.bed_z_m is None:
+        cut_m, kept = float(corners[:, :, 2].max(initial=-np.inf)), corners
+    else:
+        cut_m = crop.bed_z_m - crop.clearance_m
+        kept = corners[crop.above_bed(corners.mean(axis=1))]
+    if len(kept) == 0:
+        return 0.0, 0.0
+    normal = 0.5 * np.cross(kept[:, 1] - kept[:, 0], kept[:, 2] - kept[:, 0])  # as long as the face's area
+    area = float(np.linalg.norm(normal, axis=1).sum())
+    volume = float(((kept[:, :, 2].mean(axis=1) - cut_m) * normal[:, 2]).sum())
+    return area, abs(volume)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshFaults:
+    """Counts, of a mesh whose corners at one place are one.
+
+    duplicate_faces: faces beyond the first over the same three corners, whichever way round. crowded_edges: edges of
+    three and more faces, where no surface has an inside (non-manifold); duplicates count as one face. flat_faces:
+    without area. open_edges: edges of one face, as at the rim of a scan.
+    """
+
+    duplicate_faces: int
+    crowded_edges: int
+    flat_faces: int
+    open_edges: int
+
+    def words(self) -> list[str]:
+        """What is wrong and what it does to the figures; a rim is nothing wrong."""
+        out = []
+        if self.duplicate_faces:
+            out.append(f"{self.duplicate_faces} faces come twice, their area counts twice in completeness")
+        if self.crowded_edges:
+            out.append(f"{self.crowded_edges} edges belong to more than two faces (non-manifold): there is no inside")
+        if self.flat_faces:
+            out.append(f"{self.flat_faces} faces have no area and count for nothing")
+        return out
+
+
+def mesh_faults(mesh: MeshArrays) -> MeshFaults:
+    """Count the faults of a mesh."""
+    _, number = np.unique(np.asarray(mesh.vertices_m), axis=0, return_inverse=True)
+    faces = np.sort(number.reshape(-1)[np.asarray(mesh.faces)], axis=1)
+    flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2])
+    once = np.unique(faces[~flat], axis=0)
+    edges = np.concatenate([once[:, [0, 1]], once[:, [1, 2]], once[:, [0, 2]]])
+    count = np.unique(edges, axis=0, return_counts=True)[1] if len(edges) else np.zeros(0, dtype=np.int64)
+    return MeshFaults(
+        duplicate_faces=int((~flat).sum()) - len(once),
+        crowded_edges=int((count > 2).sum()),
+        flat_faces=int(flat.sum()),
+        open_edges=int((count == 1).sum()),
+    )

@@ -5,10 +5,10 @@ silt, flakes, the camera's motion while the shutter is open and the sensor. Ever
 poses, the true silt and a seed.
 
 Start reading in `photograph.py` (one photograph, step by step) and `scene.py` (what stands there). `camera.py`,
-`lens.py` and `camera_model.py` are the camera, also behind a flat port; `renderer.py`, `shading.py`, `texture.py`,
-`lighting.py`, `panels.py` and `daylight.py` the picture without water, `bed_view.py`, `height_field.py` and
-`tile_culling.py` what makes it fast; `optics.py`, `forward_scatter.py`, `grids.py` and `particles.py` the water,
-`auto_exposure.py`, `blur.py` and `sensor.py` the exposure.
+`camera.py` and `camera.py` are the camera, also behind a flat port; `renderer.py`, `renderer.py`, `texture.py`,
+`bed_view.py`, `daylight.py` and `daylight.py` the picture without water, `bed_view.py`, `bed_view.py` and
+`scene.py` what makes it fast; `optics.py`, `forward_scatter.py`, `optics.py` and `particles.py` the water,
+`photograph.py`, `blur.py` and `sensor.py` the exposure.
 """
 
 from typing import TYPE_CHECKING
@@ -17,8 +17,8 @@ from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
     from wakewise.vision.imaging.blur import Shutter, motion_blur, motion_px, pose_at
-    from wakewise.vision.imaging.camera import Camera, FlatPort, LensCamera, PinholeCamera
-    from wakewise.vision.imaging.camera_model import OpenCVCamera, calibrate
+    from wakewise.vision.imaging.camera import Camera, FlatPort, LensCamera, OpenCVCamera, PinholeCamera, calibrate
+    from wakewise.vision.imaging.daylight import LedPanels
     from wakewise.vision.imaging.optics import (
         SiltOptics,
         WaterOptics,
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
         water_optics,
         water_types,
     )
-    from wakewise.vision.imaging.panels import LedPanels
     from wakewise.vision.imaging.photograph import RenderedPhoto, photograph, photograph_of, sharpness
     from wakewise.vision.imaging.renderer import Lights, Render, render
     from wakewise.vision.imaging.scene import Scene

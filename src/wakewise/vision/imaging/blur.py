@@ -19,8 +19,7 @@ import numpy as np
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from wakewise.core.jit.njit import njit
-from wakewise.vision.imaging.camera import Camera
-from wakewise.vision.imaging.lens import IDEAL, pixel_at, ray_at
+from wakewise.vision.imaging.camera import IDEAL, Camera, pixel_at, ray_at
 from wakewise.vision.imaging.renderer import BAND_ROWS, Image, in_threads
 
 STEP_PX = 1.0

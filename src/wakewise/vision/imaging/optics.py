@@ -8,6 +8,8 @@ vehicle's lamps, whose light fades on the way out as well, are scattered back by
 Half of what large grains take from a beam they only diffract by a degree or so: that half comes back as a blur.
 
 Left out: the ambient light that silt above the scene takes away, and forward scattering in the lamps' veil.
+
+Values of a field on grids, between their nodes.
 """
 
 from __future__ import annotations
@@ -23,11 +25,40 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid
 from wakewise.core.jit.njit import njit
-from wakewise.vision.imaging.camera import Camera
+from wakewise.vision.imaging.camera import Camera, ray_at
 from wakewise.vision.imaging.forward_scatter import FORWARD_SHARE, forward_scattered, lobe_rad, mean_square_lever
-from wakewise.vision.imaging.grids import sample_levels
-from wakewise.vision.imaging.lens import ray_at
 from wakewise.vision.imaging.renderer import BAND_ROWS, LAMP_REFERENCE_M, Image, Lights, Render, in_threads
+
+
+@njit
+def sample_grid(values: Any, origin: Any, spacing: float, x: float, y: float, z: float) -> float:
+    """Trilinear value of a grid at a point; zero outside."""
+    u, v, w = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing
+    nx, ny, nz = values.shape
+    if not (0.0 <= u <= nx - 1 and 0.0 <= v <= ny - 1 and 0.0 <= w <= nz - 1):
+        return 0.0
+    i, j, k = min(int(u), max(nx - 2, 0)), min(int(v), max(ny - 2, 0)), min(int(w), max(nz - 2, 0))
+    a, b, c = u - i, v - j, w - k
+    i1, j1, k1 = min(i + 1, nx - 1), min(j + 1, ny - 1), min(k + 1, nz - 1)
+    low = (values[i, j, k] * (1 - a) + values[i1, j, k] * a) * (1 - b)
+    low += (values[i, j1, k] * (1 - a) + values[i1, j1, k] * a) * b
+    high = (values[i, j, k1] * (1 - a) + values[i1, j, k1] * a) * (1 - b)
+    high += (values[i, j1, k1] * (1 - a) + values[i1, j1, k1] * a) * b
+    return low * (1 - c) + high * c
+
+
+@njit
+def sample_levels(
+    values: Any, origin: Any, spacing: float, outer: Any, outer_origin: Any, outer_spacing: float, x: float, y: float,
+    z: float,
+) -> float:  # fmt: skip
+    """Trilinear value at a point: of the grid, outside it of the outer grid, zero outside both."""
+    u, v, w = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing
+    nx, ny, nz = values.shape
+    if 0.0 <= u <= nx - 1 and 0.0 <= v <= ny - 1 and 0.0 <= w <= nz - 1:
+        return sample_grid(values, origin, spacing, x, y, z)
+    return sample_grid(outer, outer_origin, outer_spacing, x, y, z)
+
 
 NOTHING_M = 1e4
 """Length of a ray that meets nothing: no light from beyond gets through."""

@@ -21,8 +21,7 @@ from wakewise.core.interfaces import FlakeCloud, ScalarGrid
 from wakewise.core.jit.njit import njit, prange
 from wakewise.vision.imaging.blur import GLOBAL, Shutter, pose_at
 from wakewise.vision.imaging.camera import Camera
-from wakewise.vision.imaging.grids import sample_levels
-from wakewise.vision.imaging.optics import WaterOptics
+from wakewise.vision.imaging.optics import WaterOptics, sample_levels
 from wakewise.vision.imaging.renderer import LAMP_REFERENCE_M, Image, Lights
 
 NEAREST_M, FARTHEST_M = 0.04, 0.6

@@ -13,9 +13,9 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.optional_dependencies import need
 from wakewise.core.settings import Settings, describe_faults
+from wakewise.vision.piv.correlation import Displacements, averaged
 from wakewise.vision.piv.images import Picture
 from wakewise.vision.piv.processing import Engine, displacements
-from wakewise.vision.piv.vectors import Displacements, averaged
 from wakewise.wake.samples import JetSamples, joined
 
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")

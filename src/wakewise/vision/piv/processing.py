@@ -14,9 +14,8 @@ import numpy as np
 
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.optional_dependencies import how_to_install
-from wakewise.vision.piv.correlation import correlate
+from wakewise.vision.piv.correlation import Displacements, correlate
 from wakewise.vision.piv.images import Picture
-from wakewise.vision.piv.vectors import Displacements
 
 Engine = Literal["auto", "openpiv", "in-house"]
 OPENPIV_WINDOWS_PX = (64, 32, 16)

@@ -1,4 +1,9 @@
-"""Dense points from posed photos: photos and sparse/ in, dense.ply out."""
+"""Dense points from posed photos: photos and sparse/ in, dense.ply out.
+
+Depth maps of many photographs: a few in memory, the rest on disk, read when they are asked for.
+
+Dense points by COLMAP's patch-match stereo, where pycolmap was built with CUDA: sparse/ in, dense.ply out.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +12,21 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 import cv2
 import numpy as np
+from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array
-from wakewise.core.errors import StageError
+from wakewise.core.errors import InputError, StageError
 from wakewise.core.interfaces import Progress
 from wakewise.core.run_lock import temporary_prefix
-from wakewise.vision.reconstruction.cells import CellMeans
-from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud
-from wakewise.vision.reconstruction.depth_store import DepthStore
-from wakewise.vision.reconstruction.fusion import facing_normals, fuse, outlier_mask
+from wakewise.vision.reconstruction.clouds import OrientedPointCloud, read_cloud, write_cloud
+from wakewise.vision.reconstruction.colmap import call, pycolmap
+from wakewise.vision.reconstruction.fusion import CellMeans, facing_normals, fuse, outlier_mask
 from wakewise.vision.reconstruction.masks import masked
 from wakewise.vision.reconstruction.photos import Image, PhotoStore
 from wakewise.vision.reconstruction.registered_photos import (
@@ -29,8 +35,91 @@ from wakewise.vision.reconstruction.registered_photos import (
     rank_partners,
     read_views,
 )
-from wakewise.vision.reconstruction.settings import ReconstructionSettings
+from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
+from wakewise.vision.reconstruction.stages import need_room
 from wakewise.vision.reconstruction.stereo import DepthMap, pair_depth, rectifiable
+
+HELD_BYTES = 250_000_000
+"""Of depth maps that stay in memory: about 25 photographs' at 640 px."""
+
+
+class DepthStore:
+    """Depth maps by number, in the order in which they were added; their arrays lie in `folder` beyond `most_bytes`."""
+
+    def __init__(self, folder: Path, most_bytes: int = HELD_BYTES) -> None:
+        self._folder = folder
+        self._left = most_bytes
+        self._maps: list[DepthMap] = []
+        self._stored: dict[int, tuple[int, int]] = {}
+
+    def add(self, depth_map: DepthMap) -> None:
+        """Keep a map.
+
+        Raises
+        ------
+        OSError
+            If the disk is full.
+        """
+        size = depth_map.depth_m.nbytes + depth_map.wanted.nbytes + depth_map.colours.nbytes
+        if size <= self._left:
+            self._left -= size
+        else:
+            height, width = depth_map.depth_m.shape
+            number = len(self._maps)
+            depth_map.depth_m.tofile(self._folder / f"{number}.depth")
+            with (self._folder / f"{number}.rest").open("wb") as file:
+                file.write(depth_map.wanted.tobytes())
+                file.write(depth_map.colours.tobytes())
+            self._stored[number] = (height, width)
+            depth_map = replace(
+                depth_map,
+                depth_m=np.zeros((0, 0), dtype=np.float32),
+                wanted=np.zeros((0, 0), dtype=np.bool_),
+                colours=np.zeros((0, 0, 3), dtype=np.uint8),
+            )
+        self._maps.append(depth_map)
+
+    def __len__(self) -> int:
+        return len(self._maps)
+
+    def photos(self, number: int) -> tuple[int, int]:
+        """The two photographs that a map is of: the one that it is seen from, and its partner."""
+        one = self._maps[number]
+        return one.first, one.second
+
+    def depths(self, number: int) -> DepthMap:
+        """A map with its depths; which are wanted, and colours, may be missing.
+
+        Raises
+        ------
+        OSError
+            If it cannot be read.
+        """
+        size = self._stored.get(number)
+        if size is None:
+            return self._maps[number]
+        depth = np.fromfile(self._folder / f"{number}.depth", dtype=np.float32).reshape(size)
+        return replace(self._maps[number], depth_m=depth)
+
+    def whole(self, number: int) -> DepthMap:
+        """A map with all that belongs to it.
+
+        Raises
+        ------
+        OSError
+            If it cannot be read.
+        """
+        size = self._stored.get(number)
+        if size is None:
+            return self._maps[number]
+        data = np.fromfile(self._folder / f"{number}.rest", dtype=np.uint8)
+        pixels = size[0] * size[1]
+        return replace(
+            self.depths(number),
+            wanted=data[:pixels].view(np.bool_).reshape(size),
+            colours=np.ascontiguousarray(data[pixels:]).reshape(*size, 3),
+        )
+
 
 # Depth maps of at most this many other photos vote on a point.
 AGREEMENT_PX = 1.0
@@ -202,3 +291,71 @@ def in_order(work: Callable[[T], S], items: Iterable[T], threads: int) -> Iterat
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
+
+
+def require_cuda() -> None:
+    """Check that patch-match can run here.
+
+    Raises
+    ------
+    InputError
+        If pycolmap has no CUDA or there is no device.
+    """
+    if not pycolmap.has_cuda:
+        raise InputError("dense: patch-match needs a pycolmap with CUDA (package pycolmap-cuda12); stereo needs none")
+    if pycolmap.get_num_cuda_devices() < 1:
+        raise InputError("dense: patch-match needs a CUDA device, none is there; stereo needs none")
+
+
+def patch_match(
+    folder: Path,
+    sparse: Path,
+    out: Path,
+    settings: ReconstructionSettings,
+    *,
+    region: RegionOfInterest | None,
+    progress: Progress,
+) -> dict[str, Any]:
+    """Patch-match stereo and fusion; what lies outside the region is left out.
+
+    J. L. Schoenberger et al., Pixelwise view selection for unstructured multi-view stereo, ECCV 2016, doi
+    10.1007/978-3-319-46487-9_31.
+
+    Returns
+    -------
+    dict
+        As of `densify`.
+
+    Raises
+    ------
+    StageError
+        If no points come out.
+    """
+    with tempfile.TemporaryDirectory(prefix=temporary_prefix("patch-match"), dir=out.parent) as scratch:
+        work = Path(scratch) / "work"
+        call(partial(pycolmap.undistort_images, work, sparse, folder), "dense", lambda: progress(0, 3, "undistort"))
+        options = pycolmap.PatchMatchOptions()
+        options.max_image_size = -1 if region is not None else settings.dense_px
+        call(partial(pycolmap.patch_match_stereo, work, options=options), "dense", lambda: progress(1, 3, "stereo"))
+        fusion = pycolmap.StereoFusionOptions()
+        fusion.min_num_pixels = settings.agreeing_views + 1
+        raw = Path(scratch) / "fused.ply"
+        call(
+            partial(pycolmap.stereo_fusion, raw, work, options=fusion, output_type="ply"),
+            "dense",
+            lambda: progress(2, 3, "fusion"),
+        )
+        need_room(out.parent, 0.0, "dense")  # on a full disk the points are cut short without a word
+        cloud = read_cloud(raw)
+    keep = np.ones(len(cloud.points_m), dtype=np.bool_)
+    if region is not None:
+        keep = np.linalg.norm(cloud.points_m - region.centre_W_m, axis=1) <= region.radius_m
+    if keep.sum() < 100:
+        raise StageError(f"dense: {keep.sum()} points survive patch-match, at least 100 must")
+    cloud = cloud.only(keep)
+    points = cloud.points_m
+    write_cloud(out, cloud)
+    some = np.random.default_rng(RANDOM_SEED).choice(len(points), min(len(points), 2000), replace=False)
+    spacing = float(np.median(np.asarray(KDTree(points).query(points[some], k=2)[0])[:, 1]))
+    maps = len(pycolmap.Reconstruction(sparse).images)
+    return {"dense_points": len(points), "depth_maps": maps, "point_spacing_mm": 1e3 * spacing}

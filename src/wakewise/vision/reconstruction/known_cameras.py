@@ -1,10 +1,18 @@
-"""Cameras that are known beforehand: pose and lens of each photograph, from COLMAP, nerfstudio, a table or Strecha."""
+"""Cameras that are known beforehand: pose and lens of each photograph, from COLMAP, nerfstudio, a table or Strecha.
+
+COLMAP's cameras and images from its files, text or binary, without the points that its own reader asks for.
+
+Formats: COLMAP documentation, Output format.
+
+Reference camera positions: a folder of Strecha's .camera files or a CSV table.
+"""
 
 from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Mapping
+import struct
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -15,9 +23,102 @@ from wakewise.core.arrays import Array
 from wakewise.core.csv_separators import other_separator
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import matrix_from_quat
-from wakewise.vision.reconstruction.colmap_files import read_colmap
-from wakewise.vision.reconstruction.lenses import Lens
+from wakewise.vision.reconstruction.lenses import COUNTS, LAYOUTS, Lens, lens_from
 from wakewise.vision.reconstruction.photos import Photo
+
+_MODELS = (
+    *("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV", "FOV"),
+    *("SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE"),
+)
+"""Names by number in binary files."""
+Pose = tuple[Array, Array]
+"""R_WC, shape (3, 3), and p_WC, shape (3,)."""
+
+
+def read_colmap(folder: Path) -> tuple[dict[str, Pose], dict[str, Lens]]:
+    """Poses and lenses by photo name from images and cameras (.bin before .txt).
+
+    Raises
+    ------
+    InputError
+        If a file is missing or damaged, or a camera is of a model that is not known here.
+    """
+    binary = (folder / "images.bin").is_file()
+    suffix = ".bin" if binary else ".txt"
+    cameras_file, images_file = folder / f"cameras{suffix}", folder / f"images{suffix}"
+    for file in (cameras_file, images_file):
+        if not file.is_file():
+            raise InputError(f"{file}: does not exist; COLMAP's cameras{suffix} and images{suffix} are needed")
+    try:
+        cameras = _cameras_bin(cameras_file) if binary else _cameras_txt(cameras_file)
+        lenses = {number: _lens(cameras_file, *camera) for number, camera in cameras.items()}
+        images = list(_images_bin(images_file) if binary else _images_txt(images_file))
+        poses = {name: _pose(numbers) for name, numbers, _ in images}
+        return poses, {name: lenses[camera] for name, _, camera in images}
+    except (OSError, UnicodeDecodeError, ValueError, IndexError, KeyError, struct.error):
+        raise InputError(f"{folder}: cameras{suffix} and images{suffix} are not as COLMAP writes them") from None
+
+
+def _lens(file: Path, model: str, width: int, height: int, params: Array) -> Lens:
+    if model not in LAYOUTS:
+        raise InputError(f"{file}: camera model {model} is not known here, allowed are {', '.join(LAYOUTS)}")
+    if len(params) != COUNTS[model] or not np.isfinite(params).all():
+        raise InputError(f"{file}: {len(params)} parameters, {model} has {COUNTS[model]}, all finite")
+    return lens_from(model, width, height, params)
+
+
+def _pose(numbers: Array) -> Pose:
+    """From world-to-camera, quaternion and shift, to the camera in the world."""
+    if not np.isfinite(numbers).all() or not np.linalg.norm(numbers[:4]) > 0.0:
+        raise ValueError
+    R_CW = matrix_from_quat(numbers[:4])
+    return R_CW.T, -R_CW.T @ numbers[4:]
+
+
+def _rows(file: Path) -> list[list[str]]:
+    return [line.split() for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+
+
+def _cameras_txt(file: Path) -> dict[int, tuple[str, int, int, Array]]:
+    rows = [row for row in _rows(file) if row]
+    return {int(r[0]): (r[1], int(r[2]), int(r[3]), np.array([float(word) for word in r[4:]])) for r in rows}
+
+
+def _images_txt(file: Path) -> Iterator[tuple[str, Array, int]]:
+    """Two lines an image; the second, of its points, may be empty."""
+    rows = _rows(file)
+    while rows and not rows[-1]:
+        rows.pop()
+    for row in rows[::2]:
+        yield " ".join(row[9:]), np.array([float(word) for word in row[1:8]]), int(row[8])
+
+
+def _cameras_bin(file: Path) -> dict[int, tuple[str, int, int, Array]]:
+    data, at, out = file.read_bytes(), 8, {}
+    for _ in range(struct.unpack_from("<Q", data)[0]):
+        number, kind, width, height = struct.unpack_from("<iiQQ", data, at)
+        model = _MODELS[kind] if 0 <= kind < len(_MODELS) else f"number {kind}"
+        if model not in COUNTS:
+            raise InputError(f"{file}: camera model {model} is not known here, allowed are {', '.join(LAYOUTS)}")
+        out[number] = (model, width, height, np.frombuffer(data, "<f8", COUNTS[model], at + 24))
+        at += 24 + 8 * COUNTS[model]
+    if at != len(data):
+        raise ValueError
+    return out
+
+
+def _images_bin(file: Path) -> Iterator[tuple[str, Array, int]]:
+    data, at = file.read_bytes(), 8
+    for _ in range(struct.unpack_from("<Q", data)[0]):
+        numbers = np.frombuffer(data, "<f8", 7, at + 4)
+        (camera,) = struct.unpack_from("<i", data, at + 60)
+        end = data.index(b"\0", at + 64)
+        yield data[at + 64 : end].decode(), numbers, camera
+        (points,) = struct.unpack_from("<Q", data, end + 1)
+        at = end + 9 + 24 * points
+    if at != len(data):
+        raise ValueError
+
 
 LEAST_CAMERAS = 2
 MOST_SKEW = 1e-3
@@ -253,3 +354,94 @@ def _read_strecha(files: list[Path]) -> KnownCameras:
         params = np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2], 0.0, 0.0, 0.0, 0.0])
         lenses[name] = Lens(width=int(size[0]), height=int(size[1]), params=params)
     return KnownCameras(rotations=rotations, positions=positions, lenses=lenses)
+
+
+def read_reference_cameras(path: Path) -> dict[str, Array]:
+    """Camera centres in m, shape (3,), by photo name.
+
+    Parameters
+    ----------
+    path : Path
+        A folder of `<photo>.camera` files (C. Strecha et al., CVPR 2008, doi 10.1109/CVPR.2008.4587706: rows of K, a
+        row of zeros, rows of the camera-to-world rotation, the camera centre, the image size), or a CSV file with
+        columns name, x_m, y_m, z_m.
+
+    Raises
+    ------
+    InputError
+        If nothing is there, or a file does not hold what it should.
+    """
+    if path.is_dir():
+        files = sorted(path.glob("*.camera"))
+        if not files:
+            raise InputError(f"{path}: holds no .camera files; a folder of them or a CSV file is needed")
+        return {file.name.removesuffix(".camera"): _read_camera(file) for file in files}
+    if not path.is_file():
+        raise InputError(
+            f"{path}: does not exist; a folder of .camera files or a CSV file (name,x_m,y_m,z_m) is needed"
+        )
+    return _read_csv(path)
+
+
+def _read_camera(path: Path) -> Array:
+    """Centre from one .camera file: the 8th row, after K (3 rows), zeros and R (3 rows)."""
+    try:
+        rows = [[float(word) for word in line.split()] for line in path.read_text(encoding="utf-8").splitlines()]
+    except (ValueError, UnicodeDecodeError):
+        raise InputError(f"{path}: is no .camera file, holds something that is no number") from None
+    rows = [row for row in rows if row]
+    if len(rows) < 8 or len(rows[7]) != 3 or not np.all(np.isfinite(rows[7])):
+        raise InputError(f"{path}: is no .camera file; row 8 must hold the camera centre, 3 numbers")
+    return np.array(rows[7])
+
+
+def _read_csv(path: Path) -> dict[str, Array]:
+    wanted = ("name", "x_m", "y_m", "z_m")
+    out: dict[str, Array] = {}
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.DictReader(file)
+            missing = [column for column in wanted if column not in (reader.fieldnames or ())]
+            if missing:
+                how = other_separator(reader.fieldnames)
+                raise InputError(f"{path}: has no column {', '.join(missing)}; needed are {', '.join(wanted)}{how}")
+            for row in reader:
+                if row["name"] in out:
+                    raise InputError(f"{path}: line {reader.line_num}: {row['name']} is there twice")
+                out[row["name"]] = _position(path, reader.line_num, [row[c] for c in wanted[1:]])
+    except (UnicodeDecodeError, csv.Error):
+        raise InputError(f"{path}: is no CSV text; needed is a table with columns {', '.join(wanted)}") from None
+    if not out:
+        raise InputError(f"{path}: holds no cameras, needs at least 3 rows")
+    return out
+
+
+def _position(path: Path, line: int, words: list[str | None]) -> Array:
+    try:
+        position = np.array([float(word or "") for word in words])
+    except ValueError:
+        raise InputError(f"{path}: line {line} holds {words}, allowed are three numbers x_m, y_m, z_m") from None
+    if not np.all(np.isfinite(position)):
+        raise InputError(f"{path}: line {line} holds {words}, every coordinate must be finite")
+    return position
+
+
+def match_references(references: dict[str, Array], names: Iterable[str]) -> dict[str, Array]:
+    """References by the photos' own names; a name matches whole or without its suffix (0001.png for 0001.jpg).
+
+    Raises
+    ------
+    InputError
+        If fewer than three photos have a reference.
+    """
+    by_stem = {Path(name).stem: position for name, position in references.items()}
+    photos = list(names)
+    found = {n: references.get(n, by_stem.get(Path(n).stem)) for n in photos}
+    matched = {name: np.asarray(p, dtype=np.float64) for name, p in found.items() if p is not None}
+    if len(matched) < 3:
+        example = f"{next(iter(references))} for {photos[0]}" if references and photos else "none given"
+        raise InputError(
+            f"reference cameras: {len(matched)} of {len(photos)} photos have one, at least 3 must; "
+            f"the names must be the photos' names ({example})"
+        )
+    return matched

@@ -20,8 +20,7 @@ from wakewise.core.run_lock import exclusive_run, temporary_prefix
 from wakewise.vision.reconstruction.clouds import read_cloud, write_cloud, write_mesh
 from wakewise.vision.reconstruction.colmap import call_apart, pycolmap
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
-from wakewise.vision.reconstruction.stage_keys import stage_key
-from wakewise.vision.reconstruction.stages import StageResult, need_room, read_stamp, run_stage
+from wakewise.vision.reconstruction.stages import StageResult, need_room, read_stamp, run_stage, stage_key
 
 FIGURES = ("mesh_vertices", "mesh_faces", "mesh_points_left_out")
 SUBJECT_PCT = (5.0, 95.0)

@@ -21,9 +21,9 @@ from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.vision.reconstruction.dense import in_order
+from wakewise.vision.reconstruction.features import Features, photo_features
 from wakewise.vision.reconstruction.photos import Image, PhotoStore, read_photos, unsupported_files
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
-from wakewise.vision.reconstruction.sift import Features, photo_features
 from wakewise.vision.reconstruction.video_frames import sharpness_of
 
 LOOKED_PX, MATCHED_PX, FEATURES = 1600, 640, 700

@@ -1,4 +1,9 @@
-"""The whole way from a folder of photos to a model, stage by stage; each can be rerun from its files."""
+"""The whole way from a folder of photos to a model, stage by stage; each can be rerun from its files.
+
+What may be asked of a reconstruction besides its photographs: lengths, masks, a box to cut to, where to stop.
+
+The stages as the pipeline calls them: room on the disk is looked for first, and what is fixed is passed on.
+"""
 
 from __future__ import annotations
 
@@ -6,34 +11,204 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from wakewise.core.arrays import Array
-from wakewise.core.errors import InputError
+from wakewise.core.arrays import Array, BoolArray, freeze
+from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import write_json
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.run_lock import exclusive_run
+from wakewise.vision.reconstruction.clouds import read_cloud, write_cloud
+from wakewise.vision.reconstruction.colmap import pycolmap
+from wakewise.vision.reconstruction.dense import densify, patch_match, require_cuda
+from wakewise.vision.reconstruction.features import database_bytes, match_photos
 from wakewise.vision.reconstruction.guided import Poses
-from wakewise.vision.reconstruction.image_retrieval import LOOK_ALIKES
-from wakewise.vision.reconstruction.known_cameras import KnownCameras, match_known
-from wakewise.vision.reconstruction.lens_groups import group_photos, known_groups, named_lenses
+from wakewise.vision.reconstruction.known_cameras import KnownCameras, match_known, match_references
+from wakewise.vision.reconstruction.known_pose_triangulation import common_region
+from wakewise.vision.reconstruction.lens_groups import LensGroup, group_photos, known_groups, named_lenses
 from wakewise.vision.reconstruction.lenses import Lens
-from wakewise.vision.reconstruction.mapping import MAPPINGS
+from wakewise.vision.reconstruction.mapping import MAPPINGS, map_photos
 from wakewise.vision.reconstruction.masks import read_masks
 from wakewise.vision.reconstruction.meshing import FIGURES as MESH_FIGURES
 from wakewise.vision.reconstruction.meshing import mesh_model
-from wakewise.vision.reconstruction.pairs import BAND_NEIGHBOURS, POSE_NEIGHBOURS, choose_pairs, uses_retrieval
-from wakewise.vision.reconstruction.patchmatch import require_cuda
+from wakewise.vision.reconstruction.pairs import (
+    BAND_NEIGHBOURS,
+    LOOK_ALIKES,
+    POSE_NEIGHBOURS,
+    Pairs,
+    choose_pairs,
+    uses_retrieval,
+)
 from wakewise.vision.reconstruction.photos import Photo, PhotoStore, read_photos, unsupported_files, without_duplicates
-from wakewise.vision.reconstruction.references import match_references
 from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
-from wakewise.vision.reconstruction.request import ReconstructionRequest
+from wakewise.vision.reconstruction.scale.bars import ScaleBars
+from wakewise.vision.reconstruction.scale.position_fixes import PositionFixes
+from wakewise.vision.reconstruction.scale.stage import place_model, scale_model
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
-from wakewise.vision.reconstruction.stage_keys import stage_key
-from wakewise.vision.reconstruction.stages import StageResult, invalidate_stage, make_folder, run_stage
-from wakewise.vision.reconstruction.steps import dense_step, map_step, match_step, scale_step
+from wakewise.vision.reconstruction.stages import (
+    StageResult,
+    invalidate_stage,
+    make_folder,
+    need_room,
+    run_stage,
+    stage_key,
+)
+
+LEAST_POINTS = 100
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CropBox:
+    """What is kept of a model: from one corner to the other along its axes, in its units (m where it has a scale)."""
+
+    low: Array
+    high: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, low=(3,), high=(3,))
+        if not (np.isfinite(self.low).all() and np.isfinite(self.high).all() and (self.low < self.high).all()):
+            raise InputError(
+                f"crop: from {np.round(self.low, 6).tolist()} to {np.round(self.high, 6).tolist()}; each of X0 Y0 Z0 "
+                "must be below X1 Y1 Z1"
+            )
+
+    def holds(self, points: Array) -> BoolArray:
+        """Which points, shape (n, 3), lie in it."""
+        return np.asarray(((points >= self.low) & (points <= self.high)).all(axis=1))
+
+    def key(self) -> list[float]:
+        """Plain values."""
+        return [*self.low.tolist(), *self.high.tolist()]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReconstructionRequest:
+    """bars: lengths that give scale; fixes: weak knowledge of places, which gives it without bars; masks: a folder of
+    them; crop: what dense points and mesh are kept of; until: the last stage.
+    """
+
+    bars: ScaleBars | None = None
+    fixes: PositionFixes | None = None
+    masks: Path | None = None
+    crop: CropBox | None = None
+    until: Literal["sparse", "dense", "mesh"] = "mesh"
+
+
+def cut_cloud(path: Path, box: CropBox) -> int:
+    """Keep of a cloud on disk what lies in a box; how many points that is.
+
+    Raises
+    ------
+    StageError
+        If too little is left; the message says where the points are.
+    """
+    cloud = read_cloud(path)
+    kept = box.holds(cloud.points_m)
+    if kept.sum() < LEAST_POINTS:
+        low, high = np.quantile(cloud.points_m, (0.01, 0.99), axis=0)
+        path.unlink()
+        raise StageError(
+            f"crop: {kept.sum()} of {len(kept)} points lie in the box, at least {LEAST_POINTS} must; nearly all lie "
+            f"from {np.round(low, 4).tolist()} to {np.round(high, 4).tolist()}"
+        )
+    write_cloud(path, cloud.only(kept))
+    return int(kept.sum())
+
+
+def match_step(
+    store: PhotoStore,
+    photos: tuple[Photo, ...],
+    database: Path,
+    settings: ReconstructionSettings,
+    focal_px: float | None,
+    groups: tuple[LensGroup, ...],
+    pairs: Pairs,
+    poses: Poses | None,
+    fixed: bool,
+    look_alikes: int,
+    progress: Progress,
+) -> dict[str, Any]:
+    """Photos to database.db; see `features.match_photos`. `fixed`: the poses are known and stay."""
+    need_room(database.parent, database_bytes(len(photos), len(pairs) + look_alikes * len(photos), settings), "match")
+    return match_photos(
+        store.folder,
+        photos,
+        database,
+        settings,
+        focal_px=focal_px,
+        pairs=pairs,
+        progress=progress,
+        store=store,
+        groups=groups,
+        poses=poses,
+        may_be_none=fixed,
+        look_alikes=look_alikes,
+    )
+
+
+def map_step(
+    store: PhotoStore,
+    database: Path,
+    sparse: Path,
+    settings: ReconstructionSettings,
+    photos: int,
+    references: dict[str, Array] | None,
+    poses: Poses | None,
+    fixed: bool,
+    progress: Progress,
+) -> dict[str, Any]:
+    """database.db to sparse/; see `mapping.map_photos`. `fixed`: the poses are known and stay."""
+    # Points and tracks are a part of what the database holds; it is copied.
+    need_room(sparse.parent, 2.0 * database.stat().st_size, "map")
+    return map_photos(
+        store.folder,
+        database,
+        sparse,
+        settings,
+        photos=photos,
+        references=references,
+        progress=progress,
+        store=store,
+        poses=None if fixed else poses,
+        fixed=poses if fixed else None,
+    )
+
+
+def scale_step(
+    store: PhotoStore, sparse: Path, wishes: ReconstructionRequest, threads: int, referred: bool, progress: Progress
+) -> dict[str, Any]:
+    """sparse/ in metres; see `scale.stage`. The surest gives the scale: references (`referred`), then bars, then fixes;
+    the others check it.
+    """
+    figures: dict[str, Any] = {}
+    if wishes.bars is not None:
+        figures |= scale_model(store, sparse, wishes.bars, threads, progress, keep=referred)
+    if wishes.fixes is not None:
+        figures |= place_model(sparse, wishes.fixes, keep=referred or wishes.bars is not None)
+    return figures
+
+
+def dense_step(
+    store: PhotoStore,
+    sparse: Path,
+    dense: Path,
+    settings: ReconstructionSettings,
+    region: RegionOfInterest | None,
+    fixed: bool,
+    crop: CropBox | None,
+    progress: Progress,
+) -> dict[str, Any]:
+    """sparse/ to dense.ply, cut to a box; see `dense.densify`. `fixed`: the poses are known and stay."""
+    if fixed and region is None:
+        region = common_region(pycolmap.Reconstruction(sparse))
+    if settings.dense == "patch-match":
+        figures = patch_match(store.folder, sparse, dense, settings, region=region, progress=progress)
+    else:
+        figures = densify(store.folder, sparse, dense, settings, region=region, progress=progress, store=store)
+    return figures if crop is None else figures | {"dense_points": cut_cloud(dense, crop)}
+
 
 LATER = ("scale_bars", "scale_fixes", "dense_points", "depth_maps", "point_spacing_mm", *MESH_FIGURES)
 """Figures of stages that may not be asked for."""

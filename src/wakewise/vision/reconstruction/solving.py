@@ -12,8 +12,7 @@ import numpy as np
 from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.colmap import call, call_apart, pycolmap
 from wakewise.vision.reconstruction.features import match_pairs
-from wakewise.vision.reconstruction.image_retrieval import read_descriptors
-from wakewise.vision.reconstruction.pairs import Pairs
+from wakewise.vision.reconstruction.pairs import Pairs, read_descriptors
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 
 # Most iterations of a bundle adjustment.

@@ -1,4 +1,7 @@
-"""Stages that are skipped when their files are there and were made from the same input with the same settings."""
+"""Stages that are skipped when their files are there and were made from the same input with the same settings.
+
+What each stage's result hangs on, as a fingerprint.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,8 @@ from typing import Any
 
 from wakewise.core.errors import EnvironmentFailure, InputError, WakewiseError, is_full
 from wakewise.core.files import write_json
-from wakewise.vision.reconstruction.colmap import RESERVE_MB
+from wakewise.vision.reconstruction.colmap import RESERVE_MB, pycolmap
+from wakewise.vision.reconstruction.settings import ReconstructionSettings
 
 LOW_DISK_MB = 5.0
 
@@ -125,3 +129,28 @@ def read_stamp(folder: Path, name: str) -> dict[str, Any]:
         return {}
     whole = isinstance(value, dict) and {"key", "wall_s", "figures"} <= value.keys()
     return value if whole else {}
+
+
+# Part of every stage's fingerprint: raise it when a stage's result changes for the same input.
+VERSION = 10
+STAGES: dict[str, tuple[str, ...]] = {
+    "match": ("detector", "max_features", "first_octave", "lens"),
+    "map": (
+        "mapper",
+        "refine_camera",
+        "lens_check",
+        "known_cameras",
+        "reprojection_px",
+        "position_priors",
+        "prior_sigma_m",
+    ),
+    "scale": (),
+    "dense": ("dense", "dense_px", "dense_zoom", "stereo_paths", "stereo_partners", "agreeing_views"),
+    "mesh": ("mesh_depth",),
+}
+
+
+def stage_key(settings: ReconstructionSettings, stage: str, before: str, *parts: Any) -> str:
+    """Fingerprint of all that a stage's result hangs on; `before` is that of the stage before."""
+    used = {field: getattr(settings, field) for field in STAGES[stage]}
+    return fingerprint(VERSION, pycolmap.__version__, stage, before, used, parts)

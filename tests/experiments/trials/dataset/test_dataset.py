@@ -16,7 +16,7 @@ from croissant_rules import complaints
 from made_trials import POSE, make_trial, target_mesh
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.exports.frames import ros_body
+from wakewise.experiments.exports.records import ros_body
 from wakewise.experiments.trials.dataset import build_dataset, check_dataset, read_words
 from wakewise.experiments.trials.dataset.statement import DatasetStatement
 from wakewise.ui.cli.main import run

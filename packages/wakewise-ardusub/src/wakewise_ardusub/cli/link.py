@@ -80,9 +80,8 @@ def log(
     from wakewise.core.errors import InputError
     from wakewise.core.optional_dependencies import has
     from wakewise.robot.vehicles import load_vehicle
-    from wakewise_ardusub.logs.folder import log_facts, write_folder
     from wakewise_ardusub.logs.read import read_log
-    from wakewise_ardusub.logs.table import tabulate
+    from wakewise_ardusub.logs.table import log_facts, tabulate, write_folder
 
     chosen = load_vehicle(vehicle or DEFAULT_VEHICLE)
     region = region_ahead(chosen, ahead, points)

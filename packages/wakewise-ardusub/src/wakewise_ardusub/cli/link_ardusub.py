@@ -29,8 +29,7 @@ from wakewise_ardusub.cli.link_ardusub_check import (
 
 if TYPE_CHECKING:
     from wakewise_ardusub.link.connection import Endpoint
-    from wakewise_ardusub.session.protected_region import ProtectedRegion
-    from wakewise_ardusub.session.session import VehicleSession
+    from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession
 
 DEFAULT_VEHICLE = "bluerov2-heavy"
 LINE_S = 0.2
@@ -171,7 +170,7 @@ def ardusub(
     from wakewise.operation import load_scenario, parse_overrides
     from wakewise_ardusub.link.connection import parse_connection
     from wakewise_ardusub.link.engagement_fsm import EngagementLimits
-    from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
+    from wakewise_ardusub.link.transports import MavlinkCodec
     from wakewise_ardusub.session.cameras import parse_camera
     from wakewise_ardusub.session.link_join import SEA
     from wakewise_ardusub.session.session import VehicleSession
@@ -240,9 +239,8 @@ def _uninterrupted() -> Iterator[None]:
 def _carried(stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None) -> tuple[Any, Any]:
     """What carries the bytes, and what is to be done once the session is there."""
     from wakewise.core.errors import InputError
-    from wakewise_ardusub.link.mavlink_codec import RelayTransport
     from wakewise_ardusub.link.mavlink_relay import MavlinkRelay
-    from wakewise_ardusub.link.transports import carrier_of, open_udp
+    from wakewise_ardusub.link.transports import RelayTransport, carrier_of, open_udp
 
     if ground_at is None:
         carrier = carrier_of(vehicle_at)
@@ -306,7 +304,7 @@ def _spare(vehicle: str, target: str | None, ahead: float, points: Path | None) 
     from wakewise.robot.importers import any_vehicle
     from wakewise.scene.targets import Region
     from wakewise_ardusub.logs.replay_allocation import bow_points
-    from wakewise_ardusub.session.protected_region import ProtectedRegion
+    from wakewise_ardusub.session.session import ProtectedRegion
 
     if target is not None and points is not None:
         raise InputError("--target, --points: both say what to spare, give one")

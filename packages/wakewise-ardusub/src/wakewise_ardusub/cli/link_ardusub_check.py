@@ -12,9 +12,8 @@ import typer
 from wakewise.ui.cli.console import ProgressBars, escaped, print_json, print_table
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.link.checks import CheckInputs, CheckResult
+    from wakewise_ardusub.link.checks import Answer, CheckInputs, CheckResult, MotorResults
     from wakewise_ardusub.link.connection import Connection
-    from wakewise_ardusub.link.motor_results import Answer, MotorResults
     from wakewise_ardusub.link.motor_test import MotorTestStep
 
 Check = Annotated[
@@ -69,8 +68,7 @@ def check_vehicle(
 ) -> None:
     """Print every row and the verdict; end with 1 unless it is go, with 2 where motors were not seen to turn."""
     from wakewise.robot.importers import any_vehicle
-    from wakewise_ardusub.link.checks import CheckInputs, check, verdict
-    from wakewise_ardusub.link.motor_results import read_results
+    from wakewise_ardusub.link.checks import CheckInputs, check, read_results, verdict
     from wakewise_ardusub.link.parameters import SYSTEM_NAMES, first_of, read_parameter_file
     from wakewise_ardusub.link.vehicle_survey import survey
 
@@ -100,7 +98,7 @@ def test_vehicle_motors(
 ) -> None:
     """Turn motors one by one with the operator's consent, and keep what was seen."""
     from wakewise.robot.importers import any_vehicle
-    from wakewise_ardusub.link.motor_results import read_results, write_results
+    from wakewise_ardusub.link.checks import read_results, write_results
     from wakewise_ardusub.link.motor_test import planned_turns, run_motor_test
     from wakewise_ardusub.link.parameters import read_parameters
     from wakewise_ardusub.link.vehicle_survey import await_autopilot
@@ -144,7 +142,7 @@ class _Person:
         return typer.confirm("turn it now?", default=False, err=True)
 
     def saw(self, turn: MotorTestStep) -> Answer:
-        from wakewise_ardusub.link.motor_results import ANSWERS
+        from wakewise_ardusub.link.checks import ANSWERS
 
         letters: dict[str, Answer] = dict(zip("yonx", ANSWERS, strict=False))
         words = f"pushed {turn.expected}? y: yes, o: the other way, n: another motor turned, x: nothing turned"

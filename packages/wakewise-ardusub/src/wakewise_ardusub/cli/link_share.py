@@ -40,7 +40,7 @@ def share(connection: Connection = VEHICLE, out: Out = None, seconds: Seconds = 
     What comes from one goes to all others as it is. On a vehicle, BlueOS's MAVLink Endpoints do this.
     """
     from wakewise_ardusub.link.connection import parse_connection
-    from wakewise_ardusub.link.mavlink_router import MavlinkRouter
+    from wakewise_ardusub.link.mavlink_relay import MavlinkRouter
 
     places = [parse_connection(connection), *(parse_connection(each, "--out") for each in out or OUTS)]
     shared = MavlinkRouter(places)

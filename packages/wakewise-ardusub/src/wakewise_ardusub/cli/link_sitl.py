@@ -122,7 +122,7 @@ def sitl(
     """
     from wakewise.operation import load_scenario
     from wakewise_ardusub.physics import PhysicsServer, PulseTable
-    from wakewise_ardusub.physics.udp import open_socket, serve
+    from wakewise_ardusub.physics.physics import open_socket, serve
     from wakewise_ardusub.sitl.own_parameters import read_params
     from wakewise_ardusub.sitl_plant import SitlPlant
 
@@ -262,9 +262,8 @@ def _depth_watch(stack: ExitStack, where: str) -> DepthMonitor | None:
     if not has("links"):
         typer.echo("the autopilot's depth is not compared: the extra `links` is not installed", err=True)
         return None
-    from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
     from wakewise_ardusub.link.protocol import DEFAULT_SYSTEM
-    from wakewise_ardusub.link.transports import carrier_of
+    from wakewise_ardusub.link.transports import MavlinkCodec, carrier_of
 
     try:
         carrier = carrier_of(parse_connection(f"udpin:{where}", "--watch"))
@@ -283,8 +282,8 @@ def _physics_line(figures: PhysicsFigures, depths: DepthMonitor | None) -> str:
     pulses = " ".join(str(pulse) for pulse in figures.pulses_us[:8])
     where = figures.stage or ("" if depths is None else depths.words)
     return (
-        f"{format_value(figures.rate_hz)} Hz, {figures.lost} lost, {figures.repeats} repeated, {figures.refused} refused; "
-        f"t {figures.time_s:.1f} s, depth {figures.depth_m or 0.0:.2f} m{', ' if where else ''}{where}; pulses {pulses}"
+        f"{format_value(figures.rate_hz)} Hz, {figures.lost} lost, {figures.repeats} repeated, "
+        f"{figures.refused} refused; t {figures.time_s:.1f} s, depth {figures.depth_m or 0.0:.2f} m{', ' if where else ''}{where}; pulses {pulses}"
     )
 
 

@@ -109,7 +109,7 @@ def meter(
     from wakewise.robot.vehicles import load_vehicle
     from wakewise_ardusub.link.parameters import read_parameter_file
     from wakewise_ardusub.vehicle_summary import VehicleSummary
-    from wakewise_ardusub.wash_meter.settings import MeterSettings
+    from wakewise_ardusub.wash_meter.run import MeterSettings
 
     chosen = load_vehicle(vehicle)
     craft = VehicleSummary.of(chosen, wake.wake_model(wake_model))

@@ -1,19 +1,114 @@
-"""What a session needs of the autopilot's parameters to drive its motors; thrusts to slots, servos to thrusts."""
+"""What a session needs of the autopilot's parameters to drive its motors; thrusts to slots, servos to thrusts.
+
+Thrusts in newtons become what the script is told: a value in [-1, 1] for each motor, all of them or none.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from wakewise.core.arrays import Array
+from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import Vehicle
-from wakewise_ardusub.link.output import MotorOutput, motor_output
-from wakewise_ardusub.link.protocol import SLOTS
-from wakewise_ardusub.motors import OUTPUTS, channels_of_motors
+from wakewise_ardusub.link.protocol import FULL_US, MIDDLE_US, SLOTS
+from wakewise_ardusub.motors import (
+    OUTPUTS,
+    channels_of_motors,
+    limits_of_motors,
+    pulses_of_thrusts,
+    require_motors,
+    supply_in_table,
+    thrusts_of_pulses,
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MotorOutput:
+    """How a vehicle's thrusters are driven through its autopilot; made by `motor_output`.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    directions : ndarray, shape (n,)
+        MOT_n_DIRECTION of each thruster's motor, 1 or -1. An override goes past the mixer that would apply it.
+    """
+
+    vehicle: Vehicle
+    directions: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, directions=(len(self.vehicle.thrusters),))
+
+    def pulses_us(self, thrusts_N: Array, battery_V: float = math.nan) -> Array:
+        """Whole pulses for wished thrusts, shape (n,), at the battery's voltage; unknown, the vehicle file's.
+
+        Raises
+        ------
+        InputError
+            If a thrust is not finite or there are not as many as thrusters.
+        """
+        self._require(np.shape(thrusts_N))
+        return pulses_of_thrusts(self.vehicle, thrusts_N, self.directions, supply_in_table(self.vehicle, battery_V))
+
+    def controls(self, thrusts_N: Array, battery_V: float = math.nan) -> Array:
+        """Wished thrusts, shape (n,), as `controls` of SET_ACTUATOR_CONTROL_TARGET, shape (8,); NaN without a motor."""
+        pulses = self.pulses_us(thrusts_N, battery_V)
+        filled = np.full(SLOTS, np.nan)
+        filled[: pulses.size] = (pulses - MIDDLE_US) / FULL_US
+        return filled
+
+    def neutral(self) -> Array:
+        """`controls` of motors at rest, shape (8,)."""
+        return self.controls(np.zeros(len(self.vehicle.thrusters)))
+
+    def delivered_N(self, pulses_us: Array, battery_V: float = math.nan) -> Array:
+        """Thrusts, shape (n,), of pulses: what comes of `pulses_us`, by the vehicle's own table."""
+        self._require(np.shape(pulses_us))
+        supply_V = supply_in_table(self.vehicle, battery_V)
+        return thrusts_of_pulses(self.vehicle, pulses_us, self.directions, supply_V)
+
+    def limits_N(self, battery_V: float = math.nan) -> tuple[Array, Array]:
+        """Lowest and highest thrusts at the battery's voltage, shape (n,) each."""
+        return limits_of_motors(self.vehicle, self.directions, supply_in_table(self.vehicle, battery_V))
+
+    def _require(self, shape: tuple[int, ...]) -> None:
+        if shape != self.directions.shape:
+            raise InputError(
+                f"thrusts: shape {shape}, vehicle {self.vehicle.name} has {self.directions.size} thrusters"
+            )
+
+
+def motor_output(vehicle: Vehicle, parameters: Mapping[str, float]) -> MotorOutput:
+    """How a vehicle is driven through an autopilot with these parameters.
+
+    Raises
+    ------
+    InputError
+        If the autopilot drives other motors than the vehicle has, or a direction is missing or neither 1 nor -1.
+    """
+    count = len(vehicle.thrusters)
+    if count > SLOTS:
+        raise InputError(f"vehicle {vehicle.name}: {count} thrusters, one message holds {SLOTS} motors")
+    require_motors(
+        vehicle,
+        list(channels_of_motors(parameters)),
+        "the autopilot",
+        "name the vehicle file of this vehicle, or set FRAME_CONFIG and SERVOn_FUNCTION to its motors",
+    )
+    for motor in range(1, count + 1):
+        name = f"MOT_{motor}_DIRECTION"
+        value = parameters.get(name)
+        if value is None:
+            raise InputError(f"{name}: the autopilot did not say it, and without it motor {motor} may run backwards")
+        if value not in {1.0, -1.0}:
+            raise InputError(f"{name} = {value:g}: must be 1 or -1")
+    directions = np.array([parameters[f"MOT_{motor}_DIRECTION"] for motor in range(1, count + 1)])
+    return MotorOutput(vehicle=vehicle, directions=directions)
 
 
 class MotorInterface(Protocol):

@@ -6,6 +6,10 @@ all of them lost, the script would let go `HOLD_MS` after the last thrusts. The 
 so that lost messages do no harm, for no longer than `EngagementLimits.thrusts_s`.
 
 Any thread may call it. It waits for nothing but its own lock, which is held for no longer than a message takes.
+
+How near what must be fresh comes to its limit, and how often it was over it: what a pilot looks at who loses it.
+
+What of a session is worth a line in its journal: changes of the vehicle and of who speaks to it.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -23,20 +27,110 @@ from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Measurement
 from wakewise_ardusub.link import protocol
 from wakewise_ardusub.link.buttons import BUTTON_PARAMETERS, button_faults
-from wakewise_ardusub.link.engagement_fsm import EngagementInputs, EngagementLimits, EngagementState, faults
-from wakewise_ardusub.link.freshness_margins import FreshnessMargins
-from wakewise_ardusub.link.journal_events import EventLogger
+from wakewise_ardusub.link.engagement_fsm import EngagementInputs, EngagementLimits, EngagementState, Transition, faults
 from wakewise_ardusub.link.message_state import REMEMBERED_S, LinkState, MavlinkMessage, tilt_of, update_link_state
 from wakewise_ardusub.link.motor_interface import MotorInterface
-from wakewise_ardusub.link.requests import (
-    AGAIN_S,
-    MOST_PARAMETERS,
-    PARAMETERS_S,
-    interval_requests,
-    parameter_request,
-)
+from wakewise_ardusub.link.protocol import AGAIN_S, MOST_PARAMETERS, PARAMETERS_S, interval_requests, parameter_request
 from wakewise_ardusub.link.session_log import SessionLog
 from wakewise_ardusub.link.telemetry_adapter import TelemetryAdapter, to_measurements
+
+SPAN_S = 60.0
+SHARE = 0.99
+_MOST = round(SPAN_S / 0.02)
+WHAT = ("pose", "sticks", "attitude")
+
+
+class FreshnessMargins:
+    """Ages of the last minute, looked at as often as the watch ticks, and trips.
+
+    A trip is a fault that ended an engagement, or took back that all was well.
+
+    Attributes
+    ----------
+    trips : Counter
+        By the kind of fault.
+    """
+
+    def __init__(self) -> None:
+        self.trips: Counter[str] = Counter()
+        self._ages: deque[tuple[float, float, float]] = deque(maxlen=_MOST)
+
+    def looked(self, facts: EngagementInputs) -> None:
+        """What is known at a tick."""
+        ages = (facts.pose_s, facts.operator_s, facts.telemetry_s)
+        if all(map(math.isfinite, ages)):
+            self._ages.append(ages)
+
+    def told(self, change: Transition) -> None:
+        """A change of state."""
+        if change.kind and change.before in ("ready", "engaged"):
+            self.trips[change.kind] += 1
+
+    def p99_s(self) -> dict[str, float]:
+        """The age that 99 of 100 looks of the last minute did not exceed, of each of `WHAT`; NaN before any."""
+        if not self._ages:
+            return dict.fromkeys(WHAT, math.nan)
+        return dict(zip(WHAT, np.quantile(np.array(self._ages), SHARE, axis=0).tolist(), strict=True))
+
+    def words(self, limits: EngagementLimits) -> str:
+        """For the status line: ages in ms against their limits, and trips."""
+        most = dict(zip(WHAT, (limits.pose_s, limits.operator_s, limits.telemetry_s), strict=True))
+        ages = [
+            f"{what} {1e3 * age_s:.0f}{'!' if age_s > most[what] else ''}"
+            for what, age_s in self.p99_s().items()
+            if math.isfinite(age_s)
+        ]
+        told = f"p99 ms {', '.join(ages)} of {1e3 * limits.pose_s:.0f}" if ages else ""
+        if self.trips:
+            which = ", ".join(f"{kind} {count}" for kind, count in self.trips.most_common())
+            told += f"{'  ' if told else ''}trips {self.trips.total()} ({which})"
+        return told
+
+
+TOLD_EVERY_S = 0.5
+"""News of one kind are written down no more often, but for changes of state."""
+
+
+class EventLogger:
+    """Writes into a journal, if there is one."""
+
+    def __init__(self, journal: SessionLog | None, clock: Callable[[], float]) -> None:
+        self._journal, self._clock = journal, clock
+        self._due: dict[str, tuple[float, int]] = {}
+        self._jump = ""
+
+    def tell(self, event: str, **told: Any) -> None:
+        """A line; what is told over and over only now and then, with how often it was left out."""
+        if self._journal is None:
+            return
+        now_s = self._clock()
+        due_s, left_out = self._due.get(event, (-math.inf, 0))
+        if event != "state" and now_s < due_s:
+            self._due[event] = (due_s, left_out + 1)
+            return
+        self._due[event] = (now_s + TOLD_EVERY_S, 0)
+        self._journal.write(event, **told, **({"left_out": left_out} if left_out else {}))
+
+    def changed(self, before: LinkState, after: LinkState, jump: str) -> None:
+        """What a message changed; `jump` is what was last said of a clock."""
+        if (before.armed, before.mode) != (after.armed, after.mode):
+            self.tell("vehicle", armed=after.armed, mode=after.mode_name)
+        if after.duplicate_s != before.duplicate_s and before.duplicate != after.duplicate:
+            self.tell("rival", words=after.duplicate)
+        if after.takeover_s != before.takeover_s:
+            self.tell("takeover", words=after.takeover)
+        if after.camera_s != before.camera_s:
+            self.tell("camera", words=after.camera)
+        if after.status != before.status:
+            self.tell("status", words=after.status)
+        if jump != self._jump:
+            self._jump = jump
+            self.tell("clock", words=jump)
+        if set(before.ground) != set(after.ground):
+            self.tell("ground stations", systems=sorted(after.ground))
+        if before.odd != after.odd:
+            self.tell("nonsense", message=after.odd[-1])
+
 
 Send = Callable[[str, Mapping[str, Any]], None]
 """Sends a message: its name as pymavlink's encoders have it, and its fields."""

@@ -1,6 +1,10 @@
 """What carries a session's bytes: UDP, TCP or a serial line, by the words that `connection.py` reads.
 
 UDP is what vehicles' routers offer and what is recommended: a stream that stalls keeps everything behind it waiting.
+
+Where MAVLink packets lie in a datagram, whatever else is in it: a packet counts only if its checksum is right.
+
+Bytes to messages and back: the companion's MAVLink 2 over whatever carries bytes.
 """
 
 from __future__ import annotations
@@ -8,13 +12,109 @@ from __future__ import annotations
 import select
 import socket
 import time
-from collections.abc import Callable
-from typing import Any
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from threading import Condition
+from typing import Any, Protocol
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise_ardusub.link.connection import Endpoint, open_serial
-from wakewise_ardusub.link.packets import partial_packet_start
+from wakewise_ardusub.link.message_state import MavlinkMessage
+from wakewise_ardusub.link.protocol import COMPANION_COMPONENT
 from wakewise_ardusub.sensors.devices import SerialPort
+
+_MARK_1, _MARK_2, _SIGNED = 0xFE, 0xFD, 0x01
+_HEAD_1, _HEAD_2, _CHECKSUM, _SIGNATURE = 6, 10, 2, 13
+
+
+@dataclass(frozen=True)
+class MavlinkPacket:
+    """A packet of a datagram: where it begins and ends, where its payload begins, and its message's number."""
+
+    start: int
+    end: int
+    payload: int
+    number: int
+
+
+@cache
+def dialect() -> Any:
+    """The messages that are known: ArduPilot's."""
+    from pymavlink.dialects.v20 import ardupilotmega
+
+    return ardupilotmega
+
+
+def packets(data: bytes) -> Iterator[MavlinkPacket | tuple[int, int]]:
+    """Packets in their order, and between them the stretches of bytes that are none, as (start, end).
+
+    Of a message that is unknown the checksum cannot be told, so it counts as a stretch that is none.
+    """
+    at = noise = 0
+    while (at := _next_mark(data, at)) < len(data):
+        packet = packet_at(data, at)
+        if packet is None:
+            at += 1
+            continue
+        if noise < at:
+            yield noise, at
+        yield packet
+        at = noise = packet.end
+    if noise < len(data):
+        yield noise, len(data)
+
+
+def packet_at(data: bytes, at: int) -> MavlinkPacket | None:
+    """The whole packet at an offset; None where there is none."""
+    size, mark = len(data), data[at]
+    if mark == _MARK_2 and at + _HEAD_2 + _CHECKSUM <= size:
+        payload, number = at + _HEAD_2, int.from_bytes(data[at + 7 : at + 10], "little")
+        signature = _SIGNATURE if data[at + 2] & _SIGNED else 0
+    elif mark == _MARK_1 and at + _HEAD_1 + _CHECKSUM <= size:
+        payload, number, signature = at + _HEAD_1, data[at + 5], 0
+    else:
+        return None
+    last = payload + data[at + 1]
+    end = last + _CHECKSUM + signature
+    message = dialect().mavlink_map.get(number)
+    if end > size or message is None:
+        return None
+    told = int.from_bytes(data[last : last + _CHECKSUM], "little")
+    return MavlinkPacket(at, end, payload, number) if checksum(data[at + 1 : last], message.crc_extra) == told else None
+
+
+def partial_packet_start(data: bytes) -> int:
+    """Where a packet begins whose end has not come yet, by what its head promises; the end where there is none."""
+    at = 0
+    for part in packets(data):
+        if isinstance(part, MavlinkPacket):
+            at = part.end
+    while (at := _next_mark(data, at)) < len(data):
+        if len(data) - at < _HEAD_2 or at + _HEAD_2 + data[at + 1] + _CHECKSUM + _SIGNATURE > len(data):
+            return at
+        at += 1
+    return len(data)
+
+
+def is_signed(data: bytes, packet: MavlinkPacket) -> bool:
+    """Whether a packet bears a signature, so that nobody may change it."""
+    return data[packet.start] == _MARK_2 and bool(data[packet.start + 2] & _SIGNED)
+
+
+def checksum(data: bytes, extra: int) -> int:
+    """CRC-16/MCRF4XX of a packet from its length on, with the extra byte of its message."""
+    crc = dialect().x25crc(data)
+    crc.accumulate(bytes([extra]))
+    return int(crc.crc)
+
+
+def _next_mark(data: bytes, at: int) -> int:
+    """Offset of the next byte that may begin a packet; the end where there is none."""
+    found = [place for mark in (_MARK_1, _MARK_2) if (place := data.find(mark, at)) >= 0]
+    return min(found, default=len(data))
+
 
 LARGEST = 65535
 _AT_ONCE = 4096
@@ -156,3 +256,82 @@ def _own_side(host: str) -> str:
 def _refused(endpoint: Endpoint, fault: OSError) -> EnvironmentFailure:
     taken = "another program listens there already" if fault.errno == _TAKEN else str(fault.strerror or fault)
     return EnvironmentFailure(f"{endpoint.words}: {taken}")
+
+
+class Transport(Protocol):
+    """Carries bytes to a vehicle and from it."""
+
+    def receive(self, timeout_s: float) -> bytes:
+        """Bytes that came; waits for some at most so long, and gives none then."""
+        ...
+
+    def send(self, data: bytes) -> None:
+        """Hand bytes over; may raise OSError."""
+        ...
+
+
+class MavlinkCodec:
+    """Speaks as the companion of a vehicle.
+
+    Parameters
+    ----------
+    carrier : Transport
+    system : int
+        The vehicle's id, which its companion shares.
+    """
+
+    def __init__(self, carrier: Transport, system: int) -> None:
+        self._carrier = carrier
+        self._out = dialect().MAVLink(None, srcSystem=system, srcComponent=COMPANION_COMPONENT)
+        self._in = dialect().MAVLink(None)
+
+    def receive(self, timeout_s: float) -> tuple[list[MavlinkMessage], int]:
+        """Messages that came, and how many stretches of bytes were none; waits at most so long for the first."""
+        data = self._carrier.receive(timeout_s)
+        said: list[MavlinkMessage] = []
+        noise = 0
+        for part in packets(data):
+            try:
+                if not isinstance(part, MavlinkPacket):
+                    raise TypeError
+                said.append(MavlinkMessage.of(self._in.decode(bytearray(data[part.start : part.end]))))
+            except Exception:  # pymavlink raises what the fields made it raise
+                noise += 1
+        return said, noise
+
+    def send(self, name: str, fields: Mapping[str, Any]) -> None:
+        """Send a message, by the name of pymavlink's encoder."""
+        message = getattr(self._out, f"{name}_encode")(**fields)
+        data = message.pack(self._out)
+        self._out.seq = (self._out.seq + 1) % 256
+        self._carrier.send(bytes(data))
+
+
+class RelayTransport:
+    """A `Transport` beside a relay: what it forwards is put in here, and what is to be sent goes out through it."""
+
+    def __init__(self, most: int = 4096) -> None:
+        self._waiting: deque[bytes] = deque(maxlen=most)
+        self._came = Condition()
+        self.out: Any = None
+        """Sends bytes to the vehicle; set once the relay is there."""
+
+    def put(self, data: bytes) -> None:
+        """A datagram went by."""
+        with self._came:
+            self._waiting.append(data)
+            self._came.notify()
+
+    def receive(self, timeout_s: float) -> bytes:
+        """All that went by since."""
+        with self._came:
+            if not self._waiting:
+                self._came.wait(timeout_s)
+            data = b"".join(self._waiting)
+            self._waiting.clear()
+            return data
+
+    def send(self, data: bytes) -> None:
+        """Hand bytes to the relay."""
+        if self.out is not None:
+            self.out(data)

@@ -9,12 +9,10 @@ from typing import Any
 
 from wakewise.core.errors import EnvironmentFailure
 from wakewise.robot.vehicles import Vehicle
-from wakewise_ardusub.link.checks import CheckInputs, ReceivedTelemetry
+from wakewise_ardusub.link.checks import CheckInputs, MotorResults, ReceivedTelemetry
 from wakewise_ardusub.link.connection import MavlinkSession, send_command
-from wakewise_ardusub.link.motor_results import MotorResults
 from wakewise_ardusub.link.parameters import read_parameters
-from wakewise_ardusub.link.protocol import AUTOPILOT_COMPONENT, HEARTBEAT_PERIOD_S, VERSION_NAME
-from wakewise_ardusub.link.requests import interval_requests
+from wakewise_ardusub.link.protocol import AUTOPILOT_COMPONENT, HEARTBEAT_PERIOD_S, VERSION_NAME, interval_requests
 
 LISTEN_S = 3.0
 """Long enough for the script, which speaks twice a second, and for sticks and poses."""

@@ -4,21 +4,211 @@ Channels, all in SI, NED and FRD: `sticks` (forward, right, down, turn in [-1, 1
 `attitude` (roll, pitch, yaw in rad), `position` (north, east, down of the autopilot's origin, m), `armed`, `mode` (its
 number), `voltage`; of depth, each source by itself: `depth VFR_HUD`, `depth AHRS2`, `depth CTUN`, `depth BARO` (m),
 `pressure 1` to `pressure 3` (Pa).
+
+One clock for a log whose own may jump: computers without a battery set theirs when the network tells them.
+
+What a vehicle is by its own words: the type in its heartbeats, the name of its firmware, parameters of one alone.
+
+Tables of ArduSub (its modes, its channels, its motors) are used for nothing else than an ArduSub.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise_ardusub.logs.clock import ClockJump, LogClock
-from wakewise_ardusub.logs.identity import VehicleIdentity, firmware_of_parameters
+
+BACK_S, AHEAD_S = 0.5, 3.0
+"""Steps from one record to the next beyond these are questioned."""
+LONGEST_PAUSE_S = 3600.0
+"""Longest pause that is believed where no second clock tells of it."""
+_AGREE_S = 1.0
+
+
+@dataclass(frozen=True)
+class ClockJump:
+    """A step of the log's clock that was taken out: when, on the mended clock, and by how much."""
+
+    time_s: float
+    step_s: float
+
+
+class LogClock:
+    """Turns the stamps of records, in the order of the file, into seconds from the first one that never run back.
+
+    A step back, or ahead by more than `AHEAD_S`, is a jump or a pause. The vehicle's time since boot tells which: after
+    the step the mended clock goes on as that does. Where nothing tells, a step back counts as none and one ahead as a
+    pause of at most `LONGEST_PAUSE_S`. A single stamp far from those about it is damage and does not count.
+    """
+
+    def __init__(self) -> None:
+        self.jumps: list[ClockJump] = []
+        self.first_stamp_s: float | None = None
+        self._stamp_s = math.nan
+        self._now_s = 0.0
+        self._boot: tuple[float, float] | None = None
+        self._open: tuple[float, float] | None = None
+        self._ahead_s = 0.0
+        self._stray: tuple[float, int] | None = None
+
+    @property
+    def now_s(self) -> float:
+        """Mended time of the last record that had a stamp; 0 before the first."""
+        return self._now_s
+
+    def at(self, stamp_s: float, boot_s: float | None = None) -> float:
+        """Mended time of a record by its stamp, and by the vehicle's own time since boot where it has one."""
+        if self.first_stamp_s is None:
+            self.first_stamp_s = self._stamp_s = stamp_s
+        step = stamp_s - self._stamp_s
+        if self._stray is not None:
+            before_s, told = self._stray
+            self._stray = None
+            if -BACK_S <= stamp_s - before_s <= AHEAD_S:
+                # The one record between had a damaged stamp.
+                step, self._open = stamp_s - before_s, None
+                del self.jumps[told:]
+        last_s, self._stamp_s = self._stamp_s, stamp_s
+        if self._open is not None and not -BACK_S <= step <= AHEAD_S:
+            # Several steps with nothing to judge them by between count as one.
+            at_s, before = self._open
+            step, self._open = before + step, None
+            if not -BACK_S <= step <= AHEAD_S:
+                self._open = (at_s, step)
+        elif not -BACK_S <= step <= AHEAD_S:
+            self._open = (self._now_s, step)
+            self._stray = (last_s, len(self.jumps))
+        if -BACK_S <= step <= AHEAD_S:
+            held = min(max(step, 0.0), self._ahead_s)
+            self._ahead_s -= held
+            self._now_s += max(step, 0.0) - held
+        if boot_s is not None:
+            if self._open is not None:
+                self._settle(boot_s)
+            self._boot = (boot_s, self._now_s)
+        return self._now_s
+
+    def close(self) -> None:
+        """Judge a step that no time since boot came after."""
+        self._settle(None)
+
+    def _settle(self, boot_s: float | None) -> None:
+        """Say what the open step was, and go on after it."""
+        if self._open is None:
+            return
+        (at_s, step), self._open = self._open, None
+        gap = None
+        if boot_s is not None and self._boot is not None and boot_s >= self._boot[0]:
+            late = (boot_s - self._boot[0]) - (self._now_s - self._boot[1])
+            gap = max(late, 0.0)
+            # A clock that never runs back stands still where it went too far.
+            self._ahead_s = max(-late, 0.0)
+        if gap is None or gap > LONGEST_PAUSE_S:
+            gap = step if 0.0 < step <= LONGEST_PAUSE_S else 0.0
+        self._now_s += gap
+        if abs(step - gap) > _AGREE_S:
+            self.jumps.append(ClockJump(time_s=at_s, step_s=step - gap))
+
+
+SUBMARINE, ARDUPILOT = 12, 3
+"""MAV_TYPE and MAV_AUTOPILOT of an ArduSub."""
+NO_AUTOPILOT = 8
+"""MAV_AUTOPILOT of what is no vehicle: ground stations, cameras, companions."""
+_ARDUSUB = "ArduSub"
+_FIRMWARE = re.compile(
+    r"(?:APM:?\s*)?(ArduSub|Sub|ArduCopter|Copter|ArduPlane|Plane|ArduRover|Rover2?|Blimp|Heli|AntennaTracker)\s+V?\d",
+    re.IGNORECASE,
+)
+_ONLY_ARDUSUB = re.compile(r"MOT_\d+_DIRECTION\Z|JS_GAIN_DEFAULT\Z")
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleIdentity:
+    """MAV_TYPE and MAV_AUTOPILOT of the heartbeats, or the firmware's name; None where nothing says it."""
+
+    mav_type: int | None = None
+    autopilot: int | None = None
+    firmware: str | None = None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether anything said what the vehicle is."""
+        return self.mav_type is not None or self.firmware is not None
+
+    @property
+    def is_ardusub(self) -> bool:
+        """Whether it is a submarine that ArduPilot steers."""
+        if self.mav_type is not None:
+            return (self.mav_type, self.autopilot) == (SUBMARINE, ARDUPILOT)
+        return self.firmware == _ARDUSUB
+
+    @property
+    def is_other(self) -> bool:
+        """Whether it is known to be another vehicle."""
+        return self.is_known and not self.is_ardusub
+
+    @property
+    def words(self) -> str:
+        """For people, such as "ArduSub" or "octorotor of ArduPilot (heartbeat type 14)"."""
+        if self.is_ardusub:
+            return _ARDUSUB
+        if self.mav_type is None:
+            return self.firmware or "not said"
+        maker = "ArduPilot" if self.autopilot == ARDUPILOT else _name("MAV_AUTOPILOT", self.autopilot)
+        return f"{_name('MAV_TYPE', self.mav_type)} of {maker} (heartbeat type {self.mav_type})"
+
+
+def firmware_of(text: str) -> str | None:
+    """Name of the ArduPilot firmware that a message of the autopilot begins with, such as "ArduSub V4.1.0 (f2af)"."""
+    found = _FIRMWARE.match(text.strip())
+    if found is None:
+        return None
+    name = found[1]
+    return _ARDUSUB if name.lower() in ("ardusub", "sub") else name
+
+
+def firmware_of_parameters(names: Iterable[str]) -> str | None:
+    """ArduSub if a parameter is there that no other firmware has."""
+    return _ARDUSUB if any(_ONLY_ARDUSUB.match(name) for name in names) else None
+
+
+def enumerated(enum: str, value: Any) -> int:
+    """Number of an enumeration's value, which BlueOS's JSON has in words or as an object with `type`.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If it is none.
+    """
+    if isinstance(value, Mapping):
+        value = value["type"]
+    if isinstance(value, str):
+        from pymavlink.dialects.v20 import ardupilotmega
+
+        numbers: dict[str, int] = {entry.name: number for number, entry in ardupilotmega.enums[enum].items()}
+        return numbers[value]
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TypeError
+    return value
+
+
+def _name(enum: str, number: int | None) -> str:
+    """An enumeration's value in small letters."""
+    from pymavlink.dialects.v20 import ardupilotmega
+
+    entry = ardupilotmega.enums[enum].get(number)
+    if entry is None:
+        return f"type {number}" if enum == "MAV_TYPE" else f"autopilot {number}"
+    return str(entry.name.removeprefix(f"{enum}_").lower().replace("_", " "))
+
 
 SERVOS = 16
 WIDTHS = {"sticks": 4, "servo": SERVOS, "attitude": 3, "position": 3}

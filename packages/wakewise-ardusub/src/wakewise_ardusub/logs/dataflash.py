@@ -13,8 +13,7 @@ import struct
 from dataclasses import dataclass
 from typing import Any
 
-from wakewise_ardusub.logs.channels import SERVOS, LogCollector, SystemRecords
-from wakewise_ardusub.logs.identity import firmware_of
+from wakewise_ardusub.logs.channels import SERVOS, LogCollector, SystemRecords, firmware_of
 
 HEAD = b"\xa3\x95"
 _FMT_TYPE, _FMT_LENGTH = 128, 89

@@ -48,8 +48,7 @@ def read_log(path: Path, *, any_vehicle: bool = False) -> VehicleLog:
     """
     need("wakewise link log", "links", only=("pymavlink", "mcap"))
     from wakewise_ardusub.logs.dataflash import HEAD, read_dataflash
-    from wakewise_ardusub.logs.mcap_file import MAGIC, is_ros_bag, read_mcap
-    from wakewise_ardusub.logs.tlog import holds_packets, read_tlog
+    from wakewise_ardusub.logs.mavlink import MAGIC, holds_packets, is_ros_bag, read_mcap, read_tlog
 
     if path.is_dir():
         raise InputError(f"{path}: {_folder(path)}, expected {FORMATS}")

@@ -2,19 +2,25 @@
 
 What a log and a flight in the tank both know has the same name and meaning as in a trial's `steps.parquet`: where the
 vehicle believed to be (`est_`), and with `hindsight.py` its thrusts and wrench.
+
+A read log as a folder: the table, what was found in the file, and the parameters.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import polars as pl
 
 from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
+from wakewise.core.files import whole_file, write_json, write_text
 from wakewise.core.geometry import quat_from_euler
 from wakewise_ardusub.logs.channels import HELD_S, MODES, SERVOS, ChannelSeries, VehicleLog
+from wakewise_ardusub.logs.replay_allocation import ReplayedAllocation
 
 RATE_HZ = 10.0
 MOST_ROWS = 500_000
@@ -148,3 +154,70 @@ def _of_pressure(log: VehicleLog, number: int) -> ChannelSeries:
     gravity = log.parameters.get("BARO_SPEC_GRAV", 1.0)
     density = _FRESH_KG_M3 * (gravity if 0.9 <= gravity <= 1.1 else 1.0)
     return ChannelSeries(time_s=series.time_s, values=(series.values - at_surface) / (density * GRAVITY_M_S2))
+
+
+STEPS, FACTS, PARAMETERS, PAGE = "steps.parquet", "log.json", "parameters.csv", "report.html"
+
+
+def log_facts(
+    log: VehicleLog, table: LogTable, hindsight: ReplayedAllocation | None, why_not: str | None
+) -> dict[str, Any]:
+    """What a log held and what it would have saved, as figures; `why_not` says why there is no hindsight."""
+    rows = table.rows
+    lowest = cast("float | None", rows["depth_m"].min())
+    facts: dict[str, Any] = {
+        "file": log.path.name,
+        "format": log.kind,
+        "identity": log.identity.words,
+        "system": log.system,
+        "other_systems": list(log.others),
+        "started_s": log.started_s,
+        "duration_s": log.duration_s,
+        "records": log.records,
+        "bad_records": log.bad_records,
+        "bad_by_reason": log.bad,
+        "bad_bytes": log.bad_bytes,
+        "unread_records": log.unread,
+        "cut_short": log.cut_short,
+        "clock_jumps": [{"time_s": jump.time_s, "step_s": jump.step_s} for jump in log.jumps],
+        "samples": {name: len(series.time_s) for name, series in sorted(log.series.items())},
+        "parameters": len(log.parameters),
+        "rows": len(rows),
+        "rate_hz": table.rate_hz,
+        "depth_from": table.depth_from,
+        "depth_max_m": None if log.identity.is_other else rows["depth_m"].max(),
+        "voltage_min_V": rows["voltage_V"].min(),
+        "armed_s": float(rows["armed"].fill_null(False).sum()) / table.rate_hz,
+        "modes": {
+            mode: count / table.rate_hz
+            for mode, count in rows["mode"].drop_nulls().value_counts(sort=True, name="count").iter_rows()
+        },
+    }
+    if log.identity.is_other:
+        facts["height_max_m"] = None if lowest is None else -lowest
+    if hindsight is None:
+        return facts | {"why_no_hindsight": why_not}
+    running = int(hindsight.running.sum())
+    return facts | {
+        "running_s": running / table.rate_hz,
+        "motors": list(hindsight.motors),
+        "directions": [int(d) for d in hindsight.directions],
+        "total_weight": hindsight.total_weight,
+        "disturbance_flown": hindsight.total("flown") / max(running, 1),
+        "disturbance_least": hindsight.total("least") / max(running, 1),
+        "disturbance_gentle": hindsight.total("gentle") / max(running, 1),
+        "saved_pct": hindsight.saved_pct("flown"),
+        "saved_against_least_pct": hindsight.saved_pct("least"),
+    }
+
+
+def write_folder(
+    folder: Path, log: VehicleLog, table: LogTable, hindsight: ReplayedAllocation | None, facts: dict[str, Any]
+) -> None:
+    """Write the table, the figures and the parameters."""
+    rows = table.rows if hindsight is None else pl.concat([table.rows, hindsight.columns()], how="horizontal")
+    with whole_file(folder / STEPS) as temporary:
+        rows.write_parquet(temporary)
+    write_json(folder / FACTS, facts)
+    lines = [f"{name},{value:.9g}" for name, value in sorted(log.parameters.items())]
+    write_text(folder / PARAMETERS, "\n".join(["name,value", *lines]) + "\n")

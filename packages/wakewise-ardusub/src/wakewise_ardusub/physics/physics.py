@@ -2,21 +2,87 @@
 
 No socket and no clock of its own, so that a test, or a stand-in in the same process, calls `answer` directly; the
 sockets are in `udp.py`.
+
+Which frames of the firmware are new: a repeat is answered again and moves nothing, a gap is counted.
+
+The socket of the physics link; loopback unless another address is asked for.
 """
 
 from __future__ import annotations
 
+import socket
+import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
 
 import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise_ardusub.physics.datagrams import LARGEST_B, PhysicsState, read_request, write_reply
-from wakewise_ardusub.physics.frames import FrameCounter
+
+LATE = 8
+"""A count that is lower by no more than this came late; lower by more, the firmware was started anew."""
+QUIET_S = 1.0
+"""How long the firmware must have been silent before another one may take its place."""
+
+Verdict = Literal["begin", "step", "repeat", "late", "other"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameCounter:
+    """What has come so far.
+
+    Parameters
+    ----------
+    last : int or None
+        Count of the last new frame.
+    sender : tuple of str and int, or None
+        Who sent it.
+    heard_s : float
+        When that one was last heard.
+    stepped, repeats, lost, late, starts, strangers : int
+        Frames that moved the vehicle, that were resent, that never came, that came late; how often the firmware
+        started; frames of others meanwhile.
+    """
+
+    last: int | None = None
+    sender: tuple[str, int] | None = None
+    heard_s: float = 0.0
+    stepped: int = 0
+    repeats: int = 0
+    lost: int = 0
+    late: int = 0
+    starts: int = 0
+    strangers: int = 0
+
+    def take(self, frame: int, sender: tuple[str, int], now_s: float) -> tuple[FrameCounter, Verdict]:
+        """What a frame is, and the count after it.
+
+        "begin" asks for the vehicle at its start and one step, "step" for a step, "repeat" for the last answer again;
+        "late" and "other" (a second firmware beside the first) ask for nothing.
+        """
+        if self.last is None or sender != self.sender:
+            if self.last is not None and now_s - self.heard_s < QUIET_S:
+                return replace(self, strangers=self.strangers + 1), "other"
+            return self._begun(frame, sender, now_s), "begin"
+        ahead = frame - self.last
+        if ahead == 0:
+            return replace(self, repeats=self.repeats + 1, heard_s=now_s), "repeat"
+        if ahead > 0:
+            return (
+                replace(self, last=frame, stepped=self.stepped + 1, lost=self.lost + ahead - 1, heard_s=now_s),
+                "step",
+            )
+        if -ahead <= LATE and frame > 1:
+            return replace(self, late=self.late + 1, heard_s=now_s), "late"
+        return self._begun(frame, sender, now_s), "begin"
+
+    def _begun(self, frame: int, sender: tuple[str, int], now_s: float) -> FrameCounter:
+        return replace(self, last=frame, sender=sender, heard_s=now_s, stepped=self.stepped + 1, starts=self.starts + 1)
+
 
 RATES_HZ = (20, 2000)
 """Steps a second that are taken; a firmware that asks for others is refused."""
@@ -146,3 +212,59 @@ class PhysicsServer:
             pulses_us=self._pulses,
             stage=str(getattr(self._body, "stage", "")),
         )
+
+
+LOOPBACK = "127.0.0.1"
+_LISTEN_S = 0.2
+
+
+def open_socket(host: str, port: int) -> socket.socket:
+    """A UDP socket that listens; port 0 lets the system choose.
+
+    Raises
+    ------
+    InputError
+        If the address cannot be had.
+    """
+    if not 0 <= port <= 65535:
+        raise InputError(f"--port {port}: 0 to 65535 are allowed")
+    listening = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        listening.bind((host, port))
+    except OSError as fault:
+        listening.close()
+        raise InputError(
+            f"UDP {host}:{port}: {fault.strerror or fault}; another program listens there, or it is no address here"
+        ) from None
+    listening.settimeout(_LISTEN_S)
+    return listening
+
+
+def serve(
+    physics: PhysicsServer,
+    listening: socket.socket,
+    going: Callable[[], bool],
+    *,
+    said: Callable[[], None] | None = None,
+    every_s: float = 1.0,
+) -> None:
+    """Answer frames until `going` says no; `said` is called now and then, also while nobody sends.
+
+    Whoever sends is answered; `going` is asked at least five times a second.
+    """
+    next_s = time.monotonic() + every_s
+    while going():
+        try:
+            datagram, sender = listening.recvfrom(LARGEST_B + 1)
+        except TimeoutError:
+            datagram = b""
+        except ConnectionResetError:  # Windows says so when the last answer found nobody
+            continue
+        now_s = time.monotonic()
+        if datagram:
+            reply = physics.answer(datagram, sender, now_s)
+            if reply is not None:
+                listening.sendto(reply, sender)
+        if said is not None and now_s >= next_s:
+            said()
+            next_s = now_s + every_s

@@ -3,18 +3,32 @@
 The hull is its box. The share of its height that is above z = 0 has lost its buoyancy, which acts at the centre of
 buoyancy; a thruster gives the share of its disk's height that is below. An estimate: no waves, no splash, and drag and
 added mass stay those of the whole hull.
+
+A vehicle in still water without walls, by the readable equations: the body of quick tests, of no kernel and no tank.
+
+Motors lag and steps are those of the vehicle file. It stops at the surface, and nothing else is there.
+
+A vehicle that is held at the surface while its autopilot starts, then let down to where it begins.
+
+ArduSub takes the pressure at its start for that of the surface, and any that is less for it later on. Started under
+water it reads a depth of 0 there, and goes on doing so while it rises.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
-from wakewise.core.geometry import Pose
-from wakewise.robot.vehicles import Vehicle
+from wakewise.core.geometry import Pose, matrix_from_quat, quat_multiply
+from wakewise.core.interfaces import BodyState
+from wakewise.robot.thrusters import saturate, thruster_lag
+from wakewise.robot.vehicles import Vehicle, fossen
+from wakewise_ardusub.physics.datagrams import PhysicsState
+from wakewise_ardusub.physics.physics import SimulatedBody
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,3 +81,127 @@ class WaterSurface:
         """What thrusters that are partly above the water make of thrusts, both shape (n,)."""
         depths = float(X_WB.p_m[2]) + self.disks_B_m @ X_WB.R[2]
         return thrusts_N * np.clip((depths + self.radii_m) / (2.0 * self.radii_m), 0.0, 1.0)
+
+
+_GRAVITY_W_M_S2 = np.array([0.0, 0.0, GRAVITY_M_S2])
+
+
+class FreeWater:
+    """Implements `Body`; steps of semi-implicit Euler, velocity first.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    start : BodyState, optional
+        At rest 2 m deep, level and heading north, if not given.
+    """
+
+    def __init__(self, vehicle: Vehicle, start: BodyState | None = None) -> None:
+        begin = start or BodyState(X_WB=Pose(np.array([0.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0, 0.0])))
+        self._vehicle = vehicle
+        self._p, self._q, self._nu = begin.X_WB.p_m.copy(), begin.X_WB.q.copy(), begin.nu_B.copy()
+        self._motors_N = np.zeros(len(vehicle.thrusters))
+        self._time_s = 0.0
+        self._inverse = np.linalg.inv(fossen.mass_matrix(vehicle))
+        self._mass = fossen.mass_matrix(vehicle)
+
+    @property
+    def thrusts_N(self) -> Array:
+        """What the thrusters give now, shape (n,)."""
+        return self._motors_N.copy()
+
+    def step(self, thrusts_N: Array, dt_s: float) -> PhysicsState:
+        """Hold commanded thrusts, shape (n,), for `dt_s`."""
+        vehicle = self._vehicle
+        wanted = saturate(thrusts_N, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
+        self._motors_N = thruster_lag(self._motors_N, wanted, vehicle.time_constants_s, dt_s)
+        R_WB, nu = matrix_from_quat(self._q), self._nu
+        v_before_W = R_WB @ nu[:3]
+        load = (
+            vehicle.allocation_matrix @ self._motors_N
+            - fossen.coriolis_matrix(self._mass, nu) @ nu
+            - fossen.damping_matrix(vehicle, nu) @ nu
+            - fossen.restoring_vector(vehicle, R_WB, TRIM_WATER_KG_M3, GRAVITY_M_S2)
+        )
+        self._nu = nu + dt_s * (self._inverse @ load)
+        turn = quat_multiply(self._q, np.concatenate([[1.0], 0.5 * dt_s * self._nu[3:]]))
+        self._q = turn / np.linalg.norm(turn)
+        R_WB = matrix_from_quat(self._q)
+        v_W = R_WB @ self._nu[:3]
+        self._p = self._p + dt_s * v_W
+        if self._p[2] < 0.0:
+            self._p[2], v_W[2] = 0.0, max(float(v_W[2]), 0.0)
+            self._nu[:3] = R_WB.T @ v_W
+        self._time_s += dt_s
+        return PhysicsState(
+            time_s=self._time_s,
+            omega_B_rad_s=self._nu[3:],
+            force_B_m_s2=R_WB.T @ ((v_W - v_before_W) / dt_s - _GRAVITY_W_M_S2),
+            p_WB_m=self._p,
+            q_WB=self._q,
+            v_W_m_s=v_W,
+        )
+
+
+LOWERED_M_S = 0.3
+"""Fastest that it is let down."""
+
+
+class LoweringBody:
+    """Implements `SimulatedBody`: at rest at a depth of 0, then down without a jerk, then the body of its own.
+
+    Thrusts move nothing before that, and the body's own time begins then.
+
+    Parameters
+    ----------
+    body : SimulatedBody
+        At its start.
+    start : BodyState
+        Where that is.
+    held_s : float
+        How long it is held.
+    """
+
+    def __init__(self, body: SimulatedBody, start: BodyState, held_s: float) -> None:
+        self._body, self._start, self._held_s = body, start, held_s
+        self._down_s = 2.0 * max(float(start.X_WB.p_m[2]), 0.0) / LOWERED_M_S
+        self._time_s = 0.0
+
+    @property
+    def stage(self) -> str:
+        """What is done with it now, in words; empty once it is free."""
+        if self._time_s > self._held_s + self._down_s:
+            return ""
+        left_s = self._held_s - self._time_s
+        if left_s > 0.0:
+            return f"held at the surface for {math.ceil(left_s)} s more"
+        return f"let down, {math.ceil(left_s + self._down_s)} s more"
+
+    def step(self, thrusts_N: Array, dt_s: float) -> PhysicsState:
+        """Hold commanded thrusts, shape (n,), for `dt_s`; before it is free they move nothing."""
+        self._time_s += dt_s
+        if self._time_s > self._held_s + self._down_s:
+            return replace(self._body.step(thrusts_N, dt_s), time_s=self._time_s)
+        depth_m, down_m_s, down_m_s2 = self._way()
+        p, R = self._start.X_WB.p_m, self._start.X_WB.R
+        return PhysicsState(
+            time_s=self._time_s,
+            omega_B_rad_s=np.zeros(3),
+            force_B_m_s2=(np.array([0.0, 0.0, down_m_s2]) - _GRAVITY_W_M_S2) @ R,
+            p_WB_m=np.array([p[0], p[1], depth_m]),
+            q_WB=self._start.X_WB.q,
+            v_W_m_s=np.array([0.0, 0.0, down_m_s]),
+        )
+
+    def _way(self) -> tuple[float, float, float]:
+        """Depth, speed and acceleration downwards now."""
+        since_s = self._time_s - self._held_s
+        if since_s <= 0.0 or self._down_s <= 0.0:
+            return 0.0, 0.0, 0.0
+        depth, turn = float(self._start.X_WB.p_m[2]), 2.0 * math.pi * since_s / self._down_s
+        mean = depth / self._down_s
+        return (
+            mean * (since_s - self._down_s * math.sin(turn) / (2.0 * math.pi)),
+            mean * (1.0 - math.cos(turn)),
+            mean * 2.0 * math.pi / self._down_s * math.sin(turn),
+        )

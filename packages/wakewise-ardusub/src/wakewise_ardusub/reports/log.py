@@ -13,7 +13,7 @@ import polars as pl
 from wakewise.core.files import write_text
 from wakewise.ui.reports.page import missing, plot, section, tile, whole_page
 from wakewise.ui.reports.text import NONE, fixed, number, shown
-from wakewise_ardusub.logs.folder import FACTS, PAGE, STEPS
+from wakewise_ardusub.logs.table import FACTS, PAGE, STEPS
 from wakewise_ardusub.reports import log_plots
 
 _END = {True: "within a record", False: "after a whole record", None: NONE}

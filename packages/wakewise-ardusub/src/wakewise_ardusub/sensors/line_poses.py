@@ -9,24 +9,90 @@ For optical tracking, a SLAM program, a DVL's dead reckoning, or a person with n
 metres, north-east-down unless `"frame": "enu"` says otherwise, which makes the body forward-left-up. `q` is (w, x, y,
 z) from body to world; `"rpy"` in radians may stand in its place; without either it is a position alone, as optical
 tracking has it. `std_m` and `std_rad`, one sigma per axis, may be left out. Lines that begin with # are none.
+
+What a source of poses says, with how sure it is.
+
+Poses handed on as MAVLink's VISION_POSITION_ESTIMATE, to an autopilot, a ground station or `wakewise link ardusub`.
+
+Fields and the layout of the covariance are those of MAVLink's common set
+(https://mavlink.io/en/messages/common.html#VISION_POSITION_ESTIMATE): NED and FRD, the upper triangle of a 6 x 6 matrix
+by rows, its first number NaN where it is not known. Who reads the message is `wakewise_ardusub.link.telemetry_adapter`.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import socket
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from wakewise.core.arrays import Array
-from wakewise.core.errors import InputError
-from wakewise.core.geometry import quat_from_euler
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.errors import EnvironmentFailure, InputError
+from wakewise.core.geometry import Pose, euler_from_quat, quat_from_euler
 from wakewise.core.interfaces import Measurement
-from wakewise.experiments.exports.frames import enu_of, ros_body
+from wakewise.core.optional_dependencies import need
+from wakewise.experiments.exports.records import enu_of, ros_body
+from wakewise_ardusub.link.protocol import DEFAULT_SYSTEM
 from wakewise_ardusub.link.telemetry_adapter import SenderClock
-from wakewise_ardusub.sensors.samples import PoseSample, checked_place, checked_pose, checked_turn
+from wakewise_ardusub.sensors.devices import read_place
+
+LARGEST_M = 1e5
+"""A place further from the origin than this is no place of a dive."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PoseSample:
+    """A pose or a position in NED/FRD on our clock.
+
+    `measurement` has `X_WB`, or `p_WB_m` where the source knows no attitude. `covariance`, shape (6, 6), is that of
+    position in W (m) and of attitude (rad, roll, pitch, yaw as MAVLink has it, a rotation vector for small errors);
+    None where the source does not say.
+    """
+
+    measurement: Measurement
+    covariance: Array | None = None
+
+    def __post_init__(self) -> None:
+        if self.covariance is not None:
+            freeze(self, covariance=(6, 6))
+
+    @property
+    def position_std_m(self) -> float | None:
+        """One sigma of the position per axis, the root of the mean variance; None where nothing is known."""
+        if self.covariance is None:
+            return None
+        return math.sqrt(float(np.trace(self.covariance[:3, :3])) / 3.0)
+
+
+def checked_pose(p_m: Array, q: Array) -> Pose:
+    """A pose, or what is wrong with it.
+
+    Raises
+    ------
+    InputError
+        If it is not finite, further away than a dive goes, or its quaternion is none.
+    """
+    return Pose(checked_place(p_m), checked_turn(q))
+
+
+def checked_place(p_m: Array) -> Array:
+    """A place in m, shape (3,), or what is wrong with it."""
+    if p_m.shape != (3,) or not np.isfinite(p_m).all() or np.abs(p_m).max() > LARGEST_M:
+        told = " ".join(f"{x:g}" for x in p_m.ravel())
+        raise InputError(f"position {told}: must be three numbers of at most {LARGEST_M:g} m")
+    return p_m
+
+
+def checked_turn(q: Array) -> Array:
+    """A unit quaternion (w, x, y, z), or what is wrong with it; 1 % of length is taken for rounding."""
+    if q.shape != (4,) or not abs(float(np.linalg.norm(q)) - 1.0) <= 0.01:
+        raise InputError(f"quaternion {' '.join(f'{x:g}' for x in q.ravel())}: its length must be 1")
+    return np.asarray(q / np.linalg.norm(q))
+
 
 LONGEST_LINE = 2000
 _CSV = ("t", "x", "y", "z", "qw", "qx", "qy", "qz", "std_m", "std_rad")
@@ -169,3 +235,74 @@ def _numbers(name: str, values: Any, count: int) -> Array:
     if not isinstance(values, list) or len(values) != count:
         raise InputError(f"{name}: must be {count} numbers")
     return np.array([_number(name, value) for value in values])
+
+
+COMPONENT = 197
+"""MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY: a part of the vehicle beside its companion, which is 191."""
+_UPPER = np.triu_indices(6)
+
+
+def vision_position_estimate(sample: PoseSample) -> dict[str, Any] | None:
+    """Fields of the message that says a pose; None for a position alone, which the message cannot say."""
+    pose = sample.measurement.X_WB
+    if pose is None:
+        return None
+    roll, pitch, yaw = (float(angle) for angle in euler_from_quat(pose.q))
+    covariance = [math.nan] + [0.0] * 20
+    if sample.covariance is not None:
+        covariance = [float(x) for x in sample.covariance[_UPPER]]
+    x, y, z = (float(c) for c in pose.p_m)
+    return {
+        "usec": max(round(1e6 * sample.measurement.time_s), 0),
+        **{"x": x, "y": y, "z": z, "roll": roll, "pitch": pitch, "yaw": yaw},
+        "covariance": covariance,
+        "reset_counter": 0,
+    }
+
+
+class PoseForwarder:
+    """Sends poses to a place, `HOST:PORT`, over UDP, as a part of the vehicle of id `system`.
+
+    Raises
+    ------
+    InputError, EnvironmentFailure
+        If the place is none, or its name leads nowhere.
+    MissingExtra
+        If pymavlink is not installed.
+    """
+
+    def __init__(self, place: str, system: int = DEFAULT_SYSTEM) -> None:
+        need("wakewise link sensors --forward", "links", only=("pymavlink",))
+        from pymavlink.dialects.v20 import common
+
+        host, port = read_place(place, "--forward")
+        try:
+            self._to = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)[0][4]
+        except OSError as fault:
+            raise EnvironmentFailure(f"--forward {place}: {fault.strerror or fault}") from None
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._link = common.MAVLink(None, srcSystem=system, srcComponent=COMPONENT)
+        self._message = common.MAVLink_vision_position_estimate_message
+        self.sent = 0
+        self.lost = 0
+        """Poses that did not leave this computer, and positions alone."""
+
+    def __call__(self, sample: Measurement | PoseSample) -> None:
+        """Send a pose; what is none is let be."""
+        if not isinstance(sample, PoseSample):
+            return
+        fields = vision_position_estimate(sample)
+        try:
+            if fields is None:
+                raise OSError
+            message = self._message(**fields).pack(self._link)
+            self._link.seq = (self._link.seq + 1) % 256
+            self._socket.sendto(message, self._to)
+        except OSError:
+            self.lost += 1
+            return
+        self.sent += 1
+
+    def close(self) -> None:
+        """Give the socket back."""
+        self._socket.close()

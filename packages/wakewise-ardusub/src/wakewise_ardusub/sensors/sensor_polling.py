@@ -15,9 +15,8 @@ from wakewise.core.geometry import euler_from_quat
 from wakewise.core.interfaces import Measurement
 from wakewise_ardusub.sensors.devices import SerialPort, UdpSocket
 from wakewise_ardusub.sensors.jy901 import InertialUnit
-from wakewise_ardusub.sensors.line_poses import LinePoses
+from wakewise_ardusub.sensors.line_poses import LinePoses, PoseSample
 from wakewise_ardusub.sensors.ms5837 import DepthSensor, PressureReading
-from wakewise_ardusub.sensors.samples import PoseSample
 
 DEPTH_PERIOD_S = 0.1
 """A pressure sensor is asked this often; its two conversions take 36 ms of it."""

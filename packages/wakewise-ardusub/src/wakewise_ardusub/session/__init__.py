@@ -6,6 +6,6 @@ the vehicle is; each engagement begins afresh from there. In which engagement a 
 goal is asked for, and thrusts of another are not sent (`wakewise_ardusub.link.output_gate`).
 
 Start reading in `session.py` (from a connection to a flight) and `link_join.py` (the parts); `control_handover.py` is
-who flies now, `protected_region.py` what is spared, `cameras.py` who takes the photographs, `figures.py` what ground
-stations are told, `warm_up.py` what is done before it counts.
+who flies now, `session.py` what is spared, `cameras.py` who takes the photographs, `link_join.py` what ground
+stations are told, `link_join.py` what is done before it counts.
 """

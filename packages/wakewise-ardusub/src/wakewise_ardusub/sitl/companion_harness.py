@@ -19,12 +19,12 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import Vehicle
 from wakewise_ardusub.link.engagement_fsm import EngagementLimits
-from wakewise_ardusub.link.mavlink_codec import MavlinkCodec
 from wakewise_ardusub.link.message_state import attitude_of
 from wakewise_ardusub.link.motor_interface import VehicleMotors
 from wakewise_ardusub.link.output_gate import TICK_S, OutputGate
 from wakewise_ardusub.link.protocol import ALT_HOLD, COMPANION_COMPONENT, ENABLE_PARAMETER
 from wakewise_ardusub.link.session_log import SessionLog
+from wakewise_ardusub.link.transports import MavlinkCodec
 from wakewise_ardusub.sitl.inprocess_session import (
     STATION_COMPONENT,
     FaultOutcome,
@@ -41,7 +41,7 @@ _OFFSET_S = 1000.0
 
 
 class CompanionHarness:
-    """A warden on a rehearsal's links; implements `wakewise_ardusub.link.mavlink_codec.Transport`.
+    """A warden on a rehearsal's links; implements `wakewise_ardusub.link.transports.Transport`.
 
     Parameters
     ----------

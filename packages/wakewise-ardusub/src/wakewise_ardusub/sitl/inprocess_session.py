@@ -26,8 +26,8 @@ from wakewise_ardusub.link.protocol import (
     THRUST_GROUP,
 )
 from wakewise_ardusub.link.script import script_text
-from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
+from wakewise_ardusub.physics.surface import FreeWater
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics

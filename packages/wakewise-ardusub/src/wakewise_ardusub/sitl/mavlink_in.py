@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from wakewise_ardusub.sitl.mavlink_out import BUILDERS, parameter
-from wakewise_ardusub.sitl.sticks import demands_of
+from wakewise_ardusub.sitl.modes import demands_of
 
 if TYPE_CHECKING:
     from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot

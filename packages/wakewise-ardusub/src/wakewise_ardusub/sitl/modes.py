@@ -6,21 +6,79 @@ depth as well while the throttle is let go: the depth's error times PSC_POSZ_P i
 an acceleration, and a PI of what is missing of that the throttle. Those loops go on while a script overrides the
 outputs, so what they have summed up jumps out when the override ends, unless the mode was entered anew: then depth and
 heading are those of that moment, and the sum is what gives the throttle of the mode before, as in ArduSub.
+
+The pilot's sticks, as MANUAL_CONTROL says them, to demands.
+
+A stick's way becomes a pulse of 1500 us plus up to 400 times the gain (JS_GAIN_DEFAULT), so a demand is the stick times
+the gain. The last sticks go on until the failsafe of the pilot's input says otherwise.
+
+What the pilot's buttons do, by BTNn_FUNCTION and, while a shift button is held, by BTNn_SFUNCTION.
+
+Arming, disarming, modes and shift are here; mount, lights, gain, trim, input hold, relays and servos are not.
+
+The mixer: demands to one pulse per motor, by the factors of ArduSub's vectored frames.
+
+Roll, pitch and throttle are summed and divided by the largest sum where that is above 1; yaw, forward and lateral
+likewise; both are added and cut at 1 (see `wakewise.control.motor_mix`, which tells the sources). MOT_n_DIRECTION turns
+a motor's pulse about the middle.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import euler_from_quat
-from wakewise_ardusub.link.protocol import ALT_HOLD, MANUAL, STABILIZE
+from wakewise.robot.vehicles.mixing import ARDUSUB_VECTORED, ARDUSUB_VECTORED_6DOF
+from wakewise_ardusub.link.buttons import ARM, ARM_TOGGLE, BUTTONS, DISARM, MODE_FUNCTIONS, NONE, SHIFT, parameters_of
+from wakewise_ardusub.link.protocol import ALT_HOLD, FULL_US, MANUAL, MIDDLE_US, STABILIZE
 from wakewise_ardusub.physics.datagrams import PhysicsState
-from wakewise_ardusub.sitl.parameters import ParameterTable
-from wakewise_ardusub.sitl.sticks import PilotDemands
+from wakewise_ardusub.sitl.own_parameters import FRAME_VECTORED, ParameterTable
+
+if TYPE_CHECKING:
+    from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+
+
+STICK_FULL = 1000.0
+THROTTLE_MIDDLE = 500.0
+_EXTENSIONS_PITCH, _EXTENSIONS_ROLL = 1, 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class PilotDemands:
+    """What is asked of the mixer, each in [-1, 1]; forward, right and up are positive."""
+
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float = 0.0
+    throttle: float = 0.0
+    forward: float = 0.0
+    lateral: float = 0.0
+
+
+def demands_of(
+    x: int, y: int, z: int, r: int, *, pitch: int = 0, roll: int = 0, extensions: int = 0, gain: float, throttle: float
+) -> PilotDemands:
+    """Demands of MANUAL_CONTROL's numbers at a gain, and at one of the throttle on top; numbers out of range count as
+    the end of their range.
+    """
+    return PilotDemands(
+        roll=_share(roll) * gain if extensions & _EXTENSIONS_ROLL else 0.0,
+        pitch=_share(pitch) * gain if extensions & _EXTENSIONS_PITCH else 0.0,
+        yaw=_share(r) * gain,
+        throttle=max(-1.0, min(1.0, (max(0, min(1000, z)) - THROTTLE_MIDDLE) / THROTTLE_MIDDLE)) * gain * throttle,
+        forward=_share(x) * gain,
+        lateral=_share(y) * gain,
+    )
+
+
+def _share(value: int) -> float:
+    return max(-1.0, min(1.0, value / STICK_FULL))
+
 
 MODES = {MANUAL: "MANUAL", STABILIZE: "STABILIZE", ALT_HOLD: "ALT_HOLD"}
 """Modes that the stand-in flies."""
@@ -112,3 +170,63 @@ def _depth(
 
 def _wrapped(angle_rad: float) -> float:
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+class ButtonHandler:
+    """Remembers which buttons are down: one acts as it goes down."""
+
+    def __init__(self) -> None:
+        self._before = 0
+
+    def take(self, board: SimulatedAutopilot, buttons: int) -> None:
+        """Buttons as bits, as the last sticks have them."""
+        pressed, self._before = buttons & ~self._before, buttons
+        if not pressed:
+            return
+        shifted = any(buttons & 1 << b and _function(board.parameters, b) == SHIFT for b in range(BUTTONS))
+        for button in range(BUTTONS):
+            if pressed & 1 << button:
+                _act(board, _function(board.parameters, button, shifted=shifted))
+
+
+def can_disarm(parameters: ParameterTable) -> bool:
+    """Whether some button disarms: without one ArduSub refuses to arm, whatever ARMING_CHECK says."""
+    plain = {_function(parameters, button) for button in range(BUTTONS)}
+    shifted = {_function(parameters, button, shifted=True) for button in range(BUTTONS)} if SHIFT in plain else set()
+    return bool((plain | shifted) & {ARM_TOGGLE, DISARM})
+
+
+def _function(parameters: ParameterTable, button: int, *, shifted: bool = False) -> int:
+    return round(parameters.value(parameters_of(button)[shifted], otherwise=NONE))
+
+
+def _act(board: SimulatedAutopilot, function: int) -> None:
+    if function == ARM or (function == ARM_TOGGLE and not board.armed):
+        board.arm()
+    elif function in (DISARM, ARM_TOGGLE):
+        board.disarm("button")
+    elif function in MODE_FUNCTIONS:
+        board.set_mode(MODE_FUNCTIONS[function])
+
+
+def factors_of(parameters: ParameterTable) -> Array:
+    """Motor factors of the frame, shape (n, 6): roll, pitch, yaw, throttle, forward, lateral."""
+    frame = parameters.value("FRAME_CONFIG", otherwise=FRAME_VECTORED)
+    return ARDUSUB_VECTORED if frame == FRAME_VECTORED else ARDUSUB_VECTORED_6DOF
+
+
+def directions_of(parameters: ParameterTable, motors: int) -> Array:
+    """MOT_n_DIRECTION of each motor, shape (n,): 1 or -1."""
+    said = [parameters.value(f"MOT_{i + 1}_DIRECTION", otherwise=1.0) for i in range(motors)]
+    return np.where(np.array(said) < 0.0, -1.0, 1.0)
+
+
+def motor_pulses_us(demands: PilotDemands, factors: Array, directions: Array) -> list[int]:
+    """Pulse of each motor, shape (n,), for demands."""
+    asked = np.array(
+        [demands.roll, demands.pitch, demands.yaw, demands.throttle, demands.forward, demands.lateral], dtype=np.float64
+    )
+    groups = [factors[:, own] @ asked[own] for own in ([0, 1, 3], [2, 4, 5])]
+    mixed = sum(group / max(1.0, float(np.abs(group).max())) for group in groups)
+    outputs = directions * np.clip(mixed, -1.0, 1.0)
+    return [int(pulse) for pulse in np.round(MIDDLE_US + FULL_US * outputs)]

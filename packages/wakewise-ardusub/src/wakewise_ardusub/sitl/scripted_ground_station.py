@@ -12,8 +12,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from wakewise.robot.importers import any_vehicle
 from wakewise_ardusub.link.protocol import ENABLE_PARAMETER, STICKS_MIDDLE
-from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
+from wakewise_ardusub.physics.surface import FreeWater
 from wakewise_ardusub.sitl.inprocess_session import STATION, STATION_COMPONENT, MavlinkSender, shipped_script
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot

@@ -13,7 +13,7 @@ from importlib import resources
 from typing import Any, Protocol
 
 from wakewise.core.optional_dependencies import need
-from wakewise_ardusub.sitl.parameters import ParameterTable
+from wakewise_ardusub.sitl.own_parameters import ParameterTable
 
 LONGEST_WAIT_MS = 600_000
 MOST_QUEUED = 255

@@ -1,6 +1,8 @@
 """The stand-in itself: bytes and motion in, pulses and bytes out, a loop at a time; time is what physics says.
 
 Nothing here waits, sleeps or reads a clock, so a minute of flight takes as long as its arithmetic.
+
+What happens when the ground station or the pilot falls silent while the vehicle is armed.
 """
 
 from __future__ import annotations
@@ -8,34 +10,52 @@ from __future__ import annotations
 import logging
 from collections import deque
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
-from wakewise_ardusub.link.protocol import (
-    ALT_HOLD,
-    AUTOPILOT_COMPONENT,
-    DEFAULT_SYSTEM,
-    MANUAL,
-    MIDDLE_US,
-)
+from wakewise_ardusub.link.protocol import ALT_HOLD, AUTOPILOT_COMPONENT, DEFAULT_SYSTEM, MANUAL, MIDDLE_US
 from wakewise_ardusub.physics.datagrams import PhysicsState
-from wakewise_ardusub.sitl.failsafes import Action, ground_station, pilot_input
 from wakewise_ardusub.sitl.files import MavftpServer
-from wakewise_ardusub.sitl.joystick import ButtonHandler, can_disarm
 from wakewise_ardusub.sitl.mavlink_in import handle_message
 from wakewise_ardusub.sitl.mavlink_out import BUILDERS, MessageSchedule, parameter
-from wakewise_ardusub.sitl.modes import MODES, ModeControllers, apply_mode
-from wakewise_ardusub.sitl.motor_tests import MotorTest
-from wakewise_ardusub.sitl.motors import directions_of, factors_of, motor_pulses_us
-from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.parameters import ParameterTable
+from wakewise_ardusub.sitl.modes import (
+    MODES,
+    ButtonHandler,
+    ModeControllers,
+    PilotDemands,
+    apply_mode,
+    can_disarm,
+    directions_of,
+    factors_of,
+    motor_pulses_us,
+)
+from wakewise_ardusub.sitl.own_parameters import ParameterTable, own_parameters
 from wakewise_ardusub.sitl.scripting import LuaScript
-from wakewise_ardusub.sitl.servos import OUTPUTS, ServoOutputs, find_channel
-from wakewise_ardusub.sitl.sticks import PilotDemands
+from wakewise_ardusub.sitl.servos import OUTPUTS, MotorTest, ServoOutputs, find_channel
+
+Action = Literal["none", "warn", "disarm", "hold depth", "surface"]
+
+_GCS: dict[int, Action] = {0: "none", 1: "warn", 2: "disarm", 3: "hold depth", 4: "surface"}
+_PILOT: dict[int, Action] = {0: "none", 1: "warn", 2: "disarm"}
+
+
+def ground_station(parameters: ParameterTable, heard_s: float | None, now_s: float) -> Action:
+    """What FS_GCS_ENABLE asks for: nothing while a heartbeat is fresh, or if there was never one."""
+    if heard_s is None or now_s - heard_s <= parameters.value("FS_GCS_TIMEOUT", otherwise=3.0):
+        return "none"
+    return _GCS.get(round(parameters.value("FS_GCS_ENABLE", otherwise=2.0)), "disarm")
+
+
+def pilot_input(parameters: ParameterTable, heard_s: float | None, now_s: float) -> Action:
+    """What FS_PILOT_INPUT asks for: nothing while sticks are fresh. Sticks that never came are silent ones."""
+    if heard_s is not None and now_s - heard_s <= parameters.value("FS_PILOT_TIMEOUT", otherwise=3.0):
+        return "none"
+    return _PILOT.get(round(parameters.value("FS_PILOT_INPUT", otherwise=2.0)), "disarm")
+
 
 FIRMWARE = (4, 5, 3)
 """Release that it says it is: the one that BlueOS 1.4 brings."""

@@ -19,8 +19,7 @@ import numpy as np
 from wakewise.core.errors import InputError
 from wakewise_ardusub.link.parameters import read_parameter_file
 from wakewise_ardusub.vehicle_summary import read_vehicle_summary
-from wakewise_ardusub.wash_meter.run import MeterLoop
-from wakewise_ardusub.wash_meter.settings import PORT, MeterSettings
+from wakewise_ardusub.wash_meter.run import PORT, MeterLoop, MeterSettings
 from wakewise_ardusub.wash_savings import bow_ball
 
 

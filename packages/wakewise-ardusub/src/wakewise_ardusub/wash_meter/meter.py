@@ -1,14 +1,27 @@
-"""The meter itself: pulses and pose in, a reading out, and sums over the last minute and the whole dive."""
+"""The meter itself: pulses and pose in, a reading out, and sums over the last minute and the whole dive.
+
+The last minutes as the page draws them: one mean a second, so that a page opened late sees them, too.
+
+The dive on disk: a row of CSV for every reading while thrusters run, and how it ended as JSON.
+
+A reading as JSON: what the page, and anybody else on this computer, is told.
+"""
 
 from __future__ import annotations
 
+import csv
+import math
 from collections import deque
 from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
+from wakewise.core.files import write_json
 from wakewise.core.geometry import Pose
 from wakewise.wake.disturbance import split_roots
 from wakewise.wake.influence import InfluenceModel
@@ -219,3 +232,137 @@ class _Seen:
         total = float(np.sum(part))
         m = len(thrusts_N)
         return 100.0 * (part[:m] + part[m:]) / total if total > 0.0 else np.zeros(m)
+
+
+KEPT_S = 600
+
+
+@dataclass
+class WashHistory:
+    """Mean D of each second, as flown and with gentle thrusts; a second without readings is a gap."""
+
+    weight: float
+    _seconds: deque[tuple[int, float | None, float | None]] = field(default_factory=lambda: deque(maxlen=KEPT_S))
+    _now: int | None = None
+    _flown: list[float] = field(default_factory=list)
+    _gentle: list[float] = field(default_factory=list)
+
+    def add(self, reading: MeterReading) -> None:
+        """Take in a reading."""
+        second = math.floor(reading.time_s)
+        if self._now is None:
+            self._now = second
+        while self._now < second:
+            self._seconds.append((self._now, self._mean(self._flown), self._mean(self._gentle)))
+            self._flown, self._gentle = [], []
+            # After a pause of any length only what is kept is gone through.
+            self._now = max(self._now + 1, second - KEPT_S)
+        if reading.spared is not None:
+            self._flown.append(reading.spared.disturbance["flown"])
+            self._gentle.append(reading.spared.disturbance["gentle"])
+
+    def told(self) -> dict[str, Any]:
+        """Root mean square speeds in mm/s, oldest first; the last ended `until_s`."""
+        return {
+            "until_s": self._now,
+            "flown_mm_s": [self._speed(d) for _, d, _ in self._seconds],
+            "gentle_mm_s": [self._speed(d) for _, _, d in self._seconds],
+        }
+
+    @property
+    def last(self) -> tuple[int | None, float | None, float | None]:
+        """The last whole second, and its speeds in mm/s."""
+        if not self._seconds:
+            return None, None, None
+        second, flown, gentle = self._seconds[-1]
+        return second, self._speed(flown), self._speed(gentle)
+
+    def _speed(self, disturbance: float | None) -> float | None:
+        return None if disturbance is None else round(1e3 * math.sqrt(disturbance / self.weight), 3)
+
+    @staticmethod
+    def _mean(values: list[float]) -> float | None:
+        return sum(values) / len(values) if values else None
+
+
+ROWS, SUMMARY = "meter.csv", "meter.json"
+
+
+class DiveRecord:
+    """Writes one dive into a folder; a row is whole or not there.
+
+    Parameters
+    ----------
+    folder : Path
+        Made where it is not there; a record in it is gone on with where its columns are the same, else put aside.
+    craft : VehicleSummary
+    """
+
+    def __init__(self, folder: Path, craft: VehicleSummary) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._folder = folder
+        names = ["time_s", *(f"disturbance_{share}" for share in SHARES), "peak_flown_m_s", "peak_gentle_m_s"]
+        names += [f"{share}_{i + 1}_N" for share in ("flown", "gentle") for i in range(craft.count)]
+        path = folder / ROWS
+        before = path.read_text(encoding="utf-8").partition("\n")[0] if path.is_file() else ""
+        if before not in ("", ",".join(names)):
+            numbers = (n for n in count(1) if not (folder / f"meter-{n}.csv").exists())
+            path.rename(folder / f"meter-{next(numbers)}.csv")
+            before = ""
+        self._file: IO[str] = path.open("a", encoding="utf-8", newline="", buffering=1)
+        self._rows = csv.writer(self._file, lineterminator="\n")
+        if not before:
+            self._rows.writerow(names)
+
+    def add(self, unix_s: float, reading: MeterReading) -> None:
+        """Write a reading under the time of day, if thrusters ran."""
+        if reading.spared is None or not reading.running:
+            return
+        spared = reading.spared
+        row = [f"{unix_s:.3f}", *(f"{spared.disturbance[share]:.9g}" for share in SHARES)]
+        row += [f"{reading.peak_m_s['flown']:.6g}", f"{reading.peak_m_s['gentle']:.6g}"]
+        row += [f"{thrust:.5g}" for share in ("flown", "gentle") for thrust in spared.thrusts_N[share]]
+        self._rows.writerow(row)
+
+    def close(self, summary: dict[str, Any]) -> None:
+        """End with how it came out."""
+        self._file.close()
+        write_json(self._folder / SUMMARY, summary)
+
+
+def reading_as_json(meter: WashMeter, reading: MeterReading, history: WashHistory, points: str) -> dict[str, Any]:
+    """How it stands; no number is NaN, what is not known is null."""
+    craft, hearing, now_s = meter.craft, meter.hearing, reading.time_s
+    armed = hearing.number("armed", now_s)
+    second, flown, gentle = history.last
+    state: dict[str, Any] = {
+        "time_s": now_s,
+        "vehicle": craft.name,
+        "wake_model": craft.wake.name,
+        "points": "of a mark in the world" if meter.marked else points,
+        "marked": meter.marked,
+        "can_mark": hearing.pose(now_s) is not None,
+        "system": hearing.system,
+        "armed": None if armed is None else armed > 0.5,
+        "mode": hearing.mode(now_s),
+        "voltage_V": hearing.number("voltage", now_s),
+        "directions_known": meter.directions_known,
+        "others": list(hearing.others),
+        "why_not": reading.why_not,
+        "running": reading.running,
+        "saved_pct": meter.saved_pct(),
+        "saved_dive_pct": meter.dive.saved_pct(meter.weight),
+        "running_instants": meter.dive.instants,
+        "second": second,
+        "second_mm_s": [flown, gentle],
+        "thrusters": list(craft.thrusters),
+    }
+    if reading.spared is not None:
+        state |= {
+            "disturbance": dict(reading.spared.disturbance),
+            "rms_mm_s": {share: 1e3 * reading.rms_m_s[share] for share in SHARES},
+            "peak_mm_s": {share: 1e3 * reading.peak_m_s[share] for share in SHARES},
+            "thrusts_N": {share: reading.spared.thrusts_N[share].tolist() for share in SHARES},
+            "shares_pct": reading.shares.tolist(),
+        }
+    return state

@@ -1,4 +1,7 @@
-"""A meter at work: the wire, the meter, the page and the record, in one loop of ten readings a second."""
+"""A meter at work: the wire, the meter, the page and the record, in one loop of ten readings a second.
+
+What is asked of a meter, checked.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +9,91 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
 from wakewise.ui.web.origin_check import is_loopback
+from wakewise_ardusub.link.connection import Endpoint, parse_connection
 from wakewise_ardusub.link.protocol import DISTURBANCE_NAME, SAVED_NAME
 from wakewise_ardusub.logs.channels import SERVOS
 from wakewise_ardusub.vehicle_summary import VehicleSummary
-from wakewise_ardusub.wash_meter.history import WashHistory
-from wakewise_ardusub.wash_meter.json_state import reading_as_json
-from wakewise_ardusub.wash_meter.mavlink_socket import MavlinkSocket
-from wakewise_ardusub.wash_meter.meter import MeterReading, WashMeter, WashTotals
-from wakewise_ardusub.wash_meter.record import DiveRecord
+from wakewise_ardusub.wash_meter.meter import (
+    DiveRecord,
+    MeterReading,
+    WashHistory,
+    WashMeter,
+    WashTotals,
+    reading_as_json,
+)
 from wakewise_ardusub.wash_meter.server import MeterServer
-from wakewise_ardusub.wash_meter.settings import TICK_S, MeterSettings
-from wakewise_ardusub.wash_meter.vehicle_listener import VehicleListener
+from wakewise_ardusub.wash_meter.vehicle_listener import MavlinkSocket, VehicleListener
+
+TICK_S = 0.1
+PORT = 8765
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeterSettings:
+    """What one meter does.
+
+    Parameters
+    ----------
+    connection : str
+        `udpin:HOST:PORT` where the vehicle's router sends to, or `udpout:HOST:PORT` of its server.
+    host, port : str, int
+        Where the page is served; port 0 takes any.
+    token : bool
+        Whether callers from other computers must show the token.
+    system : int or None
+        The vehicle's MAVLink system id; the first with servo outputs if None.
+    publish : bool
+        Send D and saved per cent as NAMED_VALUE_FLOAT.
+    ask : bool
+        Ask the autopilot for its motors' channels and directions.
+    out : Path or None
+        Folder for the dive's record.
+    """
+
+    connection: str
+    host: str = "127.0.0.1"
+    port: int = PORT
+    token: bool = True
+    system: int | None = None
+    publish: bool = False
+    ask: bool = False
+    out: Path | None = None
+
+    def __post_init__(self) -> None:
+        _ = self.ends
+        if self.system is not None and not 1 <= self.system <= 255:
+            raise InputError(f"--system {self.system}: 1 to 255 are allowed")
+        if not 0 <= self.port <= 65535:
+            raise InputError(f"--port {self.port}: 0 to 65535 are allowed")
+        if self.out is not None and self.out.exists() and not self.out.is_dir():
+            raise InputError(f"--out {self.out}: a file is there, a folder is needed")
+
+    @property
+    def ends(self) -> Endpoint:
+        """The connection taken apart.
+
+        Raises
+        ------
+        InputError
+            If it is none of UDP: a server for one client, such as BlueOS' TCP one, is not for somebody who only looks.
+        """
+        ends = parse_connection(self.connection)
+        if ends.way not in ("udpin", "udpout"):
+            raise InputError(
+                f"--connection {self.connection}: a meter listens by UDP, udpin:HOST:PORT or udpout:HOST:PORT; a file "
+                "is for `wakewise link log`"
+            )
+        return ends
+
 
 BEAT_S, PUBLISH_S, ASK_S = 1.0, 0.5, 0.5
 _MOST_ROUNDS, _AT_ONCE = 5, 6

@@ -21,11 +21,17 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.core.errors import InputError
-from wakewise.ui.web.addresses import page_addresses
 from wakewise.ui.web.blueos import ServiceDescription, as_json
 from wakewise.ui.web.files import StaticFile, StaticFiles
-from wakewise.ui.web.origin_check import TOKEN_HEADER, OriginCheck, RequestOrigin, is_loopback, page_headers
-from wakewise.ui.web.pending import PendingConnections
+from wakewise.ui.web.origin_check import (
+    TOKEN_HEADER,
+    OriginCheck,
+    PendingConnections,
+    RequestOrigin,
+    is_loopback,
+    page_addresses,
+    page_headers,
+)
 
 PAGE = Path(__file__).with_name("page")
 OFFER = ServiceDescription(

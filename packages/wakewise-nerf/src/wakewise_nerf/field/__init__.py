@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
-    from wakewise_nerf.field.backend import DEVICES, pick_device, require_torch
     from wakewise_nerf.field.pipeline import build_field
-    from wakewise_nerf.field.settings import PROFILES, FieldSettings, profile
+    from wakewise_nerf.field.settings import DEVICES, PROFILES, FieldSettings, pick_device, profile, require_torch
 
 __all__ = [
     "DEVICES",

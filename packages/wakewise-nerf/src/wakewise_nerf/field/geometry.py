@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import StageError
 from wakewise.core.interfaces import Progress
-from wakewise.vision.reconstruction.cells import CellMeans
 from wakewise.vision.reconstruction.clouds import OrientedPointCloud
-from wakewise.vision.reconstruction.fusion import facing_normals, fuse, outlier_mask
+from wakewise.vision.reconstruction.fusion import CellMeans, facing_normals, fuse, outlier_mask
 from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise.vision.reconstruction.stereo import DepthMap
 from wakewise_nerf.field.posed import PosedPhoto

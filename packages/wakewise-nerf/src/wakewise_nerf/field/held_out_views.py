@@ -15,8 +15,7 @@ from wakewise.core.files import write_bytes
 from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise_nerf.field.posed import PosedPhoto
-from wakewise_nerf.field.rays import origin_in
-from wakewise_nerf.field.rendering import render
+from wakewise_nerf.field.rendering import origin_in, render
 from wakewise_nerf.field.training import TrainingState
 
 # Points that one pass may ask about at most, which bounds memory.

@@ -18,10 +18,9 @@ from wakewise.vision.reconstruction.meshing import mesh_points
 from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.stages import StageResult, fingerprint, make_folder, run_stage
-from wakewise_nerf.field.backend import pick_device
 from wakewise_nerf.field.geometry import depth_camera, depth_map, fuse_depth
 from wakewise_nerf.field.posed import PosedPhoto, read_model, read_posed, sees, surroundings
-from wakewise_nerf.field.settings import FieldSettings
+from wakewise_nerf.field.settings import FieldSettings, pick_device
 
 # Part of every stage's fingerprint: raise it when a stage's result changes for the same input.
 VERSION = 1
@@ -80,7 +79,7 @@ def build_field(
     ball = surroundings(model) if region is None else _ball(region)
     posed = read_posed(model, photos, ball, settings.photo_px)
     # PyTorch is an extra, so what needs it is imported only now.
-    from wakewise_nerf.field import held_out_views, rays, training
+    from wakewise_nerf.field import held_out_views, rendering, training
 
     learn, held_out = held_out_views.split(posed, settings.held_out_every)
     used = settings.model_dump(exclude=_JUST_HOW)
@@ -101,7 +100,7 @@ def build_field(
         return held[0]
 
     def learnt() -> dict[str, Any]:
-        table = rays.RayTable(learn, ball, where)
+        table = rendering.RayTable(learn, ball, where)
         held.append(training.train(table, settings, where, checkpoint, train_key, progress))
         return {
             "loss": held[0].losses[-1],
@@ -122,7 +121,7 @@ def build_field(
             # The rectangle's corners look past the region.
             rays_C[~sees(rays_C, camera.R_CW @ (ball.centre_W_m - camera.p_WC_m), ball.radius_m)] = np.nan
             directions = (rays_C @ camera.R_CW).astype(np.float32)
-            colours, distance = held_out_views.draw_surface(trained(), rays.origin_in(photo, ball), directions)
+            colours, distance = held_out_views.draw_surface(trained(), rendering.origin_in(photo, ball), directions)
             shown = np.rint(255.0 * np.clip(colours, 0.0, 1.0)).astype(np.uint8)
             maps.append(depth_map(index, camera, ball.radius_m * distance, shown, ball))
         cloud, spacing = fuse_depth(maps, settings.agreeing_views, progress)
@@ -173,7 +172,7 @@ def build_field(
 
 
 def _digest(posed: tuple[PosedPhoto, ...]) -> str:
-    """Fingerprint of names, poses, rays and colours."""
+    """Fingerprint of names, poses, rendering and colours."""
     digest = hashlib.blake2b(digest_size=16)
     for photo in posed:
         digest.update(photo.name.encode())

@@ -13,10 +13,8 @@ import torch
 from wakewise.core.errors import StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import Progress
-from wakewise_nerf.field.field import RadianceField
-from wakewise_nerf.field.occupancy import OccupancyGrid
-from wakewise_nerf.field.rays import RayTable
-from wakewise_nerf.field.rendering import render
+from wakewise_nerf.field.field import OccupancyGrid, RadianceField
+from wakewise_nerf.field.rendering import RayTable, render
 from wakewise_nerf.field.settings import FieldSettings
 
 # Where the loss turns from squares to absolute values, so that specks in a photo do not rule (P. J. Huber, 1964).

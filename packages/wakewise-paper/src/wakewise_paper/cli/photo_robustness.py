@@ -38,7 +38,7 @@ def degrade(
     from wakewise.operation import load_scenario
     from wakewise.ui.cli.options import overrides
     from wakewise_paper.photo_robustness import FACTORS, degrade
-    from wakewise_paper.reports.photo_robustness import plot_degradation
+    from wakewise_paper.reports.operator_bench_plot import plot_degradation
 
     changes = overrides(sets, seed=None, vehicle=None, target=target, target_size=None)
     scenario = load_scenario(preset, None, changes)

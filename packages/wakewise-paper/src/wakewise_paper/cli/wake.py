@@ -104,7 +104,7 @@ def learn(
     """Train the learned rival on tank and lattice; hold every model against water that none was fitted to."""
     from wakewise.wake.learned import load_network
     from wakewise_paper.learned_wake import evaluation
-    from wakewise_paper.learned_wake.making import TrainingRecipe, make
+    from wakewise_paper.learned_wake.training import TrainingRecipe, make
 
     with ProgressBars().stage("learn") as progress:
         if shipped:

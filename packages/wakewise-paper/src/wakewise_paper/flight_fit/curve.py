@@ -21,8 +21,7 @@ from wakewise.scene.missions import Leg, Route
 from wakewise.vision.imaging import PinholeCamera
 from wakewise.wake import RoundJet
 from wakewise_paper.flight_fit.flake_likelihood import FlightFit, fit_flight
-from wakewise_paper.flight_fit.flake_tracks import FlakeObserver, FlakeTracks
-from wakewise_paper.flight_fit.held_vehicle import held_sightings
+from wakewise_paper.flight_fit.flake_tracks import FlakeObserver, FlakeTracks, held_sightings
 from wakewise_paper.learned_wake.evaluation import WakeModelScore, unit_f
 from wakewise_paper.learned_wake.truth import SampledWater, even_parcel_rows
 

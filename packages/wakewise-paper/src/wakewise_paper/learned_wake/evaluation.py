@@ -17,8 +17,7 @@ from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.interfaces import Progress, WakeModel, no_progress
 from wakewise.wake import RoundJet, wake_model
-from wakewise.wake.learned import CIRCULAR, LearnedWake, shape
-from wakewise.wake.network import EDGES, Network
+from wakewise.wake.learned import CIRCULAR, EDGES, LearnedWake, Network, shape
 from wakewise_paper.learned_wake.truth import (
     DIAMETER_M,
     SampledWater,

@@ -1,6 +1,6 @@
 """Truth about one jet that pushes as a history says: rows of places, histories and velocities, dimensionless.
 
-Everything is in the units of `wakewise.wake.network`: lengths in D, velocities in sqrt(M*) / (R + D), so that the
+Everything is in the units of `wakewise.wake.learned`: lengths in D, velocities in sqrt(M*) / (R + D), so that the
 tank's newtons and the lattice's own units are the same.
 """
 
@@ -18,8 +18,7 @@ from wakewise.core.interfaces import Progress, no_progress
 from wakewise.simulation.lattice import CASES, DiskJet, LatticeCase, LatticeRun, load_mean_field
 from wakewise.simulation.water import Water
 from wakewise.simulation.water.round_jet_closure import JetSpreading
-from wakewise.wake.learned import MEMORY_S
-from wakewise.wake.network import EDGES, JetPoints, history_bins, remembered
+from wakewise.wake.learned import EDGES, MEMORY_S, JetPoints, history_bins, remembered
 
 DIAMETER_M = 0.06
 WIDTHS, LIVES = (0.094, 0.177), (1.0, 1.7)

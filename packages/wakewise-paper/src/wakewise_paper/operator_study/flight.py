@@ -1,32 +1,198 @@
-"""One flight of the operator's bench: a world, a pilot, a method, a w_track, a seed."""
+"""One flight of the operator's bench: a world, a pilot, a method, a w_track, a seed.
+
+Listens to a controller: what the plan within it expects now, however deep it lies.
+
+What a pilot asks for: three courses of a script, and a route that the human model flies by eye.
+
+Velocities are asked in the vehicle's level frame, as sticks do: forward along its heading, right, down. Every course
+begins with `SETTLE_S` of rest, like the gentle bench's, so that what holds the vehicle has come to the target by then.
+"""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
 from wakewise.allocation import disturbance_of
+from wakewise.control import PlanningController
 from wakewise.control.intent import FULL_M_S, PAPER_W_TRACK
+from wakewise.control.receding import PlanState
 from wakewise.control.spare import watching
 from wakewise.core.arrays import Array
-from wakewise.core.interfaces import BodyState, TruthProvider
+from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler
+from wakewise.core.interfaces import BodyState, Command, Controller, Goal, TruthProvider
 from wakewise.operation import Parts, Scenario, fly
 from wakewise.operation.loop import Step
-from wakewise.operation.teleop.assist_modes import level_frame
+from wakewise.operation.teleop.arbitration import level_frame
 from wakewise.operation.teleop.assisted import AssistedPilot, assisted_pilot
-from wakewise.operation.teleop.input import ControlSource
+from wakewise.operation.teleop.human_pilot import SimulatedOperatorInput
+from wakewise.operation.teleop.input import Controls, ControlSource
 from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
-from wakewise.operation.teleop.simulated_operator import SimulatedOperatorInput
-from wakewise.scene.missions import SETTLING, RoutePilot
+from wakewise.scene.missions import SETTLING, Leg, Route, RoutePilot
+from wakewise.scene.missions.route import rest_to_rest
+from wakewise.scene.targets import Target
 from wakewise.vision.evaluation import flight_figures
-from wakewise_paper.operator_study.controller_probe import ControllerProbe
-from wakewise_paper.operator_study.courses import COURSES, SQUARE, CourseInput, look_route, operator_route, start_pose
 from wakewise_paper.operator_study.worlds import water_of
 from wakewise_paper.wash_reduction.paper import WATER_EVERY_S
-from wakewise_paper.wash_reduction.routes import SETTLE_S
+from wakewise_paper.wash_reduction.routes import SETTLE_S, joined, resting, top_above_centre_m
+
+T = TypeVar("T")
+DEEPEST = 6
+
+
+@dataclass(eq=False)
+class ControllerProbe:
+    """A controller, and what was asked of it and what its plan expects at the last step; implements `Controller`.
+
+    `asked_W_m_s`, shape (3,); `planned_W_m_s`, shape (3,), None where nothing is planned.
+    """
+
+    inner: Controller[Any]
+    asked_W_m_s: Array | None = None
+    planned_W_m_s: Array | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the controller within."""
+        return self.inner.name
+
+    def init(self) -> Any:
+        """State before the first step."""
+        return self.inner.init()
+
+    def step(self, state: Any, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[Any, Command]:
+        """Decide, and remember what was asked and what the plan expects by then."""
+        state, command = self.inner.step(state, dt_s, estimate, goal)
+        self.asked_W_m_s = goal.X_WB.R @ goal.nu_B[:3]
+        planner, plan = find_record(self.inner, PlanningController), find_record(state, PlanState)
+        expected = None if planner is None or plan is None else planner.expected(plan)
+        self.planned_W_m_s = None if expected is None else matrix_from_quat(expected[3:7]) @ expected[7:10]
+        return state, command
+
+
+def find_record(record: Any, kind: type[T], deep: int = DEEPEST) -> T | None:
+    """The record itself or the first of that kind in its fields, in those of its fields, and so on; None if none is."""
+    if isinstance(record, kind):
+        return record
+    if deep == 0 or not is_dataclass(record):
+        return None
+    for one in fields(record):
+        value = getattr(record, one.name, None)
+        if is_dataclass(value) and not isinstance(value, np.ndarray):
+            found = find_record(value, kind, deep - 1)
+            if found is not None:
+                return found
+    return None
+
+
+SPEED_M_S, CLIMB_M_S = 0.10, 0.05
+SLEW_M_S2 = 0.1
+ELEVATION_DEG, CLIMBED_DEG = 30.0, 50.0
+"""Where a course begins; the middle of a mission's lower two orbits. The human climbs to between its upper two."""
+APPROACH_M, LOOK_ARC_M, LOOK_REST_S = 0.4, 0.5, 3.0
+ABOVE_M, HALF_HULL_M, HALF_WAY_M = 0.2, 0.14, 0.3
+"""Left between hull and target by `over`; half the height of the paper's hull; half of the way to and fro."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """What a script asks for.
+
+    `legs` are seconds and velocity forward, right, down in m/s, one after the other, from the end of rest on.
+    `watches`: the camera is kept on the target; otherwise the vehicle is level and keeps its heading. `outside_m`: so
+    much farther off than the standoff it begins.
+    """
+
+    legs: tuple[tuple[float, tuple[float, float, float]], ...]
+    watches: bool = True
+    outside_m: float = 0.0
+
+    @property
+    def duration_s(self) -> float:
+        """How long it asks, without the rest."""
+        return sum(seconds for seconds, _ in self.legs)
+
+    def asked_m_s(self, time_s: float) -> Array:
+        """Velocity asked `time_s` after the start, shape (3,); none at rest and after the end."""
+        left_s = time_s - SETTLE_S
+        for seconds, velocity in self.legs:
+            if 0.0 <= left_s < seconds:
+                return np.array(velocity)
+            left_s -= seconds
+        return np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class CourseInput:
+    """A `ControlSource` that flies a course; `share` is what full stick asks for, of the fastest."""
+
+    course: Course
+    share: float
+
+    def read(self, time_s: float) -> Controls:
+        """The sticks of that time."""
+        return Controls(axes=np.array([*self.course.asked_m_s(time_s) / (FULL_M_S * self.share), 0.0, 0.0]))
+
+
+COURSES = {
+    "front": Course(
+        legs=(
+            (4.0, (0.0, SPEED_M_S, 0.0)),
+            (4.0, (0.0, 0.0, -CLIMB_M_S)),
+            (4.0, (0.0, -SPEED_M_S, 0.0)),
+            (4.0, (0.0, 0.0, CLIMB_M_S)),
+        )
+    ),
+    "over": Course(legs=((6.0, (SPEED_M_S, 0.0, 0.0)), (6.0, (-SPEED_M_S, 0.0, 0.0))), watches=False),
+    "look": Course(
+        legs=(
+            (APPROACH_M / SPEED_M_S, (SPEED_M_S, 0.0, 0.0)),
+            (LOOK_ARC_M / SPEED_M_S, (0.0, SPEED_M_S, 0.0)),
+            (LOOK_REST_S, (0.0, 0.0, 0.0)),
+            (4.0, (0.0, 0.0, -CLIMB_M_S)),
+        ),
+        outside_m=APPROACH_M,
+    ),
+}
+"""In the order of the Latin square (see `waters`)."""
+SQUARE = tuple(COURSES)
+
+
+def operator_route(centre_W_m: Array, duration_s: float) -> Route:
+    """Rest, then a leg of this length that says nothing of where to be, with photographs."""
+    return joined(centre_W_m, (resting("operator", np.array([0.0, 0.0, 1.0]), duration_s),), ("operator",))
+
+
+def look_route(centre_W_m: Array, azimuth_rad: float, standoff_m: float) -> Route:
+    """What the human would like to see: `look` as a route, by the clock and on the sphere."""
+    elevation, climbed = np.radians((ELEVATION_DEG, CLIMBED_DEG))
+    # To the right of a camera that looks inward is towards smaller azimuths, seen from above with x north, y east.
+    turn = -LOOK_ARC_M / (standoff_m * np.cos(elevation))
+    far = np.array([azimuth_rad, elevation, standoff_m + APPROACH_M])
+    near = np.array([azimuth_rad, elevation, standoff_m])
+    round_ = near + np.array([turn, 0.0, 0.0])
+    legs: tuple[Leg, ...] = (
+        rest_to_rest("approach", far, near, SPEED_M_S, SLEW_M_S2),
+        rest_to_rest("arc", near, round_, SPEED_M_S, SLEW_M_S2),
+        resting("stop", round_, LOOK_REST_S),
+        rest_to_rest("climb", round_, np.array([round_[0], climbed, standoff_m]), CLIMB_M_S, SLEW_M_S2),
+    )
+    return joined(centre_W_m, legs, tuple(leg.name for leg in legs))
+
+
+def start_pose(course: Course, target: Target, azimuth_rad: float, standoff_m: float, X_BC: Pose) -> Pose:
+    """Where a course begins, X_WB: its camera on the target from outside, or level above it."""
+    centre = target.centre_W_m
+    if not course.watches:
+        inward = np.array([np.cos(azimuth_rad + np.pi), np.sin(azimuth_rad + np.pi), 0.0])
+        up_m = top_above_centre_m(target) + ABOVE_M + HALF_HULL_M
+        return Pose(centre - HALF_WAY_M * inward - [0.0, 0.0, up_m], quat_from_euler(0.0, 0.0, azimuth_rad + np.pi))
+    place = np.array([azimuth_rad, np.radians(ELEVATION_DEG), standoff_m + course.outside_m])
+    return joined(centre, (resting("start", place, 0.0),), ()).body(0.0, X_BC).X_WB
+
 
 PILOTS = ("script", "human")
 LOOK = "look"

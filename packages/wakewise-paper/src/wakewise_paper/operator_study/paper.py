@@ -29,8 +29,7 @@ from wakewise.scene.missions import open_route
 from wakewise.simulation.tank import TankSettings
 from wakewise.wake import InfluenceModel, WakeSettings, disturbance, wake_model
 from wakewise_paper.flight_batches import Key
-from wakewise_paper.operator_study.controller_probe import ControllerProbe
-from wakewise_paper.operator_study.flight import deviations
+from wakewise_paper.operator_study.flight import ControllerProbe, deviations
 from wakewise_paper.wash_reduction.figures import Row
 from wakewise_paper.wash_reduction.paper import OFF, PAPER_WAKE, paper_place
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from wakewise.operation.randomization import FieldDistribution
 from wakewise.operation.worlds.library import load_world, world_names
-from wakewise_paper.wash_reduction.strata import Side, current_W_m_s, stratum
+from wakewise_paper.wash_reduction.scenario_files import Side, current_W_m_s, stratum
 
 TROUBLE = ("payload", "close", "fluff", "mud")
 """Chosen beforehand (docs/research-log/0047), as is the control; `--worlds` flies any other of the library, too."""

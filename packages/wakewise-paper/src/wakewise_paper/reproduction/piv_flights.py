@@ -18,9 +18,8 @@ from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.interfaces import Flow, TruthProvider
 from wakewise.operation import Parts
 from wakewise.scene.targets import Target
-from wakewise.vision.piv.images import CameraSettings, photograph_pair
+from wakewise.vision.piv.images import CameraSettings, LightSheet, TracerSettings, photograph_pair
 from wakewise.vision.piv.processing import displacements
-from wakewise.vision.piv.tracers import LightSheet, TracerSettings
 from wakewise_paper.wash_reduction.routes import SETTLE_S
 
 NEAR_M, CLEAR_M = 0.05, 0.004

@@ -11,14 +11,20 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.campaigns.task import Task
-from wakewise.experiments.campaigns.versions import FLIES, PHOTOGRAPHS
+from wakewise.experiments.campaigns.task import FLIES, PHOTOGRAPHS, Task
 from wakewise.scene.targets import coral_kinds
 from wakewise_paper.reproduction.claim import ORDER, TABLES
-from wakewise_paper.reproduction.mission_variation import varied_mission
-from wakewise_paper.reproduction.published_flights import VARIANTS
-from wakewise_paper.reproduction.published_tables import W_TRACKS
-from wakewise_paper.reproduction.worlds import CACO3, FIELD, PAPER, PUMP_TANK, TableWorld, water, water_names
+from wakewise_paper.reproduction.published_tables import VARIANTS, W_TRACKS
+from wakewise_paper.reproduction.worlds import (
+    CACO3,
+    FIELD,
+    PAPER,
+    PUMP_TANK,
+    TableWorld,
+    varied_mission,
+    water,
+    water_names,
+)
 
 CORALS = ("branching", "brain", "plate")
 """In place of the paper's three."""
@@ -251,7 +257,7 @@ def _operated(world: str, method: str, target: str, seed: int, wish: TableReques
         told["duration_s"] = wish.duration_s
     return Task(
         name=_name("operator", world, target, method, seed),
-        work="wakewise_paper.reproduction.bench_tasks:operator_one",
+        work="wakewise_paper.reproduction.scans:operator_one",
         settings=told,
         sources=_OPERATOR,
     )
@@ -264,7 +270,7 @@ def _solved(world: str, method: str, target: str, seed: int, wish: TableRequest)
 def _validated(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:  # noqa: ARG001
     return Task(
         name="wake",
-        work="wakewise_paper.reproduction.bench_tasks:wake_one",
+        work="wakewise_paper.reproduction.scans:wake_one",
         settings={"quick": True},
         sources=_WAKE,
     )

@@ -19,18 +19,33 @@ import numpy as np
 from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise_paper import flight_batches
-from wakewise_paper.flight_batches import FlightFailure, Key
-from wakewise_paper.flight_store import FlightStore, store_folder
-from wakewise_paper.wash_reduction.ablations import MECHANISMS, NONE, only_name, selected_mechanisms, without_name
+from wakewise_paper.flight_batches import FlightFailure, FlightStore, Key, store_folder
 from wakewise_paper.wash_reduction.energy_optimum import BoundTrial
-from wakewise_paper.wash_reduction.energy_optimum_tables import bound_figures
-from wakewise_paper.wash_reduction.figures import SPEED, Row, log_reduction_pct, means, pairs_of, reduction_pct
+from wakewise_paper.wash_reduction.figures import (
+    SPEED,
+    Row,
+    bound_figures,
+    log_reduction_pct,
+    means,
+    pairs_of,
+    reduction_pct,
+)
 from wakewise_paper.wash_reduction.flight import FIGURES
 from wakewise_paper.wash_reduction.paper import FIGURES as PAPER_FIGURES
 from wakewise_paper.wash_reduction.paper import METHODS as PAPER_METHODS
 from wakewise_paper.wash_reduction.paper import SEEDS as PAPER_SEEDS
 from wakewise_paper.wash_reduction.paper import PaperWashTrial
-from wakewise_paper.wash_reduction.plan import METHODS, flight_s, flown_methods, planned_trials
+from wakewise_paper.wash_reduction.plan import (
+    MECHANISMS,
+    METHODS,
+    NONE,
+    flight_s,
+    flown_methods,
+    only_name,
+    planned_trials,
+    selected_mechanisms,
+    without_name,
+)
 from wakewise_paper.wash_reduction.scenario_files import names_of, title_of, trim_of
 from wakewise_paper.wash_reduction.summary_table import PLACE, RIVALS, WRONG, headline, tag_of
 

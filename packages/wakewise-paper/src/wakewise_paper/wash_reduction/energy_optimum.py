@@ -11,6 +11,16 @@ been flown before, too, and chosen by the very gusts it is judged by: more than 
 in water with other gusts, after single stretches were tried anew: what knowing all does gain. What neither sees: other
 motions (leaning a body, trim, a mission's own choices), and sharings that change within a stretch other than with the
 wrench; these could pass it.
+
+Ways to share a flight's wrench out among its thrusters, from the least thrusts out to where thrusters rest.
+
+Of all thrusts that make a wrench, T_0(t) + lambda z are those that differ along one line z of the null space. On such a
+line each thruster rests at one place, r_i = -T_0i / z_i, and wash is made of roots of thrusts: it has its minima where
+a thruster rests, or nearly. So a sharing is said by these places, which move with the wrench: at the least thrusts, at
+the first, second ... rest, half of the way to the inner ones, and beyond the last. Two lines (level, vertical) give
+all pairs.
+
+One sharing for each stretch of a flight: the least wash that a bound on energy allows.
 """
 
 from __future__ import annotations
@@ -18,6 +28,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 import polars as pl
@@ -37,12 +48,112 @@ from wakewise.operation.loop import Step
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.missions import SETTLING
 from wakewise.simulation.tank.prescribed_motion import PrescribedMotionTank, PrescribedPath
-from wakewise.simulation.tank.tank import tank_ambient, tank_points
-from wakewise.simulation.tank.world import TankWorld
+from wakewise.simulation.tank.tank import TankWorld, tank_ambient, tank_points
 from wakewise.wake import bed_of
-from wakewise_paper.wash_reduction.allocations import candidate_allocations, split
-from wakewise_paper.wash_reduction.energy_bound import choose_under_budget, sum_of
 from wakewise_paper.wash_reduction.flight import WashTrial, parts_of
+
+HALF, BEYOND = 0.5, 1.4
+"""Shares of the way from the least thrusts to an inner and to an outermost rest that are looked at besides."""
+ALIKE_N = 0.03
+"""Places on a line nearer to each other than this, in the mean over a flight, are one."""
+_NOT_IN_IT = 1e-3
+
+
+def candidate_allocations(layout: Layout, least_N: Array) -> Array:
+    """Thrusts of all sharings, shape (j, k, n), the first of them the least thrusts themselves, shape (k, n).
+
+    Raises
+    ------
+    InputError
+        If the null space is not made of lines that share no thruster.
+    """
+    if not len(layout.lines):
+        raise InputError("bound: the vehicle's spare thrusts are not lines that share no thruster, so it has no grid")
+    along = [line_places(layout, line, least_N) for line in layout.lines]
+    return np.array([least_N + sum(moves) for moves in product(*along)])
+
+
+def line_places(layout: Layout, line: Array, least_N: Array) -> list[Array]:
+    """Moves along one line, shape (k, n) each, that lead from the least thrusts to its places; the first is none."""
+    rests = np.sort(_rests(line, least_N), axis=1)
+    low, high = _room(layout, line, least_N)
+    places = [np.zeros(len(least_N))]
+    last = rests.shape[1] - 1
+    looked_at = [(number, 1.0) for number in range(last + 1)] + [(number, HALF) for number in range(1, last)]
+    for number, share in (*looked_at, (0, BEYOND), (last, BEYOND)):
+        place = np.clip(share * rests[:, number], low, high)
+        if all(np.abs(place - other).mean() >= ALIKE_N for other in places):
+            places.append(place)
+    return [place[:, None] * line for place in places]
+
+
+def _rests(line: Array, least_N: Array) -> Array:
+    """Where on a line each of its thrusters rests, shape (k, those that it has)."""
+    own = np.abs(line) > _NOT_IN_IT
+    return np.asarray(-least_N[:, own] / line[own])
+
+
+def _room(layout: Layout, line: Array, least_N: Array) -> tuple[Array, Array]:
+    """How far the limits let each step go along a line, down and up, shape (k,) each."""
+    own = np.abs(line) > _NOT_IN_IT
+    ends = np.stack([(limit[own] - least_N[:, own]) / line[own] for limit in (layout.lower_N, layout.upper_N)])
+    low, high = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
+    return np.minimum(low, 0.0), np.maximum(high, 0.0)
+
+
+def split(layout: Layout, thrusts_N: Array) -> tuple[Array, Array]:
+    """Least thrusts of the same wrenches, and what is spare in these thrusts; shape (k, n) each."""
+    spare = thrusts_N @ layout.null @ layout.null.T
+    return thrusts_N - spare, spare
+
+
+_LEVELS = 2000
+"""Steps in which the energy over the least is counted; each choice is rounded up, so that the bound is kept."""
+
+
+def choose_under_budget(wash: Array, energy: Array, most: float) -> IntArray:
+    """Which choice to take in each stretch, shape (b,), so that the sum of wash is least and that of energy in bounds.
+
+    Exact but for the rounding of energy, by dynamic programming over stretches (the knapsack with one choice of each).
+
+    Parameters
+    ----------
+    wash, energy : ndarray, shape (b, j)
+        What each choice adds in each stretch.
+    most : float
+        Bound on the sum of energy, infinite for none; where nothing is within it, the choices of least energy.
+    """
+    least = energy.min(axis=1)
+    free = most - float(least.sum())
+    if not np.isfinite(most):
+        return np.asarray(wash.argmin(axis=1))
+    if free <= 0.0:
+        return np.asarray(energy.argmin(axis=1))
+    cost = np.ceil((energy - least[:, None]) / free * _LEVELS - 1e-9)
+    taken: list[tuple[IntArray, Array]] = []
+    best = np.zeros(_LEVELS + 1)  # least wash by how much of the room may be used
+    for own, steps in zip(wash, cost, strict=True):
+        after, pick = np.full(_LEVELS + 1, np.inf), np.zeros(_LEVELS + 1, dtype=np.int64)
+        for j in np.flatnonzero(steps <= _LEVELS):
+            shift = int(steps[j])
+            total = best[: _LEVELS + 1 - shift] + own[j]
+            better = total < after[shift:]
+            after[shift:][better] = total[better]
+            pick[shift:][better] = j
+        best = after
+        taken.append((pick, steps))
+    picks, left = np.zeros(len(taken), dtype=np.int64), _LEVELS
+    for b in reversed(range(len(taken))):
+        pick, steps = taken[b]
+        picks[b] = pick[left]
+        left -= round(float(steps[picks[b]]))
+    return picks
+
+
+def sum_of(values: Array, picks: IntArray) -> float:
+    """Sum over stretches of what was picked, of values of shape (b, j)."""
+    return float(values[np.arange(len(picks)), picks].sum())
+
 
 ENERGIES: dict[str, float] = {"1.05": 1.05, "1.15": 1.15, "1.3": 1.3, "1.5": 1.5, "1.7": 1.7, "any": np.inf}
 """Bounds on energy over that of the least thrusts, by what they are called."""

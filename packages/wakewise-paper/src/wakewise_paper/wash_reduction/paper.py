@@ -14,8 +14,8 @@ import polars as pl
 
 from wakewise.core.geometry import Pose
 from wakewise.operation import Parts, fly
+from wakewise.operation.randomization import Seeds
 from wakewise.operation.scenario import Scenario, check_scenario
-from wakewise.operation.seeds import Seeds
 from wakewise.scene.missions import SETTLING
 from wakewise.scene.targets import Region, find_target, sample_region
 from wakewise.vision.evaluation import flight_figures

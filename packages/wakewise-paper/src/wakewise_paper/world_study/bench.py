@@ -22,8 +22,7 @@ from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import load_scenario
 from wakewise.operation.worlds.library import load_world, world_names
 from wakewise_paper import flight_batches
-from wakewise_paper.flight_batches import FlightFailure, Key, Row
-from wakewise_paper.flight_store import PHOTOGRAPHS, FlightStore, store_folder
+from wakewise_paper.flight_batches import PHOTOGRAPHS, FlightFailure, FlightStore, Key, Row, store_folder
 from wakewise_paper.world_study.figures import method_figures, ratios
 from wakewise_paper.world_study.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial
 from wakewise_paper.world_study.lattice_comparison import JUDGED, judge_table, judge_trials

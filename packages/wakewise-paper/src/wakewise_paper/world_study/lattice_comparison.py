@@ -21,7 +21,7 @@ from scipy.spatial import ConvexHull
 from wakewise.core.arrays import Array
 from wakewise.operation.loop import Step
 from wakewise.scene.targets import Mesh, Target
-from wakewise.simulation.tank.probes import surface_samples
+from wakewise.simulation.tank.water_truth import surface_samples
 from wakewise_paper.flight_batches import Key, Row
 from wakewise_paper.world_study.flight import WorldTrial, flown_figures, short_flight
 

@@ -16,7 +16,7 @@ from wakewise.ui.reports.methods_compared import methods_compared, profiles
 from wakewise_paper.reports.reproduction import plots, write_pages, write_results
 from wakewise_paper.reports.reproduction.results import standalone_svg
 from wakewise_paper.reports.reproduction.sentences import computer_description, reproduced
-from wakewise_paper.reproduction.acceptance import JUDGED
+from wakewise_paper.reproduction.claim import JUDGED
 from wakewise_paper.reproduction.flights import SERIES
 from wakewise_paper.reproduction.rows import CompletedCase
 from wakewise_paper.reproduction.run import _figures, _Growing

@@ -1,22 +1,264 @@
-"""One trial's share of a data set: files that say what was known, files that say what is true, and facts of both."""
+"""One trial's share of a data set: files that say what was known, files that say what is true, and facts of both.
+
+Which columns of a trial a controller could know, and what each column means.
+
+What is known is listed; everything else is truth, so that a column that is added one day does not slip into what may be
+learnt from.
+
+Which folders are trials, and where each keeps its flight, its settings and its figures.
+
+What a trial was set to and what was measured of it, from the files of a trial or of a campaign.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import re
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import polars as pl
+import yaml
 
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_folder
-from wakewise.experiments.exports.checksums import copied, sha256_of
-from wakewise.experiments.trials.dataset.columns import known_and_true
-from wakewise.experiments.trials.dataset.settings import TrialSettings, figures_of, settings_of
-from wakewise.experiments.trials.dataset.trial_sources import METRICS, SCENARIO, STEPS, TrialSource
+from wakewise.core.safe_yaml import YamlError, read_yaml
+from wakewise.experiments.exports.croissant import copied, sha256_of
 from wakewise.scene.targets import read_mesh
+
+_KNOWN = re.compile(
+    r"time_s|exposing|fallback|leg|disturbance|name|sharpness|(est|goal|wrench|load)_\w+|command_\d+_N|ardusub_\w+"
+)
+_WHOSE = {"true": "true", "est": "estimated", "goal": "wished"}
+_STATE = {
+    "x_m": "north of the body's origin, m", "y_m": "east of the body's origin, m", "z_m": "its depth, m",
+    "qw": "attitude quaternion from body to world, w", "qx": "the same, x", "qy": "the same, y", "qz": "the same, z",
+    "u_m_s": "velocity forward, m/s", "v_m_s": "velocity to the right, m/s", "w_m_s": "velocity down, m/s",
+    "p_rad_s": "turning about the axis forward, rad/s", "q_rad_s": "turning about the axis to the right, rad/s",
+    "r_rad_s": "turning about the axis down, rad/s", "tilt_deg": "angle of the camera's joint, up, deg",
+}  # fmt: skip
+_CAMERA = {
+    "x_m": "north of the camera's centre, m", "y_m": "east of the camera's centre, m", "z_m": "its depth, m",
+    "qw": "quaternion from camera (x right, y down, z ahead) to world, w",
+}  # fmt: skip
+_AXES = {
+    "X_N": "force forward, N", "Y_N": "force to the right, N", "Z_N": "force down, N",
+    "K_Nm": "moment about the axis forward, N m", "M_Nm": "moment about the axis to the right, N m",
+    "N_Nm": "moment about the axis down, N m",
+}  # fmt: skip
+_SINGLE = {
+    "trial": "which trial the row is of",
+    "time_s": "seconds since the trial's start",
+    "exposing": "whether a photograph is taken in this step",
+    "collision": "whether the hull touches something",
+    "fallback": "why what was sent is not what the method wanted; empty if it is",
+    "leg": "what stretch of the mission this is",
+    "disturbance": "D by the controller's own wake model, (m/s)^2",
+    "power_W": "electrical power of all thrusters, W",
+    "name": "file name of the photograph",
+    "sharpness": "of the photograph, without unit",
+    "turbidity_per_m": "mean beam attenuation by silt near the target, 1/m",
+    "target_speed_mean_m_s": "water speed on the target in excess of the same water without the vehicle, mean, m/s",
+    "target_speed_p95_m_s": "the same, 95th percentile, m/s",
+    "bed_speed_p95_m_s": "the same 1 to 2 cm above the bed round its foot, 95th percentile, m/s",
+}
+
+
+def is_known(column: str) -> bool:
+    """Whether a controller or a crew could have had it."""
+    return _KNOWN.fullmatch(column) is not None
+
+
+def known_and_true(columns: Iterable[str], shared: tuple[str, ...]) -> tuple[list[str], list[str]]:
+    """Columns of both sides, in their order; the `shared` ones, which join the two, stand on both."""
+    names = list(columns)
+    known = [name for name in names if is_known(name)]
+    return known, [name for name in names if not is_known(name) or name in shared]
+
+
+def meaning(column: str, of_camera: bool = False) -> str:
+    """What a column is, with its unit; world north-east-down, body forward-right-down."""
+    if column in _SINGLE:
+        return _SINGLE[column]
+    head, _, rest = column.partition("_")
+    table = _STATE | _CAMERA if of_camera else _STATE
+    if head in _WHOSE and rest in table:
+        return f"{_WHOSE[head]}: {table[rest]}"
+    if head in ("wrench", "load") and rest in _AXES:
+        return f"{'asked of the thrusters' if head == 'wrench' else 'unexplained load, estimated'}: {_AXES[rest]}"
+    match = re.fullmatch(r"(thrust|command)_(\d+)_N", column)
+    if match is not None:
+        return f"thruster {match[2]}: {'thrust it gave' if match[1] == 'thrust' else 'thrust it was sent'}, N"
+    return f"{column.replace('_', ' ')}; see the data sheet"
+
+
+STEPS, SCENARIO, METRICS = "steps.parquet", "scenario.yaml", "metrics.json"
+TASK, FIGURES = "trial.json", "figures.json"
+"""What a campaign keeps of each of its trials: what is made, and, once it is finished, its figures."""
+_WORK = ("work/trial", "work")
+"""Where a campaign's work leaves its flight: a whole trial, or a flight alone."""
+
+
+@dataclass(frozen=True)
+class TrialSource:
+    """A trial: the folder of its flight; settings and figures, which a campaign keeps elsewhere.
+
+    `settings` is a scenario (YAML) or a campaign's task (JSON); files may not be there.
+    """
+
+    folder: Path
+    settings: Path
+    figures: Path
+
+
+def source_in(folder: Path) -> TrialSource | None:
+    """The trial in a folder, its own or a campaign's; None where none was flown to its end."""
+    if (folder / STEPS).is_file():
+        return TrialSource(folder, folder / SCENARIO, folder / METRICS)
+    if (folder / TASK).is_file() and (folder / FIGURES).is_file():
+        for work in _WORK:
+            flown = folder / work
+            if (flown / STEPS).is_file():
+                settings, figures = flown / SCENARIO, flown / METRICS
+                return TrialSource(
+                    flown,
+                    settings if settings.is_file() else folder / TASK,
+                    figures if figures.is_file() else folder / FIGURES,
+                )
+    return None
+
+
+def trials_of(folder: Path) -> tuple[dict[str, TrialSource], list[str]]:
+    """Trials by name, and names of folders that hold one that was not flown to its end.
+
+    A trial's own folder is one trial; a campaign's holds them below trials/; else every folder in it that is a trial,
+    and those one further down, whose names are then joined.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; give that of a campaign, of trials, or of one trial")
+    alone = source_in(folder)
+    if alone is not None:
+        return {_name(folder.resolve().name): alone}, []
+    top = folder / "trials" if (folder / "trials").is_dir() else folder
+    found: dict[str, TrialSource] = {}
+    unfinished: list[str] = []
+    for path in _folders(top):
+        inner = [path] if _is_trial(path) else [deep for deep in _folders(path) if _is_trial(deep)]
+        for trial in inner:
+            name = _name("-".join(trial.relative_to(top).parts))
+            source = source_in(trial)
+            if source is None:
+                unfinished.append(name)
+            elif name in found:
+                raise InputError(f"{trial}: a trial of the name {name} is there already; rename one of them")
+            else:
+                found[name] = source
+    if not found:
+        more = f", {len(unfinished)} not flown to their end" if unfinished else ""
+        raise InputError(f"{folder}: holds no trial (a folder with {STEPS}){more}")
+    return found, unfinished
+
+
+def _folders(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
+
+
+def _is_trial(folder: Path) -> bool:
+    return any((folder / name).is_file() for name in (STEPS, SCENARIO, TASK))
+
+
+def _name(text: str) -> str:
+    """A name that every file system and every glob pattern takes as it is."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "_", text).strip(".") or "trial"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialSettings:
+    """A scenario as a tree and as text; nothing where a trial has none.
+
+    Names of folders are taken out of the text: they tell of somebody's computer and lead nowhere else.
+    """
+
+    tree: Mapping[str, Any] = field(default_factory=dict)
+    text: str = ""
+    wakewise: str | None = None
+
+    def word(self, *path: str) -> str | None:
+        """A name in the tree as it may be published: of a path the last part; None where there is none."""
+        value: Any = self.tree
+        for name in path:
+            value = value.get(name) if isinstance(value, Mapping) else None
+        return Path(value).name if isinstance(value, str) else None
+
+
+def settings_of(source: TrialSource) -> TrialSettings:
+    """Settings of a trial.
+
+    Raises
+    ------
+    InputError
+        If their file is there and cannot be read.
+    """
+    path = source.settings
+    if not path.is_file():
+        return TrialSettings()
+    if path.suffix == ".json":
+        told = _json(path).get("settings")
+        tree = told.get("scenario") if isinstance(told, dict) else None
+        if not isinstance(tree, dict):
+            return TrialSettings()
+        return TrialSettings(tree=tree, text=_without_folders(yaml.safe_dump(tree, sort_keys=False)))
+    try:
+        text = path.read_text(encoding="utf-8")
+        tree = read_yaml(text)
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is no text in UTF-8") from None
+    except YamlError as fault:
+        raise InputError(f"{path}: {fault}") from None
+    version = re.search(r"^# wakewise (\S+)$", text, flags=re.M)
+    return TrialSettings(
+        tree=tree if isinstance(tree, dict) else {},
+        text=_without_folders(text),
+        wakewise=version[1] if version else None,
+    )
+
+
+def figures_of(source: TrialSource) -> dict[str, float]:
+    """What was measured of a trial, as far as it is numbers.
+
+    Raises
+    ------
+    InputError
+        If their file is there and cannot be read.
+    """
+    if not source.figures.is_file():
+        return {}
+    told = _json(source.figures)
+    inner = told.get("figures")
+    told = inner if isinstance(inner, dict) else told
+    numbers = {key: value for key, value in told.items() if isinstance(value, int | float) and key != "seed"}
+    return {key: float(value) for key, value in numbers.items() if math.isfinite(value)}
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, UnicodeDecodeError):
+        raise InputError(f"{path}: is no JSON that can be read") from None
+    return told if isinstance(told, dict) else {}
+
+
+def _without_folders(text: str) -> str:
+    return re.sub(r"(?m)(:\s+['\"]?)(?:/|[A-Za-z]:[\\/])[^\n'\"]*[/\\]([^/\\\n'\"]+)", r"\1\2", text)
+
 
 KNOWN, TRUTH = "known", "truth"
 NOTE = "part.json"

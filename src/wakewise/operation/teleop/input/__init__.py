@@ -1,7 +1,7 @@
 """Input of an operator: what hands do, whatever they hold.
 
 `controls.py` is the record of all inputs; it comes from a script (`script.py`), a trace (`control_log.py`), keys
-(`keyboard.py`) or a gamepad (`gamepad.py`, the only module that knows SDL, and `pad_mapping.py`); `sources.py` reads
+(`keyboard.py`) or a gamepad (`gamepad.py`, the only module that knows SDL, and `pad_mapping.py`); `script.py` reads
 script and trace. The model of an operator is `wakewise.control.operator_model`.
 """
 

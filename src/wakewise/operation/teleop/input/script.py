@@ -6,11 +6,13 @@ As YAML, each entry with `at_s` and any of the axes (those not named are centred
     - {at_s: 2, right: 0.6}
     - {at_s: 5, pressed: [capture]}
     - {at_s: 8, gone: true}
+
+Hands from a file, by its ending: a script in YAML, or the record of a flight as Parquet or CSV.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,7 +21,7 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import yaml_file
-from wakewise.operation.teleop.input.controls import CENTRED, CONTROL_AXES, Controls
+from wakewise.operation.teleop.input.controls import CENTRED, CONTROL_AXES, Controls, ControlSource
 
 LONGEST = 100_000
 """Most entries of a script."""
@@ -118,3 +120,31 @@ def _number(value: Any, what: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
         raise InputError(f"{what}: {value!r}, must be a finite number")
     return float(value)
+
+
+def _record(path: Path) -> ControlSource:
+    """The record of a flight; tables are imported where one is read, since every scenario knows of this file."""
+    from wakewise.operation.teleop.input.control_log import read_trace
+
+    return read_trace(path)
+
+
+READERS: dict[str, Callable[[Path], ControlSource]] = {
+    ".yaml": load_script,
+    ".yml": load_script,
+    ".parquet": _record,
+    ".csv": _record,
+}
+
+
+def read_input(path: Path) -> ControlSource:
+    """Hands that a file tells of.
+
+    Raises
+    ------
+    InputError
+        If its ending is none of `READERS`, or it cannot be read.
+    """
+    if path.suffix not in READERS:
+        raise InputError(f"{path}: hands are read from {', '.join(READERS)}")
+    return READERS[path.suffix](path)

@@ -1,18 +1,32 @@
-"""The report of a model from photographs: whether it can be trusted, the model, its scale, every photograph."""
+"""The report of a model from photographs: whether it can be trusted, the model, its scale, every photograph.
+
+Rows of the page: facts one below the other, and of tables.
+
+The page's words on scale: where metres come from, how sure they are, what disagrees.
+
+A model from photographs in 3D: surface or points, and the cameras with their pictures, as one HTML page.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
+import trimesh
+import viser
 from matplotlib.figure import Figure
 
-from wakewise.core.arrays import IntArray
+from wakewise.core.arrays import Array, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
+from wakewise.core.geometry import quat_from_matrix
 from wakewise.ui.reports.page import (
     collapsible_section,
     legend_entry,
@@ -23,12 +37,262 @@ from wakewise.ui.reports.page import (
     tile,
     whole_page,
 )
-from wakewise.ui.reports.photo_model.rows import facts_list, table_row
-from wakewise.ui.reports.photo_model.scale import scale_section, scale_tile
-from wakewise.ui.reports.photo_model.scene import model_scene
+from wakewise.ui.reports.scene3d import CAMERA_RGB, MAX_POINTS, decimated, without_server
 from wakewise.ui.reports.svg_style import TEAL, new_figure, style_axes
 from wakewise.ui.reports.text import NONE, fixed, number, shown
-from wakewise.vision.reconstruction.photo_facts import ModelStatistics, model_facts
+from wakewise.ui.reports.trial import TrialMesh
+from wakewise.vision.image_decoding import read_picture
+from wakewise.vision.reconstruction import read_cloud
+from wakewise.vision.reconstruction.photo_facts import ModelStatistics, PhotoStatistics, model_facts
+from wakewise.vision.texturing.textured import read_textured
+
+
+def facts_list(rows: Sequence[tuple[str, str]]) -> str:
+    """Names and values, one below the other."""
+    return f'<dl class="facts">{"".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in rows)}</dl>'
+
+
+def table_row(cells: tuple[str, ...], tag: str, kinds: str) -> str:
+    """A row of a table: cells of a tag, each text (t), a list (l) or a number set right (r)."""
+    classes = {"t": "", "l": "", "r": ' class="num"'}
+    inner = [f"<{tag}{classes[k]}>{escape(cell)}</{tag}>" for cell, k in zip(cells, kinds, strict=True)]
+    return f"<tr>{''.join(inner)}</tr>"
+
+
+_HOW = (
+    "<p>Lay two or more bars between coded targets into the scene (<code>--bar A,B,LENGTH</code>), give the places of "
+    "the cameras (<code>--reference-cameras</code>), or at least their depths or GPS fixes (<code>--fixes</code>).</p>"
+)
+
+
+def scale_tile(figures: dict[str, Any]) -> str:
+    """One figure for the top of the page."""
+    bars, fixes, scale = figures.get("scale_bars"), figures.get("scale_fixes"), figures.get("scale")
+    if bars is not None and bars["used"]:
+        count = len(bars["bars"])
+        return tile("scale", f"± {number(bars['uncertainty_pct'], 2)}", "%", f"by {count} bar{'s' * (count > 1)}")
+    if scale is not None:
+        rms = figures.get("cameras_rmse_mm")
+        if rms is None:
+            return tile("scale", "given", "", "by the known cameras, which stay as they were")
+        return tile("scale", number(rms), "mm", "cameras from their references, rms")
+    if fixes is not None and fixes["used"]:
+        return tile(
+            "scale", f"± {number(fixes['uncertainty_pct'], 2)}", "%", f"by fixes of {shown(fixes['photos'])} photos"
+        )
+    return tile("scale", "–", "", "fixes are too unsure" if fixes is not None else "no bars, no reference cameras")
+
+
+def scale_section(figures: dict[str, Any]) -> str:
+    """The section: bars, references or fixes, whichever gave the scale first, then what checks it."""
+    bars, fixes = figures.get("scale_bars"), figures.get("scale_fixes")
+    lead, content = "The model has no scale: its lengths mean nothing by themselves.", _HOW
+    if bars is not None:
+        lead, content = _by_bars(bars)
+    elif figures.get("scale") is not None:
+        lead, content = "From the places of the cameras that were given.", facts_list(_references(figures))
+    elif fixes is not None and fixes["used"]:
+        lead, content = f"From where {shown(fixes['photos'])} photos were taken, as their fixes tell it.", ""
+    return section("scale", "Scale", lead, content + ("" if fixes is None else facts_list(_by_fixes(fixes))))
+
+
+def _by_fixes(fixes: dict[str, Any]) -> list[tuple[str, str]]:
+    unsure = fixes.get("uncertainty_pct")
+    rows = [("scale by fixes", "cannot be told" if unsure is None else f"uncertain by {number(unsure, 2)} %")]
+    if fixes["why"] is not None:
+        rows.append(("not used", fixes["why"]))
+    if fixes["model_off_pct"] is not None and fixes["why"] is None:
+        rows.append(("lengths by fixes", f"{fixed(fixes['model_off_pct'], 1, sign=True)} % off"))
+    for key, words in (("horizontal_rms_m", "fixes off horizontally"), ("depth_rms_m", "fixes off in depth")):
+        if fixes[key] is not None:
+            rows.append((words, f"{number(fixes[key], 2)} m rms"))
+    if fixes["far"]:
+        far = [str(name) for name in fixes["far"]]
+        rows.append(("fixes that do not fit", ", ".join(far[:6]) + (" ..." if len(far) > 6 else "")))
+    if fixes["used"]:
+        axes = "north, east, down" if fixes["north_known"] else "the third is down, north is not known"
+        rows.append(("the model's axes", axes))
+    return rows
+
+
+def _by_bars(bars: dict[str, Any]) -> tuple[str, str]:
+    lead = (
+        f"From {len(bars['bars'])} bars between coded targets, uncertain by {number(bars['uncertainty_pct'], 2)} %."
+        if bars["used"]
+        else f"From reference cameras; by the bars, lengths are {fixed(bars['model_off_pct'], 3, sign=True)} % off."
+    )
+    head = table_row(("bar", "stated", "in the model", "off", "by the other bars", "photos"), "th", "tlrrrr")
+    rows = "".join(
+        table_row(
+            (
+                bar["name"],
+                f"{fixed(bar['length_m'], 2, scale=1e3)} ± {fixed(bar['sigma_m'], 2, scale=1e3)} mm",
+                f"{fixed(bar['found_m'], 2, scale=1e3)} mm",
+                f"{fixed(bar['off_mm'], 2, sign=True)} mm",
+                "only one" if bar["check_pct"] is None else f"{fixed(bar['check_pct'], 3, sign=True)} %",
+                shown(bar["photos"]),
+            ),
+            "td",
+            "tlrrrr",
+        )
+        for bar in bars["bars"]
+    )
+    table = f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
+    targets = "".join(
+        table_row(
+            (
+                shown(one["target"]),
+                shown(one["photos"]),
+                f"{fixed(one['error_px'], 2)} px",
+                f"{fixed(_mean(one['sides_mm']), 2)} mm",
+                ", ".join(fixed(value, 4) for value in one["middle_m"] or []),
+            ),
+            "td",
+            "trrrl",
+        )
+        for one in bars["targets"]
+    )
+    if targets:
+        head = table_row(("target", "photos", "error", "side", "middle, m"), "th", "trrrl")
+        inner = f"<table><thead>{head}</thead><tbody>{targets}</tbody></table>"
+        table += collapsible_section(f"Targets ({bars['family']})", inner, f"{len(bars['targets'])}")
+    return lead, table
+
+
+def _mean(values: Sequence[float | None] | None) -> float | None:
+    known = [value for value in values or [] if value is not None]
+    return float(np.mean(known)) if known else None
+
+
+def _references(figures: dict[str, Any]) -> list[tuple[str, str]]:
+    surface = ("surface", f"{number(figures.get('surface_distance_m'))} m from the cameras")
+    if figures.get("cameras_rmse_mm") is None:
+        return [("cameras", "as they were given: nothing was fitted to them"), surface]
+    return [
+        ("cameras from their references", f"{number(figures['cameras_rmse_mm'])} mm rms, "
+         f"{number(figures.get('cameras_max_mm'))} mm at most"),
+        ("references that fit", shown(figures.get("reference_inliers"))),
+        surface,
+    ]  # fmt: skip
+
+
+FOV_RAD = float(np.radians(40.0))
+FRUSTUM_SHARE = 0.12
+"""Size of a camera's pyramid over the median distance from camera to subject."""
+_THUMB_PX, _MOST_PICTURES = 128, 120
+
+
+def model_up(facts: ModelStatistics) -> Array:
+    """Which way is up, a unit vector: the pictures' own where they agree on it, else against where cameras look."""
+    turns = [photo.R_WC for photo in facts.photos if photo.R_WC is not None]
+    if not turns:
+        return np.array([0.0, 0.0, 1.0])
+    upright, back = -np.mean([R[:, 1] for R in turns], axis=0), -np.mean([R[:, 2] for R in turns], axis=0)
+    best = upright if np.linalg.norm(upright) > max(0.6, float(np.linalg.norm(back))) else back
+    length = float(np.linalg.norm(best))
+    return np.asarray(best / length, dtype=np.float64) if length > 1e-6 else np.array([0.0, 0.0, 1.0])
+
+
+def model_scene(model: Path, photos: Path, facts: ModelStatistics) -> str | None:
+    """Whole HTML page with the scene of a model's folder; None if no photograph has a place."""
+    placed = [photo for photo in facts.photos if photo.p_WC is not None]
+    if not placed or not len(facts.points):
+        return None
+    eyes = np.array([photo.p_WC for photo in placed])
+    middle = np.median(facts.points, axis=0)
+    # viser greets on standard output, which belongs to the command line's own answer.
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        with without_server():
+            server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        try:
+            up = model_up(facts)
+            server.scene.set_up_direction(tuple(float(v) for v in up))
+            server.scene.configure_environment_map(None)  # it would be fetched from the network
+            server.scene.add_light_ambient("/light", intensity=1.3)
+            seen = _subject(server, model, facts)
+            distance = float(np.median(np.linalg.norm(eyes - middle, axis=1)))
+            _cameras(server, photos, placed, FRUSTUM_SHARE * distance)
+            _aim(server, seen, eyes, up)
+            return str(server.get_scene_serializer().as_html())
+        finally:
+            server.stop()
+
+
+def _subject(server: viser.ViserServer, model: Path, facts: ModelStatistics) -> Array:
+    """Add surface, dense and sparse points; what is in sight at first, as points."""
+    scene, seen = server.scene, facts.points
+    surface = (model / "mesh.glb").is_file()
+    if surface:
+        vertices, faces, colours = read_textured(model / "mesh.glb")
+        light, chosen = decimated(TrialMesh(vertices_m=vertices, faces=faces))
+        mesh = trimesh.Trimesh(light.vertices_m, light.faces, process=False)
+        mesh.visual = trimesh.visual.TextureVisuals(
+            material=trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)
+        )
+        rgba = np.concatenate([colours[chosen], np.ones((len(chosen), 1))], axis=1)
+        mesh.visual.vertex_attributes["color"] = np.round(255 * rgba).astype(np.uint8)
+        scene.add_mesh_trimesh("/surface", mesh)
+        seen = light.vertices_m
+    dense = (model / "dense.ply").is_file()
+    if dense:
+        cloud = read_cloud(model / "dense.ply")
+        step = max(1, -(-len(cloud.points_m) // MAX_POINTS))
+        if not surface:
+            seen = cloud.points_m
+        _points(server, "/dense points", cloud.points_m[::step], cloud.colours[::step], not surface)
+    _points(server, "/sparse points", facts.points, facts.colours, not surface and not dense)
+    return np.asarray(seen, dtype=np.float64)
+
+
+def _points(server: viser.ViserServer, name: str, points: Array, colours: Array, visible: bool) -> None:
+    extent = float(np.linalg.norm(np.subtract(*np.quantile(points, (0.95, 0.05), axis=0))))
+    server.scene.add_point_cloud(
+        name,
+        points=points.astype(np.float32),
+        colors=np.round(255 * colours).astype(np.uint8),
+        point_size=0.004 * extent,
+        point_shape="circle",
+        precision="float32",
+        visible=visible,
+    )
+
+
+def _cameras(server: viser.ViserServer, photos: Path, placed: list[PhotoStatistics], size: float) -> None:
+    every = max(1, -(-len(placed) // _MOST_PICTURES))
+    for k, photo in enumerate(placed):
+        if photo.R_WC is None or photo.p_WC is None:
+            continue
+        server.scene.add_camera_frustum(
+            f"/photographs/{photo.name}", fov=float(np.radians(photo.fov_deg)), aspect=photo.aspect, scale=size,
+            thickness=0.02 * size, color=CAMERA_RGB, image=_thumb(photos / photo.name) if k % every == 0 else None,
+            format="jpeg", jpeg_quality=70, cast_shadow=False, receive_shadow=False,
+            wxyz=quat_from_matrix(photo.R_WC), position=photo.p_WC,
+        )  # fmt: skip
+
+
+def _thumb(path: Path) -> Array | None:
+    image = read_picture(path, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    if image is None:
+        return None
+    height = max(1, round(_THUMB_PX * image.shape[0] / image.shape[1]))
+    return np.ascontiguousarray(cv2.resize(image, (_THUMB_PX, height), interpolation=cv2.INTER_AREA)[..., ::-1])
+
+
+def _aim(server: viser.ViserServer, seen: Array, eyes: Array, up: Array) -> None:
+    """Open on the subject from where the cameras are, a little raised."""
+    low, high = np.quantile(seen, (0.02, 0.98), axis=0)
+    centre, reach = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    way = eyes.mean(axis=0) - centre
+    side = eyes[0] - centre
+    way = way / max(float(np.linalg.norm(way)), 1e-9) + 0.35 * side / max(float(np.linalg.norm(side)), 1e-9)
+    way = way / max(float(np.linalg.norm(way)), 1e-9)
+    distance = 1.15 * reach / np.sin(0.5 * FOV_RAD)
+    server.initial_camera.look_at = tuple(float(v) for v in centre)
+    server.initial_camera.position = tuple(float(v) for v in centre + distance * way)
+    server.initial_camera.up = tuple(float(v) for v in up)
+    server.initial_camera.fov = FOV_RAD
+    server.initial_camera.near = 0.005 * distance
+
 
 PARTS = (
     ("model", "Model"),

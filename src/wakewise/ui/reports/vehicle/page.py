@@ -13,9 +13,8 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.robot.vehicles.check import WRENCH_AXES, AnyVehicle
-from wakewise.robot.vehicles.describe import as_draft, describe
+from wakewise.robot.vehicles.describe import as_draft, describe, parameters
 from wakewise.robot.vehicles.draft import VehicleDraft
-from wakewise.robot.vehicles.parameters import parameters
 from wakewise.ui.reports.text import NONE, shown
 from wakewise.ui.reports.vehicle.drawing import drawing_svg
 

@@ -1,8 +1,8 @@
 """Metres by bars of known length between coded targets that the photographs show, or by where these were taken.
 
 Start reading in `stage.py` (a sparse model in, the same model in metres out). `bars.py` is what a user says, `marks.py`
-finds targets in photographs, `places.py` puts them into the model, `fitting.py` weighs the bars and says where they
-disagree. `position_fixes.py` reads what GPS receivers and depth gauges tell of the cameras, `scale_from_positions.py`
+finds targets in photographs, `marks.py` puts them into the model, `bars.py` weighs the bars and says where they
+disagree. `position_fixes.py` reads what GPS receivers and depth gauges tell of the cameras, `position_fixes.py`
 asks what it is worth.
 """
 

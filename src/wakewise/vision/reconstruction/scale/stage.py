@@ -20,12 +20,9 @@ from wakewise.vision.reconstruction.calibration import CalibrationBoard
 from wakewise.vision.reconstruction.colmap import pycolmap
 from wakewise.vision.reconstruction.photos import PhotoStore
 from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto, read_views
-from wakewise.vision.reconstruction.scale.bars import ScaleBars
-from wakewise.vision.reconstruction.scale.fitting import BarMeasurement, fit_scale
-from wakewise.vision.reconstruction.scale.marks import Sightings, find_board, find_marks
-from wakewise.vision.reconstruction.scale.places import TriangulatedPoint, place
-from wakewise.vision.reconstruction.scale.position_fixes import PositionFixes
-from wakewise.vision.reconstruction.scale.scale_from_positions import figures, place_by_fixes, why_unused
+from wakewise.vision.reconstruction.scale.bars import BarMeasurement, ScaleBars, fit_scale
+from wakewise.vision.reconstruction.scale.marks import Sightings, TriangulatedPoint, find_board, find_marks, place
+from wakewise.vision.reconstruction.scale.position_fixes import PositionFixes, figures, place_by_fixes, why_unused
 
 MOST_SIDE_PCT = 2.0
 """A printed square's side may differ from what was meant by this much, and three times what is unsure about it."""

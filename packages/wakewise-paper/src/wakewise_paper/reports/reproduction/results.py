@@ -19,16 +19,15 @@ from wakewise.core.arrays import Array
 from wakewise.core.files import whole_file, write_text
 from wakewise.experiments.campaigns.statistics import smallest_effect
 from wakewise.experiments.campaigns.summary import worst_trials
-from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, winner_text
+from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, sheet, winner_text
 from wakewise.ui.reports.svg_style import CARD, CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET
 from wakewise.ui.reports.text import duration, number, shown
-from wakewise.ui.reports.trial_pictures import sheet
 from wakewise_paper.reports.reproduction import plots, sentences
-from wakewise_paper.reproduction.acceptance import CIRCULAR, JUDGED, glances
-from wakewise_paper.reproduction.comparison import COLUMNS, command_of
-from wakewise_paper.reproduction.comparison import tables as compared_tables
+from wakewise_paper.reproduction.claim import CIRCULAR, JUDGED, glances
 from wakewise_paper.reproduction.flights import read_series
 from wakewise_paper.reproduction.published_tables import UNKNOWN
+from wakewise_paper.reproduction.run import COLUMNS, command_of
+from wakewise_paper.reproduction.run import tables as compared_tables
 from wakewise_paper.reproduction.worlds import water
 
 INDEX, REPRODUCED = "README.md", "reproduced.md"

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from wakewise.ui.reports.text import number, percent, shown
-from wakewise_paper.reproduction.acceptance import SETUP, count_met
+from wakewise_paper.reproduction.claim import SETUP, count_met
 
 Row = Mapping[str, Any]
 Table = Mapping[str, Any]

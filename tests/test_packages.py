@@ -1,0 +1,46 @@
+"""Every package says what is in it, its pages are true, and each public class name has one meaning."""
+
+import ast
+import re
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = (ROOT / "src", *sorted(ROOT.glob("packages/*/src")), ROOT / "benchmarks")
+PACKAGES = sorted(page.parent for source in SOURCES for page in source.glob("wakewise*/**/__init__.py"))
+MODULES = sorted(path for source in SOURCES for path in source.glob("wakewise*/**/*.py"))
+MAX_LINES = 600
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.name)
+def test_the_page_of_a_package_names_only_files_that_are_there(package: Path) -> None:
+    """The module docstring of a package exists, and each file that it names exists."""
+    text = ast.get_docstring(ast.parse((package / "__init__.py").read_text(encoding="utf-8")))
+    assert text, f"{package}: __init__.py has no docstring"
+    for name in re.findall(r"`([\w*/]+(?:\.py|/))`", text):
+        assert list(package.rglob(name.rstrip("/"))), f"{package.name}: {name} is not there"
+
+
+def test_no_module_is_longer_than_600_lines() -> None:
+    """A module is one concept."""
+    lines = {str(path.relative_to(ROOT)): len(path.read_text(encoding="utf-8").splitlines()) for path in MODULES}
+    assert {name: count for name, count in lines.items() if count > MAX_LINES} == {}
+
+
+def test_a_public_class_name_has_one_meaning() -> None:
+    """No two modules of the project define a public class of the same name."""
+    homes = defaultdict(list)
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes[node.name].append(str(path.relative_to(ROOT)))
+    assert {name: where for name, where in homes.items() if len(where) > 1} == {}
+
+
+def test_the_library_is_at_most_80000_lines_and_400_modules() -> None:
+    """The library keeps its size; what is not part of it lives in packages of its own."""
+    library = [path for path in MODULES if path.is_relative_to(ROOT / "src")]
+    assert len([path for path in library if path.name != "__init__.py"]) <= 400
+    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in library) <= 80_000
