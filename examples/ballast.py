@@ -3,7 +3,7 @@
 import sys
 
 import wakewise as ww
-from wakewise.control.trim import ballasted, net_buoyancy_N, trim_advice
+from wakewise.control.ballast_advice import ballasted, net_buoyancy_N, trim_advice
 
 parts = ww.Scenario.preset("quick", world="tank", vehicle=sys.argv[1] if sys.argv[1:] else "paper", method="dp").parts()
 times = parts.route.exposures_s[:: len(parts.route.exposures_s) // 12]

@@ -4,13 +4,13 @@ import sys
 
 import wakewise as ww
 from wakewise.allocation import min_norm_allocation
-from wakewise.control import TrackerState as State, make_tracker, vehicle_layout
+from wakewise.control import PidState as State, make_pid, vehicle_layout
 
 
 class Mine:
     def __init__(self, parts: ww.Parts) -> None:
         self.name, self.layout = "mine", vehicle_layout(parts.vehicle)
-        self.tracker = make_tracker(parts.vehicle, parts.control)
+        self.tracker = make_pid(parts.vehicle, parts.control)
 
     def init(self) -> State:
         return self.tracker.init()

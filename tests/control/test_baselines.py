@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.control import ControlSettings, make_controller
-from wakewise.control.trim import ballasted
+from wakewise.control.ballast_advice import ballasted
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.planning import PlanSettings

@@ -68,8 +68,9 @@ def test_reported_disturbance_is_that_of_the_thrusts():
     for method in INSTANT:
         controller = make_controller(method, VEHICLE, small_region(), wake_model("jet"))
         _, command = controller.step(controller.init(), 0.02, estimate, goal)
-        eyes, thrusts = controller.watch, command.thrusts_N
-        G = controller.view.gram(estimate.X_WB) if eyes is None else eyes.seen(estimate, thrusts).gram
+        allocator, thrusts = controller.allocator, command.thrusts_N
+        context = allocator.context
+        G = allocator.view.gram(estimate.X_WB) if context is None else context.influence(estimate, thrusts).gram
         expected = disturbance(G, thrusts)
         assert command.disturbance == pytest.approx(expected, rel=1e-9)
 
@@ -123,7 +124,7 @@ def test_a_far_goal_saturates_within_limits_and_says_so(method):
     state, command = controller.step(controller.init(), 0.02, estimate, goal)
     assert np.all(command.thrusts_N >= VEHICLE.thrust_lower_N) and np.all(command.thrusts_N <= VEHICLE.thrust_upper_N)
     assert command.fallback is not None and "saturated" in command.fallback
-    assert state.share < 1.0
+    assert state.saturated
 
 
 def test_the_state_holds_everything():

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wakewise.control import ControlSettings, safeguarded
+from wakewise.control import ControlSettings, with_failsafe
+from wakewise.control.failsafe import PlanFailsafe
 from wakewise.core.errors import STRICT, InputError, is_strict
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Command, Goal
-from wakewise.operation.plugin_adapter import PluginController
-from wakewise.planning.guard import Guard
 from wakewise.robot.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("paper")
@@ -55,30 +54,16 @@ class Asked:
 
 
 def stepped(answer: Any, **options: Any) -> Command:
-    guard = safeguarded(Method(answer), VEHICLE, ControlSettings(), **options)
+    guard = with_failsafe(Method(answer), VEHICLE, ControlSettings(), **options)
     return guard.step(guard.init(), 0.02, HERE, GOAL)[1]
 
 
 def planned(fault: Exception, **options: Any) -> str | None:
-    return Guard(planner=Asked(fault), deadline_s=1.0, **options).ask(lambda: None, None, 0.0).trouble  # type: ignore[arg-type, return-value]
-
-
-def backup() -> Any:
-    still = Command(thrusts_N=np.zeros(8), wrench_B=np.zeros(6))
-    return safeguarded(Method(still), VEHICLE, ControlSettings())
+    return PlanFailsafe(planner=Asked(fault), deadline_s=1.0, **options).ask(lambda: None, None, 0.0).trouble  # type: ignore[arg-type, return-value]
 
 
 def flown(fault: Exception, strict: bool) -> Command:
-    guard = PluginController(
-        name="theirs",
-        inner=Method(fault),
-        thrusters=8,
-        lower_N=VEHICLE.thrust_lower_N,
-        upper_N=VEHICLE.thrust_upper_N,
-        backup=backup,
-        strict=strict,
-    )
-    return guard.step(guard.init(), 0.02, HERE, GOAL)[1]
+    return stepped(fault, strict=strict, foreign=True)
 
 
 @pytest.mark.parametrize("work", [stepped, planned, flown])
@@ -116,9 +101,9 @@ def test_a_vehicle_in_the_water_keeps_its_thrusts_whatever_is_set(
     for value, wished in (("1", True), ("0", False), ("", False)):
         monkeypatch.setenv(STRICT, value)
         assert is_strict() is wished
-        assert safeguarded(Method(None), VEHICLE, ControlSettings()).strict is wished
-        assert safeguarded(Method(None), VEHICLE, ControlSettings(), enforce=True).strict is False
-        assert Guard(planner=Asked(KeyError()), deadline_s=1.0).strict is False  # type: ignore[arg-type]
+        assert with_failsafe(Method(None), VEHICLE, ControlSettings()).failsafe.strict is wished
+        assert with_failsafe(Method(None), VEHICLE, ControlSettings(), enforce=True).failsafe.strict is False
+        assert PlanFailsafe(planner=Asked(KeyError()), deadline_s=1.0).strict is False  # type: ignore[arg-type]
     monkeypatch.setenv(STRICT, "1")
     assert "IndexError" in str(stepped(IndexError("x"), enforce=True).fallback)
 

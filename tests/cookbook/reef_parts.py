@@ -9,7 +9,7 @@ import numpy as np
 
 import wakewise as ww
 from wakewise.allocation import Layout, min_norm_allocation
-from wakewise.control import ControlTask, Tracker, TrackerState, make_tracker, vehicle_layout
+from wakewise.control import ControlTask, Pid, PidState, make_pid, vehicle_layout
 from wakewise.core.arrays import Array
 from wakewise.operation.worlds.makers import tank_world
 from wakewise.robot.vehicles import VehicleDraft, load_draft
@@ -21,16 +21,14 @@ from wakewise.simulation.tank import TankWorld
 class SternOnly:
     """Controller: the PID of `dp`; the two bow thrusters never blow forward."""
 
-    tracker: Tracker
+    tracker: Pid
     layout: Layout
     name: str = "stern-only"
 
-    def init(self) -> TrackerState:
+    def init(self) -> PidState:
         return self.tracker.init()
 
-    def step(
-        self, state: TrackerState, dt_s: float, estimate: ww.BodyState, goal: ww.Goal
-    ) -> tuple[TrackerState, ww.Command]:
+    def step(self, state: PidState, dt_s: float, estimate: ww.BodyState, goal: ww.Goal) -> tuple[PidState, ww.Command]:
         state, wrench_B = self.tracker.wrench(state, dt_s, estimate, goal, saturated=False)
         return state, ww.Command(thrusts_N=min_norm_allocation(self.layout, wrench_B).thrusts_N, wrench_B=wrench_B)
 
@@ -43,7 +41,7 @@ def stern_only(task: ControlTask) -> SternOnly:
     # A jet leaves against the force: forward jets push astern.
     astern = task.vehicle.thruster_axes_B[:, 0] < 0
     upper[bow & astern], lower[bow & ~astern] = 0.0, 0.0
-    return SternOnly(make_tracker(task.vehicle, task.settings), replace(layout, lower_N=lower, upper_N=upper))
+    return SternOnly(make_pid(task.vehicle, task.settings), replace(layout, lower_N=lower, upper_N=upper))
 
 
 @dataclass(frozen=True)

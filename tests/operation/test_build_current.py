@@ -62,12 +62,12 @@ def test_no_controller_is_told_the_current_that_the_tank_has():
 
     def made(**changes):
         controller = load_scenario("quick", None, {"method": "instant", **changes}).parts().controller
-        return controller, controller.watch.flow(BodyState(X_WB=Pose(np.zeros(3))), np.zeros(8))
+        return controller, controller.allocator.context.flow(BodyState(X_WB=Pose(np.zeros(3))), np.zeros(8))
 
     (still, flow), (east, flow_east) = (
         made(**{"tank.current.velocity_m_s": [0.0, speed, 0.0]}) for speed in (0.0, 0.05)
     )
-    assert np.array_equal(still.view.points_W_m, east.view.points_W_m)
+    assert np.array_equal(still.allocator.context.view.points_W_m, east.allocator.context.view.points_W_m)
     assert flow is None and flow_east is None
 
 

@@ -72,7 +72,7 @@ def test_the_planner_knows_the_tank_and_the_target():
         "quick", None, {"control.obstacles": [[2.0, 0.0, 1.0, 0.1]], "control.levers.spare": False}
     )
     parts = scenario.parts()
-    table = parts.controller.model.table
+    table = parts.controller.motion.model.table
     assert table.planes.shape == (6, 4)
     assert table.spheres[0].tolist() == [2.0, 0.0, 1.0, 0.1]
     vertices = parts.found_target.mesh.vertices_m

@@ -1,4 +1,4 @@
-"""A controller that nobody here has read cannot end a flight or send nonsense: the guard flies on and says why."""
+"""A controller that nobody here has read cannot end a flight or send nonsense: the failsafe flies on and says why."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -8,9 +8,10 @@ import polars as pl
 import pytest
 
 import wakewise as ww
-from wakewise.control import make_controller
+from wakewise.control import with_failsafe
+from wakewise.control.pipeline import PluginStage
 from wakewise.core.errors import StageError
-from wakewise.operation.plugin_adapter import PluginController, described
+from wakewise.operation.plugin_adapter import described
 
 pytestmark = pytest.mark.usefixtures("fallbacks_fly")
 
@@ -54,16 +55,18 @@ def seven(good):
     [
         (raises, "theirs: raised ZeroDivisionError: no such thing (test_plugin_adapter.py:"),
         (nan, "theirs: raised NotFinite: thrusts_N: holds NaN"),
-        (seven, "theirs: gave 7 thrusts, needs 8"),
-        (lambda good: good.thrusts_N, "theirs: gave ndarray, must be a Command"),
+        (seven, "theirs: raised TypeError: must answer a Command of 8 thrusts"),
+        (lambda good: good.thrusts_N, "theirs: raised TypeError: must answer a Command of 8 thrusts"),
     ],
 )
-def test_nonsense_is_flown_by_dp_and_counted(act, words):
+def test_nonsense_is_flown_by_pid_and_counted(act, words):
     """The flight is whole; each bad step has its reason in one line, and the thrusts flown are finite, one each."""
     flight = ww.fly(parts().replace(controller=Foreign(act)), duration_s=SECONDS)
     said = flight.steps["fallback"].to_list()
     assert len(said) == 20 and said[:2] == ["", ""]
-    assert all(line.startswith(words) and "flown by dp" in line and "\n" not in line for line in said[2:])
+    assert all(
+        line.startswith(words) and line.endswith("; PID and least thrusts") and "\n" not in line for line in said[2:]
+    )
     assert flight.figures["fallbacks"] == 18
     thrusts = flight.steps.select(pl.selectors.starts_with("command_")).to_numpy()
     assert thrusts.shape == (20, 8) and np.isfinite(thrusts).all()
@@ -81,24 +84,16 @@ def test_thrusts_beyond_the_limits_are_cut_and_counted():
     assert "beyond their limits, cut" in flight.steps["fallback"][5]
 
 
-def guarded(clock, patience_s=5.0):
-    vehicle = parts().vehicle
-    return PluginController(
-        name="slow",
-        inner=Foreign(lambda good: good),
-        thrusters=8,
-        lower_N=vehicle.thrust_lower_N,
-        upper_N=vehicle.thrust_upper_N,
-        backup=lambda: make_controller("dp", vehicle, parts().region, parts().wake, parts().control),
-        patience_s=patience_s,
-        clock=clock,
-    )
+def slow_flight(clock, patience_s=5.0):
+    pipeline = with_failsafe(Foreign(lambda good: good, name="slow"), parts().vehicle, parts().control, foreign=True)
+    pipeline.failsafe.clock, pipeline.failsafe.patience_s = clock, patience_s
+    return pipeline
 
 
 def test_two_seconds_a_step_are_counted_and_after_some_patience_not_asked_for_again():
-    """A simulated world waits, so late thrusts are flown and said; then `dp` flies the rest, said too."""
+    """A simulated world waits, so late thrusts are flown and said; then the PID flies the rest, said too."""
     now = iter(np.arange(0.0, 1000.0, 2.0))
-    controller = guarded(lambda: float(next(now)))
+    controller = slow_flight(lambda: float(next(now)))
     state, goal = controller.init(), ww.Goal(X_WB=parts().start.X_WB)
     said = []
     for _ in range(6):
@@ -106,10 +101,10 @@ def test_two_seconds_a_step_are_counted_and_after_some_patience_not_asked_for_ag
         said.append(command.fallback or "")
     assert said[0] == "", "the first step may compile"
     assert said[1] == "slow: late, 2000 ms of 20 allowed"
-    assert said[-1].startswith("slow: given up, 6 s late in all, last 2.00 s for 0.02 s; flown by dp")
+    assert said[-1].startswith("slow: given up, 6 s late in all, last 2.00 s for 0.02 s; PID and least thrusts")
 
 
-def test_an_init_that_raises_leaves_the_flight_to_dp():
+def test_an_init_that_raises_leaves_the_flight_to_the_pid():
     """Nothing of the controller is asked after that."""
     broken = Foreign(raises)
     broken.init = lambda: 1 / 0
@@ -159,13 +154,15 @@ def test_a_world_that_does_not_wait_has_the_deadline_enforced():
             pytest.fail("nothing is flown")
 
     own = parts().replace(method="dp")
-    assert own.replace(world=Sea()).flying.inner.enforce and not own.flying.inner.enforce
+    assert own.replace(world=Sea()).flying.failsafe.enforce and not own.flying.failsafe.enforce
 
 
-def test_our_own_have_the_guard_of_a_control_step_and_not_that_of_a_stranger():
-    """A controller of this package is trusted with its answers' kind and pace; its guard waits as the tank does."""
+def test_our_own_are_flown_as_pipelines_and_a_stranger_as_a_foreign_stage_of_one():
+    """Stages of our own stay as they are; both have one failsafe, which waits as the tank does."""
     own = parts().replace(method="dp")
-    assert own.flying.inner.inner is own.controller and not own.flying.inner.enforce
+    assert own.flying.motion is own.controller.motion
+    assert not own.flying.failsafe.enforce and not own.flying.failsafe.foreign
     assert own.replace(vehicle=own.vehicle.with_ideal_thrusters()).flying.name == own.controller.name
-    assert isinstance(parts().replace(controller=Foreign(nan)).flying.inner, PluginController)
-    assert described(Foreign(nan)) == "theirs (test_foreign.Foreign)"
+    theirs = parts().replace(controller=Foreign(nan)).flying
+    assert isinstance(theirs.motion, PluginStage) and theirs.failsafe.foreign
+    assert described(Foreign(nan)) == "theirs (test_plugin_adapter.Foreign)"

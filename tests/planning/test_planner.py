@@ -7,11 +7,11 @@ import pytest
 from plan_cases import AROUND, CENTRE, CONE, REGION, VEHICLE, model, problem
 from pydantic import ValidationError
 
-from wakewise.control.intent import obeying
+from wakewise.control.velocity_reference import scaled_tracking
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.core.interfaces import Goal
-from wakewise.planning.guard import check_start
+from wakewise.planning import check_start
 from wakewise.planning.planner import Planner, compile_plan
 from wakewise.planning.problem import PlanSettings, shifted
 from wakewise.planning.reference import reference_of
@@ -148,7 +148,7 @@ def test_infeasible_starts_are_refused():
 
 def test_obedience_is_the_dial_of_the_tracking_weights():
     """A problem that is to be obeyed four times as closely is planned as by settings of w_track 20, and 1 as ever."""
-    asked, strict = problem(), Planner(model(**obeying(PlanSettings(), 20.0).model_dump()))
+    asked, strict = problem(), Planner(model(**scaled_tracking(PlanSettings(), 20.0).model_dump()))
     dial, usual = Planner(model()), Planner(model())
     for obedience, other in ((4.0, strict), (1.0, usual)):
         asked = replace(asked, obedience=obedience)

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from plan_cases import REGION, VEHICLE, model, problem
 
+from wakewise.control.failsafe import PlanFailsafe
 from wakewise.core.errors import InputError
+from wakewise.planning import check_start
 from wakewise.planning import qp as qp_module
-from wakewise.planning.guard import Guard, check_start
 from wakewise.planning.planner import Planner
 from wakewise.planning.qp import BoxQP
 from wakewise.planning.surroundings import Surroundings
@@ -75,10 +76,10 @@ def test_a_plan_beyond_either_limit_is_not_flown(side: str, breaks: bool) -> Non
             commands[1, 0] = limit * (1.01 if breaks else 1.0)
             return replace(plan, commands_N=commands)
 
-    guard = Guard(planner=Bold(model(iterations=1)), deadline_s=1e9)
-    found = guard.ask(problem, None, 0.0)
+    failsafe = PlanFailsafe(planner=Bold(model(iterations=1)), deadline_s=1e9)
+    found = failsafe.ask(problem, None, 0.0)
     assert (found.plan is None) == breaks
-    assert guard.counts == ({"limits": 1} if breaks else {})
+    assert failsafe.incidents.counts == ({"limits": 1} if breaks else {})
 
 
 def test_a_start_nearer_to_something_than_the_clearance_is_refused() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.allocation import Weights, compile_layout, min_wash_allocation
-from wakewise.control.bow_rule import bow_layout
+from wakewise.control.forward_jet_exclusion import bow_layout
 from wakewise.core.geometry import Pose
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Region

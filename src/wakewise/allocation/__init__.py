@@ -8,8 +8,8 @@ comes in as the Gram matrix G of `s' G s`, where s are roots of thrusts.
 
 Start reading in `allocate.py` (what is asked and answered). `layout.py` is the matrix and its null space,
 `attainable_set.py` what the limits leave. The search for the minimum: `line_search.py` for one or two spare thrusts,
-`branch_and_bound.py` with `branch_and_bound.py` and `coordinate_descent.py` (branch and bound) for more, `convex.py`
-for the convex cost of effort alone. `power.py` leaves what is not worth its electrical power, and keeps a bound on it.
+`branch_and_bound.py` with `coordinate_descent.py` for more, `convex.py` for the convex cost of effort alone.
+`power_budget.py` bounds the electrical power.
 """
 
 from wakewise.allocation.allocate import (
@@ -22,11 +22,12 @@ from wakewise.allocation.allocate import (
     min_wash_allocation,
     pseudo_inverse,
 )
-from wakewise.allocation.power import PowerLaw, best_by_power, power_adjusted_cost
+from wakewise.allocation.power_budget import PowerBoundedAllocator, PowerLaw, best_by_power, power_adjusted_cost
 
 __all__ = [
     "Allocation",
     "Layout",
+    "PowerBoundedAllocator",
     "PowerLaw",
     "Weights",
     "best_by_power",

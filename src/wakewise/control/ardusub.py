@@ -13,7 +13,7 @@ PSC_VELXY_P 5, I .5, D .8, PSC_POSZ_P 1, PSC_VELZ_P 5), which hold five times as
 Lowered where they oscillate. A BlueROV2 runs its loops 400 times a second; here it is the trial's rate, the estimator's
 delay and another vehicle's inertia and lag. A pilot who sees a vehicle shake lowers the gains of that loop together.
 So each axis is taken at the slope that the thrusters have at 2 N, and inner and outer gain are lowered by one factor
-until the loop withstands twice the gain and 40 degrees of phase, the margins of all other methods (`stability.py`).
+until the loop withstands twice the gain and 40 degrees of phase, the margins of all other methods (`gain_margins.py`).
 
 In its favour: it has the estimator's pose and velocity like all, no magnetometer, no dead zone of its sticks; demands
 are turned with the vehicle's roll and pitch, which matters pitched by 40 degrees; the goal's own velocity and rate are
@@ -28,11 +28,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.control.loop import HOLD_S
+from wakewise.control.gain_margins import Gains, axis_scale, vehicle_axes
 from wakewise.control.motor_mix import MotorMix, motor_mix
+from wakewise.control.null_space_allocation import vehicle_layout
+from wakewise.control.pid import ESTIMATOR_LAG_S, GYRO_LAG_S
+from wakewise.control.pipeline import Demand, MotionStage, Pipeline, PipelineState
 from wakewise.control.settings import ControlSettings
-from wakewise.control.stability import Gains, axis_scale, vehicle_axes
-from wakewise.control.tracker import ESTIMATOR_LAG_S, GYRO_LAG_S
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
@@ -44,7 +45,7 @@ from wakewise.core.geometry import (
     quat_multiply,
     rotvec_from_quat,
 )
-from wakewise.core.interfaces import BodyState, Command, Goal, WakeModel
+from wakewise.core.interfaces import BodyState, Goal, WakeModel
 from wakewise.planning import Surroundings
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
@@ -72,10 +73,9 @@ class ArduSubState:
     """Integrals of rate (roll, pitch, yaw), of velocity (north, east, m/s2) and of climb, and the filters' memories.
 
     Shapes: (3,), (2,), a float; `rate_error`, `rate_slope` (3,), `velocity_error`, `velocity_slope` (2,),
-    `climb_error` a float, `v_W_m_s` (3,) or None before the first step; `thrusts_N`, shape (n,), the last ones.
+    `climb_error` a float, `v_W_m_s` (3,) or None before the first step.
     """
 
-    thrusts_N: Array
     rate_sum: Array
     velocity_sum: Array
     rate_error: Array
@@ -85,30 +85,15 @@ class ArduSubState:
     climb_sum: float = 0.0
     climb_error: float = 0.0
     v_W_m_s: Array | None = None
-    saturated: bool = False
 
     def __post_init__(self) -> None:
-        freeze(self, thrusts_N=(None,), rate_sum=(3,), velocity_sum=(2,), rate_error=(3,), rate_slope=(3,))
+        freeze(self, rate_sum=(3,), velocity_sum=(2,), rate_error=(3,), rate_slope=(3,))
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ArduSubController:
-    """Implements `wakewise.core.interfaces.Controller`; make one with `ardusub`.
-
-    `lowered`, shape (6,), is what the margins left of the gains: roll, pitch, yaw, north, east, down.
-    """
-
-    name: str
-    mix: MotorMix
-    lowered: Array
-    allocation: Array
-    view: InfluenceModel
-
-    def init(self) -> ArduSubState:
-        """State before the first step."""
+    @classmethod
+    def zero(cls) -> ArduSubState:
+        """Before the first step."""
         none2, none3 = np.zeros(2), np.zeros(3)
-        return ArduSubState(
-            thrusts_N=np.zeros(self.allocation.shape[1]),
+        return cls(
             rate_sum=none3,
             velocity_sum=none2,
             rate_error=none3,
@@ -117,28 +102,41 @@ class ArduSubController:
             velocity_slope=none2,
         )
 
-    def step(self, state: ArduSubState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[ArduSubState, Command]:
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ArduSubStage(MotionStage):
+    """Motion stage with a mixer of its own, which is part of what is compared; make a pipeline with `ardusub`.
+
+    `lowered`, shape (6,), is what the margins left of the gains: roll, pitch, yaw, north, east, down.
+    """
+
+    mix: MotorMix
+    lowered: Array
+    allocation: Array
+    view: InfluenceModel
+
+    def begin(self, state: PipelineState) -> PipelineState:
+        """State before the first step."""
+        return replace(state, ardusub=ArduSubState.zero())
+
+    def step(self, state: PipelineState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PipelineState, Demand]:
         """Decide the thrusts for the next `dt_s` seconds."""
-        for what, X_WB, nu_B in (("estimate", estimate.X_WB, estimate.nu_B), ("goal", goal.X_WB, goal.nu_B)):
-            if not np.isfinite(X_WB.p_m.sum() + X_WB.q.sum() + nu_B.sum()):
-                thrusts = state.thrusts_N * np.exp(-dt_s / HOLD_S)
-                why = f"{what} not finite: holding the last thrusts, fading"
-                return replace(state, thrusts_N=thrusts), Command(thrusts_N=thrusts, wrench_B=np.zeros(6), fallback=why)
-        state, turns = self._attitude(state, dt_s, estimate, goal)
-        state, moves = self._position(state, dt_s, estimate, goal)
+        loops, grows = state.ardusub or ArduSubState.zero(), not state.saturated
+        loops, turns = self._attitude(loops, grows, dt_s, estimate, goal)
+        loops, moves = self._position(loops, grows, dt_s, estimate, goal)
         outputs, saturated = self.mix.outputs(np.array([*turns, moves[2], moves[0], moves[1]]))
         thrusts = self.mix.thrusts_N(outputs)
         gram = self.view.gram(estimate.X_WB)
-        command = Command(
-            thrusts_N=thrusts,
+        demand = Demand(
             wrench_B=self.allocation @ thrusts,
+            thrusts_N=thrusts,
             disturbance=float(disturbance(gram, thrusts)) if np.isfinite(gram).all() else None,
-            fallback="motors saturated" if saturated else None,
+            trouble="motors saturated" if saturated else None,
         )
-        return replace(state, thrusts_N=thrusts, saturated=saturated), command
+        return replace(state, ardusub=loops, saturated=saturated), demand
 
     def _attitude(
-        self, state: ArduSubState, dt_s: float, estimate: BodyState, goal: Goal
+        self, state: ArduSubState, grows: bool, dt_s: float, estimate: BodyState, goal: Goal
     ) -> tuple[ArduSubState, Array]:
         """Demands of roll, pitch and yaw, shape (3,)."""
         q_BG = quat_multiply(quat_conjugate(estimate.X_WB.q), goal.X_WB.q)
@@ -147,13 +145,13 @@ class ArduSubController:
         share = _share(dt_s, RATE_D_HZ)
         slope = state.rate_slope + share * ((error - state.rate_error) / dt_s - state.rate_slope)
         total = state.rate_sum
-        if not state.saturated:
+        if grows:
             total = np.clip(total + RATE_I * self.lowered[:3] * error * dt_s, -RATE_IMAX, RATE_IMAX)
         demand = self.lowered[:3] * (RATE_P * error + RATE_D * slope) + total
         return replace(state, rate_error=error, rate_slope=slope, rate_sum=total), demand
 
     def _position(
-        self, state: ArduSubState, dt_s: float, estimate: BodyState, goal: Goal
+        self, state: ArduSubState, grows: bool, dt_s: float, estimate: BodyState, goal: Goal
     ) -> tuple[ArduSubState, Array]:
         """Demands forward, lateral and throttle (up) in the vehicle's own frame, shape (3,)."""
         R_WB, low = estimate.X_WB.R, self.lowered[3:]
@@ -164,7 +162,7 @@ class ArduSubController:
         error = state.velocity_error + share * (error_W[:2] - state.velocity_error)
         slope = state.velocity_slope + share * ((error - state.velocity_error) / dt_s - state.velocity_slope)
         total = state.velocity_sum
-        if not state.saturated:
+        if grows:
             total = total + VELOCITY_I * low[:2] * error * dt_s
             total = total * min(1.0, VELOCITY_IMAX_M_S2 / max(float(np.linalg.norm(total)), 1e-9))
         wished_W = low[:2] * (VELOCITY_P[:2] * error + VELOCITY_D * slope) + total
@@ -172,7 +170,7 @@ class ArduSubController:
         off_a = VELOCITY_P[2] * low[2] * error_W[2] - (v_W[2] - before_W[2]) / dt_s
         climb_error = state.climb_error + _share(dt_s, CLIMB_HZ) * (off_a - state.climb_error)
         climb = state.climb_sum
-        if not state.saturated:
+        if grows:
             climb = float(np.clip(climb + CLIMB_I * climb_error * dt_s, -CLIMB_IMAX, CLIMB_IMAX))
         _, _, heading_rad = euler_from_quat(estimate.X_WB.q)
         c, s = math.cos(heading_rad), math.sin(heading_rad)
@@ -252,7 +250,7 @@ def ardusub(
     wake: WakeModel,
     settings: ControlSettings,
     around: Surroundings | None = None,  # noqa: ARG001
-) -> ArduSubController:
+) -> Pipeline:
     """`ardusub`: position hold as shipped; the wake model is only asked what D the thrusts cause.
 
     Raises
@@ -261,10 +259,10 @@ def ardusub(
         If the vehicle's thrusters are not those of the frame vectored_6dof.
     """
     mix = motor_mix(vehicle)
-    return ArduSubController(
-        name="ardusub",
+    motion = ArduSubStage(
         mix=mix,
         lowered=lowered_gains(vehicle, mix, 1.0 / settings.rate_hz),
         allocation=vehicle.allocation_matrix,
         view=InfluenceModel.of(vehicle, region, wake, settings.superposition),
     )
+    return Pipeline(name="ardusub", layout=vehicle_layout(vehicle), motion=motion)

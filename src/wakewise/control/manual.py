@@ -4,7 +4,7 @@ Flown as BlueROV2 and its kin are flown, in ArduSub's ALT_HOLD: sticks for forwa
 the pilot's gain; the stick for down asks for a rate of climb and holds the depth where it is let go, that for turn
 asks for a rate and holds the heading; roll and pitch are held level, or at the angle that is set. The wrench is
 shared out by the pseudo-inverse, which for ArduSub's vectored_6dof frame is its motor factors up to a scale per axis.
-The person sees what the estimator says, late (`wakewise.operation.teleop.input`), and knows neither jets nor target's
+The person sees what the estimator says, late (`wakewise.control.operator_model`), and knows neither jets nor target's
 water.
 
 Assumed, in favour of the person: the autopilot holds depth, heading and attitude with the gains of `dp` and knows the
@@ -20,8 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.allocation import Layout, min_norm_allocation
-from wakewise.control.loop import HOLD_S, vehicle_layout
+from wakewise.control.null_space_allocation import least_thrust_allocator, vehicle_layout
 from wakewise.control.operator_model import (
     CameraMotion,
     OperatorModel,
@@ -31,16 +30,15 @@ from wakewise.control.operator_model import (
     sample_operator,
     steer,
 )
+from wakewise.control.pid import Pid, PidState, make_pid
+from wakewise.control.pipeline import Demand, MotionStage, Pipeline, PipelineState
 from wakewise.control.settings import ControlSettings
-from wakewise.control.tracker import Tracker, TrackerState, make_tracker
-from wakewise.control.watch import FULL
-from wakewise.core.arrays import Array, freeze
+from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, euler_from_quat, quat_from_euler
-from wakewise.core.interfaces import BodyState, Command, Goal, WakeModel
+from wakewise.core.interfaces import BodyState, Goal, WakeModel
 from wakewise.planning import Surroundings
 from wakewise.robot.vehicles import Vehicle, restoring_wrench
 from wakewise.scene.targets import Region
-from wakewise.wake import InfluenceModel
 
 CLIMB_M_S, TURN_RAD_S = 5.0, math.radians(3.375 * 45.0)
 """What full stick asks for at gain 1 (ArduSub 4.0.0, BlueROV2)."""
@@ -48,57 +46,38 @@ CLIMB_M_S, TURN_RAD_S = 5.0, math.radians(3.375 * 45.0)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ManualState:
-    """Person, autopilot's integral of attitude and of depth (N), its set points, and the thrusts last asked for.
-
-    `depth_m` and `heading_rad` are None before the first step.
+    """OperatorModel, the autopilot's set points, and its integral of depth (N). `depth_m` is None before the first
+    step.
     """
 
     person: OperatorModelState
-    tracker: TrackerState
-    thrusts_N: Array
     depth_m: float | None = None
     heading_rad: float = 0.0
     lift_N: float = 0.0
-    share: float = 1.0
-
-    def __post_init__(self) -> None:
-        freeze(self, thrusts_N=(None,))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ManualController:
-    """Flown by hand; implements `wakewise.core.interfaces.Controller`. Make one with `manual`."""
+class ManualStage(MotionStage):
+    """Motion stage flown by hand: sticks and autopilot give the wrench."""
 
-    name: str
     person: OperatorModel
-    tracker: Tracker
-    layout: Layout
-    view: InfluenceModel
+    pid: Pid
     X_BC: Pose
     middle_W_m: Array
 
-    def init(self) -> ManualState:
+    def begin(self, state: PipelineState) -> PipelineState:
         """State before the first step."""
-        return ManualState(
-            person=begin(self.person), tracker=self.tracker.init(), thrusts_N=np.zeros(self.layout.B.shape[1])
-        )
+        return replace(state, manual=ManualState(person=begin(self.person)))
 
-    def step(self, state: ManualState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[ManualState, Command]:
-        """Decide the thrusts for the next `dt_s` seconds."""
-        for what, X_WB, nu_B in (("estimate", estimate.X_WB, estimate.nu_B), ("goal", goal.X_WB, goal.nu_B)):
-            if not np.isfinite(X_WB.p_m.sum() + X_WB.q.sum() + nu_B.sum()):
-                thrusts = state.thrusts_N * np.exp(-dt_s / HOLD_S)
-                why = f"{what} not finite: holding the last thrusts, fading"
-                return replace(state, thrusts_N=thrusts), Command(thrusts_N=thrusts, wrench_B=np.zeros(6), fallback=why)
+    def step(self, state: PipelineState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PipelineState, Demand]:
+        """Decide the wrench for the next `dt_s` seconds."""
+        before = state.manual or ManualState(person=begin(self.person))
         wish = CameraMotion.of(goal.X_WB, goal.nu_B, self.X_BC)
         now = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
-        person, asked = steer(self.person, state.person, dt_s, now, wish, self._watched(goal))
-        state, wrench = self._autopilot(replace(state, person=person), dt_s, estimate, goal, asked)
-        gram = self.view.gram(estimate.X_WB)
-        found = min_norm_allocation(self.layout, wrench, gram if np.isfinite(gram).all() else None)
-        fallback = None if found.scale >= FULL else f"thrusters saturated: {100.0 * found.scale:.0f} % of the wrench"
-        command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=found.disturbance, fallback=fallback)
-        return replace(state, thrusts_N=found.thrusts_N, share=found.scale), command
+        person, asked = steer(self.person, before.person, dt_s, now, wish, self._watched(goal))
+        manual = replace(before, person=person)
+        pid, manual, wrench = self._autopilot(state, manual, dt_s, estimate, goal, asked)
+        return replace(state, pid=pid, manual=manual, goal_nu=goal.nu_B), Demand(wrench_B=wrench)
 
     def _watched(self, goal: Goal) -> Array:
         """What the wished picture has in its middle, shape (3,): on its axis, as far as the target is."""
@@ -107,41 +86,41 @@ class ManualController:
         return np.asarray(X_WC.p_m + axis_W * float((self.middle_W_m - X_WC.p_m) @ axis_W))
 
     def _autopilot(
-        self, state: ManualState, dt_s: float, estimate: BodyState, goal: Goal, asked: Array
-    ) -> tuple[ManualState, Array]:
-        """Hold depth, heading and attitude where sticks left them; the next state and the wrench in B, shape (6,)."""
+        self, state: PipelineState, manual: ManualState, dt_s: float, estimate: BodyState, goal: Goal, asked: Array
+    ) -> tuple[PidState, ManualState, Array]:
+        """Hold depth, heading and attitude where sticks left them; the next states and the wrench in B, shape (6,)."""
         R_WB, nu = estimate.X_WB.R, estimate.nu_B
         forward, right, climb_m_s, turn_rad_s = asked
         _, _, heading_rad = euler_from_quat(estimate.X_WB.q)
         v_W = R_WB @ nu[:3]
-        depth_m, held_rad = state.depth_m, state.heading_rad
+        depth_m, held_rad = manual.depth_m, manual.heading_rad
         if depth_m is None:
             depth_m, held_rad = float(estimate.X_WB.p_m[2]), float(heading_rad)
         depth_m, held_rad = depth_m + climb_m_s * dt_s, held_rad + turn_rad_s * dt_s
         roll_rad, pitch_rad, _ = euler_from_quat(goal.X_WB.q)
         held = Pose(estimate.X_WB.p_m, quat_from_euler(roll_rad, pitch_rad, held_rad))
-        saturated = state.share < FULL
+        saturated = state.saturated
         R_GW = held.R.T
         # As the place is where the vehicle is and the velocity what it has, only attitude is steered by this.
         level = Goal(X_WB=held, nu_B=np.concatenate([R_GW @ v_W, R_GW @ np.array([0.0, 0.0, turn_rad_s])]))
-        tracker, wrench = self.tracker.correction(state.tracker, dt_s, estimate, level, saturated=saturated)
-        weight_B = restoring_wrench(self.tracker.body, estimate.X_WB.q)
-        error_m, k = depth_m - float(estimate.X_WB.p_m[2]), self.tracker
-        lift_N = state.lift_N
+        pid, wrench = self.pid.correction(state.pid, dt_s, estimate, level, saturated=saturated)
+        weight_B = restoring_wrench(self.pid.body, estimate.X_WB.q)
+        error_m, k = depth_m - float(estimate.X_WB.p_m[2]), self.pid
+        lift_N = manual.lift_N
         if not saturated:
             lift_N = float(np.clip(lift_N + k.ki[2] * error_m * dt_s, -k.integral_limit[2], k.integral_limit[2]))
         down_N = k.kp[2] * error_m + k.kd[2] * (climb_m_s - v_W[2]) + lift_N - float((R_WB @ weight_B[:3])[2])
         c, s = math.cos(heading_rad), math.sin(heading_rad)
         force_W = np.array([c * forward - s * right, s * forward + c * right, down_N])
-        moment_B = wrench[3:] - restoring_wrench(self.tracker.body, held.q)[3:]
-        after = replace(state, tracker=tracker, depth_m=depth_m, heading_rad=held_rad, lift_N=lift_N)
-        return after, np.concatenate([R_WB.T @ force_W, moment_B])
+        moment_B = wrench[3:] - restoring_wrench(self.pid.body, held.q)[3:]
+        after = replace(manual, depth_m=depth_m, heading_rad=held_rad, lift_N=lift_N)
+        return pid, after, np.concatenate([R_WB.T @ force_W, moment_B])
 
 
-def vehicle_sticks(vehicle: Vehicle, tracker: Tracker) -> StickDeflection:
+def vehicle_sticks(vehicle: Vehicle, pid: Pid) -> StickDeflection:
     """What the sticks of a vehicle do: force forward and right, rate of climb and of turn."""
     reach = np.abs(vehicle.allocation_matrix) @ np.minimum(-vehicle.thrust_lower_N, vehicle.thrust_upper_N)
-    body = tracker.body
+    body = pid.body
     return StickDeflection(
         inertia=np.array([body.mass_matrix[0, 0], body.mass_matrix[1, 1], 0.0, 0.0]),
         drag=np.array([body.linear_damping[0, 0], body.linear_damping[1, 1], 0.0, 0.0]),
@@ -156,15 +135,14 @@ def manual(
     wake: WakeModel,
     settings: ControlSettings,
     around: Surroundings | None = None,  # noqa: ARG001
-) -> ManualController:
+) -> Pipeline:
     """`manual`: the person whom the trial's seed draws; the wake model is only asked what D the thrusts cause."""
-    tracker = make_tracker(vehicle, settings)
-    return ManualController(
-        name="manual",
-        person=sample_operator(settings.person or 0, vehicle_sticks(vehicle, tracker)),
-        tracker=tracker,
-        layout=vehicle_layout(vehicle),
-        view=InfluenceModel.of(vehicle, region, wake, settings.superposition),
+    pid, layout = make_pid(vehicle, settings), vehicle_layout(vehicle)
+    motion = ManualStage(
+        person=sample_operator(settings.person or 0, vehicle_sticks(vehicle, pid)),
+        pid=pid,
         X_BC=vehicle.X_BC,
         middle_W_m=np.average(region.points_W_m, axis=0, weights=region.weights),
     )
+    allocator = least_thrust_allocator(layout, vehicle, region, wake, settings)
+    return Pipeline(name="manual", layout=layout, motion=motion, allocator=allocator)

@@ -1,37 +1,58 @@
-"""Methods by name: what each cares for, and how one is made, ours or one from outside.
+"""Methods by name, each a pipeline; ours or one from outside.
 
-- `dp`: dynamic positioning, a PID with the least thrusts.
-- `manual`: a person at two sticks, with the autopilot that such vehicles have (see `wakewise.operation.teleop.input`).
-- `ardusub`: the loops and the mixer that such vehicles are shipped with, holding the mission's pose.
-- `bow-rule`: `dp` whose bow thrusters never blow ahead.
-- `pseudo-inverse`: the motion of `wake-aware`, wrench for wrench, made with the least thrusts (an ablation).
-- `unaware`: the planner without a disturbance term.
-- `smooth`: the same with a price on change of thrust.
-- `linear`: `wake-aware` that believes in the `linear` wake model (an ablation).
-- `instant`: the PID of `dp` with the gentlest thrusts of each instant, with the weights and levers of `wake-aware`.
-- `wake-aware`: model predictive control of the target's water, the exact allocator behind it.
+Two makers. `tracking` methods control one step at a time: a PID and an allocator. `mpc` methods plan and follow the
+plan. The rest of a method is its settings:
+
+| method | motion | allocation | difference |
+|---|---|---|---|
+| `dp` | PID | least thrusts | dynamic positioning, the baseline |
+| `bow-rule` | PID | least thrusts | level thrusters at the bow never blow ahead |
+| `instant` | PID | null space, gentle | weights and wake terms of `wake-aware` |
+| `unaware` | MPC | the plan's own | no disturbance term |
+| `smooth` | MPC | the plan's own | the same with a price on change of thrust |
+| `wake-aware` | MPC | null space, gentle | the product |
+| `linear` | MPC | null space, gentle | believes in the `linear` wake model (an ablation) |
+| `pseudo-inverse` | MPC | least thrusts | the wrenches of `wake-aware` (an ablation) |
+| `manual` | person and autopilot | least thrusts | see `manual.py` |
+| `ardusub` | ArduSub's loops | ArduSub's mixer | see `ardusub.py` |
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, cast
 
+from wakewise.allocation import Layout
 from wakewise.control.ardusub import ardusub
-from wakewise.control.bow_rule import bow_rule
-from wakewise.control.dynamic_positioning import dynamic_positioning
-from wakewise.control.instant import instant
+from wakewise.control.attitude_optimizer import attitude_optimizer
+from wakewise.control.bed_points import with_bed_points
+from wakewise.control.forward_jet_exclusion import bow_layout
 from wakewise.control.manual import manual
-from wakewise.control.pseudo_inverse import planned_pseudo_inverse
+from wakewise.control.mpc_controller import mpc_pipeline
+from wakewise.control.null_space_allocation import (
+    SEARCH_S,
+    STAGGER_S,
+    Allocator,
+    allocation_context,
+    least_thrust_allocator,
+    vehicle_layout,
+)
+from wakewise.control.pid import make_pid
+from wakewise.control.pipeline import Pipeline, TrackingStage
 from wakewise.control.settings import ControlSettings
-from wakewise.control.unaware import smooth, unaware
-from wakewise.control.wake_aware import linear, planned
 from wakewise.core.interfaces import Controller, WakeModel
 from wakewise.core.plugins import find
 from wakewise.planning import Surroundings
+from wakewise.planning.surroundings import around_target
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
+from wakewise.wake import bed_of, free_jet, wake_model
+
+FILTER_S = 0.77
+"""Time over which `smooth` filters its thrusts: of those flown the longest whose position error is within a tenth of
+that of `unaware` (docs/research-log/0036)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,19 +79,127 @@ class ControlTask:
     surroundings: Surroundings | None = None
 
 
-Maker = Callable[[Vehicle, Region, WakeModel, ControlSettings, Surroundings | None], Controller[Any]]
+def tracking(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,
+    *,
+    name: str,
+    layout: Callable[[Vehicle], Layout] = vehicle_layout,
+    gentle: bool = False,
+) -> Pipeline:
+    """PID, and the least or the gentlest thrusts of a layout, which may allow thrusters less than the vehicle's does.
+
+    Without `gentle` the wake model is only asked what D the thrusts cause.
+    """
+    own = layout(vehicle)
+    stage = TrackingStage(pid=make_pid(vehicle, settings))
+    if not gentle:
+        allocator = least_thrust_allocator(own, vehicle, region, wake, settings)
+        return Pipeline(name=name, layout=vehicle_layout(vehicle), motion=stage, allocator=allocator)
+    context = allocation_context(vehicle, with_bed_points(region, settings.levers, bed_of(wake)), wake, settings)
+    return Pipeline(
+        name=name,
+        layout=own,
+        motion=stage,
+        attitude=attitude_optimizer(context, vehicle, settings, around or around_target(region)),
+        allocator=Allocator(layout=own, context=context),
+    )
+
+
+def mpc(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,
+    *,
+    name: str,
+    least: bool = False,
+) -> Pipeline:
+    """The planner with a disturbance term, and null-space allocation of its wrench where the settings say so.
+
+    With `least` thrusts sent are the least ones of the same wrench.
+    """
+    levers, solid = settings.levers, around or around_target(region)
+    seen = with_bed_points(region, levers, bed_of(wake))
+    if levers.spare:
+        # The motion spares the target alone: points beside it, and the bed, move only spare thrusts. A plan that is
+        # told of them leaves its path for water that nobody photographs.
+        planned = mpc_pipeline(vehicle, region, free_jet(wake), settings, name=name, surroundings=solid)
+        context = allocation_context(vehicle, seen, wake, settings)
+        allocator = Allocator(layout=context.layout, context=context, first_age_s=SEARCH_S - STAGGER_S)
+    else:
+        planned = mpc_pipeline(vehicle, seen, wake, settings, name=name, surroundings=solid)
+        context, allocator = allocation_context(vehicle, seen, wake, settings), None
+    sent_by = least_thrust_allocator(vehicle_layout(vehicle), vehicle, region, wake, settings) if least else None
+    attitude = attitude_optimizer(context, vehicle, settings, solid)
+    return replace(planned, attitude=attitude, allocator=allocator, sent_by=sent_by)
+
+
+def linear(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,  # noqa: ARG001
+    settings: ControlSettings,
+    around: Surroundings | None = None,
+) -> Pipeline:
+    """`linear`: as `wake-aware`, believing in the `linear` wake model, whatever the settings say."""
+    return mpc(vehicle, region, wake_model("linear"), settings, around, name="linear")
+
+
+def unaware(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,
+    *,
+    name: str = "unaware",
+) -> Pipeline:
+    """`unaware`: the planner without a disturbance term."""
+    careless = settings.model_copy(update={"w_disturbance": 0.0})
+    return mpc_pipeline(vehicle, region, free_jet(wake), careless, name=name, surroundings=around)
+
+
+def smooth(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,
+) -> Pipeline:
+    """`smooth`: the planner without a disturbance term and with a price on change of thrust."""
+    change = max(settings.plan.w_change, price_of_change(settings))
+    plan = settings.plan.model_copy(update={"w_change": change})
+    return unaware(vehicle, region, wake, settings.model_copy(update={"plan": plan}), around, name="smooth")
+
+
+def price_of_change(settings: ControlSettings) -> float:
+    """Price of squared change of thrust from stage to stage, per N^2.
+
+    Thrusts that cost w_effort h T^2 in a stage of h seconds and w_change (dT)^2 from stage to stage relax over the
+    time h sqrt(w_change / (w_effort h)), so the price follows effort and stage where these are set otherwise.
+    """
+    stage_s = settings.plan.stage_s
+    return (FILTER_S / stage_s) ** 2 * settings.w_effort * stage_s
+
+
+Maker = Callable[[Vehicle, Region, WakeModel, ControlSettings, Surroundings | None], Pipeline]
 
 MAKERS: dict[str, Maker] = {
-    "dp": dynamic_positioning,
-    "bow-rule": bow_rule,
+    "dp": partial(tracking, name="dp"),
+    "bow-rule": partial(tracking, name="bow-rule", layout=bow_layout),
     "manual": manual,
     "ardusub": ardusub,
-    "pseudo-inverse": planned_pseudo_inverse,
+    "pseudo-inverse": partial(mpc, name="pseudo-inverse", least=True),
     "unaware": unaware,
     "smooth": smooth,
     "linear": linear,
-    "instant": instant,
-    "wake-aware": planned,
+    "instant": partial(tracking, name="instant", gentle=True),
+    "wake-aware": partial(mpc, name="wake-aware"),
 }
 
 METHODS: tuple[str, ...] = tuple(MAKERS)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from wakewise.control.levers import LeverSettings
 from wakewise.core.defaults import DISTURBANCE_WEIGHT, EFFORT_WEIGHT
 from wakewise.core.settings import Settings
 from wakewise.planning.problem import PlanSettings
@@ -15,12 +14,52 @@ from wakewise.wake.disturbance import Superposition
 
 Coordinate = Annotated[float, Field(ge=-100.0, le=100.0)]
 Radius = Annotated[float, Field(gt=0.0, le=10.0)]
+Component = Annotated[float, Field(ge=-1.0, le=1.0)]
+Velocity = tuple[Component, Component, Component]
 
 
 PREVIOUS_SHARE = 5.0
 """Weight of squared change of thrust per step over `w_effort`. A thruster cannot follow commands faster than its lag
 (about 0.1 s), so asking for them only stirs. With effort alone the proximal term w_p |T - T_previous|^2 relaxes thrusts
 with the time constant dt w_p / w_effort; setting that to the lag at 50 Hz gives 5."""
+
+
+class LeverSettings(Settings):
+    """Switches of the levers; those that the tank bore out are on (docs/research-log/0014), all off is the paper's."""
+
+    bed: bool = Field(default=False, description="also keep the water still on the bed around the target")
+    spare: bool = Field(
+        default=True, description="share out the plan's wrench anew at every step by the exact allocator"
+    )
+    meet: bool = Field(
+        default=True, description="count what jets become that meet: they join and run on between them; needs spare"
+    )
+    drift: bool = Field(
+        default=True, description="follow the jets as the current bends, stops and brings them; needs spare"
+    )
+    doubt: bool = Field(
+        default=True, description="hold that some of the jets go elsewhere than they are reckoned to; needs spare"
+    )
+    thrift: bool = Field(
+        default=True,
+        description="gentle shares only as far as they are worth their power, and bounded by what there is to save",
+    )
+    posture: bool | None = Field(
+        default=None,
+        description="lean the body as its thrusters like it where the camera's joint keeps the view (mission.aim: "
+        "auto); null: where there is a joint",
+    )
+    drift_m_s: Velocity | None = Field(
+        default=None, description="that current, north, east, down, if it is stated; null: as the estimator finds it"
+    )
+
+    @model_validator(mode="after")
+    def _stated_current_can_act(self) -> LeverSettings:
+        if self.drift_m_s is not None and not self.drift:
+            raise ValueError("drift_m_s is stated but drift is off; leave it null, or turn drift on")
+        if self.drift_m_s is not None and not any(self.drift_m_s):
+            raise ValueError("drift_m_s is no current at all; null takes the estimator's, drift: false does without")
+        return self
 
 
 class ControlSettings(Settings):

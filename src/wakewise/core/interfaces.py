@@ -362,7 +362,7 @@ class World(Protocol):
     """Where a vehicle flies: simulated tank, the paper's water, an autopilot, the sea.
 
     One that does not wait for its controller says so by an attribute `waits` that is False; thrusts that come too late
-    are not sent there (see `wakewise.control.safeguard`).
+    are not sent there (see `wakewise.control.failsafe`).
     """
 
     @property

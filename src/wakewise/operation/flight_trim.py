@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from wakewise.control.hover_trim import HoverTrim, hover_trim
+from wakewise.control.ballast_from_hover import HoverTrim, hover_trim
 from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError
 from wakewise.operation.parts import Parts

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, overload
 
 import numpy as np
 
-from wakewise.control import ControlSettings, in_pulses, make_controller
+from wakewise.control import ControlSettings, Pipeline, make_controller
 from wakewise.control.settings import flown_by
 from wakewise.core.arrays import Array
 from wakewise.core.checks import has_methods, instance_of, quoted
@@ -26,7 +26,7 @@ from wakewise.core.interfaces import BodyState, Controller, Estimator, Pilot, Wa
 from wakewise.estimation import ErrorStateFilter
 from wakewise.operation.calibration_error import current_with_error, target_with_error
 from wakewise.operation.pilot_makers import make_pilot
-from wakewise.operation.plugin_adapter import described, external_parts, with_failsafe
+from wakewise.operation.plugin_adapter import described, external_parts, flown_controller
 from wakewise.operation.preflight import PreflightResult, preflight, surroundings_of, tank_bounds
 from wakewise.operation.randomization import Seeds
 from wakewise.operation.worlds.makers import make_world
@@ -361,9 +361,9 @@ class Parts:
         return preflight(self)
 
     @cached_property
-    def flying(self) -> Controller[Any]:
-        """The controller as it is flown: with a guard round each step, small thrusts sent as pulses."""
-        return in_pulses(with_failsafe(self), self.vehicle, self.scenario.control.pulse_s)
+    def flying(self) -> Pipeline:
+        """The controller as it is flown, with failsafe and thruster model."""
+        return flown_controller(self)
 
     @cached_property
     def camera(self) -> PinholeCamera | LensCamera:

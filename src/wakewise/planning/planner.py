@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -67,6 +68,11 @@ class PlanModel:
     def thrusters(self) -> int:
         """Number of thrusters n."""
         return len(self.table.lower)
+
+    @cached_property
+    def total_weight(self) -> float:
+        """Sum of the region's weights."""
+        return float(np.sum(self.region.weights))
 
 
 def compile_plan(

@@ -8,6 +8,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
+from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
 
 TANK_FACES = ("the south wall", "the west wall", "the water surface", "the north wall", "the east wall", "the floor")
@@ -92,3 +93,49 @@ def covering_spheres(points_W_m: Array, most_radius_m: float = 0.15, most: int =
 def _around(points: Array) -> Array:
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return np.append(middle, np.linalg.norm(points - middle, axis=1).max())
+
+
+def check_start(
+    vehicle: Vehicle,
+    region: Region,
+    state: Array,
+    surroundings: Surroundings,
+    clearance_m: float = 0.0,
+    what: str = "start",
+) -> None:
+    """Refuse a start from which no plan can be good, before the loop begins.
+
+    `state` is position, quaternion, twist, shape (13,); `what` it is called in the message.
+
+    Raises
+    ------
+    InputError
+        An empty region or weights that are negative or NaN, points of the target inside the hull, a hull that touches
+        something or is nearer to it than `clearance_m`, or a state that is not finite.
+    """
+    from wakewise.planning.barrier import plane_gap, sphere_gap
+    from wakewise.planning.kernels import rotation
+
+    x = np.array(state, dtype=np.float64)
+    if x.shape != (13,) or not np.isfinite(x).all():
+        raise InputError(f"{what}: must be 13 finite numbers (position, quaternion, twist)")
+    if len(region.points_W_m) == 0:
+        raise InputError("region: no points, the target is empty")
+    if np.any(region.weights < 0.0) or not np.sum(region.weights) > 0.0:
+        raise InputError("region: weights must not be negative, and at least one must be more than 0")
+    R = np.empty((3, 3))
+    rotation(x, R)
+    half = 0.5 * np.array(vehicle.size_m)
+    inside = np.all(np.abs((region.points_W_m - x[:3]) @ R) < half, axis=1) & (region.distance_m == 0.0)
+    if np.any(inside):
+        raise InputError(f"{what}: {int(inside.sum())} points of the target lie inside the vehicle, it must be outside")
+    slope = np.empty(6)
+    planes = len(surroundings.planes)
+    for number, row in enumerate((*surroundings.planes, *surroundings.spheres)):
+        gap = plane_gap if number < planes else sphere_gap
+        clear = gap(x[:3], R, half, np.array(row), slope)
+        if clear < clearance_m:
+            raise InputError(
+                f"{what}: the hull comes within {clear:.3f} m of {surroundings.name(number)}, "
+                f"allowed is {clearance_m:g} m or more"
+            )

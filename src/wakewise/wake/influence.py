@@ -28,7 +28,7 @@ class InfluenceMatrices(NamedTuple):
     """Matrices of D, shape (2 n, 2 n) each: `gram`, by which shares are chosen, and `sent`, of what thrusts do as sent.
 
     They are one unless `gram` also charges thrusts for what may be: others that join them, jets that go astray
-    (`wakewise.control.watch`).
+    (`wakewise.control.null_space_allocation`).
     """
 
     gram: Array

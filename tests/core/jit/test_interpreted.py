@@ -13,7 +13,7 @@ import pytest
 
 import wakewise
 from wakewise.allocation import Weights, min_norm_allocation, min_wash_allocation
-from wakewise.control.loop import vehicle_layout
+from wakewise.control.null_space_allocation import vehicle_layout
 from wakewise.core.jit.cache_dir import is_interpreted
 from wakewise.robot.vehicles import compile_body, load_vehicle, step_rk4
 

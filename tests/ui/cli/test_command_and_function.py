@@ -124,7 +124,7 @@ def test_what_is_printed_at_home_is_what_a_flight_would_do() -> None:
     """A flight's own weights at a pose of its mission give the thrusts of `ww.allocate` with nothing said."""
     from wakewise.allocation import min_wash_allocation
     from wakewise.control import vehicle_layout
-    from wakewise.control.thrift import weights_of
+    from wakewise.control.null_space_allocation import weights_of
     from wakewise.wake import InfluenceModel
 
     parts = ww.Scenario.preset("quick").parts()

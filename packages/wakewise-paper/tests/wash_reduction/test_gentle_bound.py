@@ -8,8 +8,8 @@ import pytest
 
 from pools import Here
 from wakewise.allocation import compile_layout
-from wakewise.control.bow_rule import bow_layout
-from wakewise.control.loop import vehicle_layout
+from wakewise.control.forward_jet_exclusion import bow_layout
+from wakewise.control.null_space_allocation import vehicle_layout
 from wakewise.core.errors import InputError
 from wakewise.experiments.trials import BenchOptions
 from wakewise.robot.vehicles import load_vehicle

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from wakewise.control.trim import net_buoyancy_N
+from wakewise.control.ballast_advice import net_buoyancy_N
 from wakewise.operation.worlds.makers import true_vehicle
 from wakewise.robot.vehicles.ballast import BallastBlock
 from wakewise_paper.wash_reduction.ballasted_world import ballasted_world

@@ -19,7 +19,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wakewise.control.intent import FULL_M_S, FULL_RAD_S, HIGHEST_RAD, moved_on, shaped, slewed
+from wakewise.control.velocity_reference import (
+    FULL_M_S,
+    FULL_RAD_S,
+    HIGHEST_RAD,
+    advance_reference,
+    limit_acceleration,
+    limit_jerk,
+)
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.geometry import (
     Pose,
@@ -268,7 +275,7 @@ def steer_position(
         if wish.any():  # what is asked for, not what is left of it by now, is what something is in the way of
             _, blocked_by = keep_off.allowed(motion.X_WB, frame @ wish - swing, motion.omega_B_rad_s)
     # Near the zenith the frame turns faster than a velocity may.
-    velocity = slewed(motion.velocity_W_m_s, velocity, dt_s, HARDEST_M_S2)
+    velocity = limit_acceleration(motion.velocity_W_m_s, velocity, dt_s, HARDEST_M_S2)
     place = limit_lead(motion.place_W_m, 0.5 * (motion.velocity_W_m_s + velocity), estimate, dt_s)
     moved = replace(motion, place_W_m=place, velocity_W_m_s=velocity)
     return moved, StickFrame(
@@ -282,7 +289,9 @@ def filtered_velocity(now_m_s: Array, change_m_s2: Array, wish_m_s: Array, dt_s:
     A change that comes as fast as a hand moves no vehicle can make, and what it misses it makes up for with thrust.
     """
     slower = np.linalg.norm(wish_m_s) < np.linalg.norm(now_m_s)
-    return shaped(now_m_s, change_m_s2, wish_m_s, dt_s, BRAKING_PEAK_M_S2 if slower else FASTER_PEAK_M_S2, JERK_M_S3)
+    return limit_jerk(
+        now_m_s, change_m_s2, wish_m_s, dt_s, BRAKING_PEAK_M_S2 if slower else FASTER_PEAK_M_S2, JERK_M_S3
+    )
 
 
 def _at_range(wish: float, now: float, kept_m: float | None, range_m: float) -> tuple[float, float | None]:
@@ -298,7 +307,7 @@ def limit_lead(place_W_m: Array, velocity_W_m_s: Array, estimate: BodyState, dt_
     known = bool(np.isfinite(estimate.X_WB.p_m).all())
     if not velocity_W_m_s.any() or not known:
         return np.asarray(place_W_m + dt_s * velocity_W_m_s)
-    new = moved_on(place_W_m, velocity_W_m_s, estimate, dt_s)
+    new = advance_reference(place_W_m, velocity_W_m_s, estimate, dt_s)
     step = new - place_W_m
     size, most = float(np.linalg.norm(step)), (PULL_M_S + float(np.linalg.norm(velocity_W_m_s))) * dt_s
     return np.asarray(new if size <= most else place_W_m + step * (most / size))

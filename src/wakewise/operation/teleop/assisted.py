@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wakewise.control import make_controller, vehicle_layout
-from wakewise.control.firmness import allowed_stray
-from wakewise.control.intent import PAPER_W_TRACK
-from wakewise.control.switching import Switched
+from wakewise.control.bumpless_transfer import switched
+from wakewise.control.pipeline import Pipeline, pipeline_of
+from wakewise.control.velocity_reference import PAPER_W_TRACK, deviation_limit
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Controller, Goal
 from wakewise.operation.teleop.arbitration import (
@@ -172,7 +172,7 @@ class AssistedPilot:
         most = math.inf if first else DIAL_PER_S * self.dt_s
         self._dial += min(max(wished - self._dial, -most), most)
         obedience = math.exp(self._dial)
-        return self.motion.goal(obedience=obedience, stray=allowed_stray(PAPER_W_TRACK * obedience))
+        return self.motion.goal(obedience=obedience, stray=deviation_limit(PAPER_W_TRACK * obedience))
 
     @property
     def leg(self) -> str:
@@ -318,11 +318,14 @@ def assisted_pilot(
 def switched_controller(parts: Parts, wanted: Callable[[], str]) -> Controller[Any]:
     """A controller that is `wake-aware` or direct (`dp`), as is wanted at each step."""
     gentle = parts.scenario.method if parts.scenario.method not in ("dp", "manual", "ardusub") else WAYS[0]
-    made: dict[str, Controller[Any]] = {
-        way: make_controller(method, parts.vehicle, parts.region, parts.wake, parts.control, parts.surroundings)
+    layout = vehicle_layout(parts.vehicle)
+    made: dict[str, Pipeline] = {
+        way: pipeline_of(
+            make_controller(method, parts.vehicle, parts.region, parts.wake, parts.control, parts.surroundings), layout
+        )
         for way, method in ((WAYS[0], gentle), (WAYS[1], "dp"))
     }
-    return Switched(name="operator", methods=made, wanted=wanted, layout=vehicle_layout(parts.vehicle))
+    return switched("operator", made, wanted, layout)
 
 
 def _emptied(queue: deque[Any]) -> tuple[Any, ...]:

@@ -15,8 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wakewise.control.easing import slewed_rate
-from wakewise.control.intent import FULL_M_S, FULL_RAD_S
+from wakewise.control.motion_profile import limit_slew
 from wakewise.control.operator_model import (
     CameraMotion,
     OperatorModel,
@@ -26,6 +25,7 @@ from wakewise.control.operator_model import (
     sample_operator,
     steer,
 )
+from wakewise.control.velocity_reference import FULL_M_S, FULL_RAD_S
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, euler_from_quat, matrix_from_quat, quat_from_euler
 from wakewise.core.interfaces import BodyState, Goal, Pilot
@@ -95,7 +95,7 @@ class HumanPilot:
         )
         before_m_s, before_rad_s = self._velocity_m_s, self._turn_rad_s
         self._velocity_m_s, self._change_m_s2 = filtered_velocity(before_m_s, self._change_m_s2, asked[:3], self.dt_s)
-        self._turn_rad_s = slewed_rate(before_rad_s, float(asked[3]), self.dt_s, TURN_RAD_S2)
+        self._turn_rad_s = limit_slew(before_rad_s, float(asked[3]), self.dt_s, TURN_RAD_S2)
         self._heading_rad += 0.5 * (before_rad_s + self._turn_rad_s) * self.dt_s
         # In the frame of the goal's heading: the estimate's own would steer with its noise.
         frame = level_frame(self._heading_rad)

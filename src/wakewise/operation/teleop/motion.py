@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.control.easing import eased_after, near_turn, slewed_rate
+from wakewise.control.motion_profile import limit_slew, profile_step_moving, unwrap_near
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.geometry import Pose, euler_from_quat, quat_from_euler
 from wakewise.core.interfaces import BodyState, Goal
@@ -92,10 +92,10 @@ def step_attitude(motion: MotionReference, wished: AttitudeReference, dt_s: floa
 
 def step_angle(motion: MotionReference, k: int, wished: AttitudeReference, dt_s: float) -> MotionReference:
     """The motion with angle number k a step nearer to a wished one that moves."""
-    angle, rate = eased_after(
+    angle, rate = profile_step_moving(
         float(motion.angles_rad[k]),
         float(motion.rates_rad_s[k]),
-        near_turn(float(wished.angles_rad[k]), float(motion.angles_rad[k])),
+        unwrap_near(float(wished.angles_rad[k]), float(motion.angles_rad[k])),
         float(wished.rates_rad_s[k]),
         dt_s,
         TURN_RAD_S,
@@ -108,7 +108,7 @@ def step_tilt(motion: MotionReference, wished: AttitudeReference, dt_s: float, a
     """The motion with its camera's joint a step nearer to a wished tilt that moves."""
     if aim.joint is None:
         return motion
-    tilt, rate = eased_after(
+    tilt, rate = profile_step_moving(
         motion.tilt_rad, motion.tilt_rad_s, wished.tilt_rad, wished.tilt_rad_s, dt_s, aim.joint.rate_rad_s, TILT_RAD_S2
     )
     return replace(motion, tilt_rad=aim.joint.within(tilt), tilt_rad_s=rate)
@@ -119,7 +119,7 @@ def turn_tilt_joint(motion: MotionReference, wished_rad_s: float, dt_s: float, a
     if aim.joint is None:
         return motion
     most = aim.joint.rate_rad_s
-    rate = slewed_rate(motion.tilt_rad_s, min(max(wished_rad_s, -most), most), dt_s, TILT_RAD_S2)
+    rate = limit_slew(motion.tilt_rad_s, min(max(wished_rad_s, -most), most), dt_s, TILT_RAD_S2)
     asked = motion.tilt_rad + 0.5 * (motion.tilt_rad_s + rate) * dt_s
     tilt = aim.joint.within(asked)
     return replace(motion, tilt_rad=tilt, tilt_rad_s=rate if tilt == asked else 0.0)
@@ -128,7 +128,7 @@ def turn_tilt_joint(motion: MotionReference, wished_rad_s: float, dt_s: float, a
 def step_rate(motion: MotionReference, k: int, wished_rad_s: float, dt_s: float) -> MotionReference:
     """The motion with angle number k turned at a wished rate, which is reached at `TURN_RAD_S2`."""
     before = float(motion.rates_rad_s[k])
-    rate = slewed_rate(before, wished_rad_s, dt_s, TURN_RAD_S2)
+    rate = limit_slew(before, wished_rad_s, dt_s, TURN_RAD_S2)
     return _with_angle(motion, k, float(motion.angles_rad[k]) + 0.5 * (before + rate) * dt_s, rate)
 
 

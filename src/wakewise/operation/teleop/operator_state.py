@@ -42,7 +42,7 @@ class OperatorSettings:
     method : "wake-aware" or "direct"
         How thrusts are chosen; direct is `dp`, the least thrusts.
     w_track : float
-        How closely the command is obeyed, on the paper's scale (see `wakewise.control.intent`), 0.5 to 50.
+        How closely the command is obeyed, on the paper's scale (see `wakewise.control.velocity_reference`), 0.5 to 50.
     gain : float
         Share of the fastest speed that full stick asks for, 0.1 to 1.
     precise : bool

@@ -14,8 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from wakewise.control.easing import near_turn
-from wakewise.control.intent import slewed
+from wakewise.control.motion_profile import unwrap_near
+from wakewise.control.velocity_reference import limit_acceleration
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, euler_from_quat, quat_conjugate, quat_multiply
 from wakewise.operation.teleop.motion import (
@@ -128,13 +128,13 @@ class ResumableMission:
         azimuth = math.atan2(away[1], away[0])
         elevation = math.asin(min(max(-float(away[2]) / max(distance, 1e-6), -1.0), 1.0))
         start = np.array([azimuth, elevation, distance])
-        end = np.array([near_turn(float(end[0]), azimuth), end[1], end[2]])
+        end = np.array([unwrap_near(float(end[0]), azimuth), end[1], end[2]])
         return rest_to_rest("back to the mission", start, end, self.speed_m_s, self.acceleration_m_s2)
 
 
 def stopped(motion: MotionReference, dt_s: float, braking_m_s2: float, aim: CameraAim) -> MotionReference:
     """The motion a step nearer to rest, which it comes to ahead of where it is."""
-    velocity = slewed(motion.velocity_W_m_s, np.zeros(3), dt_s, braking_m_s2)
+    velocity = limit_acceleration(motion.velocity_W_m_s, np.zeros(3), dt_s, braking_m_s2)
     place = motion.place_W_m + 0.5 * dt_s * (motion.velocity_W_m_s + velocity)
     motion = turn_tilt_joint(replace(motion, place_W_m=place, velocity_W_m_s=velocity), 0.0, dt_s, aim)
     for k in range(3):

@@ -13,7 +13,7 @@ from wakewise.ui.cli.console import print_json, print_table
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
-    from wakewise.control.trim import TrimAdvice, TrimRow
+    from wakewise.control.ballast_advice import TrimAdvice, TrimRow
 
 Vehicle = Annotated[
     str | None, typer.Argument(help="Library name or vehicle file; paper if not given.", show_default=False)
@@ -111,7 +111,7 @@ def _for_mission(
 ) -> None:
     """Trim by the wake model over a mission's poses."""
     from wakewise.control import LeverSettings
-    from wakewise.control.trim import trim_advice
+    from wakewise.control.ballast_advice import trim_advice
     from wakewise.operation import load_scenario
     from wakewise.robot.vehicles.ballast import net_buoyancy_N
     from wakewise.wake import wake_model

@@ -6,7 +6,7 @@ What the thrusts of now do to the target, as the controller's own wake model see
 
 The flown thrusts are held against those that direct allocation, the least thrusts, would give for the same wrench at
 the same place: what differs is what sparing the target brings. The jets are carried by the current that the estimator
-finds, as they are for the controller (see `wakewise.control.watch`).
+finds, as they are for the controller (see `wakewise.control.null_space_allocation`).
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.allocation import disturbance_of, min_norm_allocation
-from wakewise.control.spare import watching
-from wakewise.control.watch import Watch
+from wakewise.control.null_space_allocation import AllocationContext, allocation_context
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.geometry import euler_from_quat
 from wakewise.core.interfaces import BodyState
@@ -47,7 +46,7 @@ class WakeReadout:
     """
 
     view: InfluenceModel
-    watch: Watch
+    watch: AllocationContext
     points_W_m: Array
     true_points_W_m: Array
 
@@ -63,7 +62,7 @@ class WakeReadout:
         made_of = (parts.vehicle, parts.region, parts.wake)
         return cls(
             view=InfluenceModel.of(*made_of, parts.control.superposition),
-            watch=watching(*made_of, parts.control),
+            watch=allocation_context(*made_of, parts.control),
             points_W_m=true + off_m,
             true_points_W_m=true,
         )

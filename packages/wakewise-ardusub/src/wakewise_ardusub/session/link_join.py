@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.allocation import disturbance_of, min_norm_allocation
-from wakewise.control import make_tracker, vehicle_layout
+from wakewise.control import make_pid, vehicle_layout
 from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
@@ -251,7 +251,7 @@ def run_warm_up(sea: VehicleFlight, steps: int = 12) -> float:
         sea.figures(Step(time_s=k * dt_s, goal=goal, estimate=start, command=command, truth=None, solve_s=0.0))
         took_s = max(took_s, time.perf_counter() - began) if k >= steps // 2 else 0.0
         own, _ = method.step(own, dt_s, estimate, goal)  # what it keeps beside its state
-    tracker = make_tracker(parts.vehicle, parts.control)
+    tracker = make_pid(parts.vehicle, parts.control)
     min_norm_allocation(layout, tracker.wrench(tracker.init(), dt_s, start, Goal(X_WB=start.X_WB))[1])
     sea.figures.begin()
     return took_s

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.control.intent import PAPER_W_TRACK
+from wakewise.control.velocity_reference import PAPER_W_TRACK
 from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.trials.timing import BenchOptions

@@ -11,16 +11,15 @@ begins with `SETTLE_S` of rest, like the gentle bench's, so that what holds the 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, fields, is_dataclass
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from wakewise.allocation import disturbance_of
-from wakewise.control import PlanningController
-from wakewise.control.intent import FULL_M_S, PAPER_W_TRACK
-from wakewise.control.receding import PlanState
-from wakewise.control.spare import watching
+from wakewise.control import Pipeline
+from wakewise.control.null_space_allocation import allocation_context
+from wakewise.control.velocity_reference import FULL_M_S, PAPER_W_TRACK
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.core.interfaces import BodyState, Command, Controller, Goal, TruthProvider
@@ -38,9 +37,6 @@ from wakewise.vision.evaluation import flight_figures
 from wakewise_paper.operator_study.worlds import water_of
 from wakewise_paper.wash_reduction.paper import WATER_EVERY_S
 from wakewise_paper.wash_reduction.routes import SETTLE_S, joined, resting, top_above_centre_m
-
-T = TypeVar("T")
-DEEPEST = 6
 
 
 @dataclass(eq=False)
@@ -67,25 +63,9 @@ class ControllerProbe:
         """Decide, and remember what was asked and what the plan expects by then."""
         state, command = self.inner.step(state, dt_s, estimate, goal)
         self.asked_W_m_s = goal.X_WB.R @ goal.nu_B[:3]
-        planner, plan = find_record(self.inner, PlanningController), find_record(state, PlanState)
-        expected = None if planner is None or plan is None else planner.expected(plan)
+        expected = self.inner.expected(state) if isinstance(self.inner, Pipeline) else None
         self.planned_W_m_s = None if expected is None else matrix_from_quat(expected[3:7]) @ expected[7:10]
         return state, command
-
-
-def find_record(record: Any, kind: type[T], deep: int = DEEPEST) -> T | None:
-    """The record itself or the first of that kind in its fields, in those of its fields, and so on; None if none is."""
-    if isinstance(record, kind):
-        return record
-    if deep == 0 or not is_dataclass(record):
-        return None
-    for one in fields(record):
-        value = getattr(record, one.name, None)
-        if is_dataclass(value) and not isinstance(value, np.ndarray):
-            found = find_record(value, kind, deep - 1)
-            if found is not None:
-                return found
-    return None
 
 
 SPEED_M_S, CLIMB_M_S = 0.10, 0.05
@@ -291,7 +271,7 @@ def fly_trial(trial: OperatorTrial) -> dict[str, float | None]:
     assert isinstance(heard, ControllerProbe)
     assert isinstance(pilot, AssistedPilot)
     # One yardstick for all methods: what the levers know, in the current that the estimator finds.
-    watch = watching(parts.vehicle, parts.region, parts.wake, parts.control)
+    watch = allocation_context(parts.vehicle, parts.region, parts.wake, parts.control)
     rows: list[tuple[Array, ...]] = []
     D: list[float] = []
     solve_ms: list[float] = []

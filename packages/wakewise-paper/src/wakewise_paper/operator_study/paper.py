@@ -18,7 +18,14 @@ from typing import Any
 import numpy as np
 
 from wakewise.control import ControlSettings, LeverSettings, make_controller
-from wakewise.control.intent import PAPER_W_TRACK, Intent, goal_of, moved_on, obeying, slewed
+from wakewise.control.velocity_reference import (
+    PAPER_W_TRACK,
+    VelocityCommand,
+    advance_reference,
+    goal_of,
+    limit_acceleration,
+    scaled_tracking,
+)
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Goal, TruthProvider
 from wakewise.operation import Scenario, fly
@@ -99,9 +106,9 @@ class ScriptedOperator:
         if time_s < HOLD_S:
             return self.start
         leg = min(int((time_s - HOLD_S) / self.course.leg_s), len(self.course.legs_W) - 1)
-        self.velocity_W = slewed(self.velocity_W, SPEED_M_S * np.array(self.course.legs_W[leg]), self.dt_s)
-        self.place_W = moved_on(self.place_W, self.velocity_W, estimate, self.dt_s)
-        return goal_of(Intent(velocity_W_m_s=self.velocity_W, watch_W_m=self.watch_W_m), self.place_W)
+        self.velocity_W = limit_acceleration(self.velocity_W, SPEED_M_S * np.array(self.course.legs_W[leg]), self.dt_s)
+        self.place_W = advance_reference(self.place_W, self.velocity_W, estimate, self.dt_s)
+        return goal_of(VelocityCommand(velocity_W_m_s=self.velocity_W, watch_W_m=self.watch_W_m), self.place_W)
 
 
 def paper_trials(w_tracks: tuple[float, ...], seeds: int) -> dict[Key, PaperOperatorTrial]:
@@ -156,7 +163,7 @@ def fly_trial(trial: PaperOperatorTrial) -> dict[str, float | None]:
     vehicle, tank = load_vehicle("paper"), TankSettings()
     target, region = paper_place(tank.size_m[2])
     base = ControlSettings(wake=WakeSettings(**PAPER_WAKE), levers=LeverSettings(**OFF))
-    control = base.model_copy(update={"plan": obeying(base.plan, trial.w_track)})
+    control = base.model_copy(update={"plan": scaled_tracking(base.plan, trial.w_track)})
     plant_rng, _ = np.random.default_rng([seed, 13]).spawn(2)
     trim_N = float(plant_rng.uniform(-tank.mismatch.trim_range_N, tank.mismatch.trim_range_N))
     true = perturbed(
@@ -169,7 +176,7 @@ def fly_trial(trial: PaperOperatorTrial) -> dict[str, float | None]:
         trim_N=-tank.mismatch.trim_range_N if course.sinks else trim_N,
     )
     watch = target.centre_W_m if course.watches else None
-    rest = Intent(velocity_W_m_s=np.zeros(3), watch_W_m=watch)
+    rest = VelocityCommand(velocity_W_m_s=np.zeros(3), watch_W_m=watch)
     here = goal_of(rest, target.centre_W_m + np.array(course.from_target_m))
     start = BodyState(X_WB=here.X_WB)
     world = QuasiSteadyWorld(

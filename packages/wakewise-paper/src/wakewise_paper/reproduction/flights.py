@@ -14,7 +14,7 @@ import numpy as np
 import polars as pl
 
 from wakewise.allocation import disturbance_of
-from wakewise.control.spare import watching
+from wakewise.control.null_space_allocation import allocation_context
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
@@ -79,7 +79,7 @@ def fly_one(settings: Mapping[str, Any], folder: Path, progress: Progress) -> di
     if settings.get("ballast"):
         parts = ballasted_world(parts, blocks_of(parts))
     rate_hz = parts.control.rate_hz
-    watch = watching(parts.vehicle, parts.region, parts.wake, parts.control)
+    watch = allocation_context(parts.vehicle, parts.region, parts.wake, parts.control)
     every = max(1, round(SERIES_EVERY_S * rate_hz))
     duration_s = settings.get("duration_s") or parts.route.duration_s
     piv = PivRecorder.over(parts, float(duration_s), int(settings.get("piv_instants") or 0))

@@ -34,12 +34,16 @@ import numpy as np
 import polars as pl
 
 from wakewise.allocation import Layout, PowerLaw, min_norm_allocation
-from wakewise.control.bow_rule import bow_layout
-from wakewise.control.levers import with_bed_points
-from wakewise.control.loop import vehicle_layout
-from wakewise.control.spare import watching
-from wakewise.control.thrift import power_law
-from wakewise.control.watch import EVERY_S, JUMP_EVERY_S, Watch
+from wakewise.control.bed_points import with_bed_points
+from wakewise.control.forward_jet_exclusion import bow_layout
+from wakewise.control.null_space_allocation import (
+    RESTART_S,
+    SEARCH_S,
+    AllocationContext,
+    allocation_context,
+    power_law,
+    vehicle_layout,
+)
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState, TruthProvider
@@ -193,7 +197,7 @@ class RecordedFlight:
     """A flight of `dp` as its water needs it, at the water's own steps.
 
     `least_N`, shape (k, n), are the least true thrusts of its wrench without noise; `wrench_B`, shape (k, 6), what the
-    controller asked for; `estimates` what the estimator said, each `EVERY_S`; `judged_s` when settling had ended.
+    controller asked for; `estimates` what the estimator said, each `SEARCH_S`; `judged_s` when settling had ended.
     """
 
     parts: Parts
@@ -250,7 +254,7 @@ def fly_dp(trial: BoundTrial) -> RecordedFlight:
     world = parts.world
     if not isinstance(world, TankWorld):
         raise InputError(f"bound: {trial.scenario} is not flown in the tank")
-    every, estimates = round(EVERY_S * parts.scenario.control.rate_hz), []
+    every, estimates = round(SEARCH_S * parts.scenario.control.rate_hz), []
     seen: list[int] = []
 
     def heard(step: Step, witness: TruthProvider | None) -> None:  # noqa: ARG001
@@ -302,28 +306,28 @@ def candidates(flown: RecordedFlight) -> tuple[Array, dict[str, int]]:
         rows.append(np.array([min_norm_allocation(rule, wrench).thrusts_N for wrench in flown.least_N @ rule.B.T]))
     parts = flown.parts
     region = with_bed_points(parts.region, parts.control.levers, bed_of(parts.wake))
-    watch = watching(parts.vehicle, region, parts.wake, parts.control)
-    for name, one in (("belief", watch), ("belief_any", replace(watch, sharer=replace(watch.sharer, law=None)))):
+    watch = allocation_context(parts.vehicle, region, parts.wake, parts.control)
+    for name, one in (("belief", watch), ("belief_any", replace(watch, allocator=replace(watch.allocator, law=None)))):
         named[name] = len(rows)
         rows.append(flown.least_N + believed(one, flown))
     return np.array(rows), named
 
 
-def believed(watch: Watch, flown: RecordedFlight) -> Array:
+def believed(watch: AllocationContext, flown: RecordedFlight) -> Array:
     """Spare thrusts that a belief chooses on the flight's way, as they are given, shape (k, n).
 
     Shares are sought as often as in flight, from the same estimates, for the wrench without its noise.
     """
     times, n = flown.led.times_s, flown.least_N.shape[1]
-    thrusts, given, jumps = np.zeros(n), [], round(JUMP_EVERY_S / EVERY_S)
-    asked_s: Array = np.arange(len(flown.estimates), dtype=np.float64) * EVERY_S
+    thrusts, given, jumps = np.zeros(n), [], round(RESTART_S / SEARCH_S)
+    asked_s: Array = np.arange(len(flown.estimates), dtype=np.float64) * SEARCH_S
     asked = _at(asked_s, times, flown.wrench_B)
     for k, (estimate, wrench) in enumerate(zip(flown.estimates, asked, strict=True)):
-        shared = watch.share_out(wrench, estimate, thrusts)
+        shared = watch.search(wrench, estimate, thrusts)
         if shared is not None:
             thrusts = shared[0].thrusts_N
             if k % jumps == 0:
-                anew = watch.jump(wrench, estimate, thrusts, shared[1])
+                anew = watch.restart(wrench, estimate, thrusts, shared[1])
                 thrusts = thrusts if anew is None else anew[0].thrusts_N
         given.append(flown.vehicle.thrust_gains * thrusts)
     return split(flown.layout, _at(times, asked_s, np.array(given)))[1]

@@ -1,0 +1,228 @@
+"""Electrical power of thrusts, and gentle allocation within a bound on it.
+
+Of all thrusts that make a wrench, T_0 are the least (pseudo-inverse) and T_1 the gentlest. The power of a propeller
+grows as |T|^1.5 (actuator disk at bollard pull). Load on half of the thrusters needs sqrt(2) times the power, more
+where they run in reverse. The bound is kept by going a part of the way from T_0 to T_1. All points between make the
+same wrench within limits, and power is convex in thrust, so the allowed part of a way is an interval that begins at
+T_0.
+
+A higher price on effort cannot do the same. D is made of roots of thrusts, so along a way it is concave between two
+thrusters' rests, and its weighted sum with effort has minima at rests alone. With a rising price the minimum jumps from
+the gentlest thrusts to about the least ones, past all that the bound allows.
+
+Trade. Parts of the null space that share no thruster (the horizontal ones, the vertical ones) are each gone along by
+themselves. Of all such points within the bound that of the least product of cost and power is taken: D goes as the
+square of a speed, so 2 % of power must save 1 % of speed. The cost of what counts as calm is added to the cost, as
+nobody gains by water stiller than that; `standing_W` is added to the power.
+
+Bound. It goes with the mean speed that the least thrusts would leave at the target, by the wake model and its known
+bias `MODEL_BIAS`: `CALM` times the power of the least thrusts up to `CALM_M_S`, `TROUBLE` at `TROUBLE_M_S`, `MOST` from
+`MOST_M_S` on, straight in between. The first two were set beforehand: a flight may cost 1.3 times the energy of `dp`
+where that leaves more than 10 mm/s, 1.05 times where it leaves less than 5 (docs/research-log/0036). Of what lies above
+1, a twentieth stays for what the bound does not see: pulses, the lag of rotors, corrections between two searches. A
+step may cost more than a flight, since other steps cost less (docs/research-log/0065). A ballasted vehicle hovers on 1
+to 2 W, and a quarter of that is no price, hence `standing_W` (docs/research-log/0078).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wakewise.allocation.allocate import Allocation, Weights, disturbance_of, min_wash_allocation
+from wakewise.allocation.attainable_set import largest_feasible_share
+from wakewise.allocation.layout import Layout
+from wakewise.allocation.line_search import cost
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.jit.njit import njit
+
+KEPT = 0.95
+"""Share of the extra power of a whole flight that the bound of a step hands out: with a bound of 1.3 two flights cost
+1.307 and 1.299 times the energy of `dp`."""
+CALM, TROUBLE = 1.0 + KEPT * 0.05, 1.0 + KEPT * 0.3
+"""Most power over that of the least thrusts, where these leave the target's water calm, and where they do not."""
+CALM_M_S, TROUBLE_M_S, MOST_M_S = 0.005, 0.010, 0.025
+MOST = 1.5
+"""The least bound that costs no wash: 1.7, about what the gentlest thrusts of a heavy vehicle need, left 33 % of `dp`'s
+in 18 flights in trouble for 1.28 times its energy, 1.5 leaves 32 for 1.27, 1.4 leaves 34 for 1.25
+(docs/research-log/0079)."""
+MODEL_BIAS = 2.6
+"""How many times too fast the wake model has the target's water under the least thrusts: twice in the median of 14
+flights in trouble (1 to 3.7), 3.2 times in 35 calm ones. With 2.6 all but one of the first lie above `TROUBLE_M_S` and
+all but one of the others below (docs/research-log/0078)."""
+_PARTS = 3
+"""Most parts of the null space gone along by themselves; what a layout has beyond goes with the last of them."""
+_STEPS = {0: 1, 1: 32, 2: 16, 3: 8}
+"""Steps on the way along each part, by the number of parts."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PowerLaw:
+    """Electrical power of thrusters: `forward`, `reverse`, shape (n,), in W/N^1.5, and their least thrusts in N.
+
+    Below a least thrust a thruster is run at it for a part of the time, so there power goes with |T|. `standing_W` is
+    reckoned beside that of the thrusters where shares are held against each other.
+    """
+
+    forward: Array
+    reverse: Array
+    least_forward_N: float = 0.0
+    least_reverse_N: float = 0.0
+    standing_W: float = 0.0
+
+    def __post_init__(self) -> None:
+        freeze(self, forward=(None,), reverse=(None,))
+
+    def power_W(self, thrusts_N: Array) -> Array:
+        """Sum over thrusters, shape (...), for thrusts of shape (..., n); nothing of what stands beside."""
+        T = np.array(thrusts_N, dtype=np.float64)
+        rows = T.reshape(-1, T.shape[-1])
+        power = _power_of(rows, self.forward, self.reverse, self.least_forward_N, self.least_reverse_N)
+        return np.asarray(power.reshape(T.shape[:-1]))
+
+
+@njit
+def _power(T, forward, reverse, least_forward, least_reverse):  # type: ignore[no-untyped-def]
+    """`PowerLaw.power_W` of thrusts, shape (n,)."""
+    power = 0.0
+    for i in range(T.size):
+        each, least = (forward[i], least_forward) if T[i] >= 0.0 else (reverse[i], least_reverse)
+        power += each * abs(T[i]) * np.sqrt(max(abs(T[i]), least))
+    return power
+
+
+@njit
+def _power_of(rows, forward, reverse, least_forward, least_reverse):  # type: ignore[no-untyped-def]
+    """`PowerLaw.power_W` of rows of thrusts, shape (r, n)."""
+    power = np.empty(rows.shape[0])
+    for r in range(rows.shape[0]):
+        power[r] = _power(rows[r], forward, reverse, least_forward, least_reverse)
+    return power
+
+
+@njit
+def _best_by_power(  # type: ignore[no-untyped-def]
+    least, ways, steps, forward, reverse, least_forward, least_reverse, standing, most_W, calm, G, previous, weights
+):
+    """Thrusts of the least `power_adjusted_cost` on the grid of `steps` along each of `ways`, shape (k, n), within
+    `most_W`.
+
+    Those that begin it, `least`, count whatever they need.
+    """
+    best, thrusts = least.copy(), np.empty(least.size)
+    value = np.inf
+    for point in range((steps + 1) ** ways.shape[0]):
+        thrusts[:] = least
+        rest = point
+        for way in ways:
+            thrusts += rest % (steps + 1) / steps * way
+            rest //= steps + 1
+        power = _power(thrusts, forward, reverse, least_forward, least_reverse)
+        if power <= most_W or point == 0:
+            own = (cost(G, thrusts, previous, weights) + calm) * (power + standing)
+            if own < value:
+                value = own
+                best[:] = thrusts
+    return best
+
+
+def power_adjusted_cost(cost_: float, power_W: float, calm: float) -> float:
+    """What shares are compared by: cost over what is calm times power with what stands beside; less is better."""
+    return (cost_ + calm) * power_W
+
+
+def best_by_power(
+    layout: Layout,
+    found: Allocation,
+    least_N: Array,
+    law: PowerLaw,
+    most_W: float,
+    calm: float,
+    gram: Array,
+    weights: Weights,
+    previous_N: Array | None = None,
+) -> Allocation:
+    """Of what lies between the least thrusts and the gentlest found: the shares that are worth their power most.
+
+    Parameters
+    ----------
+    layout : Layout
+    found : Allocation
+    least_N : ndarray, shape (n,)
+        Thrusts of the same wrench; where they alone need more than `most_W`, they are the answer.
+    law : PowerLaw
+    most_W : float
+        Bound on the thrusters' power.
+    calm : float
+        Cost of what counts as calm, in the units of the weights.
+    gram : ndarray, shape (2 n, 2 n)
+    weights : Weights
+    previous_N : ndarray, shape (n,), optional
+        As `min_wash_allocation`.
+
+    Returns
+    -------
+    Allocation
+        With the gap of `found`, which is that of the minimum of cost alone.
+    """
+    G, base = np.array(gram), np.array(least_N, dtype=np.float64)
+    previous = np.zeros(len(base)) if previous_N is None else np.array(previous_N, dtype=np.float64)
+    parts = list(layout.owners[: _PARTS - 1])
+    if len(layout.owners) >= _PARTS:
+        parts.append(layout.owners[_PARTS - 1 :].any(axis=0))
+    ways = np.array([np.where(own, found.thrusts_N - base, 0.0) for own in parts]).reshape(-1, len(base))
+    best = _best_by_power(
+        base, ways, _STEPS[len(parts)], law.forward, law.reverse, law.least_forward_N, law.least_reverse_N,
+        law.standing_W, most_W, calm, G, previous, weights.packed,
+    )  # fmt: skip
+    return replace(found, thrusts_N=best, wrench_B=layout.B @ best, disturbance=disturbance_of(G, best))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PowerBoundedAllocator:
+    """Gentle thrusts for a wrench within the bound on their power, if there is a power law."""
+
+    layout: Layout
+    law: PowerLaw | None = None
+
+    def allocate(
+        self,
+        wrench_B: Array,
+        gram: Array,
+        sent: Array,
+        weights: Weights,
+        total_weight: float,
+        previous_N: Array | None = None,
+    ) -> Allocation:
+        """Thrusts of least cost; arguments as for `min_wash_allocation`, `total_weight` that of the points behind D.
+
+        Thrusts are chosen by `gram`; the bound asks by `sent`, shape (2 n, 2 n), what the least thrusts do as sent.
+        """
+        found = min_wash_allocation(self.layout, wrench_B, gram, weights, previous_N)
+        if self.law is None:
+            return found
+        least_N, _ = largest_feasible_share(self.layout, self.layout.inverse @ wrench_B)
+        speed_m_s = math.sqrt(max(disturbance_of(sent, least_N), 0.0) / total_weight) / MODEL_BIAS
+        share = power_limit(speed_m_s)
+        most_W = share * float(self.law.power_W(least_N)) + (share - CALM) * self.law.standing_W
+        calm = _calm(weights, total_weight)
+        return best_by_power(self.layout, found, least_N, self.law, most_W, calm, gram, weights, previous_N)
+
+    def adjusted_cost(self, cost: float, thrusts_N: Array, weights: Weights, total_weight: float) -> float:
+        """What thrusts of one wrench, shape (n,), are compared by; the cost alone if no power law is known."""
+        if self.law is None:
+            return cost
+        drawn_W = float(self.law.power_W(thrusts_N)) + self.law.standing_W
+        return power_adjusted_cost(cost, drawn_W, _calm(weights, total_weight))
+
+
+def power_limit(speed_m_s: float) -> float:
+    """Most power over that of the least thrusts, if these leave a mean speed at the target."""
+    return float(np.interp(speed_m_s, (CALM_M_S, TROUBLE_M_S, MOST_M_S), (CALM, TROUBLE, MOST)))
+
+
+def _calm(weights: Weights, total_weight: float) -> float:
+    """Cost of the disturbance that counts as calm."""
+    return weights.disturbance * total_weight * (MODEL_BIAS * CALM_M_S) ** 2

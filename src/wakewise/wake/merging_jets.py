@@ -1,0 +1,309 @@
+"""Jets that meet: what two become, as terms of D beside those of single jets.
+
+Two jets that cross at less than 120 deg join and run on along the sum of their momenta (conservation of momentum; the
+angle is that above which they rather turn aside, as jets that blow at each other do). The two forward jets of a
+vectored layout cross a decimetre ahead of the bow, and what they become goes where the camera looks, although neither
+jet alone comes near the target. In the tank this was most of the water's motion at a target downstream of a hover.
+
+In a flow, a pair of which one does no more than correct is charged as if the other pushed as a thruster at rest is
+guessed to: half of what they would become each. D is of an instant, and shares that alternate between two jets that
+miss are the least that it can find; the water has both of them. That is a charge, not what is in the water: thrusts
+that leave one of the two at rest leave nothing of it, so the bound on power (`allocation.power_budget`) asks what they
+do as sent.
+
+As a term of D. Of jets a and b with T_a = T_b = 1 N the joined jet carries |e_a + e_b| N of momentum along
+e_a + e_b. With unequal thrusts it turns towards the stronger, and without one of them there is none; the geometric mean
+sqrt(T_a T_b) = s_a s_b vanishes in the same way and keeps D a quadratic form of s, so the exact allocators of this room
+take it as it is: it is an entry of G off the diagonal. It errs on the safe side where thrusts are unequal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from wakewise.allocation import Layout
+from wakewise.core.arrays import Array, IntArray
+from wakewise.core.geometry import Pose
+from wakewise.core.jit.njit import assign, njit
+from wakewise.wake import AxialJet, free_jet
+from wakewise.wake.advected_jets import CrossFlow
+from wakewise.wake.disturbance import carried_velocity, incoherent, velocity_gram
+from wakewise.wake.influence import InfluenceMatrices, InfluenceModel
+
+LEAST_COSINE = -0.5
+"""Cosine of 120 deg: jets that cross at more turn aside rather than join."""
+HALF_WIDTH_SLOPE = 0.096
+"""Half-speed radius of a round jet over the distance along it (see `wakewise.wake.RoundJet`)."""
+WEAK_SHARE = 0.25
+"""Thrusts below this share of the mean are corrections rather than jets."""
+_PARALLEL = 0.999
+_LEAST_SHARE, _WORTH_SHARE = 1e-3, 0.1
+
+
+class JoinedJets(NamedTuple):
+    """Jets made of two, of m pairs of slots (slot i is thruster i with T > 0, slot n + i the same with T < 0).
+
+    `origins_m`, shape (m, 3), lie as far behind the place of meeting as the two jets came on average, so that the
+    joined jet is as wide there as they are; `directions`, shape (m, 3); `momentum`, shape (m,), over `strength_N`, the
+    geometric mean of the two; `share`, shape (m,), tells how squarely they meet: 1/2 where their axes pass one
+    half-width apart; `ways_m`, shape (m, 2), how far each comes until then.
+    """
+
+    first: IntArray
+    second: IntArray
+    origins_m: Array
+    directions: Array
+    momentum: Array
+    share: Array
+    strength_N: Array
+    ways_m: Array
+
+
+class _Sent(NamedTuple):
+    """Jets of a flow: those of all slots, then those that pairs become, then those that resting pairs would become.
+
+    `origins_m` and `directions`, shape (m, 3), `areas_m2` and `thrusts_N`, shape (m,), `ends`, shape (m, 2), as for
+    `carried_velocity`; `joined` and `apart`, the numbers in `JoinedJets` of the pairs that do and that would.
+    """
+
+    origins_m: Array
+    directions: Array
+    areas_m2: Array
+    thrusts_N: Array
+    ends: Array
+    joined: IntArray
+    apart: IntArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MergingJetsModel(InfluenceModel):
+    """An `InfluenceModel` whose Gram matrix also holds what pairs of jets become where they meet.
+
+    Parameters
+    ----------
+    pairs : tuple of (int, int)
+        Thrusters whose jets are looked at.
+    """
+
+    pairs: tuple[tuple[int, int], ...] = field(default=())
+
+    def gram(self, X_WB: Pose, flow: CrossFlow | None = None) -> Array:
+        """Matrix G of D = s' G s, shape (2 n, 2 n); in a flow what two jets become takes their own place."""
+        return self.seen(X_WB, flow).gram
+
+    def seen(self, X_WB: Pose, flow: CrossFlow | None = None) -> InfluenceMatrices:
+        """Matrices of D: with the charge for a pair of which one rests, and with what it becomes where both push."""
+        origins, axes = self.places(X_WB)
+        if flow is not None and isinstance(free_jet(self.wake), AxialJet):
+            return self._seen_in(flow, origins, axes)
+        G = np.array(super().gram(X_WB))
+        met = _meet(origins, axes, *self._slots, np.ones(2 * len(origins)))
+        areas = self.areas_m2[met.first % len(origins)]
+        speed = self.wake.unit_velocity(self.points_W_m, met.origins_m, met.directions, areas)
+        D = met.momentum * met.share * np.einsum("n,inx,inx->i", self.weights, speed, speed)
+        np.add.at(G, (met.first, met.second), 0.5 * D)
+        np.add.at(G, (met.second, met.first), 0.5 * D)
+        return InfluenceMatrices(gram=G, sent=G)
+
+    def _seen_in(self, flow: CrossFlow, origins: Array, axes: Array) -> InfluenceMatrices:
+        """The same in a flow, of disks and force axes in the world, shape (n, 3) each.
+
+        Of a pair that pushes a share goes on as one, the rest as if alone. The velocity of the one is counted to its
+        two by their thrusts, so that it is right where the thrusts are those reckoned from, and D stays a sum of
+        squares. Pairs of which one pushes no more than corrections do are charged for what they would become: either
+        may push soon, and jets live for seconds, so that what one sends now meets what the other sends then.
+        """
+        pushing = np.concatenate([flow.thrusts_N, -flow.thrusts_N])
+        guessed, weak_N = flow.guessed, WEAK_SHARE * float(np.abs(flow.thrusts_N).mean())
+        met = _meet(origins, axes, *self._slots, np.where(pushing > weak_N, pushing, guessed))
+        sent = _send(origins, axes, self.areas_m2, guessed, pushing, weak_N, met)
+        place = (sent.origins_m, sent.directions, sent.areas_m2, sent.thrusts_N)
+        velocity = carried_velocity(self.wake, self.points_W_m, *place, flow, sent.ends)
+        _join(velocity, met, sent.joined, pushing)
+        G = velocity_gram(velocity[: len(pushing)], self.weights)
+        if self.superposition == "incoherent":
+            G = incoherent(G)
+            return InfluenceMatrices(gram=G, sent=G)
+        return InfluenceMatrices(
+            *_charged(G, velocity[len(pushing) + len(sent.joined) :], self.weights, met, sent.apart)
+        )
+
+    @cached_property
+    def _slots(self) -> tuple[IntArray, IntArray]:
+        return _slots_of(self.pairs, len(self.areas_m2))
+
+
+def joined_jets(
+    origins_m: Array, axes: Array, pairs: tuple[tuple[int, int], ...], thrusts_N: Array | None = None
+) -> JoinedJets:
+    """Which jets meet and what they become, from disks, shape (n, 3), and force axes, shape (n, 3), in any frame.
+
+    `thrusts_N`, shape (2 n,), are sizes to reckon with, more than 0; without them all jets are alike.
+    """
+    n = len(origins_m)
+    sizes = np.ones(2 * n) if thrusts_N is None else np.array(thrusts_N, dtype=np.float64)
+    return cast(JoinedJets, _meet(np.array(origins_m), np.array(axes), *_slots_of(pairs, n), sizes))
+
+
+def _slots_of(pairs: tuple[tuple[int, int], ...], n: int) -> tuple[IntArray, IntArray]:
+    """Slots, two arrays of shape (4 m,), whose jets m pairs of n thrusters may send."""
+    wanted = [(a, b) for i, j in pairs for a in (i, i + n) for b in (j, j + n)]
+    first, second = np.array(wanted, dtype=np.int64).reshape(-1, 2).T.copy()
+    return first, second
+
+
+@njit
+def _meet(origins, axes, first, second, sizes):  # type: ignore[no-untyped-def]
+    """`JoinedJets` of those of the pairs of slots, `first` with `second`, that meet; `sizes` as for `joined_jets`."""
+    n, many, count = origins.shape[0], first.size, 0
+    a, b = np.empty(many, np.int64), np.empty(many, np.int64)
+    starts, onward, ways = np.empty((many, 3)), np.empty((many, 3)), np.empty((many, 2))
+    momentum, share, strength = np.empty(many), np.empty(many), np.empty(many)
+    d, e = np.empty(3), np.empty(3)
+    for k in range(many):
+        i, j = first[k] % n, second[k] % n
+        cosine, along, across = 0.0, 0.0, 0.0
+        for x in range(3):
+            d[x] = axes[i, x] if first[k] >= n else -axes[i, x]
+            e[x] = axes[j, x] if second[k] >= n else -axes[j, x]
+            r = origins[j, x] - origins[i, x]
+            cosine, along, across = cosine + d[x] * e[x], along + r * d[x], across + r * e[x]
+        if not LEAST_COSINE < cosine < _PARALLEL:
+            continue
+        # Distances along both jets to where their axes come closest.
+        sine2 = 1.0 - cosine * cosine
+        ways[count, 0], ways[count, 1] = (along - cosine * across) / sine2, (cosine * along - across) / sine2
+        way = ways[count, 0] + ways[count, 1]
+        if not (ways[count, 0] > 0.0 and ways[count, 1] > 0.0):
+            continue
+        strength[count] = np.sqrt(sizes[first[k]] * sizes[second[k]])
+        by_first, by_second = sizes[first[k]] / strength[count], sizes[second[k]] / strength[count]
+        apart2, total2 = 0.0, 0.0
+        for x in range(3):
+            here, there = origins[i, x] + ways[count, 0] * d[x], origins[j, x] + ways[count, 1] * e[x]
+            starts[count, x] = 0.5 * (here + there)
+            onward[count, x] = by_first * d[x] + by_second * e[x]
+            apart2, total2 = apart2 + (there - here) ** 2, total2 + onward[count, x] ** 2
+        share[count] = np.exp(-np.log(2.0) * apart2 / max(HALF_WIDTH_SLOPE * way, 1e-9) ** 2)
+        if not share[count] > _LEAST_SHARE:
+            continue
+        momentum[count] = max(np.sqrt(total2), 1e-9)
+        for x in range(3):
+            onward[count, x] /= momentum[count]
+            starts[count, x] -= 0.5 * way * onward[count, x]
+        a[count], b[count] = first[k], second[k]
+        count += 1
+    return JoinedJets(
+        a[:count],
+        b[:count],
+        starts[:count],
+        onward[:count],
+        momentum[:count],
+        share[:count],
+        strength[:count],
+        ways[:count],
+    )
+
+
+@njit
+def _send(origins, axes, areas, guessed, pushing, weak_N, met):  # type: ignore[no-untyped-def]
+    """Jets to follow, `_Sent`, of slots that push with `pushing` and are guessed to with `guessed`, shape (2 n,)."""
+    n, pairs = origins.shape[0], met.first.size
+    joined, apart, joins, rests = np.empty(pairs, np.int64), np.empty(pairs, np.int64), 0, 0
+    taken, ends = np.zeros(2 * n, np.bool_), np.ones((2 * n + pairs, 2))
+    ends[:, 0] = np.inf
+    for _ in range(pairs):
+        # Each jet joins one other, the one it meets most squarely.
+        best, square = -1, 0.0
+        for k in range(pairs):
+            a, b = met.first[k], met.second[k]
+            free = not taken[a] and not taken[b] and min(pushing[a], pushing[b]) > weak_N
+            if free and met.share[k] > square:
+                best, square = k, met.share[k]
+        if best < 0:
+            break
+        for side in range(2):
+            slot = met.first[best] if side == 0 else met.second[best]
+            taken[slot] = True
+            ends[slot, 0], ends[slot, 1] = met.ways_m[best, side], 1.0 - square
+        joined[joins] = best
+        joins += 1
+    for k in range(pairs):
+        if min(pushing[met.first[k]], pushing[met.second[k]]) <= weak_N and met.share[k] > _WORTH_SHARE:
+            apart[rests] = k
+            rests += 1
+    many = 2 * n + joins + rests
+    places, directions, disks, thrusts = np.empty((many, 3)), np.empty((many, 3)), np.empty(many), np.empty(many)
+    for i in range(2 * n):
+        assign(places[i], origins[i % n])
+        for x in range(3):
+            directions[i, x] = -axes[i, x] if i < n else axes[i - n, x]
+        disks[i], thrusts[i] = areas[i % n], guessed[i]
+    for c in range(joins + rests):
+        k, i = joined[c] if c < joins else apart[c - joins], 2 * n + c
+        assign(places[i], met.origins_m[k])
+        assign(directions[i], met.directions[k])
+        disks[i], thrusts[i] = areas[met.first[k] % n], met.momentum[k] * met.strength_N[k]
+    return _Sent(places, directions, disks, thrusts, ends[:many], joined[:joins], apart[:rests])
+
+
+@njit
+def _join(velocity, met, joined, pushing):  # type: ignore[no-untyped-def]
+    """Add what pairs become, rows of `velocity`, (m, n, 3), after all slots, to the rows of their two, by thrust."""
+    for c in range(joined.size):
+        k, one = joined[c], velocity[pushing.size + c]
+        a, b = met.first[k], met.second[k]
+        whole = met.share[k] * np.sqrt(met.momentum[k] * met.strength_N[k]) / (pushing[a] + pushing[b])
+        for slot in (a, b):
+            part = whole * np.sqrt(pushing[slot])
+            for j in range(one.shape[0]):
+                for x in range(3):
+                    velocity[slot, j, x] += part * one[j, x]
+
+
+@njit
+def _charged(G, velocity, weights, met, apart):  # type: ignore[no-untyped-def]
+    """G with a charge on each of a pair that rests, and G with what the pair becomes, of velocities (m, n, 3).
+
+    D of what a pair becomes is per newton of its geometric mean.
+    """
+    charged, sent = G.copy(), G.copy()
+    for c in range(apart.size):
+        k, total = apart[c], 0.0
+        a, b = met.first[k], met.second[k]
+        for j in range(weights.size):
+            u, v, w = velocity[c, j, 0], velocity[c, j, 1], velocity[c, j, 2]
+            total += weights[j] * (u * u + v * v + w * w)
+        half = 0.5 * met.momentum[k] * met.share[k] * total
+        charged[a, a] += half
+        charged[b, b] += half
+        sent[a, b] += half
+        sent[b, a] += half
+    return charged, sent
+
+
+def merging_pairs(layout: Layout) -> tuple[tuple[int, int], ...]:
+    """Pairs of thrusters that share a part of the null space.
+
+    Only there can the allocation choose between them; other pairs would tie together parts that are searched exactly.
+    """
+    moves = [np.flatnonzero(own) for own in layout.owners]
+    return tuple(sorted({(int(i), int(j)) for own in moves for i in own for j in own if i < j}))
+
+
+def with_merging_jets(view: InfluenceModel, layout: Layout) -> MergingJetsModel:
+    """The same view with jets that meet."""
+    return MergingJetsModel(
+        wake=view.wake,
+        points_W_m=view.points_W_m,
+        weights=view.weights,
+        positions_B_m=view.positions_B_m,
+        axes_B=view.axes_B,
+        areas_m2=view.areas_m2,
+        superposition=view.superposition,
+        pairs=merging_pairs(layout),
+    )
