@@ -127,8 +127,8 @@ def test_the_python_of_docs_campaigns_runs(tmp_path, monkeypatch, capsys):
             "method": method,
             "target_speed_mean_m_s": mm_s * 1e-3 + noise,
         }
-        for method, mm_s in (("dp", 8.0), ("unaware", 9.0), ("wake-aware", 3.0))
-        for seed, noise in enumerate((0.0, 1e-4, -2e-4, {"dp": 3e-4, "unaware": 1e-4, "wake-aware": 0.0}[method]))
+        for method, mm_s in (("dp", 8.0), ("mpc", 9.0), ("wake-aware", 3.0))
+        for seed, noise in enumerate((0.0, 1e-4, -2e-4, {"dp": 3e-4, "mpc": 1e-4, "wake-aware": 0.0}[method]))
     ]
     pl.DataFrame(rows).write_parquet("trials.parquet")
     ran = [block for block in blocks("docs/campaigns.md", "python") if "trials.parquet" in block]
@@ -136,7 +136,7 @@ def test_the_python_of_docs_campaigns_runs(tmp_path, monkeypatch, capsys):
     exec(ran[0], {})
     assert re.findall(r"^(-\d\.\d) mm/s against (\w+)", capsys.readouterr().out, re.MULTILINE) == [
         ("-5.1", "dp"),
-        ("-6.0", "unaware"),
+        ("-6.0", "mpc"),
     ]
     assert len([ast.parse(block) for block in blocks("docs/campaigns.md", "python")]) == 4
 

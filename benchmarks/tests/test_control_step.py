@@ -6,7 +6,7 @@ from wakewise_benchmarks import control_step
 from wakewise_benchmarks.planner import goal_at
 
 
-@pytest.mark.parametrize("method", ["instant", "wake-aware"])
+@pytest.mark.parametrize("method", ["allocation-only", "wake-aware"])
 def test_a_step_is_timed_after_its_warm_up(monkeypatch, method):
     """The median is no longer than the 99th percentile, and a method that plans has steps that take longer."""
     monkeypatch.setattr(control_step, "SECONDS", 1.6)

@@ -82,7 +82,7 @@ Bound = Annotated[
     int,
     typer.Option(
         help="gentle: seeds for which the most is worked out that sharing thrusts out could gain, two minutes of a "
-        "core each; the whole is --methods dp,bow-rule,wake-aware --bound 3.",
+        "core each; the whole is --methods dp,no-forward-jets,wake-aware --bound 3.",
         min=0,
         max=1000,
     ),

@@ -23,7 +23,7 @@ from wakewise.robot.vehicles.semi_implicit import rk4_kernel
 from wakewise.wake import wake_model
 from wakewise_benchmarks.registry import VEHICLE, bench_region, bench_target
 
-METHODS = ("wake-aware", "instant", "unaware", "dp")
+METHODS = ("wake-aware", "allocation-only", "mpc", "dp")
 SECONDS, WARM_UP_S, DT_S = 11.0, 1.0, 0.02
 CURRENT_M_S = np.array([0.05, 0.02, 0.0])
 """What the estimate says of the water, so that points upstream are watched, too."""

@@ -164,7 +164,7 @@ def test_where_the_current_brings_the_wash_back_shares_are_gentler_for_knowing_i
     assert slow < 0.2 * fast
 
 
-@pytest.mark.parametrize("method", ["instant", "wake-aware"])
+@pytest.mark.parametrize("method", ["allocation-only", "wake-aware"])
 def test_thrusts_follow_the_estimates_current(method):
     """The same estimate with a current from the bow and from the stern shares the same load out differently."""
     controller = make_controller(method, VEHICLE, AHEAD, RoundJet(), ControlSettings())

@@ -24,7 +24,7 @@ from wakewise_paper.wash_reduction.routes import gentle_route
 DT = 0.02
 
 
-def make(vehicle=HEAVY, method="instant", **levers):
+def make(vehicle=HEAVY, method="allocation-only", **levers):
     settings = ControlSettings(levers={"drift": False, **levers})
     return make_controller(method, vehicle, region(), believed(), settings, OPEN)
 
@@ -79,7 +79,7 @@ def test_a_lean_is_gone_before_the_mission_comes_near_a_roof():
     roof = float(highest[2] - 0.5 * HEAVY.size_m[2] - 0.04)
     around = Surroundings(planes=np.array([[0.0, 0.0, 1.0, roof]]))
     settings = ControlSettings(levers={"drift": False})
-    controller = make_controller("instant", HEAVY, region(), believed(), settings, around)
+    controller = make_controller("allocation-only", HEAVY, region(), believed(), settings, around)
 
     def goal_at(t):
         place = low.X_WB.p_m + np.clip(t - begins_s, 0.0, stops_s - begins_s) * up_W
@@ -144,11 +144,11 @@ def test_what_is_not_finite_reaches_the_motion_stage_as_it_is():
     assert command.goal is None and "not finite" in command.fallback
 
 
-@pytest.mark.parametrize("method", ["instant", "wake-aware"])
+@pytest.mark.parametrize("method", ["allocation-only", "wake-aware"])
 def test_both_gentle_methods_are_posed_and_none_of_the_others(method):
     """`dp` and the planner that spares nothing fly the mission's own attitude."""
     assert make(method=method).attitude is not None and make(method=method).name == method
-    for other in ("dp", "unaware", "bow-rule"):
+    for other in ("dp", "mpc", "no-forward-jets"):
         assert make(method=other).attitude is None
 
 
@@ -173,7 +173,7 @@ def test_the_motion_stage_sees_the_posed_goal():
 
 def test_the_attitude_is_the_missions_where_it_says_so_or_a_person_flies():
     """Open with `auto` on a route; else false, and refused where it was asked for by name."""
-    tilting = {"vehicle": "paper-tilting", "method": "instant"}
+    tilting = {"vehicle": "paper-tilting", "method": "allocation-only"}
     asked = {"control.levers.posture": True}
     assert Scenario.preset("quick", **tilting).parts().control.levers.posture is None
     for closed in ({"mission.aim": "tilt"}, {"mission.aim": "pitch"}, {"pilot": "human"}):
@@ -192,7 +192,7 @@ def test_a_heavy_vehicle_that_leans_halves_the_wash_and_keeps_its_camera_in_plac
     """
     seen = {}
     for posture in (None, False):
-        fields = {"vehicle": "bluerov2-heavy", "method": "instant", "control.levers.posture": posture}
+        fields = {"vehicle": "bluerov2-heavy", "method": "allocation-only", "control.levers.posture": posture}
         parts = Scenario.preset("quick", world="payload", seed=2, **fields).parts()
         hover = gentle_route(parts.target.centre_W_m, parts.scenario.mission.standoff_m, -2.4)
         frame = fly(parts.replace(route=hover), checked=False, duration_s=18.0, water_every_s=0.25).steps

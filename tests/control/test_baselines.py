@@ -18,7 +18,7 @@ CENTRE = np.array([0.0, 0.0, 1.4])
 WAKE = wake_model("paper-calibrated")
 OFF = {"spare": False, "meet": False, "drift": False}
 SETTINGS = ControlSettings(plan=PlanSettings(iterations=3), levers=OFF)
-PLANNING = ("pseudo-inverse", "unaware", "smooth", "linear", "wake-aware")
+PLANNING = ("pseudo-inverse", "mpc", "mpc-smooth", "linear", "wake-aware")
 
 
 def small_region() -> Region:
@@ -77,9 +77,9 @@ def mean_D(method: str, seconds: float = 4.0) -> tuple[float, float]:
 
 
 def test_the_disturbance_term_is_what_makes_wake_aware_gentle():
-    """In closed loop at equal load, `wake-aware` has less D than `unaware`, and stays within 5 cm of its goal."""
+    """In closed loop at equal load, `wake-aware` has less D than `mpc`, and stays within 5 cm of its goal."""
     gentle, away = mean_D("wake-aware")
-    careless, _ = mean_D("unaware")
+    careless, _ = mean_D("mpc")
     assert gentle < 0.9 * careless
     assert away < 0.05
 
@@ -92,11 +92,11 @@ def test_pseudo_inverse_makes_the_wrench_of_wake_aware_with_the_least_thrusts():
 
 
 def test_smooth_changes_its_commands_less():
-    """The largest change of thrust between steps is smaller than that of `unaware`."""
+    """The largest change of thrust between steps is smaller than that of `mpc`."""
     jumps = {
-        method: np.abs(np.diff([c.thrusts_N for c in flown(method)], axis=0)).max() for method in ("unaware", "smooth")
+        method: np.abs(np.diff([c.thrusts_N for c in flown(method)], axis=0)).max() for method in ("mpc", "mpc-smooth")
     }
-    assert jumps["smooth"] <= jumps["unaware"] * 1.01
+    assert jumps["mpc-smooth"] <= jumps["mpc"] * 1.01
 
 
 def test_the_linear_ablation_believes_in_its_own_model():

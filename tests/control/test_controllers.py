@@ -14,7 +14,7 @@ from wakewise.wake import disturbance, wake_model
 
 VEHICLE = load_vehicle("paper")
 CENTRE = np.array([0.0, 0.0, 1.4])
-INSTANT = ("dp", "instant")
+INSTANT = ("dp", "allocation-only")
 """Methods that allocate one instant at a time; the others plan and follow."""
 
 
@@ -107,7 +107,7 @@ def test_a_wake_model_that_fails_is_done_without():
             return np.full((len(origins_W_m), len(points_W_m), 3), np.nan)
 
     estimate, goal = station(np.array([-0.4, 0.0, 1.1]), (0.05, 0.0, 0.0))
-    controller = make_controller("instant", VEHICLE, small_region(), Broken())
+    controller = make_controller("allocation-only", VEHICLE, small_region(), Broken())
     baseline = make_controller("dp", VEHICLE, small_region(), wake_model("jet"))
     _, command = controller.step(controller.init(), 0.02, estimate, goal)
     _, expected = baseline.step(baseline.init(), 0.02, estimate, goal)

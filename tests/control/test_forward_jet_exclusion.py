@@ -30,14 +30,14 @@ def test_the_bow_never_blows_forward_and_the_wrench_is_made_all_the_same(name):
         assert np.all(jets <= 1e-9)
         assert vehicle.allocation_matrix @ thrusts == pytest.approx(wrench, abs=1e-6)
         forward += bool(np.any(-min_norm_allocation(free, wrench).thrusts_N[level] * axes[level, 0] > 1e-3))
-    assert forward > 20 and "bow-rule" in METHODS
+    assert forward > 20 and "no-forward-jets" in METHODS
 
 
 def test_a_layout_that_the_rule_does_not_fit_is_refused():
     """A vehicle without a level thruster before its middle that blows ahead or astern has no such rule."""
     paper = load_vehicle("paper")
     verticals = tuple(t for t in paper.thrusters if abs(t.axis_B[2]) > 0.5 or t.p_BT_m[0] < 0.0)
-    with pytest.raises(InputError, match="bow-rule: paper has no level thruster before its middle"):
+    with pytest.raises(InputError, match="no-forward-jets: paper has no level thruster before its middle"):
         bow_layout(replace(paper, thrusters=verticals))
 
 

@@ -235,9 +235,11 @@ def test_a_posture_that_the_thrusters_cannot_hold_is_not_to_be_had():
 
 
 def test_the_cost_is_what_the_allocator_would_pay_there():
-    """Level and loaded, it is the weighed D and effort of the thrusts that `instant` finds for its own wrench."""
+    """Level and loaded, it is the weighed D and effort of the thrusts that `allocation-only` finds for its own
+    wrench.
+    """
     settings = ControlSettings(levers=dict.fromkeys(("meet", "drift", "doubt", "posture", "thrift"), False))
-    controller = make_controller("instant", VEHICLE, region(), believed(), settings)
+    controller = make_controller("allocation-only", VEHICLE, region(), believed(), settings)
     goal = looking(VEHICLE, np.radians(40.0))
     R, context = goal.X_WB.R, controller.allocator.context
     load = np.concatenate([R.T @ [0.0, 0.0, 3.0], np.zeros(3)])

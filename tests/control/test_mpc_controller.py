@@ -16,7 +16,7 @@ from wakewise.vision.evaluation.flight import sign_flips
 PLACE = Pose(np.array([0.45, 0.0, 1.05]), quat_from_euler(0.0, 0.0, np.pi))
 OFF = {"spare": False, "meet": False, "drift": False}
 QUICK = ControlSettings(plan=PlanSettings(iterations=2), levers=OFF)
-PLANNING = ("wake-aware", "unaware", "smooth", "linear", "pseudo-inverse")
+PLANNING = ("wake-aware", "mpc", "mpc-smooth", "linear", "pseudo-inverse")
 
 
 @pytest.fixture(scope="module")
@@ -113,8 +113,8 @@ def test_a_goal_out_of_reach_saturates_within_limits(method):
     assert np.abs(command.thrusts_N).max() > 0.9 * VEHICLE.thrust_upper_N.min()
     for _ in range(60):
         state, command = controller.step(state, 0.02, BodyState(X_WB=PLACE), Goal(X_WB=PLACE))
-    # `smooth` lets go slowly: change costs it more than fighting.
-    assert np.abs(command.thrusts_N).max() < (0.9 if method == "smooth" else 0.5) * VEHICLE.thrust_upper_N.min()
+    # `mpc-smooth` lets go slowly: change costs it more than fighting.
+    assert np.abs(command.thrusts_N).max() < (0.9 if method == "mpc-smooth" else 0.5) * VEHICLE.thrust_upper_N.min()
 
 
 def hovering(method, seconds=6.0):

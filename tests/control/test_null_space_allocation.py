@@ -112,7 +112,7 @@ def test_a_wake_model_that_fails_leaves_the_stage_its_own_thrusts():
     assert command.fallback == "wake model not finite: thrusts of the plan" and state.influence is None
 
 
-@pytest.mark.parametrize("method", ["instant", "wake-aware"])
+@pytest.mark.parametrize("method", ["allocation-only", "wake-aware"])
 def test_the_noise_of_a_wrench_does_not_blow_ahead(method):
     """Astern push with noise of 0.1 N, a slow current ahead: the bow pair blows ahead with less than 3 mN in the mean.
 
@@ -130,7 +130,7 @@ def test_the_noise_of_a_wrench_does_not_blow_ahead(method):
     assert np.mean(ahead[20:]) < 0.003
 
 
-@pytest.mark.parametrize("method", ["instant", "wake-aware"])
+@pytest.mark.parametrize("method", ["allocation-only", "wake-aware"])
 def test_levers_reach_the_controllers(method):
     """With the levers on, a hover that pushes astern does so from the rear; the name stays."""
     settings = ControlSettings(levers=LeverSettings(drift_m_s=(0.03, 0.0, 0.0)))

@@ -61,7 +61,7 @@ def test_no_controller_is_told_the_current_that_the_tank_has():
     """Whatever the tank's current, the controller that is made is the same: it learns of it from its estimate."""
 
     def made(**changes):
-        controller = load_scenario("quick", None, {"method": "instant", **changes}).parts().controller
+        controller = load_scenario("quick", None, {"method": "allocation-only", **changes}).parts().controller
         return controller, controller.allocator.context.flow(BodyState(X_WB=Pose(np.zeros(3))), np.zeros(8))
 
     (still, flow), (east, flow_east) = (

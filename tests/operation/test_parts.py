@@ -37,7 +37,7 @@ def test_fields_of_the_scenario_can_be_replaced_beside_parts():
     parts = QUICK.parts().replace(seed=5, method="dp")
     assert (parts.scenario.seed, parts.controller.name) == (5, "dp")
     mine = parts.replace(controller=parts.controller)
-    assert mine.replace(method="instant").controller.name == "instant"
+    assert mine.replace(method="allocation-only").controller.name == "allocation-only"
     with pytest.raises(InputError, match="captain: no such field"):
         parts.replace(captain="me")
     assert {"vehicle", "target", "region", "route", "world", "estimator", "controller", "pilot", "wake"} <= set(PARTS)

@@ -26,14 +26,18 @@ def test_levers_that_need_another_are_named():
     assert "control.levers.drift:" in said(
         "wake-aware", **off, **{f"control.levers.{n}": False for n in ("meet", "doubt", "thrift")}
     )
-    assert said("instant", **off) == ""
+    assert said("allocation-only", **off) == ""
 
 
 @pytest.mark.parametrize(
     ("method", "changes", "words"),
     [
         ("dp", {"control.levers.bed": True}, "control.levers.bed: nothing for dp"),
-        ("instant", {"control.obstacles": [[2.0, 2.0, 1.0, 0.1]]}, "control.obstacles: not kept clear of by instant"),
+        (
+            "allocation-only",
+            {"control.obstacles": [[2.0, 2.0, 1.0, 0.1]]},
+            "control.obstacles: not kept clear of by instant",
+        ),
         ("dp", {"control.plan.w_track": 100.0}, "control.plan: nothing for dp"),
         ("dp", {"control.person": 3}, "control.person: nobody flies dp by hand"),
         (

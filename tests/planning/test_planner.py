@@ -77,7 +77,7 @@ def test_the_disturbance_is_what_the_weight_buys():
 
 
 def test_change_of_commands_can_be_penalised():
-    """`w_change` makes the commands' steps smaller: the rival `smooth`."""
+    """`w_change` makes the commands' steps smaller: the rival `mpc-smooth`."""
     case = problem()
     rough, smooth = (Planner(model(iterations=20, w_disturbance=0.0, w_change=w)).plan(case, START) for w in (0.0, 0.5))
     assert np.sum(np.diff(smooth.commands_N, axis=0) ** 2) < 0.5 * np.sum(np.diff(rough.commands_N, axis=0) ** 2)

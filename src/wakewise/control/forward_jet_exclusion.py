@@ -1,4 +1,4 @@
-"""`bow-rule`: dynamic positioning whose bow thrusters never blow ahead, the simplest rival of all.
+"""`no-forward-jets`: dynamic positioning whose bow thrusters never blow ahead, the simplest rival of all.
 
 Astern push from a vectored bow pair crosses two jets ahead of the bow, where the camera looks. Whoever has seen that
 once forbids it: level thrusters that do not sit behind the middle never blow to where the camera looks, and the after
@@ -39,7 +39,9 @@ def ahead_of(vehicle: Vehicle) -> Array:
     axis[2] = 0.0
     length = float(np.linalg.norm(axis))
     if length < _LEVEL:
-        raise InputError(f"bow-rule: the camera of {vehicle.name} looks up or down, so there is no bow to keep still")
+        raise InputError(
+            f"no-forward-jets: the camera of {vehicle.name} looks up or down, so there is no bow to keep still"
+        )
     return axis / length
 
 
@@ -56,14 +58,16 @@ def bow_layout(vehicle: Vehicle) -> Layout:
     along = axes @ ahead
     bow = (places @ ahead > -_MIDDLE_M) & (np.abs(axes[:, 2]) < _LEVEL) & (np.abs(along) > _LEVEL)
     if not bow.any():
-        raise InputError(f"bow-rule: {vehicle.name} has no level thruster before its middle that could blow ahead")
+        raise InputError(
+            f"no-forward-jets: {vehicle.name} has no level thruster before its middle that could blow ahead"
+        )
     # A thrust of either sign sends its jet the other way along the axis.
     upper = np.where(bow & (along < 0.0), 0.0, vehicle.thrust_upper_N)
     lower = np.where(bow & (along > 0.0), 0.0, vehicle.thrust_lower_N)
     lost = missing_axis(vehicle.allocation_matrix, lower, upper)
     if lost is not None:
         names = ", ".join(vehicle.thrusters[i].name for i in np.flatnonzero(bow))
-        raise InputError(f"bow-rule: {vehicle.name} could not push {_AXES[lost]} if {names} never blew ahead")
+        raise InputError(f"no-forward-jets: {vehicle.name} could not push {_AXES[lost]} if {names} never blew ahead")
     return compile_layout(vehicle.allocation_matrix, lower, upper)
 
 

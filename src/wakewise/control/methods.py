@@ -6,10 +6,10 @@ plan. The rest of a method is its settings:
 | method | motion | allocation | difference |
 |---|---|---|---|
 | `dp` | PID | least thrusts | dynamic positioning, the baseline |
-| `bow-rule` | PID | least thrusts | level thrusters at the bow never blow ahead |
-| `instant` | PID | null space, gentle | weights and wake terms of `wake-aware` |
-| `unaware` | MPC | the plan's own | no disturbance term |
-| `smooth` | MPC | the plan's own | the same with a price on change of thrust |
+| `no-forward-jets` | PID | least thrusts | level thrusters at the bow never blow ahead |
+| `allocation-only` | PID | null space, gentle | weights and wake terms of `wake-aware` |
+| `mpc` | MPC | the plan's own | no disturbance term |
+| `mpc-smooth` | MPC | the plan's own | the same with a price on change of thrust |
 | `wake-aware` | MPC | null space, gentle | the product |
 | `linear` | MPC | null space, gentle | believes in the `linear` wake model (an ablation) |
 | `pseudo-inverse` | MPC | least thrusts | the wrenches of `wake-aware` (an ablation) |
@@ -51,8 +51,9 @@ from wakewise.scene.targets import Region
 from wakewise.wake import bed_of, free_jet, wake_model
 
 FILTER_S = 0.77
-"""Time over which `smooth` filters its thrusts: of those flown the longest whose position error is within a tenth of
-that of `unaware` (docs/research-log/0036)."""
+"""Time over which `mpc-smooth` filters its thrusts: of those flown the longest whose position error is within a tenth
+of
+that of `mpc` (docs/research-log/0036)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,9 +158,9 @@ def unaware(
     settings: ControlSettings,
     around: Surroundings | None = None,
     *,
-    name: str = "unaware",
+    name: str = "mpc",
 ) -> Pipeline:
-    """`unaware`: the planner without a disturbance term."""
+    """`mpc`: the planner without a disturbance term."""
     careless = settings.model_copy(update={"w_disturbance": 0.0})
     return mpc_pipeline(vehicle, region, free_jet(wake), careless, name=name, surroundings=around)
 
@@ -171,10 +172,10 @@ def smooth(
     settings: ControlSettings,
     around: Surroundings | None = None,
 ) -> Pipeline:
-    """`smooth`: the planner without a disturbance term and with a price on change of thrust."""
+    """`mpc-smooth`: the planner without a disturbance term and with a price on change of thrust."""
     change = max(settings.plan.w_change, price_of_change(settings))
     plan = settings.plan.model_copy(update={"w_change": change})
-    return unaware(vehicle, region, wake, settings.model_copy(update={"plan": plan}), around, name="smooth")
+    return unaware(vehicle, region, wake, settings.model_copy(update={"plan": plan}), around, name="mpc-smooth")
 
 
 def price_of_change(settings: ControlSettings) -> float:
@@ -191,14 +192,14 @@ Maker = Callable[[Vehicle, Region, WakeModel, ControlSettings, Surroundings | No
 
 MAKERS: dict[str, Maker] = {
     "dp": partial(tracking, name="dp"),
-    "bow-rule": partial(tracking, name="bow-rule", layout=bow_layout),
+    "no-forward-jets": partial(tracking, name="no-forward-jets", layout=bow_layout),
     "manual": manual,
     "ardusub": ardusub,
     "pseudo-inverse": partial(mpc, name="pseudo-inverse", least=True),
-    "unaware": unaware,
-    "smooth": smooth,
+    "mpc": unaware,
+    "mpc-smooth": smooth,
     "linear": linear,
-    "instant": partial(tracking, name="instant", gentle=True),
+    "allocation-only": partial(tracking, name="allocation-only", gentle=True),
     "wake-aware": partial(mpc, name="wake-aware"),
 }
 

@@ -48,7 +48,7 @@ DEVIATION_S = 0.5
 SLOWEST_M_S = 0.02
 """Mean speed below which a reference counts as this fast: a plan that holds still may move by millimetres."""
 LARGEST_SCALE = 100.0
-"""Largest factor of the tracking weights; the plan then follows as closely as `unaware`."""
+"""Largest factor of the tracking weights; the plan then follows as closely as `mpc`."""
 SCALE_POWER, LEAST_CHANGE, MOST_CHANGE = 0.7, 0.8, 3.0
 """How much the factor follows the deviation, and its least and largest change from a plan to the next (0.1 s): a
 hundredfold within half a second, and gone in two."""
@@ -290,7 +290,7 @@ def mpc_pipeline(
 ) -> Pipeline:
     """A pipeline of planner and tracking that flies the plan's own thrusts.
 
-    Settings with `w_disturbance` 0 make it `unaware`; the same with `plan.w_change` makes it `smooth`. Arguments as for
+    Settings with `w_disturbance` 0 make it `mpc`; the same with `plan.w_change` makes it `mpc-smooth`. Arguments as for
     `compile_plan`; `clock` and `enforce` (the deadline, for a world that does not wait) as for `PlanFailsafe`. The
     first plan is made here, since it compiles.
     """

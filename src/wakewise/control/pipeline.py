@@ -15,7 +15,7 @@ of them. Stages 5 and 6 are added where a flight is built (`with_failsafe`, `wit
 `PipelineState`.
 
 A wrench becomes thrusts in `Pipeline._allocate`. Two motion stages bring thrusts of their own. The MPC optimises
-thrusts, so its plan has them; the methods `unaware` and `smooth` fly these, and all MPC methods do on a step of
+thrusts, so its plan has them; the methods `mpc` and `mpc-smooth` fly these, and all MPC methods do on a step of
 trouble. ArduSub has no wrench: its mixer is part of what is compared.
 """
 

@@ -107,7 +107,7 @@ class ControlSettings(Settings):
     )
     plan: PlanSettings = Field(default=PlanSettings(), description="horizon and weights of the methods that plan")
     levers: LeverSettings = Field(
-        default=LeverSettings(), description="what `wake-aware` and `instant` use beyond the free jet"
+        default=LeverSettings(), description="what `wake-aware` and `allocation-only` use beyond the free jet"
     )
     person: int | None = Field(
         default=None,

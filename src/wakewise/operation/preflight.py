@@ -52,10 +52,10 @@ def surroundings_of(scenario: Scenario, target: Target | None = None) -> Surroun
     )
 
 
-PLANNING = frozenset({"pseudo-inverse", "unaware", "smooth", "linear", "wake-aware"})
+PLANNING = frozenset({"pseudo-inverse", "mpc", "mpc-smooth", "linear", "wake-aware"})
 """Our methods that plan."""
-MITIGATION_METHODS = frozenset({"pseudo-inverse", "linear", "instant", "wake-aware"})
-"""Our methods that use levers; of these all but `instant` need `spare` for all of them but the bed."""
+MITIGATION_METHODS = frozenset({"pseudo-inverse", "linear", "allocation-only", "wake-aware"})
+"""Our methods that use levers; of these all but `allocation-only` need `spare` for all of them but the bed."""
 _AFTER_SPARE = ("meet", "drift", "doubt", "thrift")
 
 

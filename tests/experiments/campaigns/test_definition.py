@@ -28,7 +28,7 @@ def _planned(**fields: Any) -> list[Any]:
 def test_every_combination_is_a_trial_seed_by_seed() -> None:
     """Methods x targets x worlds x variations x seeds; names tell them apart, keys do, too."""
     trials = _planned(
-        methods=["dp", "unaware"],
+        methods=["dp", "mpc"],
         targets=["branching", "brain"],
         worlds=["payload", "mud"],
         variations={"as-is": {}, "closer": {"mission.standoff_m": 0.45}},
@@ -123,7 +123,7 @@ def test_a_fault_of_the_file_is_told_with_what_would_be_right(
         ({"scenario": {"mision.standoff_m": 1}}, "mision: no such field, did you mean mission?"),
         ({"variations": {"far": {"mission.standoff_m": 99}}}, "variation far"),
         ({"targets": {"a": {"kinds": "brain"}}}, "target.kinds: no such field, did you mean kind?"),
-        ({"seeds": 90_000, "methods": ["dp", "unaware"]}, "180000 trials, at most 100000"),
+        ({"seeds": 90_000, "methods": ["dp", "mpc"]}, "180000 trials, at most 100000"),
     ],
 )
 def test_a_combination_that_cannot_be_flown_is_named(fields: dict[str, Any], words: str) -> None:

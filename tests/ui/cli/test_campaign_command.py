@@ -19,7 +19,7 @@ from wakewise.experiments.campaigns.definition import keep_plan
 from wakewise.experiments.campaigns.store import open_store
 from wakewise.ui.cli.main import run as command
 
-FILE = "name: small\nstages: fly\nmethods: [dp, unaware]\ntargets: [branching, brain]\nseeds: 2\n"
+FILE = "name: small\nstages: fly\nmethods: [dp, mpc]\ntargets: [branching, brain]\nseeds: 2\n"
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def cheap_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "def fly(settings, folder, progress):\n"
         "    scenario = settings['scenario']\n"
         "    time.sleep(0.02)\n"
-        "    if scenario['method'] == 'unaware' and scenario['seed'] == 2:\n"
+        "    if scenario['method'] == 'mpc' and scenario['seed'] == 2:\n"
         "        raise ValueError('no way')\n"
         "    return {'target_speed_mean_m_s': 0.01 * scenario['seed'], 'success': True, 'energy_kJ': None}\n"
     )
@@ -56,7 +56,7 @@ def test_a_campaign_is_run_looked_at_and_gone_on_with(cheap_work: Path, capsys: 
     speed = groups["dp", "branching"]["figures"]["target_speed_mean_m_s"]
     assert (speed["mean"], speed["n"]) == (pytest.approx(0.015), 2)
     assert speed["low"] <= 0.015 <= speed["high"]
-    success = groups["unaware", "brain"]["figures"]["success"]
+    success = groups["mpc", "brain"]["figures"]["success"]
     assert (success["mean"], success["n"]) == (0.5, 2)  # one failed, which is no success
     assert groups["dp", "brain"]["figures"]["energy_kJ"]["why"] == "no trial gave it"
 

@@ -104,7 +104,7 @@ def test_the_page_of_a_model_whose_lists_or_photographs_lack_something():
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory, made_up) -> Path:
     """A trial with figures and a record, but without photographs and models."""
-    folder = tmp_path_factory.mktemp("flown") / "smooth"
+    folder = tmp_path_factory.mktemp("flown") / "mpc-smooth"
     folder.mkdir()
     for name in ("steps.parquet", "scenario.yaml"):
         (folder / name).write_bytes((made_up / name).read_bytes())
@@ -125,8 +125,8 @@ def test_the_page_of_a_trial_and_of_a_comparison(flown, tmp_path):
     def holed(found: dict[str, Any]) -> Any:
         return replace(whole, metrics=replace(whole.metrics, values=found))
 
-    pages = [report_page, lambda trial: comparison_page({"dp": whole, "smooth": trial}),
-             lambda trial: comparison_page({"smooth": trial, "dp": whole})]  # fmt: skip
+    pages = [report_page, lambda trial: comparison_page({"dp": whole, "mpc-smooth": trial}),
+             lambda trial: comparison_page({"mpc-smooth": trial, "dp": whole})]  # fmt: skip
     for page in pages:
         every_hole(told, lambda found, page=page: page(holed(found)))
 
@@ -158,7 +158,7 @@ def _tables() -> dict[str, Any]:
     places = [
         {"world": "pump-tank", "method": method, "target": "brain", "seed": seed, "folder": "x", "reason": None,
          "figures": {"target_speed_mean_m_s": 0.02 / (1 + k) + 1e-4 * seed, "energy_kJ": 1.0, "rmse_mm": 2.0}}
-        for seed in (1, 2) for k, method in enumerate(("unaware", "wake-aware"))
+        for seed in (1, 2) for k, method in enumerate(("mpc", "wake-aware"))
     ]  # fmt: skip
     common = {"title": "hold a place", "made": 6, "failed": 0, "trials": 3, "trial_s": 60.0, "seeds": [1, 2, 3],
               "config_hash": "ab", "worlds": ["pump-tank"], "failures": [], "why": {}, "places": places,

@@ -74,7 +74,7 @@ def test_every_figure_with_a_better_side_has_its_better_value_bold(made_up: Path
     low = dict.fromkeys(BETTER, 2.0) | {"why": {}}
     trials = {
         "a": changed(made_up, tmp_path / "a", **high | {"method": "dp"}),
-        "b": changed(made_up, tmp_path / "b", **low | {"method": "instant"}),
+        "b": changed(made_up, tmp_path / "b", **low | {"method": "allocation-only"}),
     }
     text = write_comparison(trials, tmp_path).read_text()
     for key, better in BETTER.items():

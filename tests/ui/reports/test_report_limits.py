@@ -94,8 +94,8 @@ def test_a_comparison_tells_each_water_once_and_whose_it_was(tmp_path: Path) -> 
     same = limits_section({"dp": tank, "wake-aware": other})
     assert same.count("<table") == 1
     assert "sheet-leg" not in same
-    mixed = comparison_page({"dp": tank, "wake-aware": other, "smooth": paper})
+    mixed = comparison_page({"dp": tank, "wake-aware": other, "mpc-smooth": paper})
     part = mixed[mixed.index('id="limits"') : mixed.index('id="figures"')]
-    assert re.findall(r'<p class="sheet-leg">([^<]+)</p>', part) == ["dp, wake-aware", "smooth"]
+    assert re.findall(r'<p class="sheet-leg">([^<]+)</p>', part) == ["dp, wake-aware", "mpc-smooth"]
     assert part.count("<table") == 1
     assert "circular" in part

@@ -15,10 +15,10 @@ from wakewise.ui.reports.text import duration, percent
 from wakewise_paper.reports.reproduction import sentences
 
 
-def judged(low=5.0, high=15.0, trials=12, less=10.0, ours=0.9, theirs=1.0, rival="smooth"):
+def judged(low=5.0, high=15.0, trials=12, less=10.0, ours=0.9, theirs=1.0, rival="mpc-smooth"):
     """A comparison of two methods."""
     return MethodSummary(
-        world="mud", figure="rmse_mm", words="mm RMSE", means={"wake-aware": ours, "smooth": theirs},
+        world="mud", figure="rmse_mm", words="mm RMSE", means={"wake-aware": ours, "mpc-smooth": theirs},
         winner="wake-aware", rival=rival, less_pct=less, interval_pct=None if low is None else (low, high), p_t=0.2,
         improvement=0.7,
         energy_ratio=1.0, failed={}, trials=trials,

@@ -16,7 +16,7 @@ def made(monkeypatch, tmp_path):
     from wakewise_paper.reproduction import run as module
 
     def campaign(tasks, folder, engine, **options):
-        wash = {"manual": 0.03, "dp": 0.02, "unaware": 0.02, "smooth": 0.018, "wake-aware": 0.005}
+        wash = {"manual": 0.03, "dp": 0.02, "mpc": 0.02, "mpc-smooth": 0.018, "wake-aware": 0.005}
         fields = [task.settings["fields"] for task in tasks]
         return [
             TrialOutcome(
@@ -50,7 +50,7 @@ def test_json_is_one_object_with_the_promised_keys(made, capsys):
     )
     less = rows["wake-aware", "wash at the target, less than dp"]
     assert less["paper"] == 67.0 and less["ours"] == pytest.approx(74.3, abs=0.1) and less["met"] and less["sure"]
-    assert rows["wake-aware", "energy, less than unaware"]["met"] is False
+    assert rows["wake-aware", "energy, less than mpc"]["met"] is False
 
 
 def test_people_get_a_table_and_a_page(made, capsys):

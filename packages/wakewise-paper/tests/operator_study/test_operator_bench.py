@@ -19,7 +19,7 @@ def flight(trial):
     """A tenth of direct's wash at w_track 5, more with more; the control is calm; `close` seed 2 of ours is lost."""
     if (trial.world, trial.method, trial.seed) == ("close", "wake-aware", 2):
         raise StageError("the vehicle was lost")
-    share = {"dp": 1.0, "wake-aware": 0.02 * trial.w_track, "bow-rule": 0.5}.get(trial.method, 0.9)
+    share = {"dp": 1.0, "wake-aware": 0.02 * trial.w_track, "no-forward-jets": 0.5}.get(trial.method, 0.9)
     base = 0.004 if trial.world == "still-tank" else 0.04
     row = dict.fromkeys(FIGURES, 1.0)
     return row | {SPEED: share * base, "disturbance": share * 1e-3, DEVIATION: 10.0, "sway_rms_mm": None, "cpu_s": 1.0}
@@ -45,7 +45,7 @@ def test_direct_flights_are_shared_by_all_w_tracks_and_the_claim_is_flown_first(
     """`dp` and the bow rule once a seed and pilot; other w_tracks for the first seeds alone, by the script."""
     trials = planned_trials(("payload", "mud"), (1.0, 5.0), seeds=2, grid_seeds=1)
     flown = list(trials.values())
-    for method in ("dp", "bow-rule"):
+    for method in ("dp", "no-forward-jets"):
         assert sum(t.method == method for t in flown) == 2 * 2 * 2
     grid = [t for t in flown if t.w_track != 5.0]
     assert len(grid) == 2 * 2 and {(t.pilot, t.seed) for t in grid} == {("script", 1)}
@@ -60,7 +60,7 @@ def test_the_answer_has_the_keys_of_the_figures_and_names_what_it_lacks(made_up,
     at_5 = found["w_track"]["5"]
     assert at_5[DEVIATION] == pytest.approx(10.0) and at_5["target_speed_reduction_pct"] == pytest.approx(90.0)
     assert at_5["disturbance_reduction_pct"] == pytest.approx(90.0) and at_5["trouble_flights"] == 4
-    assert set(at_5["pilots"]) == {"script", "human"} and at_5["unaware"]["target_speed_reduction_pct"] < 15.0
+    assert set(at_5["pilots"]) == {"script", "human"} and at_5["mpc"]["target_speed_reduction_pct"] < 15.0
     assert at_5["sway_rms_mm"] is None and "rigid" in at_5["why"]["sway_rms_mm"]
     calm = found["worlds"]["still-tank"]["w_track"]["5"]
     assert calm["target_speed_reduction_pct"] is None and "10 mm/s" in calm["why"]["target_speed_reduction_pct"]
@@ -96,7 +96,7 @@ def test_a_run_that_was_stopped_goes_on(made_up, monkeypatch):
     )
     assert bench.run(options)["flown"] == 0 and not again
     bench.run(BenchOptions(seeds=1, worlds=("mud",), w_tracks=(5.0, 20.0), store=made_up))
-    assert {(t.method, t.w_track) for t in again} == {("wake-aware", 20.0), ("unaware", 20.0)}
+    assert {(t.method, t.w_track) for t in again} == {("wake-aware", 20.0), ("mpc", 20.0)}
 
 
 def test_worlds_and_w_tracks_that_cannot_be_are_refused():

@@ -30,7 +30,9 @@ def test_deviation_is_the_rms_of_what_is_missed_over_that_of_what_is_asked():
 
 def test_the_same_seed_is_the_same_water_for_every_method_and_pilot():
     """Tank, start and course do not depend on who flies; the method does not change what is asked."""
-    one, two = (parts_of(OperatorTrial(world="close", pilot="script", method=m, seed=2)) for m in ("dp", "bow-rule"))
+    one, two = (
+        parts_of(OperatorTrial(world="close", pilot="script", method=m, seed=2)) for m in ("dp", "no-forward-jets")
+    )
     person = parts_of(OperatorTrial(world="close", pilot="human", method="dp", seed=2))
     assert one.scenario.tank == two.scenario.tank == person.scenario.tank
     assert one.start.X_WB.p_m == pytest.approx(two.start.X_WB.p_m)

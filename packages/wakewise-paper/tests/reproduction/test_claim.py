@@ -50,23 +50,23 @@ def test_a_number_of_the_paper_is_finite_and_one_that_is_not_known_says_so(name,
 def test_the_figures_that_the_records_quote_are_among_them():
     """Values, with their method, as the paper's tables and sections have them."""
     known = {(name, c.method, c.figure, c.than): c.paper for name, c in EVERY if c.paper is not None}
-    rmse = {m: known["dynamic", m, "rmse_mm", None] for m in ("manual", "unaware", "smooth", "wake-aware")}
-    assert rmse == {"manual": 8.7, "unaware": 4.3, "smooth": 2.8, "wake-aware": 1.9}
+    rmse = {m: known["dynamic", m, "rmse_mm", None] for m in ("manual", "mpc", "mpc-smooth", "wake-aware")}
+    assert rmse == {"manual": 8.7, "mpc": 4.3, "mpc-smooth": 2.8, "wake-aware": 1.9}
     assert known["dynamic", "wake-aware", "completeness_pct", None] == 94.8
     assert known["success", "wake-aware", "success", None] == 98.5
     assert known["station", "wake-aware", "position_rmse_mm", None] == 2.1
     assert known["station", "wake-aware", "energy_kJ", "dp"] == 31.0
     asked = {c.than: c.asked for _, c in EVERY if (c.figure, c.reading) == ("roll_pitch_rms_deg", "less_pct")}
-    assert asked == {"dp": None, "manual": 45.0, "smooth": 45.0, "unaware": 45.0}
+    assert asked == {"dp": None, "manual": 45.0, "mpc-smooth": 45.0, "mpc": 45.0}
     assert known["station", "wake-aware", "roll_pitch_rms_deg", "dp"] == 45.0
-    whole = {m: known["dynamic", m, "completeness_pct", None] for m in ("manual", "unaware", "smooth", "wake-aware")}
-    assert whole == {"manual": 34.2, "unaware": 68.5, "smooth": 87.0, "wake-aware": 94.8}
-    assert known["success", "unaware", "success", None] == 45.0
+    whole = {m: known["dynamic", m, "completeness_pct", None] for m in ("manual", "mpc", "mpc-smooth", "wake-aware")}
+    assert whole == {"manual": 34.2, "mpc": 68.5, "mpc-smooth": 87.0, "wake-aware": 94.8}
+    assert known["success", "mpc", "success", None] == 45.0
     assert known["solver", "wake-aware", "ms_mean", None] == 45.0
     assert known["wake", "paper", "r2_core", None] == 0.99
     assert known["operator", "wake-aware, w_track 5", "velocity_deviation_pct", None] == 15.0
     shares = 100.0 * (1.0 - 0.06 / 0.18)
-    assert known["flow", "wake-aware", "piv_speed_m_s", "unaware"] == pytest.approx(shares, abs=0.5)
+    assert known["flow", "wake-aware", "piv_speed_m_s", "mpc"] == pytest.approx(shares, abs=0.5)
     assert UNKNOWN
 
 

@@ -37,7 +37,7 @@ def test_without_a_budget_all_trials_are_made_at_once(tmp_path, campaign):
     told = reproduce(["station"], tmp_path, ReproduceOptions(trials=2, worlds=("pump-tank",)))["station"]
     assert [len(call) for call in campaign] == [10]
     assert (told["trials"], told["seeds"], told["made"], told["failed"]) == (2, [1, 2], 10, 0)
-    assert {row["method"] for row in told["rows"]} == {"manual", "dp", "unaware", "smooth", "wake-aware"}
+    assert {row["method"] for row in told["rows"]} == {"manual", "dp", "mpc", "mpc-smooth", "wake-aware"}
 
 
 def test_a_budget_buys_whole_blocks_by_what_they_were_found_to_cost(tmp_path, campaign):
@@ -69,9 +69,9 @@ def test_the_same_trials_have_the_same_configuration(tmp_path, campaign):
 
 def test_methods_of_one_table_do_not_hinder_another(tmp_path, campaign):
     """What a table does not have it ignores, unless it has none of them."""
-    options = ReproduceOptions(trials=1, worlds=("pump-tank",), methods=("dp", "unaware", "linear"))
+    options = ReproduceOptions(trials=1, worlds=("pump-tank",), methods=("dp", "mpc", "linear"))
     told = reproduce(["station", "ablation"], tmp_path, options)
-    assert told["station"]["methods"] == ["dp", "unaware"] and told["ablation"]["methods"] == ["unaware", "linear"]
+    assert told["station"]["methods"] == ["dp", "mpc"] and told["ablation"]["methods"] == ["mpc", "linear"]
     with pytest.raises(InputError, match="--methods"):
         reproduce(["station"], tmp_path, ReproduceOptions(methods=("magic",)))
 

@@ -62,9 +62,9 @@ def test_worlds_and_targets_take_turns():
 
 def test_wishes_narrow_a_table():
     """Worlds, methods and targets by name; what cannot be flown in the world of nothing stays."""
-    wish = TableRequest(trials=1, worlds=("reef",), methods=("smooth",), targets=("plate",))
+    wish = TableRequest(trials=1, worlds=("reef",), methods=("mpc-smooth",), targets=("plate",))
     (block,) = blocks_of("dynamic", wish)
-    assert [(plan.world, plan.method, plan.target) for plan in block] == [("reef", "smooth", "plate")]
+    assert [(plan.world, plan.method, plan.target) for plan in block] == [("reef", "mpc-smooth", "plate")]
     (solver,) = blocks_of("solver", TableRequest(trials=5, worlds=("reef",)))
     assert solver[0].world == NOWHERE
 

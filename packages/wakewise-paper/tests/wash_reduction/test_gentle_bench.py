@@ -30,7 +30,7 @@ from wakewise_paper.wash_reduction.plan import (
 from wakewise_paper.wash_reduction.summary_table import WRONG
 
 ROW = dict.fromkeys(FIGURES, 1.0)
-SHARE = {"dp": 1.0, "bow-rule": 0.4, "wake-aware": 0.1}
+SHARE = {"dp": 1.0, "no-forward-jets": 0.4, "wake-aware": 0.1}
 
 
 def made_up(trial):
@@ -67,7 +67,7 @@ def test_the_answer_has_the_keys_that_were_promised(here, tmp_path, capsys):
     scenario = found["scenarios"]["orbit/paper"]
     assert scenario["dp_target_speed_m_s"] == pytest.approx(0.04)
     assert scenario["reduction_vs_dp_pct"] == pytest.approx(90.0)
-    assert scenario["reduction_vs_bow_rule_pct"] == pytest.approx(75.0)
+    assert scenario["reduction_vs_no_forward_jets_pct"] == pytest.approx(75.0)
     row = scenario["methods"]["wake-aware"]
     for key in ("exceedance_1cm_s_pct", "exceedance_ambient_pct", "attitude_rmse_deg", "camera_rmse_mm"):
         assert row[key] == 1.0
@@ -119,7 +119,7 @@ def test_a_bench_that_was_stopped_goes_on_and_failures_count(here, monkeypatch, 
     lost = False
     again = gentle.run(options)
     assert again["flown"] == 1 and again["failed"] == 0 and len(here) == 7
-    assert again["why"]["smooth"] == "this method was left out" and "paper" in again["why"]
+    assert again["why"]["mpc-smooth"] == "this method was left out" and "paper" in again["why"]
 
 
 def test_a_method_that_is_not_made_is_left_out_with_a_reason():

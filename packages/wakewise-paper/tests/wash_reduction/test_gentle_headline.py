@@ -16,8 +16,8 @@ BAD, WORSE, CALM = ("orbit/paper", 1), ("close/paper", 1), ("calm/paper", 1)
 BETWEEN = ("orbit/paper", 2)
 FLIGHTS = {
     "dp": {BAD: row(40.0), WORSE: row(20.0), CALM: row(4.0), BETWEEN: row(7.0)},
-    "unaware": {BAD: row(40.0), WORSE: row(20.0), CALM: row(4.0)},
-    "bow-rule": {BAD: row(8.0), WORSE: row(16.0), CALM: row(2.0)},
+    "mpc": {BAD: row(40.0), WORSE: row(20.0), CALM: row(4.0)},
+    "no-forward-jets": {BAD: row(8.0), WORSE: row(16.0), CALM: row(2.0)},
     "wake-aware": {
         BAD: row(4.0, silt=0.5, sway=0.2, place=5.3, energy=1.4),
         WORSE: row(8.0, silt=0.1, sway=0.4, place=5.3, energy=1.0),
@@ -43,8 +43,8 @@ def test_the_bars_are_computed_as_decision_33_says():
     """Logarithms for wash, sums for silt, sway and energy, the camera's place for accuracy, the least for the worst."""
     found = headline(FLIGHTS, TRIMS, set())["trouble"]
     assert found["reduction_vs_dp_pct"] == pytest.approx(80.0)  # ln(.1) and ln(.4) average to ln(.2)
-    assert found["reduction_vs_unaware_pct"] == pytest.approx(80.0)
-    assert found["reduction_vs_bow_rule_pct"] == pytest.approx(50.0)
+    assert found["reduction_vs_mpc_pct"] == pytest.approx(80.0)
+    assert found["reduction_vs_no_forward_jets_pct"] == pytest.approx(50.0)
     assert found["worst_world"] == "close/paper" and found["worst_world_pct"] == pytest.approx(60.0)
     assert found["energy_ratio"] == pytest.approx(1.2)
     assert found["silt_rays_reduction_pct"] == pytest.approx(70.0)
@@ -63,9 +63,9 @@ def test_a_flight_that_failed_is_no_gain_and_no_accuracy():
     found = headline(FLIGHTS | {"wake-aware": ours}, TRIMS, {("wake-aware", WORSE)})["trouble"]
     assert found["reduction_vs_dp_pct"] == pytest.approx(100.0 * (1.0 - 0.1**0.5))
     assert found["position_ok"] is False and found["worst_world_pct"] == pytest.approx(0.0)
-    rival = {key: value for key, value in FLIGHTS["bow-rule"].items() if key != WORSE}
-    lost = headline(FLIGHTS | {"bow-rule": rival}, TRIMS, {("bow-rule", WORSE)})["trouble"]
-    assert lost["reduction_vs_bow_rule_pct"] == pytest.approx(50.0)
+    rival = {key: value for key, value in FLIGHTS["no-forward-jets"].items() if key != WORSE}
+    lost = headline(FLIGHTS | {"no-forward-jets": rival}, TRIMS, {("no-forward-jets", WORSE)})["trouble"]
+    assert lost["reduction_vs_no_forward_jets_pct"] == pytest.approx(50.0)
 
 
 def test_harm_is_looked_for_everywhere():

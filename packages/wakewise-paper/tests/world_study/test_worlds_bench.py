@@ -32,8 +32,8 @@ def flight(trial):
 
 
 def scan(trial):
-    """A model for all but `smooth`."""
-    if trial.method == "smooth":
+    """A model for all but `mpc-smooth`."""
+    if trial.method == "mpc-smooth":
         raise StageError("too few photographs found their place")
     return dict.fromkeys(MODEL_FIGURES, 1.0)
 
@@ -76,8 +76,8 @@ def test_a_failed_flight_or_scan_is_a_failure_of_its_method_and_named(made_up, c
     table = found["worlds"]["payload"]["methods"]
     assert found["failed"] == 2 and {f["reason"].split(":")[0] for f in found["failures"]} == {"StageError"}
     assert table["dp"]["flights"] == 2 and table["dp"]["success_pct"] == pytest.approx(50.0)
-    assert table["smooth"]["success_pct"] == 0.0 and table["smooth"]["rmse_mm"] is None
-    assert table["smooth"]["why"]["rmse_mm"] == "no model"
+    assert table["mpc-smooth"]["success_pct"] == 0.0 and table["mpc-smooth"]["rmse_mm"] is None
+    assert table["mpc-smooth"]["why"]["rmse_mm"] == "no model"
     assert table["wake-aware"]["against"]["dp"]["target_speed_less_pct"] == pytest.approx(75.0)
     assert table["wake-aware"]["sway_rms_mm"] is None and "rigid" in table["wake-aware"]["why"]["sway_rms_mm"]
     show_worlds(found)
@@ -142,7 +142,7 @@ def test_worlds_and_methods_that_are_not_known_are_refused():
 
 def test_a_flight_is_of_the_world_its_seed_draws_and_of_the_mission_s_orbits():
     """It begins on the middle orbit at the drawn standoff; another method meets the same world from the same side."""
-    one, two = (short_flight(WorldTrial(world="close", method=m, seed=2)) for m in ("dp", "unaware"))
+    one, two = (short_flight(WorldTrial(world="close", method=m, seed=2)) for m in ("dp", "mpc"))
     assert one.scenario.tank == two.scenario.tank and one.scenario.mission == two.scenario.mission
     X_WC = one.route.body(0.0, one.vehicle.X_BC).X_WB @ one.vehicle.X_BC
     away = X_WC.p_m - one.target.centre_W_m

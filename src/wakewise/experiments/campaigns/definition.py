@@ -305,7 +305,7 @@ _EXAMPLE = """\
 name: first-comparison
 preset: quick                     # {presets}
 stages: fly                       # fly: the flight and the water; model: photographs and the model, too
-methods: [dp, unaware, wake-aware]  # or package.module:make for a controller of your own
+methods: [dp, mpc, wake-aware]  # or package.module:make for a controller of your own
 targets: [branching, brain]       # {corals}, or mesh files
 worlds: [payload]                 # wakewise world list
 seeds: 3                          # seeds 1 to 3, or a list

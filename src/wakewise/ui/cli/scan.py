@@ -39,8 +39,8 @@ Method = Annotated[
     str | None,
     typer.Option(
         "--method",
-        help="dp, bow-rule, manual, ardusub, pseudo-inverse, unaware, smooth, linear, instant, wake-aware, a plug-in, "
-        "or package.module:make.",
+        help="dp, no-forward-jets, manual, ardusub, pseudo-inverse, mpc, mpc-smooth, linear, allocation-only, "
+        "wake-aware, a plug-in, or package.module:make.",
         show_default=False,
     ),
 ]

@@ -46,8 +46,8 @@ _ALIKE = 0.005
 COLOURS = {
     "manual": SAND,
     "dp": CORAL,
-    "unaware": SLATE,
-    "smooth": VIOLET,
+    "mpc": SLATE,
+    "mpc-smooth": VIOLET,
     "wake-aware": TEAL,
     "the paper's recipe": CORAL,
 }

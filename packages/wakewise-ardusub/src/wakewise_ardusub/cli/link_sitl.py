@@ -283,7 +283,8 @@ def _physics_line(figures: PhysicsFigures, depths: DepthMonitor | None) -> str:
     where = figures.stage or ("" if depths is None else depths.words)
     return (
         f"{format_value(figures.rate_hz)} Hz, {figures.lost} lost, {figures.repeats} repeated, "
-        f"{figures.refused} refused; t {figures.time_s:.1f} s, depth {figures.depth_m or 0.0:.2f} m{', ' if where else ''}{where}; pulses {pulses}"
+        f"{figures.refused} refused; t {figures.time_s:.1f} s, "
+        f"depth {figures.depth_m or 0.0:.2f} m{', ' if where else ''}{where}; pulses {pulses}"
     )
 
 

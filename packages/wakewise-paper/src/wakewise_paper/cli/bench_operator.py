@@ -47,7 +47,7 @@ def show_operator(result: Mapping[str, Any]) -> None:
     for name, world in result["worlds"].items():
         for w_track, row in world["w_track"].items():
             table.add_row(name, w_track, *_cells(row))
-        table.add_row(name, "bow-rule", *_cells(world["bow-rule"]))
+        table.add_row(name, "no-forward-jets", *_cells(world["no-forward-jets"]))
     print_table(table)
     for key, where in (("w_track", "in front"), ("w_track_over", "above")):
         for w_track, row in result["paper"][key].items():

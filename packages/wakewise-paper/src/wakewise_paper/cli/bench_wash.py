@@ -25,9 +25,9 @@ _COLUMNS = (
 
 _BARS = (
     ("reduction_vs_dp_pct", "less wash than dp, %", ">= 80"),
-    ("reduction_vs_unaware_pct", "less than unaware, %", ">= 80"),
+    ("reduction_vs_mpc_pct", "less than mpc, %", ">= 80"),
     ("worst_world_pct", "less than dp in the worst scenario, %", ">= 50"),
-    ("reduction_vs_bow_rule_pct", "less than the bow rule, %", ">= 20"),
+    ("reduction_vs_no_forward_jets_pct", "less than the bow rule, %", ">= 20"),
     ("position_ok", "camera where dp has it", "yes"),
     ("energy_ratio", "energy over dp's", "<= 1.3"),
     ("silt_rays_reduction_pct", "less silt on the rays, %", ">= 60"),
@@ -68,7 +68,7 @@ def show_gentle(result: dict[str, Any]) -> None:
     for flow, figures in result["flows"].items():
         less = ", ".join(
             f"{reduction(*(figures[f'reduction_vs_{rival}_{what}pct'] for what in ('', 'interval_')))} than {rival}"
-            for rival in ("dp", "unaware")
+            for rival in ("dp", "mpc")
         )
         typer.echo(f"{flow} (circular: the planner's own model is the water): wake-aware moves less by {less}")
     typer.echo(

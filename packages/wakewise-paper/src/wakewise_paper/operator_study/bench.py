@@ -1,7 +1,7 @@
 """`wakewise bench operator`: the paper's claim in the tank's worlds, and the sweep of w_track in the paper's own.
 
 For each world and w_track, `wake-aware` against direct allocation (`dp`) on the same seeds, by a script and by the
-human model; `unaware` at the same w_track and `bow-rule` beside them. What is flown and how it is judged was written
+human model; `mpc` at the same w_track and `no-forward-jets` beside them. What is flown and how it is judged was written
 down before the first flight (docs/research-log/0047). Flights are kept: a run that was stopped goes on.
 
 From flights to the operator's table: deviation, D, the target's water, and what it costs, by world and w_track.
@@ -138,7 +138,7 @@ def _why(answer: Mapping[str, Any]) -> dict[str, str]:
 
 
 W_TRACKS = (1.0, 2.0, 5.0, 10.0, 20.0)
-DIRECT, OURS, UNAWARE, RULE = "dp", "wake-aware", "unaware", "bow-rule"
+DIRECT, OURS, UNAWARE, RULE = "dp", "wake-aware", "mpc", "no-forward-jets"
 PLANS = (OURS, UNAWARE)
 """Methods that have a w_track; the other two are flown once for all."""
 DEFAULT_WORLDS = (*TROUBLE, CONTROL)
@@ -328,7 +328,7 @@ class OperatorBenchResults:
 
 
 def world_figures(name: str, w_tracks: tuple[float, ...], told: OperatorBenchResults) -> dict[str, Any]:
-    """Tables of one world: by w_track ours, each pilot's alone and `unaware`; the bow rule once.
+    """Tables of one world: by w_track ours, each pilot's alone and `mpc`; the bow rule once.
 
     `grid` is over the flights that all w_tracks have, for holding one w_track against another.
     """

@@ -1,7 +1,7 @@
 """The same in the paper's own world, circular: the planner's model is the water
 (`wakewise.operation.worlds.quasi_steady_world`).
 
-`wake-aware` against `unaware` at the same weight, same commands, same seeds, by the paper's cost alone (no levers). The
+`wake-aware` against `mpc` at the same weight, same commands, same seeds, by the paper's cost alone (no levers). The
 operator asks for 0.1 m/s, reached at 0.1 m/s2. Two courses. `front`: sideways, up, back and down in front of the
 target, camera on it, where spare thrusters alone can keep every jet off it. `over`: to and fro above the target in a
 vehicle that sinks by the largest unknown trim; its lift blows at the target whatever the spare thrusters do, and only
@@ -42,7 +42,7 @@ from wakewise_paper.wash_reduction.paper import OFF, PAPER_WAKE, paper_place
 
 SEEDS = 1
 SPEED_M_S, HOLD_S = 0.10, 5.0
-DIRECT, OURS, UNAWARE = "dp", "wake-aware", "unaware"
+DIRECT, OURS, UNAWARE = "dp", "wake-aware", "mpc"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +124,7 @@ def paper_trials(w_tracks: tuple[float, ...], seeds: int) -> dict[Key, PaperOper
 
 
 def paper_figures(rows: Mapping[Key, Row], w_tracks: tuple[float, ...]) -> dict[str, Any]:
-    """Sweeps of both courses, the first as `w_track`; against `unaware` at the same weight, which is direct there."""
+    """Sweeps of both courses, the first as `w_track`; against `mpc` at the same weight, which is direct there."""
 
     def flights(course: str, method: str, w_track: float) -> list[Row]:
         return [row for key, row in rows.items() if key[:2] == (f"paper, {course}", f"{method} {w_track:g}")]
@@ -144,7 +144,7 @@ def _row(gentle: list[Row], careless: list[Row], floor: float | None) -> dict[st
     names = ("velocity_deviation_pct", "velocity_deviation_planned_pct", "velocity_deviation_behind_plan_pct")
     told: dict[str, Any] = {name: _mean(gentle, name) for name in (*names, "target_speed_mean_m_s")}
     told["velocity_deviation_floor_pct"] = floor
-    told["velocity_deviation_unaware_pct"] = _mean(careless, names[0])
+    told["velocity_deviation_mpc_pct"] = _mean(careless, names[0])
     told["disturbance_reduction_pct"] = less("disturbance")
     told["target_speed_reduction_pct"] = less("target_speed_mean_m_s")
     told["why"] = {key: "no flight gave it" for key, value in told.items() if value is None}

@@ -17,12 +17,12 @@ WIDTH_IN, ROW_IN = 10.0, 0.42
 INK, QUIET = "#22303a", "#8a979d"
 LOOKS = {
     "dp": ("#c65a3a", "o"),
-    "bow-rule": ("#b9923a", "s"),
-    "unaware": (QUIET, "^"),
-    "instant": ("#5b8fb0", "D"),
+    "no-forward-jets": ("#b9923a", "s"),
+    "mpc": (QUIET, "^"),
+    "allocation-only": ("#5b8fb0", "D"),
     "wake-aware": ("#1f7a78", "o"),
     "wake-aware+trim": ("#7d4f9e", "P"),
-    "bow-rule+trim": ("#d9b98a", "X"),
+    "no-forward-jets+trim": ("#d9b98a", "X"),
 }
 """Methods that are drawn, with colour and mark."""
 TROUBLE_MM_S = 10.0

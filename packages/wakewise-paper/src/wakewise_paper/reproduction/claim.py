@@ -38,7 +38,7 @@ TABLES: dict[str, str] = {
 """Tables in the order of `all`, and what each is about."""
 
 OURS = "wake-aware"
-ORDER = ("manual", "unaware", "smooth", "wake-aware")
+ORDER = ("manual", "mpc", "mpc-smooth", "wake-aware")
 """The paper's order by RMSE, the worst first."""
 
 

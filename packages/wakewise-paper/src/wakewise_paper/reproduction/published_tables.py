@@ -66,14 +66,14 @@ def station() -> list[PublishedFigure]:
     ):
         said = f"{paper:g} % less {title} than DP ({values}; section Gentle Stability)"
         claims.append(less(figure, title, "dp", paper, said, how))
-        claims += [less(figure, title, than, None, said, how, asked=paper) for than in ("manual", "smooth", "unaware")]
+        claims += [less(figure, title, than, None, said, how, asked=paper) for than in ("manual", "mpc-smooth", "mpc")]
     claims += [
         less("target_speed_mean_m_s", "wash at the target", than, 67.0, "67 % less (0.18 to 0.06 m/s)", WASH)
-        for than in ("unaware", "dp")
+        for than in ("mpc", "dp")
     ]
     said = "2.1 for DP's 2.3 mm, p = 0.18: no difference shown (section Gentle Stability)"
     claims.append(less("position_rmse_mm", "distance from the wished place", "dp", None, said, what))
-    return claims + washes(("manual", "dp", "unaware", "smooth", "wake-aware"))
+    return claims + washes(("manual", "dp", "mpc", "mpc-smooth", "wake-aware"))
 
 
 def flow() -> list[PublishedFigure]:
@@ -93,11 +93,11 @@ def flow() -> list[PublishedFigure]:
             side="less" if method == "wake-aware" else "none",
             how=how,
         )
-        for method, value in (("unaware", 0.18), ("wake-aware", 0.06))
+        for method, value in (("mpc", 0.18), ("wake-aware", 0.06))
     ]
-    claims.append(less("piv_speed_m_s", "speed at the target by PIV", "unaware", 67.0, "67 % less", how))
+    claims.append(less("piv_speed_m_s", "speed at the target by PIV", "mpc", 67.0, "67 % less", how))
     claims.append(less("piv_speed_m_s", "speed at the target by PIV", "dp", None, UNQUOTED, how, asked=0.0))
-    claims.append(less("target_speed_mean_m_s", "true excess speed", "unaware", None, UNQUOTED, WASH, asked=67.0))
+    claims.append(less("target_speed_mean_m_s", "true excess speed", "mpc", None, UNQUOTED, WASH, asked=67.0))
     claims.append(
         PublishedFigure(
             method="wake-aware",
@@ -126,7 +126,7 @@ def flow() -> list[PublishedFigure]:
 
 
 VARIANTS = {
-    "unaware": "no disturbance term",
+    "mpc": "no disturbance term",
     "linear": "linear wake model",
     "six thrusters": "six thrusters",
 }
@@ -134,7 +134,7 @@ VARIANTS = {
 
 
 PAPER_ABLATION = {
-    "unaware": "RMSE 4.1 mm, success 65 %",
+    "mpc": "RMSE 4.1 mm, success 65 %",
     "linear": "RMSE 3.2 mm, success 75 %",
     "six thrusters": "RMSE 3.8 mm, success 70 %",
 }
@@ -188,8 +188,8 @@ def operator_claims(w_tracks: tuple[float, ...]) -> list[PublishedFigure]:
 
 def dynamic() -> list[PublishedFigure]:
     """Models while flying round."""
-    rmse: dict[str, float | None] = {"manual": 8.7, "unaware": 4.3, "smooth": 2.8, "wake-aware": 1.9}
-    claims = model_claims(rmse, {"manual": 34.2, "unaware": 68.5, "smooth": 87.0, "wake-aware": 94.8})
+    rmse: dict[str, float | None] = {"manual": 8.7, "mpc": 4.3, "mpc-smooth": 2.8, "wake-aware": 1.9}
+    claims = model_claims(rmse, {"manual": 34.2, "mpc": 68.5, "mpc-smooth": 87.0, "wake-aware": 94.8})
     claims.append(
         PublishedFigure(
             method="wake-aware",
@@ -207,7 +207,7 @@ def dynamic() -> list[PublishedFigure]:
         if than != "wake-aware" and value is not None:
             words = f"{value:g} mm and 1.9 mm, from which this share follows"
             claims.append(less("rmse_mm", "RMSE", than, 100.0 * (1.0 - 1.9 / value), words, RMSE))
-    claims.append(less("target_speed_mean_m_s", "wash at the target", "unaware", None, UNQUOTED, WASH, asked=0.0))
+    claims.append(less("target_speed_mean_m_s", "wash at the target", "mpc", None, UNQUOTED, WASH, asked=0.0))
     for figure, title, unit in (
         ("position_rmse_mm", "distance from the wished place", "mm"),
         ("collisions", "times the hull touched something", ""),
@@ -246,8 +246,8 @@ def dynamic() -> list[PublishedFigure]:
 
 def success() -> list[PublishedFigure]:
     """Models that succeed."""
-    quoted = {"wake-aware": 98.5, "unaware": 45.0}
-    table = {"wake-aware": "98.3 % (59 of 60)", "unaware": "45 % (27 of 60)"}
+    quoted = {"wake-aware": 98.5, "mpc": 45.0}
+    table = {"wake-aware": "98.3 % (59 of 60)", "mpc": "45 % (27 of 60)"}
     return [
         PublishedFigure(
             method=method,
@@ -267,14 +267,14 @@ def success() -> list[PublishedFigure]:
 
 def sediment() -> list[PublishedFigure]:
     """Calcium carbonate."""
-    claims = model_claims({"wake-aware": None, "unaware": None}, {})
+    claims = model_claims({"wake-aware": None, "mpc": None}, {})
     rays = "beam attenuation by silt along the rays from camera to target, mean over rays and time"
     lifted = "what the bed gave up by the end of the flight"
     said = "62 % less disturbance in its water with silt, 67 % in clear water; silt itself is not given (Discussion)"
-    claims.append(less("ray_optical_depth", "silt on the rays", "unaware", None, said, rays, asked=0.0))
-    claims.append(less("silt_lifted_g", "silt lifted", "unaware", None, said, lifted, asked=0.0))
+    claims.append(less("ray_optical_depth", "silt on the rays", "mpc", None, said, rays, asked=0.0))
+    claims.append(less("silt_lifted_g", "silt lifted", "mpc", None, said, lifted, asked=0.0))
     said = "about 40 % more than in clear water, with the method alone (Discussion)"
-    claims.append(less("rmse_mm", "RMSE", "unaware", None, said, RMSE, asked=0.0))
+    claims.append(less("rmse_mm", "RMSE", "mpc", None, said, RMSE, asked=0.0))
     return claims
 
 

@@ -281,8 +281,8 @@ APPROACHES: dict[str, dict[str, Any]] = {
     "farther off": {"method": "dp", "mission.standoff_m": 0.8},
     "ballast": {"method": "dp", "ballast": True},
     "soft thrusters": {"method": "dp", "vehicle": "soft-thrusters"},
-    "a rule (bow-rule)": {"method": "bow-rule"},
-    "shares (instant)": {"method": "instant"},
+    "a rule (no-forward-jets)": {"method": "no-forward-jets"},
+    "shares (allocation-only)": {"method": "allocation-only"},
     "a plan (wake-aware)": {"method": "wake-aware"},
     "a tilting camera": {"method": "wake-aware", "vehicle": "paper-tilting"},
     "a plan and ballast": {"method": "wake-aware", "ballast": True},
@@ -292,12 +292,12 @@ COMPARED = (
     "dp",
     "manual",
     "ardusub",
-    "bow-rule",
+    "no-forward-jets",
     "pseudo-inverse",
-    "unaware",
-    "smooth",
+    "mpc",
+    "mpc-smooth",
     "linear",
-    "instant",
+    "allocation-only",
     "wake-aware",
 )
 """Methods of the comparison."""
@@ -330,14 +330,14 @@ def _asked(world: str) -> tuple[str, ...]:
 
 
 _FLOWN = (PUMP_TANK, TROUBLE, PAPER)
-_STATION = ("manual", "dp", "unaware", "smooth", "wake-aware")
+_STATION = ("manual", "dp", "mpc", "mpc-smooth", "wake-aware")
 
 TABLE: dict[str, TableDefinition] = {
     "dynamic": TableDefinition(
         methods=ORDER, worlds=(PUMP_TANK, TROUBLE), targets=_corals, plan=_scan, block_s=400.0, weight=4.0
     ),
     "success": TableDefinition(
-        methods=("unaware", "wake-aware"),
+        methods=("mpc", "wake-aware"),
         worlds=(PUMP_TANK, TROUBLE),
         targets=_own,
         plan=_varied,
@@ -351,10 +351,10 @@ TABLE: dict[str, TableDefinition] = {
         methods=("wake-aware", *VARIANTS), worlds=_FLOWN, targets=_own, plan=_ablated, block_s=45.0
     ),
     "sediment": TableDefinition(
-        methods=("unaware", "wake-aware"), worlds=(CACO3, "fluff"), targets=_own, plan=_plain_scan, block_s=220.0
+        methods=("mpc", "wake-aware"), worlds=(CACO3, "fluff"), targets=_own, plan=_plain_scan, block_s=220.0
     ),
     "flow": TableDefinition(
-        methods=("dp", "unaware", "wake-aware"), worlds=_FLOWN, targets=_own, plan=_flight("round", 3), block_s=50.0
+        methods=("dp", "mpc", "wake-aware"), worlds=_FLOWN, targets=_own, plan=_flight("round", 3), block_s=50.0
     ),
     "solver": TableDefinition(
         methods=(NOWHERE,),

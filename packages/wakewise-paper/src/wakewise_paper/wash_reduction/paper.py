@@ -28,7 +28,7 @@ PAPER_WAKE: dict[str, Any] = {"model": "paper-calibrated", "edge_width_deg": 3.0
 """What controllers believe in the paper's world: its own model with a smooth edge."""
 OFF = {"spare": False, "meet": False, "drift": False}
 """The paper's cost: no levers."""
-METHODS = ("dp", "unaware", "wake-aware")
+METHODS = ("dp", "mpc", "wake-aware")
 SEEDS = 3
 FIGURES = (
     "target_speed_mean_m_s",

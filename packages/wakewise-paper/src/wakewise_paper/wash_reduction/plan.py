@@ -82,16 +82,16 @@ def only_name(name: str) -> str:
 METHODS = (
     "dp",
     "manual",
-    "bow-rule",
+    "no-forward-jets",
     "ardusub",
     "pseudo-inverse",
-    "unaware",
-    "smooth",
-    "instant",
+    "mpc",
+    "mpc-smooth",
+    "allocation-only",
     "wake-aware",
     "wake-aware+trim",
     "dp+trim",
-    "bow-rule+trim",
+    "no-forward-jets+trim",
 )
 """The first is what the others are held against."""
 

@@ -20,8 +20,8 @@ SILT, SWAY, PLACE, ENERGY = "ray_optical_depth", "sway_rms_mm", "camera_rmse_mm"
 SWAY_WASH = "sway_wash_mm"
 """What the vehicle adds to the sway of the same water without it: all that a controller can take away (0038)."""
 BODY = "position_rmse_mm"
-RIVALS = ("dp", "unaware", "bow-rule", "bow-rule+trim")
-BESIDE = ("instant", "wake-aware+trim", "dp+trim", "bow-rule", "bow-rule+trim")
+RIVALS = ("dp", "mpc", "no-forward-jets", "no-forward-jets+trim")
+BESIDE = ("allocation-only", "wake-aware+trim", "dp+trim", "no-forward-jets", "no-forward-jets+trim")
 """What the table is made for as well."""
 WRONG = "wake-aware, wrong current"
 

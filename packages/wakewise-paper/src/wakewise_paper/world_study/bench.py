@@ -27,7 +27,7 @@ from wakewise_paper.world_study.figures import method_figures, ratios
 from wakewise_paper.world_study.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial
 from wakewise_paper.world_study.lattice_comparison import JUDGED, judge_table, judge_trials
 
-METHODS = ("dp", "manual", "ardusub", "unaware", "smooth", "bow-rule", "instant", "wake-aware")
+METHODS = ("dp", "manual", "ardusub", "mpc", "mpc-smooth", "no-forward-jets", "allocation-only", "wake-aware")
 """The first is what the others are held against."""
 
 EMERGENT = (

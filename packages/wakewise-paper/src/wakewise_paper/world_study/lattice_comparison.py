@@ -26,7 +26,7 @@ from wakewise_paper.flight_batches import Key, Row
 from wakewise_paper.world_study.flight import WorldTrial, flown_figures, short_flight
 
 JUDGED = ("payload", "close", "kelp")
-METHODS = ("dp", "bow-rule", "wake-aware")
+METHODS = ("dp", "no-forward-jets", "wake-aware")
 FLOWS = ("tank", "lattice")
 DURATION_S = 23.0
 """Settling and hover: the lattice takes minutes of a core for it."""

@@ -41,7 +41,7 @@ def scans(plan):
     """RMSE in the paper's order; one scan failed."""
     if plan.method == "manual" and plan.seed == 2:
         return None
-    step = ("manual", "unaware", "smooth", "wake-aware").index(plan.method)
+    step = ("manual", "mpc", "mpc-smooth", "wake-aware").index(plan.method)
     noise = 0.05 * np.sin(7.0 * plan.seed + step)
     return {"rmse_mm": 4.0 - step + noise, "completeness_pct": 90.0 + step, "success": 1.0, "energy_kJ": 1.0,
             "target_speed_mean_m_s": 0.02, "area_cm2": 100.0 + plan.seed, "volume_cm3": 50.0, "collisions": 0.0,
@@ -50,7 +50,7 @@ def scans(plan):
 
 def flights(plan):
     """Wash by method, less with ours."""
-    wash = {"manual": 0.03, "dp": 0.02, "unaware": 0.022, "smooth": 0.02, "wake-aware": 0.004}[plan.method]
+    wash = {"manual": 0.03, "dp": 0.02, "mpc": 0.022, "mpc-smooth": 0.02, "wake-aware": 0.004}[plan.method]
     return {"target_speed_mean_m_s": wash + 1e-4 * plan.seed, "position_rmse_mm": 2.0, "energy_kJ": 1.0,
             "roll_pitch_rms_deg": 1.0, "estimate_rmse_mm": 5.0, "tracking_rmse_mm": 1.8}  # fmt: skip
 
@@ -112,9 +112,9 @@ def test_what_is_met_only_in_the_papers_own_water_is_told_apart(tables):
     could, could_not, _ = reproduced(tables)
     wash = next(line for line in could if "wash at the target, less than dp" in line)
     assert "pump-tank" in wash and "paper" in wash and "n = 4" in wash
-    assert any("energy, less than unaware" in line for line in could_not)
+    assert any("energy, less than mpc" in line for line in could_not)
     assert any("the estimated place from the wished one" in line and "1.80 mm" in line for line in could)
-    assert any("order of the methods" in line and "manual > unaware" in line for line in could)
+    assert any("order of the methods" in line and "manual > mpc" in line for line in could)
     assert any("R2 near the axis" in line and "oracle" in line for line in could_not)
 
 

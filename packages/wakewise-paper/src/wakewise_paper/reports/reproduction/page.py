@@ -19,7 +19,7 @@ from wakewise_paper.reproduction.published_tables import UNKNOWN
 from wakewise_paper.reproduction.worlds import water
 
 PAGE = "reproduce.html"
-_TEMPORAL = ("unaware", "wake-aware")
+_TEMPORAL = ("mpc", "wake-aware")
 _SCANNED = ("dynamic", "success", "sediment", "field")
 
 

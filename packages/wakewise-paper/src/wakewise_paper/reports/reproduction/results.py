@@ -230,7 +230,7 @@ def _plots(table: Mapping[str, Any], store: Path) -> list[tuple[str, Figure]]:
     if name == "station":
         for world in table["worlds"]:
             series: dict[str, dict[str, Array]] = {}
-            for method in ("unaware", "wake-aware"):
+            for method in ("mpc", "wake-aware"):
                 place = next((p for p in places if (p["world"], p["method"]) == (world, method)), None)
                 found = None if place is None else read_series(store / place["folder"])
                 if found is not None:
@@ -332,11 +332,11 @@ def _reasons(tables: Mapping[str, Mapping[str, Any]]) -> list[str]:
     said = []
     for name in ("station", "flow", "ablation"):
         for world in tables.get(name, {}).get("worlds", ()):
-            speeds = _means(tables[name], world, "target_speed_mean_m_s", ("unaware", "dp", "wake-aware"))
-            if "unaware" in speeds and "wake-aware" in speeds:
+            speeds = _means(tables[name], world, "target_speed_mean_m_s", ("mpc", "dp", "wake-aware"))
+            if "mpc" in speeds and "wake-aware" in speeds:
                 said.append(
-                    f"*{name}, {world}*: there is {number(1e3 * speeds['unaware'])} mm/s of wash to take away with "
-                    f"`unaware`, where the paper has 180; `wake-aware` leaves {number(1e3 * speeds['wake-aware'])}."
+                    f"*{name}, {world}*: there is {number(1e3 * speeds['mpc'])} mm/s of wash to take away with "
+                    f"`mpc`, where the paper has 180; `wake-aware` leaves {number(1e3 * speeds['wake-aware'])}."
                 )
     for world in tables.get("station", {}).get("worlds", ()):
         place, estimate, seen = (
