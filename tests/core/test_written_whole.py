@@ -58,7 +58,7 @@ ALLOWED |= dict.fromkeys(
 ALLOWED |= dict.fromkeys(
     (
         *("reconstruction.depth_store.DepthStore.add", "reconstruction.masks.write_for_colmap"),
-        *("reconstruction.own_lenses.own_lenses", "studies.piv.openpiv_script.main"),
+        "reconstruction.own_lenses.own_lenses",
     ),
     "writes into a temporary folder, which its caller makes",
 )

@@ -24,7 +24,6 @@ EXTRAS: dict[str, dict[str, str]] = {
     "links": {"pymavlink": "pymavlink", "mcap": "mcap", "lupa": "lupa"},
     "ros": {"rosbags": "rosbags"},
     "logs": {"foxglove": "foxglove-sdk"},
-    "piv": {"openpiv": "openpiv", "cv2": "opencv-python-headless"},
     "nerf": {"torch": "torch"},
     "film": {"av": "av"},
     "dask": {"distributed": "distributed"},

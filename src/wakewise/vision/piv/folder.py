@@ -1,4 +1,4 @@
-"""A folder of image pairs as a camera left it: pictures *A and *B and a small piv.yaml that says what they show."""
+"""Folder of image pairs: pictures `*A` and `*B`, and `piv.yaml` with scale, time step, jet direction and thrusts."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.optional_dependencies import need
 from wakewise.core.settings import Settings, describe_faults
-from wakewise.vision.piv.correlation import Displacements, averaged
+from wakewise.vision.piv.correlation import Displacements, averaged, displacements
 from wakewise.vision.piv.images import Picture
-from wakewise.vision.piv.processing import Engine, displacements
 from wakewise.wake.samples import JetSamples, joined
 
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
@@ -23,7 +22,7 @@ _EDGE_WINDOWS = 2
 
 
 class PivFolder(Settings):
-    """What piv.yaml says. The picture shows a plane through the jet's axis."""
+    """Contents of piv.yaml. The picture shows a plane through the jet's axis."""
 
     m_per_px: float = Field(gt=0.0, le=0.1, description="size of a pixel in the light sheet")
     dt_s: float = Field(gt=0.0, le=10.0, description="time between the frames of a pair")
@@ -58,7 +57,7 @@ def read_pairs(folder: Path) -> dict[str, tuple[Picture, Picture]]:
 
 
 def _read(path: Path) -> Picture:
-    need("reading pictures of a jet", "piv", only=("cv2",))
+    need("reading pictures of a jet", "photos", only=("cv2",))
     import cv2
 
     from wakewise.vision.image_decoding import read_picture
@@ -90,8 +89,8 @@ def read_piv_settings(folder: Path) -> PivFolder:
         raise InputError(f"{path}: {describe_faults(fault, PivFolder, 'piv.yaml')}; it must hold {wanted}") from None
 
 
-def samples_of_folder(folder: Path, engine: Engine = "auto") -> JetSamples:
-    """Process all pairs of a folder and give the vectors as samples in the jet frame; pairs of one thrust are averaged.
+def samples_of_folder(folder: Path) -> JetSamples:
+    """Velocity samples in the jet frame from all pairs of a folder; pairs of one thrust are averaged.
 
     Raises
     ------
@@ -106,7 +105,7 @@ def samples_of_folder(folder: Path, engine: Engine = "auto") -> JetSamples:
         thrust = {name: settings.thrust_N[name] for name in pairs}
     else:
         thrust = dict.fromkeys(pairs, settings.thrust_N)
-    fields = dict(zip(pairs, displacements(list(pairs.values()), engine), strict=True))
+    fields = dict(zip(pairs, displacements(list(pairs.values())), strict=True))
     parts = []
     for value in sorted(set(thrust.values())):
         mean = averaged([field for name, field in fields.items() if thrust[name] == value])
@@ -115,7 +114,7 @@ def samples_of_folder(folder: Path, engine: Engine = "auto") -> JetSamples:
 
 
 def samples_of_vectors(field: Displacements, settings: PivFolder, thrust_N: float, title: str) -> JetSamples:
-    """Trusted vectors inside the picture's rim and downstream of the disk, as samples in the jet frame."""
+    """Valid vectors inside the picture's rim and downstream of the disk, as samples in the jet frame."""
     columns, rows = np.meshgrid(field.columns_px, field.rows_px)
     right = (columns - settings.disk_px[0]) * settings.m_per_px
     down = (rows - settings.disk_px[1]) * settings.m_per_px

@@ -422,13 +422,13 @@ def _piv(values: Mapping[str, Any]) -> str:
     if not trips:
         return section("piv", "Virtual PIV", "", missing("the round trip", values["why"].get("piv", "not run")))
     rows = "".join(
-        f"<tr><td>{escape(t['engine'])}</td><td>{escape(t['field'])}</td>"
+        f"<tr><td>{escape(t['field'])}</td>"
         f'<td class="num">{fixed(t["median_px"], 4)}</td><td class="num">{fixed(t["rms_px"], 3)}</td>'
         f'<td class="num">{fixed(t["bias_px"], 4, sign=True)}</td><td class="num">{fixed(t["valid_pct"], 1)}</td></tr>'
         for t in trips
     )
     table = (
-        '<div class="wide"><table><thead><tr><th>engine</th><th>field</th><th class="num">median error, px</th>'
+        '<div class="wide"><table><thead><tr><th>field</th><th class="num">median error, px</th>'
         '<th class="num">rms, px</th><th class="num">bias, px</th><th class="num">vectors kept, %</th></tr></thead>'
         f"<tbody>{rows}</tbody></table></div>"
     )
@@ -436,13 +436,11 @@ def _piv(values: Mapping[str, Any]) -> str:
     if real is None:
         words = missing("the real pairs", values["why"].get("piv.real_pairs", "not there"))
     else:
-        gap = real["disagreement_px"]
-        both = "" if gap is None else f" The two engines differ by {fixed(gap, 2)} px (median) where the jet is fast."
         words = (
-            f"<p>{shown(real['pairs'])} real pairs of a round jet, by {escape(real['engine'])}: "
+            f"<p>{shown(real['pairs'])} real pairs of a round jet: "
             f"{fixed(real['valid_pct'], 0)} % of the vectors kept, the fastest move {fixed(real['fastest_px'], 1)} px, "
             f"{fixed(real['along_jet_pct'], 0)} % of the "
-            f"fast ones along the jet.{both} They come without scale and time: nothing can be said of speed.</p>"
+            "fast ones along the jet. They come without scale and time: nothing can be said of speed.</p>"
         )
     lead = (
         "Synthetic pairs of a known field: 20 µm tracers (they follow the water within 23 µs), 0.02 per pixel, a light "

@@ -18,8 +18,8 @@ from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.interfaces import Flow, TruthProvider
 from wakewise.operation import Parts
 from wakewise.scene.targets import Target
+from wakewise.vision.piv.correlation import displacements
 from wakewise.vision.piv.images import CameraSettings, LightSheet, TracerSettings, photograph_pair
-from wakewise.vision.piv.processing import displacements
 from wakewise_paper.wash_reduction.routes import SETTLE_S
 
 NEAR_M, CLEAR_M = 0.05, 0.004
@@ -111,7 +111,7 @@ class PivRecorder:
     def _velocities(self, flow: Flow) -> tuple[Array, BoolArray, Array]:
         """Velocities in the sheet, shape (n, 2), which passed, shape (n,), and their places in W, shape (n, 3)."""
         pair = photograph_pair(flow, self.sheet, CAMERA, TracerSettings(), self.rng)
-        found = displacements([(pair.first, pair.second)], "in-house")[0]
+        found = displacements([(pair.first, pair.second)])[0]
         columns, rows = np.meshgrid(found.columns_px, found.rows_px)
         local = np.stack(
             [
