@@ -7,10 +7,8 @@ other process has no room for, or does not come to, is left to the stage after t
 
 from __future__ import annotations
 
-import os
 import pickle
 import queue
-import signal
 import subprocess
 import sys
 import tempfile
@@ -22,6 +20,7 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING
 
 from wakewise.core.run_lock import remove_stale
+from wakewise.core.subprocesses import ignore_interrupt, read_message, start_python, write_message
 from wakewise.operation.flight_log import ExposureRecord, packed, unpacked
 
 if TYPE_CHECKING:
@@ -103,12 +102,8 @@ class BackgroundRenderer:
 
     def _begin(self) -> None:
         self._said = tempfile.TemporaryFile()  # noqa: SIM115  (kept until the other process has ended)
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "wakewise.operation.background_renderer"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=self._said,
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+        self._process = start_python(
+            "-m", "wakewise.operation.background_renderer", stdout=subprocess.DEVNULL, stderr=self._said
         )
         self._waiting.put(pickle.dumps((self._parts.scenario, self._folder.resolve())))
         self._feeder = threading.Thread(target=self._feed, args=(self._process,), name="darkroom", daemon=True)
@@ -120,8 +115,7 @@ class BackgroundRenderer:
         while (message := self._waiting.get()) is not None:
             if process.poll() is None and pipe is not None:
                 with suppress(OSError):
-                    pipe.write(len(message).to_bytes(8, "little") + message)
-                    pipe.flush()
+                    write_message(pipe, message)
         if pipe is not None:
             with suppress(OSError):
                 pipe.close()
@@ -137,31 +131,20 @@ def _warn(reason: str) -> None:
     warnings.warn(words, RuntimeWarning, stacklevel=3)
 
 
-def _message(pipe: IO[bytes]) -> bytes | None:
-    """The next message; None at the end."""
-    head = pipe.read(8)
-    if len(head) < 8:
-        return None
-    size = int.from_bytes(head, "little")
-    message = pipe.read(size)
-    return message if len(message) == size else None
-
-
 def render_from_pipe(pipe: IO[bytes]) -> None:
     """Render the exposures that come through a pipe until it ends: the other process."""
     from wakewise.operation.photography import take_photograph
 
-    first = _message(pipe)
+    first = read_message(pipe)
     if first is None:
         return
     scenario, folder = pickle.loads(first)
     parts = scenario.parts()
     _ = parts.scene, parts.yielding, parts.route  # made while the vehicle is still on its way to the first view
-    while (message := _message(pipe)) is not None:
+    while (message := read_message(pipe)) is not None:
         take_photograph(parts, folder, *unpacked(message))
 
 
 if __name__ == "__main__":
-    with suppress(ValueError):
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started this ends it
+    ignore_interrupt()
     render_from_pipe(sys.stdin.buffer)

@@ -80,13 +80,17 @@ def test_what_cannot_be_cancelled_runs_apart_and_says_why_it_fails(tmp_path):
 def test_ctrl_c_at_random_moments_of_the_command_is_exit_130_and_one_line(relief_photos, tmp_path):
     """In starting, features, matching or mapping: exit code 130, one line, and no file that is half-done."""
     folder, _ = relief_photos
-    code = "from wakewise.ui.cli.main import main; main()"
-    out = tmp_path / "model"
+    begun, out = tmp_path / "begun", tmp_path / "model"
+    # Python itself ends otherwise before the command has begun, however long its imports take on a busy machine.
+    code = f"import pathlib; from wakewise.ui.cli.main import main; pathlib.Path({str(begun)!r}).touch(); main()"
     rng = random.Random(2)
     for _ in range(3):
         words = [sys.executable, "-c", code, "reconstruct", str(folder), "--out", str(out), "--json"]
+        begun.unlink(missing_ok=True)
         child = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        time.sleep(rng.uniform(1.5, 3.5))
+        while not begun.exists() and child.poll() is None:
+            time.sleep(0.02)
+        time.sleep(rng.uniform(0.2, 2.5))
         child.send_signal(signal.SIGINT)
         said, told = child.communicate(timeout=60)
         if child.returncode == 0:  # a machine so quick that it had ended

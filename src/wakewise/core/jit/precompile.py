@@ -23,6 +23,7 @@ from typing import IO, Any
 
 from wakewise.core.errors import InputError
 from wakewise.core.jit.cache_dir import VARIABLE, can_be_written, is_interpreted, user_cache
+from wakewise.core.subprocesses import start_python
 
 TypeWords = str | list[Any] | dict[str, list[Any]]
 LIST = Path(__file__).with_name("kernels.json")
@@ -160,7 +161,7 @@ class BackgroundCompilation:
     def _serve(self) -> None:
         """Hand kernels to one process, each when the last is done."""
         try:
-            with _worker() as worker:
+            with start_python("-m", __name__, text=True) as worker:
                 with self._change:
                     self._workers.append(worker)
                 assert worker.stdin is not None
@@ -215,18 +216,6 @@ def _asked(kernel: KernelEntry, to: IO[str], back: IO[str]) -> str:
         return back.readline()
     except OSError:
         return ""
-
-
-def _worker() -> subprocess.Popen[str]:
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    return subprocess.Popen(
-        [sys.executable, "-m", __name__],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env=environment,
-        text=True,
-    )
 
 
 def _cores() -> int:

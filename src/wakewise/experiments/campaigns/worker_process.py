@@ -14,7 +14,6 @@ import os
 import queue
 import signal
 import subprocess
-import sys
 import threading
 import time
 from contextlib import suppress
@@ -22,6 +21,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from wakewise.core.subprocesses import end_process, start_python
 from wakewise.experiments.campaigns import attempt_log, trial_lock
 from wakewise.experiments.campaigns.store import LOG
 from wakewise.experiments.campaigns.worker import AttemptRequest
@@ -129,26 +129,22 @@ class TrialProcess:
         """End the process; an attempt that is under way is told of as stopped."""
         self._closed = True
         if self._process is not None:
-            _kill(self._process)
+            end_process(self._process, group=True)
 
     def _ready(self, cwd: str) -> subprocess.Popen[str]:
         """The process, started if there is none."""
         if self._process is None or self._process.poll() is not None:
             if self._process is not None:
-                _kill(self._process)
+                end_process(self._process, group=True)
             self._lines = queue.SimpleQueue()
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "wakewise.experiments.campaigns.worker"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                env={"OPENBLAS_NUM_THREADS": "1"}  # unless the user says otherwise, as in the command line
-                | os.environ
-                | dict.fromkeys(_THREADS, str(self.threads))
-                | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+            one = os.environ.get("OPENBLAS_NUM_THREADS", "1")  # unless the user says otherwise, as in the command line
+            self._process = start_python(
+                "-m",
+                "wakewise.experiments.campaigns.worker",
+                variables=dict.fromkeys(_THREADS, str(self.threads)) | {"OPENBLAS_NUM_THREADS": one},
                 text=True,
                 cwd=cwd if cwd and Path(cwd).is_dir() else None,
-                start_new_session=True,  # Ctrl-C is the driver's, which then ends this
+                new_session=True,  # Ctrl-C is the driver's, which then ends this
             )
             threading.Thread(target=_listen, args=(self._process, self._lines), daemon=True).start()
         return self._process
@@ -163,7 +159,7 @@ class TrialProcess:
         reason: str | None,
     ) -> AttemptReport:
         """End the process and note how; what it had claimed is free for others then."""
-        _kill(process)
+        end_process(process, group=True)
         if how == "died":
             reason = _words_of(process.returncode, place / LOG)
         took_s = time.monotonic() - began
@@ -189,19 +185,6 @@ def close_slots(driver: str) -> None:
     """End the processes of all slots of a driver in this process."""
     for one in [one for one in _slots if one[0] == driver]:
         _slots.pop(one).close()
-
-
-def _kill(process: subprocess.Popen[str]) -> None:
-    """End a process and all that it started; it leads a group of its own."""
-    with suppress(OSError):
-        if hasattr(os, "killpg"):
-            os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()
-    process.wait()
-    if process.stdin is not None:
-        with suppress(OSError):
-            process.stdin.close()
 
 
 def _listen(process: subprocess.Popen[str], lines: queue.SimpleQueue[str | None]) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import pickle
-import signal
 import subprocess
 import sys
 import threading
@@ -23,6 +22,15 @@ from typing import IO, Any
 from wakewise.core.errors import StageError, WakewiseError
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.run_lock import remove_stale
+from wakewise.core.subprocesses import (
+    end_process,
+    ignore_interrupt,
+    private_stdout,
+    read_message,
+    start_python,
+    wait_for,
+    write_message,
+)
 from wakewise.experiments.trials.stages import ProgressListener
 from wakewise.vision.reconstruction import ReconstructionSettings, mesh_model
 from wakewise.vision.texturing.textured import write_textured
@@ -53,8 +61,7 @@ class SurfaceMaker:
         process, self._process = self._process, None
         if process is None:
             return
-        process.kill()
-        _close(process)
+        end_process(process)
         remove_stale(self._folder)
 
     @property
@@ -70,15 +77,9 @@ class SurfaceMaker:
         if self._process is not None or not self._wanted or self._meshed:
             return
         try:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "wakewise.experiments.trials.surface"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                # BLAS gains nothing on arrays three wide, and its threads would spin beside those of the report.
-                env=os.environ
-                | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path), "OPENBLAS_NUM_THREADS": "1"},
-            )
+            # BLAS gains nothing on arrays three wide, and its threads would spin beside those of the report.
+            one_thread = {"OPENBLAS_NUM_THREADS": "1"}
+            self._process = start_python("-m", "wakewise.experiments.trials.surface", variables=one_thread)
         except OSError as fault:
             _warn(str(fault))
 
@@ -146,7 +147,7 @@ class SurfaceMaker:
             else:
                 raise content
         self._process = None
-        _warn(f"its process ended with status {_close(process)}")
+        _warn(f"its process ended with status {wait_for(process)}")
         remove_stale(self._folder)
         return False
 
@@ -154,15 +155,6 @@ class SurfaceMaker:
 def uncoloured(folder: Path) -> bool:
     """Whether there is a mesh whose colours are not there or are those of an older one."""
     return (folder / "mesh.ply").exists() and not _newer(folder / "mesh.glb", folder / "mesh.ply")
-
-
-def _close(process: subprocess.Popen[bytes]) -> int:
-    """Wait for a process that ends, close what led to it, and give its exit status."""
-    for pipe in (process.stdin, process.stdout):
-        if pipe is not None:
-            with suppress(OSError):
-                pipe.close()
-    return process.wait()
 
 
 def _newer(product: Path, source: Path) -> bool:
@@ -187,19 +179,13 @@ def _colours(folder: Path, bed_z_m: float, progress: Progress) -> None:
 
 
 def _send(pipe: IO[bytes], value: Any) -> None:
-    message = pickle.dumps(value)
-    pipe.write(len(message).to_bytes(8, "little") + message)
-    pipe.flush()
+    write_message(pipe, pickle.dumps(value))
 
 
 def _receive(pipe: IO[bytes]) -> Any:
     """The next value; None at the end."""
-    head = pipe.read(8)
-    if len(head) < 8:
-        return None
-    size = int.from_bytes(head, "little")
-    message = pipe.read(size)
-    return pickle.loads(message) if len(message) == size else None
+    message = read_message(pipe)
+    return None if message is None else pickle.loads(message)
 
 
 def serve(asked: IO[bytes], answers: IO[bytes]) -> None:
@@ -230,9 +216,5 @@ def _end_with(pipe: IO[bytes]) -> None:
 
 
 if __name__ == "__main__":
-    with suppress(ValueError):
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started this ends it
-    # What libraries print is no answer.
-    _answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    serve(sys.stdin.buffer, _answers)
+    ignore_interrupt()
+    serve(sys.stdin.buffer, private_stdout())

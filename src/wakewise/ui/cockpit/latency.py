@@ -7,9 +7,7 @@ client in a process of its own that holds the helm, sends sticks at 25 Hz and ta
 from __future__ import annotations
 
 import json
-import os
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +17,7 @@ import numpy as np
 
 from wakewise.core.errors import StageError
 from wakewise.core.interfaces import no_progress
+from wakewise.core.subprocesses import end_process, start_python
 from wakewise.operation import Scenario
 from wakewise.ui.cockpit.server import CockpitServer
 from wakewise.ui.cockpit.session import CockpitSession
@@ -112,19 +111,13 @@ def measure(
         )
     finally:
         for other in others:
-            other.kill()
-            other.wait()
-            if other.stdout is not None:
-                other.stdout.close()
+            end_process(other)
         session.stop()
         server.stop()
 
 
 def _python(code: str, *arguments: str) -> subprocess.Popen[str]:
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    return subprocess.Popen(
-        [sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE, text=True, env=environment
-    )
+    return start_python("-c", code, *arguments, stdin=None, stderr=None, text=True)
 
 
 _PAGE = """

@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import pickle
 import queue
-import signal
 import subprocess
 import sys
 import threading
@@ -23,6 +22,14 @@ from typing import IO, TYPE_CHECKING, Any
 from wakewise.core.errors import StageError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid
+from wakewise.core.subprocesses import (
+    end_process,
+    ignore_interrupt,
+    private_stdout,
+    read_message,
+    start_python,
+    write_message,
+)
 
 if TYPE_CHECKING:
     from wakewise.operation import Scenario
@@ -111,14 +118,7 @@ class LiveCamera:
 
     def start(self) -> None:
         """Start the process, which takes a few seconds to light its scene."""
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "wakewise.ui.cockpit.live_camera"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env=os.environ
-            | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path), "NUMBA_NUM_THREADS": "1"},
-        )
+        self._process = start_python("-m", "wakewise.ui.cockpit.live_camera", variables={"NUMBA_NUM_THREADS": "1"})
         threading.Thread(target=self._listen, args=(self._process.stdout,), name="pictures", daemon=True).start()
         self._send(pickle.dumps(self._begin))
         self._waited_for = 1  # its word that the scene is ready
@@ -147,12 +147,7 @@ class LiveCamera:
         """End the process."""
         process, self._process = self._process, None
         if process is not None:
-            process.kill()
-            process.wait()
-            for pipe in (process.stdin, process.stdout):
-                if pipe is not None:
-                    with suppress(OSError):
-                        pipe.close()
+            end_process(process)
 
     def _caught_up(self, timeout_s: float) -> bool:
         """Whether all that was asked for has been answered, within a time."""
@@ -170,28 +165,13 @@ class LiveCamera:
         assert self._process is not None
         assert self._process.stdin is not None
         with suppress(OSError):  # then it has ended, which the answers tell
-            _write(self._process.stdin, message)
+            write_message(self._process.stdin, message)
 
     def _listen(self, pipe: IO[bytes]) -> None:
         with suppress(OSError, ValueError):
-            while (answer := _read(pipe)) is not None:
+            while (answer := read_message(pipe)) is not None:
                 self._answers.put(answer)
         self._answers.put(None)
-
-
-def _write(pipe: IO[bytes], message: bytes) -> None:
-    pipe.write(len(message).to_bytes(8, "little") + message)
-    pipe.flush()
-
-
-def _read(pipe: IO[bytes]) -> bytes | None:
-    """The next message; None at the end."""
-    head = pipe.read(8)
-    if len(head) < 8:
-        return None
-    size = int.from_bytes(head, "little")
-    message = pipe.read(size)
-    return message if len(message) == size else None
 
 
 class PictureRenderer:
@@ -250,22 +230,19 @@ def serve(pipe: IO[bytes], answers: IO[bytes]) -> None:
     """Draw what is asked for until nobody asks any more: the other process."""
     import cv2
 
-    first = _read(pipe)
+    first = read_message(pipe)
     if first is None:
         return
     easel = PictureRenderer(*pickle.loads(first))
     easel.warm()
-    _write(answers, b"ready")
+    write_message(answers, b"ready")
     with suppress(OSError):
         os.nice(NICER)
-    while (message := _read(pipe)) is not None:
+    while (message := read_message(pipe)) is not None:
         image = easel.draw(pickle.loads(message))
-        _write(answers, cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes())
+        write_message(answers, cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes())
 
 
 if __name__ == "__main__":
-    with suppress(ValueError):
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started this ends it
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # whatever else is printed is no answer
-    serve(sys.stdin.buffer, answers)
+    ignore_interrupt()
+    serve(sys.stdin.buffer, private_stdout())

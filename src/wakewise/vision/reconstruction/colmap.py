@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 import pycolmap
 
 from wakewise.core.errors import EnvironmentFailure, StageError
+from wakewise.core.subprocesses import end_process, start_python
 
 __all__ = [
     "RESERVE_MB",
@@ -136,13 +137,7 @@ def call_apart(what: str, function: str, *arguments: Any, watch: Callable[[], No
     """
     order: bytes | None = pickle.dumps((function, arguments))
     # Its own session: a terminal's Ctrl-C goes to whoever waits for it, and that ends it.
-    child = subprocess.Popen(
-        [sys.executable, "-c", _APART],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-    )
+    child = start_python("-c", _APART, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, new_session=True)
     told = b""
     try:
         while True:
@@ -153,8 +148,7 @@ def call_apart(what: str, function: str, *arguments: Any, watch: Callable[[], No
                 order = None  # it has it
                 watch()
     finally:
-        child.kill()
-        child.communicate()
+        end_process(child)
     if child.returncode != 0:
         last = told.decode(errors="replace").strip().splitlines()[-1:] or [f"exit code {child.returncode}"]
         raise StageError(f"{what}: COLMAP stopped: {' '.join(last[0].split())[:200]}")
