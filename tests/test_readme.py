@@ -227,7 +227,7 @@ def test_the_draws_of_the_page_of_worlds_are_taken(tmp_path):
     (shown,) = blocks("docs/worlds.md", "yaml")
     (tmp_path / "my.yaml").write_text(shown, encoding="utf-8")
     scenario = load_scenario("quick", tmp_path / "my.yaml", {})
-    assert set(load_world("reef").draws) < set(scenario.draws)
+    assert set(load_world("reef").randomize) < set(scenario.randomize)
     first, second = (scenario.replace(seed=seed).drawn() for seed in (3, 4))
     assert scenario.mission.standoff_m == first.mission.standoff_m == 0.6
     for seen in (first, second):

@@ -205,7 +205,7 @@ def _mismatch(parts: Parts, options: BenchOptions) -> dict[str, dict[str, float]
         sensors = scenario.tank.sensors
         lasting = {
             name: tuple(ratio * v for v in getattr(sensors, name))
-            for name in ("pose_slow_m", "pose_slow_rad", "tracking_slow_m")
+            for name in ("pose_drift_m", "pose_drift_rad", "tracking_drift_m")
         }
         changed = sensors.model_copy(update=lasting | {"depth_bias_m": ratio * sensors.depth_bias_m})
         tank = scenario.tank.model_copy(update={"sensors": changed})

@@ -19,7 +19,7 @@ EYE = np.array([-0.7, 0.0, 1.4])
 def controller(seed=1, shift=(0.0, 0.0, 0.0)):
     points = CENTRE + np.array(shift) + np.random.default_rng(0).uniform(-0.1, 0.1, (60, 3))
     region = Region(points_W_m=points, weights=np.ones(60), distance_m=np.zeros(60))
-    return make_controller("manual", VEHICLE, region, wake_model("jet"), ControlSettings(person=seed))
+    return make_controller("manual", VEHICLE, region, wake_model("jet"), ControlSettings(operator_seed=seed))
 
 
 def commands(hand, estimates, goals):

@@ -132,7 +132,7 @@ def test_a_part_given_in_python_is_named_in_the_record(installed: Path, tmp_path
     mine = parts.replace(controller=reef_parts.stern_only(task))
     left = resolved_scenario(mine)
     assert left.method == "stern-only"
-    assert left.replaced == {"controller": "stern-only (reef_parts.SternOnly)"}
+    assert left.overrides == {"controller": "stern-only (reef_parts.SternOnly)"}
     assert ww.Scenario.model_validate(left.model_dump()) == left
 
 

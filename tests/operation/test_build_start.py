@@ -36,7 +36,7 @@ def refused(capsys, *arguments):
         ),
         (["control.obstacles=[[0.8, 0, 1.1, 0.3]]"], ["start", "obstacle 1", "control.obstacles"]),
         (["control.obstacles=[[-0.5, 0, 1.2, 0.1]]"], ["mission at", "obstacle 1", "control.obstacles"]),
-        (["target.delicate_gain=-2"], ["target.delicate_gain", "-2"]),
+        (["target.fragility_gain=-2"], ["target.fragility_gain", "-2"]),
     ],
 )
 def test_a_mission_that_cannot_be_flown_is_refused(sets, words, capsys, tmp_path, monkeypatch):

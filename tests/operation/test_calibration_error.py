@@ -16,7 +16,12 @@ from wakewise.simulation.water import AiryWave, AmbientSum, SteadyCurrent
 from wakewise.vision.imaging import calibrate
 
 ORDERS = ("plain", "current")
-EXACT = {"survey.place_m": 0.0, "survey.focal_pct": 0.0, "survey.centre_pct": 0.0, "survey.distortion": 0.0}
+EXACT = {
+    "calibration_error.target_position_m": 0.0,
+    "calibration_error.focal_length_pct": 0.0,
+    "calibration_error.principal_point_pct": 0.0,
+    "calibration_error.distortion": 0.0,
+}
 
 
 def test_the_target_is_taken_to_be_where_it_is_not():
@@ -69,7 +74,7 @@ def test_a_calibration_is_as_far_off_as_stated():
 
 
 @pytest.mark.parametrize(
-    "bad", [{"place_m": -0.1}, {"place_m": 1.0}, {"focal_pct": 50.0}, {"distortion": float("nan")}]
+    "bad", [{"place_m": -0.1}, {"place_m": 1.0}, {"focal_length_pct": 50.0}, {"distortion": float("nan")}]
 )
 def test_bad_values_do_not_become_settings(bad):
     """Out of range or no number."""

@@ -29,7 +29,7 @@ def test_what_depends_on_a_replaced_part_is_made_anew():
     assert other.controller is not ours and parts.controller is ours
     assert other.world.vehicle.name == "bluerov2-heavy" and parts.vehicle.name == "paper"
     assert other.target is not parts.target and np.array_equal(other.target.mesh.faces, parts.target.mesh.faces)
-    assert other.replaced == {"vehicle": "bluerov2-heavy (wakewise.robot.vehicles.vehicle.Vehicle)"}
+    assert other.overrides == {"vehicle": "bluerov2-heavy (wakewise.robot.vehicles.vehicle.Vehicle)"}
 
 
 def test_fields_of_the_scenario_can_be_replaced_beside_parts():
@@ -69,7 +69,7 @@ def test_the_record_of_a_controller_of_ones_own_can_be_read(tmp_path):
     left = resolved_scenario(QUICK.parts().replace(controller=Mine()))
     write_scenario(tmp_path / "scenario.yaml", left, {})
     again = read_scenario(tmp_path / "scenario.yaml")
-    assert again == left and (again.method, list(again.replaced)) == ("mine", ["controller"])
+    assert again == left and (again.method, list(again.overrides)) == ("mine", ["controller"])
     with pytest.raises(InputError, match="controller: was given in Python"):
         _ = again.parts().controller
     with pytest.raises(InputError, match="method: found 'mine'"):

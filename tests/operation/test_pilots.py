@@ -10,15 +10,15 @@ from wakewise_paper.wash_reduction.flight import WashTrial, fly_trial
 @pytest.mark.parametrize("stray", [0.02, 0.1, None])
 def test_a_mission_s_goals_promise_what_the_mission_says(stray):
     """The setting reaches every goal; null promises nothing, and 2 % is what nobody has to ask for."""
-    settings = {} if stray == 0.02 else {"mission.stray": stray}
+    settings = {} if stray == 0.02 else {"mission.max_tracking_deviation": stray}
     parts = Scenario.preset("quick", **settings).parts()
-    assert parts.pilot.goal(3.0, parts.start).stray == stray
+    assert parts.pilot.goal(3.0, parts.start).max_tracking_deviation == stray
 
 
 def test_a_promise_of_nothing_or_of_all_is_refused():
     """0 could not be kept by any plan."""
-    with pytest.raises(InputError, match="stray"):
-        Scenario.preset("quick", **{"mission.stray": 0.0})
+    with pytest.raises(InputError, match="max_tracking_deviation"):
+        Scenario.preset("quick", **{"mission.max_tracking_deviation": 0.0})
 
 
 @pytest.mark.slow

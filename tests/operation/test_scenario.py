@@ -9,7 +9,6 @@ from pydantic import BaseModel
 
 from wakewise.core.errors import InputError
 from wakewise.operation import PRESETS, Scenario, differences, load_scenario, parse_overrides, read_scenario
-from wakewise.operation.renamed import GONE, METHODS_GONE, RENAMED, became
 from wakewise.operation.scenario import dump_scenario
 
 
@@ -171,62 +170,6 @@ def test_a_speed_that_takes_months_is_refused(field: str, value: float) -> None:
         load_scenario("quick", None, {field: value})
 
 
-OLD_FIELDS = {
-    "": "name seed method vehicle",
-    "target": "kind size_m seed points delicate_gain",
-    "mission": "elevations_deg views standoff_m speed_m_s acceleration_m_s2 approach_m settle_s clearance_m",
-    "control": (
-        "rate_hz kp_N_m kd_N_s_m ki_N_m_s estimator_lag_s gyro_lag_s integral_share hold_s w_disturbance "
-        "w_effort w_previous obstacles"
-    ),
-    "control.wake": (
-        "model sum floor edge_width_deg gain decay_power cosine_power soft_radius_m half_width_slope decay "
-        "virtual_origin_diameters start_width_diameters"
-    ),
-    "control.plan": (
-        "stages stage_s plan_hz w_disturbance w_effort w_change w_track w_path w_attitude w_twist w_time "
-        "attitude_tolerance_rad rate_limit_N_s rho smooth_N edge_width_deg superposition quiet_gain "
-        "exposure_s travel persistence clearance_m barrier_reach_m iterations tolerance second_start_every "
-        "deadline_s"
-    ),
-    "control.levers": (
-        "bed bed_points bed_radius_m bed_weight halo halo_points halo_m halo_weight quiet quiet_gain "
-        "quiet_lead_s incoherent tilt_deg level_deg spare meet drift drift_m_s drift_s drift_spread_m_s "
-        "drift_points drift_weight"
-    ),
-    "estimation": (
-        "position_std_m attitude_std_rad tracking_std_m gyro_std_rad_s accelerometer_std_m_s2 depth_std_m "
-        "gyro_bias_std_rad_s gyro_bias_walk_rad_s2 accelerometer_bias_std_m_s2 accelerometer_bias_walk_m_s3 "
-        "acceleration_noise_m_s2 turning_noise_rad_s2 gain_std drag_std inertia_std current_std_m_s lasting_s "
-        "pose_slow_std_m pose_slow_std_rad pose_slow_s force_std_N force_walk_N moment_std_N_m "
-        "moment_walk_N_m start_std_m start_std_rad start_std_m_s start_std_rad_s settle_s gate gate_patience"
-    ),
-    "tank": (
-        "size_m density_kg_m3 current_m_s current_file current_file_from_s current_file_to_s "
-        "current_file_gain current_file_gap_s wave_amplitude_m wave_period_s wave_heading_deg pump_speed_m_s "
-        "pump_diameter_m pump_at_m pump_towards background_m_s background_length_m turbulence swirl "
-        "flow_step_s max_parcels water silt grain_m grain_density_kg_m3 suspended_mg_l pickup erosion_kg_m2_s "
-        "erosion_threshold_Pa max_silt_particles trim_N trim_range_N mass_pct damping_pct added_mass_pct "
-        "thrust_pct failures inflow_loss tether_diameter_m tether_length_m tether_from_m tether_at_B_m "
-        "plant_step_s pose_rate_hz pose_noise_m pose_noise_rad pose_latency_s pose_dropout pose_range_m "
-        "pose_outages_s tracking_rate_hz tracking_noise_m tracking_latency_s imu_rate_hz gyro_noise_rad_s "
-        "gyro_bias_rad_s accelerometer_noise_m_s2 accelerometer_bias_m_s2 depth_rate_hz depth_noise_m"
-    ),
-    "imaging": (
-        "width height fov_deg exposure_s instants samples distortion port_air_m port_glass_m port_index "
-        "water_type ambient panels lamp lamp_offset_m gain flakes_per_m3 flakes_per_kg electrons_per_s "
-        "photo_format jpeg_quality read_noise_e"
-    ),
-    "reconstruction": (
-        "detector max_features first_octave peak_threshold matching exhaustive_up_to sequence_overlap "
-        "pose_neighbours mapper bundle_iterations reprojection_px refine_camera position_priors prior_sigma_m "
-        "min_registered dense dense_px dense_zoom stereo_paths stereo_partners agreeing_views agreement_px "
-        "mesh mesh_depth threads random_seed"
-    ),
-}
-"""Every field that a scenario had before research log 0018, by group."""
-
-
 def leaves(model: type[BaseModel], prefix: str = "") -> list[str]:
     """Dotted names of the fields that hold values."""
     names: list[str] = []
@@ -240,40 +183,6 @@ def leaves(model: type[BaseModel], prefix: str = "") -> list[str]:
 def test_a_scenario_has_at_most_220_fields() -> None:
     """What nobody would set, and no world, test, bench, study or document varies, is a constant with its argument."""
     assert len(leaves(Scenario)) <= 220
-
-
-def test_every_field_of_an_older_scenario_is_still_one_or_is_told_what_became_of_it() -> None:
-    """229 old names: each is a field, or the table says its new name, which exists, or why it is gone."""
-    old = [f"{group}.{name}".lstrip(".") for group, names in OLD_FIELDS.items() for name in names.split()]
-    new = set(leaves(Scenario))
-    assert len(old) == len(set(old)) == 229
-    for name in old:
-        assert (name in new) + (name in RENAMED) + (name in GONE) == 1, name
-    assert set(RENAMED) | set(GONE) <= set(old)
-    assert set(RENAMED.values()) <= new
-
-
-@pytest.mark.parametrize("name", [*RENAMED, *GONE])
-def test_an_old_name_is_refused_with_what_became_of_it(name: str) -> None:
-    """In one line, whichever value the older scenario had there."""
-    with pytest.raises(InputError) as caught:
-        load_scenario("quick", None, {name: 0.1})
-    message = str(caught.value)
-    assert message == f"scenario: {name}: {(RENAMED.get(name) and 'now ' + RENAMED[name]) or GONE[name]}"
-
-
-def test_all_old_names_of_a_file_are_told_at_once_and_new_groups_are_not_taken_for_old_names() -> None:
-    """A file of before names each of its old fields; `tank.silt` with fields of its own is the group of now."""
-    with pytest.raises(
-        InputError, match=r"tank\.trim_N: now tank\.mismatch\.trim_N; tank\.water: now tank\.silt\.kind"
-    ):
-        load_scenario(None, None, {"tank.trim_N": 0.3, "tank.water": "clear", "seed": 2})
-    assert became("tank.silt", {"load_kg_m2": 0.2}) is None
-    with pytest.raises(InputError, match=r"tank\.silt: now tank\.silt\.load_kg_m2"):
-        load_scenario(None, None, {"tank.silt": 0.3})
-    for method, words in METHODS_GONE.items():
-        with pytest.raises(InputError, match=words.split(":")[0]):
-            load_scenario(None, None, {"method": method})
 
 
 def test_a_scenario_without_a_preset_is_gentle() -> None:

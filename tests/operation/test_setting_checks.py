@@ -36,10 +36,10 @@ def test_levers_that_need_another_are_named():
         (
             "allocation-only",
             {"control.obstacles": [[2.0, 2.0, 1.0, 0.1]]},
-            "control.obstacles: not kept clear of by instant",
+            "control.obstacles: not kept clear of by allocation-only",
         ),
         ("dp", {"control.plan.w_track": 100.0}, "control.plan: nothing for dp"),
-        ("dp", {"control.person": 3}, "control.person: nobody flies dp by hand"),
+        ("dp", {"control.operator_seed": 3}, "control.operator_seed: nobody flies dp by hand"),
         (
             "dp",
             {"control.pulse_s": 0.1, "tank.ideal_thrusters": True},
@@ -50,7 +50,7 @@ def test_levers_that_need_another_are_named():
 def test_a_setting_without_a_use_is_said(method, changes, words):
     """With its field and why; where it has a use nothing is said."""
     assert words in said(method, **changes)
-    used = {"control.person": "manual", "control.levers.bed": "wake-aware"}
+    used = {"control.operator_seed": "manual", "control.levers.bed": "wake-aware"}
     other = used.get(next(iter(changes)), "wake-aware")
     if "ideal" not in str(changes):
         assert said(other, **changes) == ""

@@ -40,8 +40,8 @@ def test_soft_kinds_bend_by_themselves_and_others_are_rigid():
     assert scenario().target.tissue is None
     assert scenario().parts().yielding is None
     assert scenario(kind="gorgonian").target.tissue == TISSUES["gorgonian"]
-    assert scenario(kind="gorgonian", sway="none").target.tissue is None
-    assert scenario(kind="brain", sway="soft-coral").target.tissue == TISSUES["soft-coral"]
+    assert scenario(kind="gorgonian", elasticity="none").target.tissue is None
+    assert scenario(kind="brain", elasticity="soft-coral").target.tissue == TISSUES["soft-coral"]
 
 
 def test_a_tissue_can_be_given_numbers_of_its_own():
@@ -50,7 +50,7 @@ def test_a_tissue_can_be_given_numbers_of_its_own():
     assert (own.stiffness_Pa, own.density_kg_m3, own.drag, own.damping) == (5e6, 1100.0, 1.0, 0.2)
     with pytest.raises(InputError, match="drag is of a target that bends or lies loose"):
         scenario(drag=1.0)
-    with pytest.raises(InputError, match="stiffness_Pa is of a target that bends: let sway be one of anemone"):
+    with pytest.raises(InputError, match="stiffness_Pa is of a target that bends: let elasticity be one of anemone"):
         scenario(stiffness_Pa=5e6)
 
 
@@ -124,9 +124,9 @@ def test_what_cannot_be_moved_is_refused_beforehand():
     fast = scenario(kind="seagrass").replace(**{"tank.current.velocity_m_s": [0.1, 0.0, 0.0]})
     with pytest.raises(InputError, match=r"current of 0\.1 m/s bends seagrass"):
         check_target(fast.parts())
-    check_target(scenario(loose={"weight_N": 1.0}).parts())
-    with pytest.raises(InputError, match=r"target.loose: a current of 0\.036 m/s pushes branching"):
-        check_target(scenario(loose={"weight_N": 0.001}).parts())
+    check_target(scenario(unanchored={"weight_N": 1.0}).parts())
+    with pytest.raises(InputError, match=r"target.unanchored: a current of 0\.036 m/s pushes branching"):
+        check_target(scenario(unanchored={"weight_N": 0.001}).parts())
 
 
 @pytest.mark.parametrize("world", ["paper", "lattice"])
@@ -134,7 +134,7 @@ def test_worlds_without_a_moving_target_say_so(world):
     """They would show it at rest, so a soft or loose one is refused there."""
     with pytest.raises(InputError, match="holds its target still"):
         _ = scenario(kind="gorgonian").replace(world=world).parts().world
-    loose = scenario(loose={"weight_N": 1.0}).replace(world=world)
+    loose = scenario(unanchored={"weight_N": 1.0}).replace(world=world)
     with pytest.raises(InputError, match="holds its target still"):
         _ = loose.parts().world
 

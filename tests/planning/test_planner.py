@@ -151,11 +151,11 @@ def test_obedience_is_the_dial_of_the_tracking_weights():
     asked, strict = problem(), Planner(model(**scaled_tracking(PlanSettings(), 20.0).model_dump()))
     dial, usual = Planner(model()), Planner(model())
     for obedience, other in ((4.0, strict), (1.0, usual)):
-        asked = replace(asked, obedience=obedience)
+        asked = replace(asked, tracking_weight_scale=obedience)
         dial.load(asked)
-        other.load(replace(asked, obedience=1.0))
+        other.load(replace(asked, tracking_weight_scale=1.0))
         assert dial.cost(START) == other.cost(START)
-    turned = Planner(model()).plan(replace(asked, obedience=4.0), START)
+    turned = Planner(model()).plan(replace(asked, tracking_weight_scale=4.0), START)
     wished = asked.reference[-1, :3]
     off = [np.linalg.norm(plan.states[-1, :3] - wished) for plan in (turned, usual.plan(asked, START))]
     assert off[0] < off[1]
@@ -164,8 +164,8 @@ def test_obedience_is_the_dial_of_the_tracking_weights():
 @pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf")])
 def test_an_obedience_that_means_nothing_is_refused_before_it_is_planned(bad):
     """Zero, negative, not finite; the planner's guard then falls back and says so."""
-    with pytest.raises(InputError, match="obedience"):
-        replace(problem(), obedience=bad)
+    with pytest.raises(InputError, match="tracking_weight_scale"):
+        replace(problem(), tracking_weight_scale=bad)
 
 
 def test_a_start_that_tumbles_is_not_where_a_plan_ends():

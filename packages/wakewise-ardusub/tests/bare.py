@@ -1,4 +1,4 @@
-"""A fresh Python in which nothing can be imported but the standard library, NumPy, pymavlink and this package."""
+"""A new Python process that can import the standard library, NumPy, pymavlink and the two Wakewise packages only."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-SOURCE = Path(__file__).parents[3] / "src"
+SOURCES = (Path(__file__).parents[1] / "src", Path(__file__).parents[3] / "src")
 GATE = """
 import sys
 class Gate:
-    allowed = frozenset(sys.stdlib_module_names) | {"numpy", "pymavlink", "fastcrc", "wakewise"}
+    allowed = frozenset(sys.stdlib_module_names) | {"numpy", "pymavlink", "fastcrc", "wakewise", "wakewise_ardusub"}
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] not in self.allowed:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
@@ -26,8 +26,8 @@ def command(code: str, *arguments: str) -> list[str]:
 
 
 def environment() -> dict[str, str]:
-    """The package from its source, whatever is installed."""
-    return os.environ | {"PYTHONPATH": str(SOURCE)}
+    """Both packages from their sources, whatever is installed."""
+    return os.environ | {"PYTHONPATH": os.pathsep.join(map(str, SOURCES))}
 
 
 def bare(code: str, *arguments: str) -> str:

@@ -139,7 +139,7 @@ def manual(
     """`manual`: the person whom the trial's seed draws; the wake model is only asked what D the thrusts cause."""
     pid, layout = make_pid(vehicle, settings), vehicle_layout(vehicle)
     motion = ManualStage(
-        person=sample_operator(settings.person or 0, vehicle_sticks(vehicle, pid)),
+        person=sample_operator(settings.operator_seed or 0, vehicle_sticks(vehicle, pid)),
         pid=pid,
         X_BC=vehicle.X_BC,
         middle_W_m=np.average(region.points_W_m, axis=0, weights=region.weights),

@@ -13,8 +13,8 @@ back: 22 N of current at 6 deg push 2 N aside (docs/research-log/0080). The PID'
 
 Tracking weights. Weights alone do not bound how far a plan leaves its reference: that depends on how heavy the vehicle
 is and how near. Above a target and 5 N heavy, a plan with the paper's w_track = 5 left four fifths of the way undone
-and saved a tenth of the wash. So where a goal states a limit (`Goal.stray`), the weights are scaled from plan to plan
-until the deviation over the next `DEVIATION_S` keeps it.
+and saved a tenth of the wash. So where a goal states a limit (`Goal.max_tracking_deviation`), the weights are scaled
+from plan to plan until the deviation over the next `DEVIATION_S` keeps it.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ class MpcStage(MotionStage):
                 reference=reference,
                 force_W_N=force_W,
                 moment_B_Nm=estimate.load_B[3:],
-                obedience=goal.obedience * state.tracking_scale,
+                tracking_weight_scale=goal.tracking_weight_scale * state.tracking_scale,
             )
 
         found = self.planner.ask(make, state.plan, state.plan_age_s)
@@ -164,7 +164,7 @@ class MpcStage(MotionStage):
         return replace(
             state,
             plan=found.plan,
-            tracking_scale=scale_tracking(state.tracking_scale, deviation, goal.stray),
+            tracking_scale=scale_tracking(state.tracking_scale, deviation, goal.max_tracking_deviation),
             correction_gain=correction_gain(self.model, found.plan),
             plan_age_s=0.0,
             plan_thrusts_N=thrusts,

@@ -109,7 +109,7 @@ class ControlSettings(Settings):
     levers: LeverSettings = Field(
         default=LeverSettings(), description="what `wake-aware` and `allocation-only` use beyond the free jet"
     )
-    person: int | None = Field(
+    operator_seed: int | None = Field(
         default=None,
         ge=0,
         description="who flies `manual`, or is the pilot `human` or `assisted`, by number; none = the one whom the "
@@ -124,4 +124,4 @@ class ControlSettings(Settings):
 
 def flown_by(settings: ControlSettings, seed: int) -> ControlSettings:
     """The settings with the person whom a seed draws, unless they name one."""
-    return settings if settings.person is not None else settings.model_copy(update={"person": seed})
+    return settings if settings.operator_seed is not None else settings.model_copy(update={"operator_seed": seed})

@@ -69,17 +69,18 @@ class Goal:
     """What the mission or the pilot wants now.
 
     `nu_B` is the wished twist, expressed in the goal's own body frame, shape (6,). `tilt_rad` is the wished angle
-    of the camera's joint, positive upwards, 0 where the camera is fixed. `obedience`, more than 0, is how closely the
-    goal is to be followed where that can be traded for still water: planners weigh their tracking by this many times
-    what their settings say; other methods follow as closely as they can. `stray` is the largest share of the way asked
-    for that a plan should leave undone for the water's sake; None: as much as the weights say.
+    of the camera's joint, positive upwards, 0 where the camera is fixed. `tracking_weight_scale`, more than 0, is how
+    closely the goal is to be followed where that can be traded for still water: planners weigh their tracking by this
+    many times what their settings say; other methods follow as closely as they can. `max_tracking_deviation` is the
+    largest share of the way asked for that a plan should leave undone for the water's sake; None: as much as the
+    weights say.
     """
 
     X_WB: Pose
     nu_B: Array = field(default_factory=lambda: np.zeros(6))
     tilt_rad: float = 0.0
-    obedience: float = 1.0
-    stray: float | None = None
+    tracking_weight_scale: float = 1.0
+    max_tracking_deviation: float | None = None
 
     def __post_init__(self) -> None:
         instance_of(self.X_WB, Pose, "X_WB")

@@ -2,7 +2,7 @@
 
 Start reading in `parts.py` (what a flight is built from, and the one place where the controller's world and the true
 one meet) and `loop.py` (the loop itself). `scenario.py` with `scenario.py` is a maker of parts, read from YAML
-(`renamed.py` knows the names of older files) with `randomization.py` (what its seed draws), `randomization.py` its
+with `randomization.py` (what its seed draws), `randomization.py` its
 random streams, `parts.py` keeps what takes long to draw; `worlds/` and `pilot_makers.py` are worlds and pilots by name,
 `instant_water.py` and `lattice_water.py` worlds other than the tank, `calibration_error.py` what is known of target and
 camera beforehand; `preflight.py` is what a planner is told to keep clear of, `preflight.py` refuses what does not fit,

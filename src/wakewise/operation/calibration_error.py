@@ -36,9 +36,11 @@ class CalibrationErrorSettings(Settings):
     0.2 %, an estimate.
     """
 
-    place_m: float = Field(0.005, ge=0.0, le=0.2, description="error of the target's place, one sigma per axis")
-    focal_pct: float = Field(0.2, ge=0.0, le=10.0, description="error of the focal length, one sigma")
-    centre_pct: float = Field(
+    target_position_m: float = Field(
+        0.005, ge=0.0, le=0.2, description="error of the target's place, one sigma per axis"
+    )
+    focal_length_pct: float = Field(0.2, ge=0.0, le=10.0, description="error of the focal length, one sigma")
+    principal_point_pct: float = Field(
         0.15, ge=0.0, le=5.0, description="error of the principal point, one sigma per axis, of the image's width"
     )
     distortion: float = Field(
@@ -46,17 +48,20 @@ class CalibrationErrorSettings(Settings):
     )
 
 
-def target_with_error(target: Target, survey: CalibrationErrorSettings, rng: np.random.Generator) -> Target:
+def target_with_error(target: Target, errors: CalibrationErrorSettings, rng: np.random.Generator) -> Target:
     """The target where the crew takes it to be; its shape, and the bed, are known."""
-    return target.moved(rng.normal(0.0, survey.place_m, 3))
+    return target.moved(rng.normal(0.0, errors.target_position_m, 3))
 
 
 def calibration_with_error(
-    true: OpenCVCamera, survey: CalibrationErrorSettings, rng: np.random.Generator
+    true: OpenCVCamera, errors: CalibrationErrorSettings, rng: np.random.Generator
 ) -> OpenCVCamera:
     """The calibration that the crew has of a camera; its true one is in camera.json alone."""
-    focal, centre = rng.normal(0.0, 0.01 * survey.focal_pct), rng.normal(0.0, 0.01 * survey.centre_pct * true.width, 2)
-    bend = survey.distortion * np.array([1.0, 2.0, 0.25, 0.25]) * rng.normal(size=4)
+    focal, centre = (
+        rng.normal(0.0, 0.01 * errors.focal_length_pct),
+        rng.normal(0.0, 0.01 * errors.principal_point_pct * true.width, 2),
+    )
+    bend = errors.distortion * np.array([1.0, 2.0, 0.25, 0.25]) * rng.normal(size=4)
     params = np.concatenate([true.params[:2] * (1.0 + focal), true.params[2:4] + centre, true.params[4:] + bend])
     return replace(true, params=params)
 

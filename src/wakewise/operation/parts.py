@@ -52,7 +52,7 @@ _kept: dict[bytes, Region] = {}
 _one_at_a_time = Lock()
 
 
-def region_of(target: Target, points: int, seeds: Seeds, delicate_gain: float = 0.0) -> Region:
+def region_of(target: Target, points: int, seeds: Seeds, fragility_gain: float = 0.0) -> Region:
     """Points that stand for the water round a target; asking again for the same is answered from memory.
 
     Parameters
@@ -61,7 +61,7 @@ def region_of(target: Target, points: int, seeds: Seeds, delicate_gain: float = 
         What counts is its shape and place, not which object it is.
     points : int
     seeds : Seeds
-    delicate_gain : float
+    fragility_gain : float
         Above 0 the target's delicate features are found and weighted, see `sample_region`.
 
     Raises
@@ -69,21 +69,21 @@ def region_of(target: Target, points: int, seeds: Seeds, delicate_gain: float = 
     InputError
         As `sample_region`.
     """
-    key = _fingerprint(target, points, seeds, delicate_gain)
+    key = _fingerprint(target, points, seeds, fragility_gain)
     with _one_at_a_time:
         found = _kept.pop(key, None)
         if found is None:
-            marks = find_fragility(target.mesh) if delicate_gain > 0.0 else None
-            found = sample_region(target, points, seeds.region(), marks, delicate_gain)
+            marks = find_fragility(target.mesh) if fragility_gain > 0.0 else None
+            found = sample_region(target, points, seeds.region(), marks, fragility_gain)
         _kept[key] = found  # the last one asked for is the last to go
         while len(_kept) > MOST_KEPT:
             del _kept[next(iter(_kept))]
         return found
 
 
-def _fingerprint(target: Target, points: int, seeds: Seeds, delicate_gain: float) -> bytes:
+def _fingerprint(target: Target, points: int, seeds: Seeds, fragility_gain: float) -> bytes:
     """Of all that the points follow from; the name stands in errors only, of which nothing is kept."""
-    told = blake2b(repr((points, seeds.seed, float(delicate_gain), target.bed_z_m, target.radius_m)).encode())
+    told = blake2b(repr((points, seeds.seed, float(fragility_gain), target.bed_z_m, target.radius_m)).encode())
     for values in (target.mesh.vertices_m, target.mesh.faces, target.centre_W_m):
         told.update(repr(values.shape).encode())
         told.update(np.ascontiguousarray(values).data)
@@ -109,7 +109,7 @@ class part(cached_property[T]):  # noqa: N801  (a decorator, like cached_propert
         if self.attrname in instance.given:
             given: T = instance.given[self.attrname]
             return given
-        once = instance.scenario.replaced.get(self.attrname or "")
+        once = instance.scenario.overrides.get(self.attrname or "")
         if once is not None:  # the scenario of a trial that was flown with another part than it can name
             raise InputError(
                 f"{self.attrname}: was given in Python ({once}), which a scenario's file cannot hold; "
@@ -205,7 +205,7 @@ class Parts:
         return Parts(scenario, {**(kept if "method" in fields else self.given), **given})
 
     @property
-    def replaced(self) -> dict[str, str]:
+    def overrides(self) -> dict[str, str]:
         """What was put in place of the scenario's own parts, in words, by name."""
         return {name: described(value) for name, value in self.given.items()}
 
@@ -240,17 +240,17 @@ class Parts:
     def found_target(self) -> Target:
         """The target where mission, controller and reconstruction take it to be (see `operation.survey`)."""
         place_rng, _ = self.seeds.survey()
-        return target_with_error(self.target, self.scenario.survey, place_rng)
+        return target_with_error(self.target, self.scenario.calibration_error, place_rng)
 
     @cached_property
     def yielding(self) -> TargetCompliance | None:
         """How the target gives way to the water; None of one that nothing moves."""
         settings = self.scenario.target
         tissue = settings.tissue
-        weight_N = settings.loose.weight_N
+        weight_N = settings.unanchored.weight_N
         if tissue is None and weight_N is None:
             return None
-        loose = None if weight_N is None else UnanchoredTarget(weight_N=weight_N, friction=settings.loose.friction)
+        loose = None if weight_N is None else UnanchoredTarget(weight_N=weight_N, friction=settings.unanchored.friction)
         drag = tissue.drag if tissue is not None else settings.drag or DRAG
         sway = None if tissue is None else BendingModes.of(self.target, tissue, self.scenario.tank.density_kg_m3)
         return TargetCompliance(drag=drag, sway=sway, loose=loose)
@@ -259,7 +259,7 @@ class Parts:
     def region(self) -> Region:
         """Points that stand for the water round the target, where it is taken to be."""
         settings = self.scenario.target
-        return region_of(self.found_target, settings.points, self.seeds, settings.delicate_gain)
+        return region_of(self.found_target, settings.points, self.seeds, settings.fragility_gain)
 
     @part
     def route(self) -> Route:

@@ -48,7 +48,7 @@ def photograph_flight(parts: Parts, folder: Path, progress: Callable[..., None] 
     exposures = read_exposures(folder / "exposures.npz")
     calibration = calibrate(parts.camera)
     calibration.write(folder)
-    known = calibration_with_error(calibration, parts.scenario.survey, parts.seeds.survey()[1])
+    known = calibration_with_error(calibration, parts.scenario.calibration_error, parts.seeds.survey()[1])
     write_text(folder / "cameras.txt", known.cameras_txt("As the crew knows it; the true one is in camera.json"))
     rows = []
     for k, exposure in enumerate(exposures):

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 def route_pilot(parts: Parts) -> RoutePilot:
     """`route`: follows the mission's route by the clock."""
-    return RoutePilot(route=parts.route, aim=parts.aim, stray=parts.scenario.mission.stray)
+    return RoutePilot(
+        route=parts.route, aim=parts.aim, max_tracking_deviation=parts.scenario.mission.max_tracking_deviation
+    )
 
 
 def human_pilot(parts: Parts) -> HumanPilot:
@@ -29,7 +31,7 @@ def human_pilot(parts: Parts) -> HumanPilot:
         X_BC=parts.vehicle.X_BC,
         target_W_m=parts.target.centre_W_m,
         dt_s=1.0 / parts.control.rate_hz,
-        seed=parts.control.person or 0,
+        seed=parts.control.operator_seed or 0,
     )
 
 
@@ -44,9 +46,9 @@ def operator_pilot(parts: Parts) -> Pilot:
     from wakewise.operation.teleop.assisted import assisted_pilot
     from wakewise.operation.teleop.operator_state import OperatorState
 
-    if parts.scenario.controls is None:
+    if parts.scenario.control_log is None:
         raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or name a record in controls")
-    return assisted_pilot(parts, read_input(Path(parts.scenario.controls)), OperatorState())
+    return assisted_pilot(parts, read_input(Path(parts.scenario.control_log)), OperatorState())
 
 
 def assisted_person(parts: Parts) -> Pilot:
@@ -60,7 +62,7 @@ def assisted_person(parts: Parts) -> Pilot:
         X_BC=parts.vehicle.X_BC,
         target_W_m=parts.target.centre_W_m,
         dt_s=1.0 / parts.control.rate_hz,
-        seed=parts.control.person or 0,
+        seed=parts.control.operator_seed or 0,
     )
     begin = OperatorSettings(mode="operator")
     return assisted_pilot(parts, hands, OperatorState(begin), begin)

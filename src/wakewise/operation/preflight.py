@@ -80,8 +80,8 @@ def ineffective_settings(scenario: Scenario, vehicle: Vehicle) -> tuple[str, ...
                 found.append(f"control.obstacles: not kept clear of by {method}, which does not plan")
             if control.plan != PlanSettings():
                 found.append(f"control.plan: nothing for {method}, which does not plan")
-        if control.person is not None and method != "manual" and scenario.pilot not in ("human", "assisted"):
-            found.append(f"control.person: nobody flies {method} by hand with the pilot {scenario.pilot}")
+        if control.operator_seed is not None and method != "manual" and scenario.pilot not in ("human", "assisted"):
+            found.append(f"control.operator_seed: nobody flies {method} by hand with the pilot {scenario.pilot}")
     if control.pulse_s is not None and vehicle.thrust_steps is None:
         found.append(f"control.pulse_s: the thrusters of {vehicle.name} hold any thrust, so none is sent as pulses")
     return tuple(found)

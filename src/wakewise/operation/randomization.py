@@ -25,54 +25,58 @@ _SIGNIFICANT = 6  # digits that a drawn number keeps, so that a file holds what 
 class FieldDistribution(Settings):
     """Where a field's value comes from; written as one of these keys, or as a list of two numbers for `between`."""
 
-    between: tuple[float, float] | None = Field(None, description="evenly between two numbers")
-    in_log: tuple[float, float] | None = Field(None, description="evenly in the logarithm between two positive numbers")
-    any_of: tuple[Any, ...] | None = Field(None, min_length=1, description="any of these, each as likely")
-    level: tuple[float, float] | None = Field(
+    uniform: tuple[float, float] | None = Field(None, description="evenly between two numbers")
+    log_uniform: tuple[float, float] | None = Field(
+        None, description="evenly in the logarithm between two positive numbers"
+    )
+    choice: tuple[Any, ...] | None = Field(None, min_length=1, description="any of these, each as likely")
+    horizontal: tuple[float, float] | None = Field(
         None, description="a vector north, east, down: its size evenly between two numbers, level, to any side"
     )
 
     @model_validator(mode="before")
     @classmethod
     def _two_numbers(cls, given: Any) -> Any:
-        return {"between": given} if isinstance(given, list | tuple) else given
+        return {"uniform": given} if isinstance(given, list | tuple) else given
 
     @model_validator(mode="after")
     def _says_one_thing(self) -> FieldDistribution:
         given = [name for name in type(self).model_fields if getattr(self, name) is not None]
         if len(given) != 1:
-            raise ValueError(f"gives {', '.join(given) or 'nothing'}, must give one of between, in_log, any_of, level")
-        for name in ("between", "in_log", "level"):
+            raise ValueError(
+                f"gives {', '.join(given) or 'nothing'}, must give one of between, log_uniform, choice, level"
+            )
+        for name in ("uniform", "log_uniform", "horizontal"):
             ends = getattr(self, name)
             if ends is not None and ends[0] > ends[1]:
                 raise ValueError(f"{name}: from {ends[0]:g} to {ends[1]:g}, the smaller number comes first")
-        if self.in_log is not None and self.in_log[0] <= 0.0:
-            raise ValueError(f"in_log: begins at {self.in_log[0]:g}, must be more than 0")
-        if self.level is not None and self.level[0] < 0.0:
-            raise ValueError(f"level: begins at {self.level[0]:g}, a size is 0 or more")
+        if self.log_uniform is not None and self.log_uniform[0] <= 0.0:
+            raise ValueError(f"log_uniform: begins at {self.log_uniform[0]:g}, must be more than 0")
+        if self.horizontal is not None and self.horizontal[0] < 0.0:
+            raise ValueError(f"horizontal: begins at {self.horizontal[0]:g}, a size is 0 or more")
         return self
 
     def value(self, rng: np.random.Generator) -> Any:
         """A value from here: a number, a list of three numbers, or one of those listed."""
-        if self.between is not None:
-            return _rounded(rng.uniform(*self.between))
-        if self.in_log is not None:
-            return _rounded(math.exp(rng.uniform(math.log(self.in_log[0]), math.log(self.in_log[1]))))
-        if self.level is not None:
-            size, heading = rng.uniform(*self.level), rng.uniform(-math.pi, math.pi)
+        if self.uniform is not None:
+            return _rounded(rng.uniform(*self.uniform))
+        if self.log_uniform is not None:
+            return _rounded(math.exp(rng.uniform(math.log(self.log_uniform[0]), math.log(self.log_uniform[1]))))
+        if self.horizontal is not None:
+            size, heading = rng.uniform(*self.horizontal), rng.uniform(-math.pi, math.pi)
             return [_rounded(size * math.cos(heading)), _rounded(size * math.sin(heading)), 0.0]
-        listed = self.any_of or ()
+        listed = self.choice or ()
         return listed[int(rng.integers(len(listed)))]
 
     def __str__(self) -> str:
         """The draw in words."""
-        if self.between is not None:
-            return f"{self.between[0]:g} to {self.between[1]:g}"
-        if self.in_log is not None:
-            return f"{self.in_log[0]:g} to {self.in_log[1]:g}, evenly in its logarithm"
-        if self.level is not None:
-            return f"{self.level[0]:g} to {self.level[1]:g} to any side"
-        return "any of " + ", ".join(map(str, self.any_of or ()))
+        if self.uniform is not None:
+            return f"{self.uniform[0]:g} to {self.uniform[1]:g}"
+        if self.log_uniform is not None:
+            return f"{self.log_uniform[0]:g} to {self.log_uniform[1]:g}, evenly in its logarithm"
+        if self.horizontal is not None:
+            return f"{self.horizontal[0]:g} to {self.horizontal[1]:g} to any side"
+        return "any of " + ", ".join(map(str, self.choice or ()))
 
 
 def sample_fields(draws: dict[str, FieldDistribution], seed: int) -> dict[str, Any]:

@@ -25,7 +25,6 @@ from wakewise.estimation import FilterSettings
 from wakewise.operation.calibration_error import CalibrationErrorSettings
 from wakewise.operation.pilot_makers import PILOTS
 from wakewise.operation.randomization import FieldDistribution, sample_fields
-from wakewise.operation.renamed import became
 from wakewise.operation.worlds.library import load_world, own_file, world_names
 from wakewise.operation.worlds.makers import WORLDS
 from wakewise.robot.vehicles.ballast import BallastBlock
@@ -65,10 +64,10 @@ class TargetSettings(Settings):
     )
     seed: Seed = Field(0, description="which individual of a procedural coral")
     points: int = Field(300, ge=20, le=10000, description="sample points that stand for the target's water in D")
-    delicate_gain: float = Field(
+    fragility_gain: float = Field(
         0.0, ge=0.0, le=100.0, description="points on thin or sharp places weigh 1 + this; 0 is the paper's weighting"
     )
-    sway: Literal["by-kind", "none", "anemone", "gorgonian", "seagrass", "soft-coral"] = Field(
+    elasticity: Literal["by-kind", "none", "anemone", "gorgonian", "seagrass", "soft-coral"] = Field(
         "by-kind",
         description="the tissue it is made of, which says how it bends in flow, or none for a rigid one; by-kind: soft "
         "procedural targets bend, all others are rigid",
@@ -79,12 +78,12 @@ class TargetSettings(Settings):
     damping: float | None = Field(
         None, ge=0.0, le=2.0, description="damping by the tissue itself, relative to critical, instead of its own"
     )
-    loose: UnanchoredSettings = UnanchoredSettings()
+    unanchored: UnanchoredSettings = UnanchoredSettings()
 
     @property
     def tissue(self) -> TissueProperties | None:
         """What the target is made of, with what is set in place of the tissue's own; None of a rigid one."""
-        name = self.sway if self.sway != "by-kind" else self.kind
+        name = self.elasticity if self.elasticity != "by-kind" else self.kind
         if name not in TISSUES:
             return None
         own = {
@@ -105,9 +104,9 @@ class TargetSettings(Settings):
     def _tissue_has_a_use(self) -> Self:
         for name in ("stiffness_Pa", "tissue_kg_m3", "damping"):
             if getattr(self, name) is not None and self.tissue is None:
-                raise ValueError(f"{name} is of a target that bends: let sway be one of {', '.join(TISSUES)}")
-        if self.drag is not None and self.tissue is None and self.loose.weight_N is None:
-            raise ValueError("drag is of a target that bends or lies loose: set sway or loose.weight_N too")
+                raise ValueError(f"{name} is of a target that bends: let elasticity be one of {', '.join(TISSUES)}")
+        if self.drag is not None and self.tissue is None and self.unanchored.weight_N is None:
+            raise ValueError("drag is of a target that bends or lies loose: set elasticity or unanchored.weight_N too")
         return self
 
 
@@ -126,7 +125,7 @@ class Scenario(Settings):
 
     name: str = Field("scan", min_length=1, max_length=80, description="what the trial is called in its report")
     seed: Seed = Field(1, description="every random draw of the trial follows from it")
-    replaced: dict[str, str] = Field(
+    overrides: dict[str, str] = Field(
         default={},
         description="parts that were given in Python in place of the scenario's own, in words; not to be set",
     )
@@ -140,13 +139,13 @@ class Scenario(Settings):
         None,
         description="water in place of the world's own: tank, paper (circular), lattice, lattice-jets, a plug-in",
     )
-    draws: dict[str, FieldDistribution] = Field(
-        default={}, description="fields that the seed draws, by dotted name: two numbers, or in_log, any_of, level"
+    randomize: dict[str, FieldDistribution] = Field(
+        default={}, description="fields that the seed draws, by dotted name: two numbers, or log_uniform, choice, level"
     )
     pilot: str = Field("route", description="who leads: route, human, assisted, operator, package.module:make")
-    controls: str | None = Field(None, description="hands of the pilot `operator`: controls.parquet, .csv, .yaml")
+    control_log: str | None = Field(None, description="hands of the pilot `operator`: controls.parquet, .csv, .yaml")
     target: TargetSettings = TargetSettings()
-    survey: CalibrationErrorSettings = CalibrationErrorSettings()
+    calibration_error: CalibrationErrorSettings = CalibrationErrorSettings()
     mission: MissionSettings = MissionSettings()
     control: ControlSettings = ControlSettings()
     estimation: FilterSettings = FilterSettings()
@@ -158,7 +157,7 @@ class Scenario(Settings):
     @classmethod
     def _known(cls, value: str | None, info: ValidationInfo) -> str | None:
         kind = str(info.field_name)
-        if value is None or {"method": "controller"}.get(kind, kind) in info.data.get("replaced", {}):
+        if value is None or {"method": "controller"}.get(kind, kind) in info.data.get("overrides", {}):
             return value  # what the part that was given calls itself
         known = names({"flow": "world"}.get(kind, kind), _OWN[kind])
         if value not in known and ":" not in value:
@@ -234,15 +233,15 @@ class Scenario(Settings):
         InputError
             If a draw names no field, or gives what its field does not allow.
         """
-        if not self.draws:
+        if not self.randomize:
             return self
         tree = self.model_dump()
-        for name, value in sample_fields(self.draws, self.seed).items():
+        for name, value in sample_fields(self.randomize, self.seed).items():
             tree = _merged(tree, _with_kinds(_nested(name, value)))
         try:
-            return Scenario.model_validate(tree | {"draws": {}})
+            return Scenario.model_validate(tree | {"randomize": {}})
         except ValidationError as fault:
-            raise InputError(f"draws: {describe_fault(fault, Scenario)}") from None
+            raise InputError(f"randomize: {describe_fault(fault, Scenario)}") from None
 
     def parts(self) -> Parts:
         """What the scenario's flight is built from, each part made when asked for."""
@@ -308,11 +307,8 @@ def check_scenario(tree: dict[str, Any], source: str) -> Scenario:
 
 
 def describe_fault(fault: ValidationError, model: type[BaseModel]) -> str:
-    """Say in one line which fields of `model` are wrong, what was found and what is allowed.
-
-    Names of an older scenario are told with what became of them.
-    """
-    return describe_faults(fault, model, "scenario", became)
+    """Say in one line which fields of `model` are wrong, what was found and what is allowed."""
+    return describe_faults(fault, model, "scenario")
 
 
 def parse_overrides(items: list[str]) -> dict[str, Any]:
@@ -392,8 +388,8 @@ def _leave(tree: dict[str, Any], name: str) -> None:
     if name not in world_names():
         return
     world = load_world(name)
-    for dotted in world.draws:
-        tree["draws"].pop(dotted, None)
+    for dotted in world.randomize:
+        tree["randomize"].pop(dotted, None)
     for dotted, value in world.values.items():
         *parents, leaf = dotted.split(".")
         branch = tree
@@ -407,12 +403,12 @@ def _leave(tree: dict[str, Any], name: str) -> None:
 def _laid(tree: dict[str, Any], layer: dict[str, Any]) -> dict[str, Any]:
     """The layer over the tree; draws of fields that the layer gives are gone."""
     full = _with_kinds(layer)
-    given = _leaves({name: value for name, value in full.items() if name != "draws"})
-    draws = tree.get("draws", {})
+    given = _leaves({name: value for name, value in full.items() if name != "randomize"})
+    draws = tree.get("randomize", {})
     kept = {name: draw for name, draw in draws.items() if not any(f"{name}.".startswith(f"{g}.") for g in given)}
-    drawn = {**kept, **full.get("draws", {})}  # a draw takes the place of another whole
-    rest = {name: value for name, value in full.items() if name != "draws"}
-    return _merged(tree, rest) | ({"draws": drawn} if draws or drawn else {})
+    drawn = {**kept, **full.get("randomize", {})}  # a draw takes the place of another whole
+    rest = {name: value for name, value in full.items() if name != "randomize"}
+    return _merged(tree, rest) | ({"randomize": drawn} if draws or drawn else {})
 
 
 def _leaves(tree: dict[str, Any], prefix: str = "") -> list[str]:

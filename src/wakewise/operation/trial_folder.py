@@ -30,7 +30,7 @@ def resolved_scenario(parts: Parts) -> Scenario:
     if not parts.given:
         return parts.scenario
     scenario, given = parts.scenario, parts.given
-    told: dict[str, Any] = {"method": parts.method, "replaced": parts.replaced}
+    told: dict[str, Any] = {"method": parts.method, "overrides": parts.overrides}
     told |= {name: given[name].name for name in ("vehicle", "world") if name in given}
     if "target" in given:
         told["target"] = scenario.target.model_copy(update={"kind": given["target"].name})

@@ -47,7 +47,7 @@ from wakewise.wake.plan_disturbance import PackedWakeModel, is_compiled, wake_sc
 BARRIER_RANGE = (0.02, 20.0)
 """Least and largest mu of the clearance barrier: it grows from plan to plan while the plan comes too close."""
 TRACKING = [kernels.W_TRACK, kernels.W_PATH, kernels.W_TWIST]
-"""Places of the weights that grow with a goal's obedience."""
+"""Places of the weights that grow with the tracking weight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,7 +240,7 @@ class Planner:
         case.reference[:] = problem.reference
         # The kernels read the weights at each call, so a live dial compiles nothing.
         tracking = np.array([settings.w_track, settings.w_path, settings.w_twist])
-        self.model.table.weights[TRACKING] = problem.obedience * tracking
+        self.model.table.weights[TRACKING] = problem.tracking_weight_scale * tracking
         set_reach(self.model.table, case)
 
     def plan(

@@ -105,7 +105,7 @@ class PlanProblem:
     current_W_m_s : ndarray, shape (3,)
     reference : ndarray, shape (N + 1, 13)
         Wished states at the ends of the stages, the first one for now.
-    obedience : float
+    tracking_weight_scale : float
         What the weights of tracking (`w_track`, `w_path`, `w_twist`) are multiplied with, more than 0.
     """
 
@@ -116,7 +116,7 @@ class PlanProblem:
     force_W_N: Array = field(default_factory=lambda: np.zeros(3))
     moment_B_Nm: Array = field(default_factory=lambda: np.zeros(3))
     current_W_m_s: Array = field(default_factory=lambda: np.zeros(3))
-    obedience: float = 1.0
+    tracking_weight_scale: float = 1.0
 
     def __post_init__(self) -> None:
         n = len(self.thrusts_N)
@@ -130,8 +130,8 @@ class PlanProblem:
             moment_B_Nm=(3,),
             current_W_m_s=(3,),
         )
-        if not 0.0 < self.obedience < np.inf:
-            raise InputError(f"obedience: {self.obedience:g}, must be finite and more than 0")
+        if not 0.0 < self.tracking_weight_scale < np.inf:
+            raise InputError(f"tracking_weight_scale: {self.tracking_weight_scale:g}, must be finite and more than 0")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

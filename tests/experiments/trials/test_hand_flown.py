@@ -70,7 +70,7 @@ def test_a_scenario_may_name_hands_and_their_record_flies_again(tmp_path: Path) 
         encoding="utf-8",
     )
     for folder, hands in (("a", script), ("b", tmp_path / "a" / "controls.parquet")):
-        run_trial(SCENARIO.replace(pilot="operator", controls=str(hands)), tmp_path / folder)
+        run_trial(SCENARIO.replace(pilot="operator", control_log=str(hands)), tmp_path / folder)
     for name in ("steps.parquet", "exposures.npz", "planned.csv", "images.csv"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
     assert pl.read_csv(tmp_path / "a/planned.csv").height == 1

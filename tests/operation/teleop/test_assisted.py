@@ -241,10 +241,10 @@ def test_buttons_change_the_desk_or_wait_to_be_taken(parts):
 def test_the_dial_reaches_the_planner_little_by_little(parts):
     """w_track from 5 to 50 is ten times the obedience, by no more than 4 % a step."""
     flown = Flown(parts).until(0.1)
-    assert flown.goals[-1].obedience == pytest.approx(1.0)
+    assert flown.goals[-1].tracking_weight_scale == pytest.approx(1.0)
     flown.desk.set(w_track=50.0)
     flown.until(3.0)
-    shares = np.array([goal.obedience for goal in flown.goals])
+    shares = np.array([goal.tracking_weight_scale for goal in flown.goals])
     assert shares[-1] == pytest.approx(10.0) and np.all(np.abs(np.diff(np.log(shares))) < 0.0401)
 
 

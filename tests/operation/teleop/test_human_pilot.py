@@ -35,7 +35,7 @@ def test_the_sticks_lead_near_the_route_and_never_on_it(parts):
 def test_a_flight_begun_again_is_the_same(parts):
     """At time zero the person begins afresh; another person leads elsewhere."""
     first, second = (goals(parts.pilot, parts.route, parts.vehicle.X_BC, n=300) for _ in range(2))
-    other = parts.replace(**{"control.person": 5}).pilot
+    other = parts.replace(**{"control.operator_seed": 5}).pilot
     third = goals(other, parts.route, parts.vehicle.X_BC, n=300)
     assert all(np.array_equal(a.X_WB.p_m, b.X_WB.p_m) for a, b in zip(first, second, strict=True))
     assert any(not np.array_equal(a.X_WB.p_m, b.X_WB.p_m) for a, b in zip(first, third, strict=True))

@@ -44,8 +44,8 @@ def test_a_world_lies_over_the_preset_and_under_what_the_user_says(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text("world: payload\ntank: {mismatch: {trim_N: 0.5}}\n")
     scenario = load_scenario("quick", path, {})
-    drawn = set(load_world("payload").draws)
-    assert scenario.tank.mismatch.trim_N == 0.5 and set(scenario.draws) == drawn - {"tank.mismatch.trim_N"}
+    drawn = set(load_world("payload").randomize)
+    assert scenario.tank.mismatch.trim_N == 0.5 and set(scenario.randomize) == drawn - {"tank.mismatch.trim_N"}
     assert load_scenario("quick", path, {"world": "still-tank"}).tank.current.velocity_m_s == (0.0, 0.0, 0.0)
 
 
@@ -67,7 +67,7 @@ def test_a_trial_holds_the_world_that_was_flown_in_numbers(tmp_path):
 
 def test_the_water_of_a_world_can_be_another():
     """`flow` takes the place of the world's own water and leaves the rest."""
-    scenario = Scenario.preset("quick", world="payload", **{"target.sway": "none"})
+    scenario = Scenario.preset("quick", world="payload", **{"target.elasticity": "none"})
     assert flow_name(scenario) == "tank" and flow_name(scenario.replace(flow="paper")) == "paper"
     assert scenario.replace(flow="paper").parts().world.name == "paper"
     with pytest.raises(InputError, match="flow: 'paper' holds its target still"):
@@ -84,7 +84,7 @@ def test_a_world_that_is_none_is_refused():
         load_world("paylod")
     with pytest.raises(InputError, match=r"world w: fields\.a\.source"):
         parse_world("w", "title: abc\nwhy: nobody knows why it is\nfields: {a: {value: 1}}")
-    with pytest.raises(InputError, match=r"world w: fields\.a: gives value and draw or neither"):
+    with pytest.raises(InputError, match=r"world w: fields\.a: gives value and randomize or neither"):
         parse_world("w", "title: abc\nwhy: nobody knows why it is\nfields: {a: {source: a book}}")
 
 

@@ -45,14 +45,14 @@ def test_a_case_changes_damping_and_nothing_else() -> None:
     assert np.diag(other.hydrodynamics.linear_damping)[:3].tolist() == [4.03, 6.22, 5.18]
     assert np.array_equal(other.hydrodynamics.added_mass, heavy.hydrodynamics.added_mass)
     assert (other.name, other.thrusters, other.mass_kg) == (heavy.name, heavy.thrusters, heavy.mass_kg)
-    assert with_drag(heavy, "as-believed") is heavy
+    assert with_drag(heavy, "nominal") is heavy
 
 
 def test_a_seed_draws_each_case_alike() -> None:
     """Believed, box and Wu: a third of the draws each, within three sigma of 600."""
     heavy = load_vehicle("bluerov2-heavy")
     drawn = [
-        with_drag(heavy, "drawn", np.random.default_rng(seed)).hydrodynamics.quadratic_damping[0, 0]
+        with_drag(heavy, "random", np.random.default_rng(seed)).hydrodynamics.quadratic_damping[0, 0]
         for seed in range(600)
     ]
     counts = [drawn.count(value) for value in (141.0, 76.67, 18.18)]
@@ -63,23 +63,23 @@ def test_a_seed_draws_each_case_alike() -> None:
 def test_without_cases_a_draw_is_the_believed_drag() -> None:
     """There is nothing else to draw."""
     rexrov = load_vehicle("rexrov")
-    assert with_drag(rexrov, "drawn", np.random.default_rng(1)) is rexrov
+    assert with_drag(rexrov, "random", np.random.default_rng(1)) is rexrov
 
 
 def test_what_may_be_drawn_is_told() -> None:
     """All sets for `drawn`, else the one that is named."""
     paper = load_vehicle("paper")
-    assert possible_drags(paper, "drawn") == ("as-believed", "box", "von-benzon")
+    assert possible_drags(paper, "random") == ("nominal", "box", "von-benzon")
     assert possible_drags(paper, "box") == ("box",)
 
 
 def test_a_case_that_is_not_there_is_refused() -> None:
     """One line tells which there are; reserved names and damping that pushes are refused in the file."""
-    with pytest.raises(InputError, match=r"tank.mismatch.drag: 'bx', paper .* as-believed, box, von-benzon, drawn"):
+    with pytest.raises(InputError, match=r"tank.mismatch.drag: 'bx', paper .* nominal, box, von-benzon, drawn"):
         with_drag(load_vehicle("paper"), "bx")
     with pytest.raises(InputError, match="drag_cases: drawn is not a name"):
         DragCase(
-            name="drawn",
+            name="random",
             source="x",
             estimate=False,
             linear_damping=np.zeros((6, 6)),

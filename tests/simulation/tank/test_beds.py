@@ -43,7 +43,7 @@ def test_fluff_is_gone_where_its_firm_layer_is_not():
     bed = SiltSettings(kind="fluff")
     laws = SiltProperties.of(
         bed.grain_m, bed.grain_density_kg_m3, 1000.0, bed.erosion_kg_m2_s, bed.threshold_Pa,
-        stress_intensity=STRESS_INTENSITY, firm_kg_m2=bed.firm_load_kg_m2,
+        stress_intensity=STRESS_INTENSITY, firm_kg_m2=bed.consolidated_load_kg_m2,
     )  # fmt: skip
     loose, firm = laws.lifted_kg_m2_s(np.array([0.1, 0.1]), np.array([1.1, 1.0]))
     assert firm < 1e-3 * loose
@@ -51,5 +51,5 @@ def test_fluff_is_gone_where_its_firm_layer_is_not():
 
 def test_a_firm_part_is_a_part():
     """A firm layer heavier than the whole bed is refused."""
-    with pytest.raises(ValidationError, match="firm_load_kg_m2: 2, is a part of load_kg_m2"):
-        SiltSettings(load_kg_m2=1.0, firm_load_kg_m2=2.0)
+    with pytest.raises(ValidationError, match="consolidated_load_kg_m2: 2, is a part of load_kg_m2"):
+        SiltSettings(load_kg_m2=1.0, consolidated_load_kg_m2=2.0)

@@ -26,11 +26,11 @@ FORCE = np.array([0.3, -0.1, -9.8])
 
 
 NOTHING_LASTS = {
-    "pose_slow_m": (0.0, 0.0),
-    "pose_slow_rad": (0.0, 0.0),
-    "pose_stamp_late_s": (0.0, 0.0),
+    "pose_drift_m": (0.0, 0.0),
+    "pose_drift_rad": (0.0, 0.0),
+    "pose_timestamp_delay_s": (0.0, 0.0),
     "pose_outliers": 0.0,
-    "tracking_slow_m": (0.0, 0.0),
+    "tracking_drift_m": (0.0, 0.0),
     "depth_bias_m": 0.0,
 }
 """Sensors whose errors are all gone at the next sample, but for the inertial unit's bias."""
@@ -132,7 +132,7 @@ def _place_errors(record):
 
 def test_a_poses_lasting_error_does_not_average_out():
     """The mean over two seconds is off by millimetres, each flight by its own; over 60 flights by the stated spread."""
-    flights = [[m for _, m in _record(2.0, seed=k, pose_slow_m=(0.004, 0.004))] for k in range(60)]
+    flights = [[m for _, m in _record(2.0, seed=k, pose_drift_m=(0.004, 0.004))] for k in range(60)]
     means = np.array([_place_errors(record).mean(axis=0) for record in flights])
     assert means.std() == pytest.approx(0.004, rel=0.2)
     exact = np.array([_place_errors([m for _, m in _record(2.0, seed=k)]).mean(axis=0) for k in range(5)])
@@ -143,8 +143,8 @@ def test_each_lasting_error_is_its_own_sensors():
     """Attitude, tracking and depth are off for good where they are told to be; the other sensors say what they said."""
     before = [m for _, m in _record(5.0)]
     for settings, of in (
-        ({"pose_slow_rad": (0.003, 0.003)}, lambda m: m.X_WB is not None and m.X_WB.q),
-        ({"tracking_slow_m": (0.004, 0.004)}, lambda m: m.p_WB_m),
+        ({"pose_drift_rad": (0.003, 0.003)}, lambda m: m.X_WB is not None and m.X_WB.q),
+        ({"tracking_drift_m": (0.004, 0.004)}, lambda m: m.p_WB_m),
         ({"depth_bias_m": 0.02}, lambda m: m.depth_m),
     ):
         after = [m for _, m in _record(5.0, **settings)]
@@ -164,10 +164,12 @@ def test_each_lasting_error_is_its_own_sensors():
 def test_a_pose_is_stamped_late_by_the_flights_own_delay():
     """Its stamp runs behind the picture by one value of the span, the same all flight; never behind its arrival."""
     exact = [m.time_s for _, m in _record(3.0) if m.X_WB is not None]
-    late = [m.time_s for _, m in _record(3.0, pose_stamp_late_s=(0.005, 0.02)) if m.X_WB is not None]
+    late = [m.time_s for _, m in _record(3.0, pose_timestamp_delay_s=(0.005, 0.02)) if m.X_WB is not None]
     by = np.array(late) - np.array(exact)
     assert 0.005 <= by[0] <= 0.02 and by == pytest.approx(np.full(len(by), by[0]))
-    hurried = [(now, m.time_s) for now, m in _record(1.0, pose_stamp_late_s=(0.02, 0.02), pose_latency_s=0.0) if m.X_WB]
+    hurried = [
+        (now, m.time_s) for now, m in _record(1.0, pose_timestamp_delay_s=(0.02, 0.02), pose_latency_s=0.0) if m.X_WB
+    ]
     assert hurried and all(stamp <= now + 1e-9 for now, stamp in hurried)
 
 
@@ -203,16 +205,16 @@ def test_the_inertial_bias_walks():
 def test_errors_that_last_are_on_by_default():
     """A default sensor has each of them."""
     s = SensorSettings()
-    assert min(s.pose_slow_m[0], s.pose_slow_rad[0], s.pose_stamp_late_s[0], s.tracking_slow_m[0]) > 0.0
+    assert min(s.pose_drift_m[0], s.pose_drift_rad[0], s.pose_timestamp_delay_s[0], s.tracking_drift_m[0]) > 0.0
     assert s.pose_outliers > 0.0 and s.depth_bias_m > 0.0
 
 
 @pytest.mark.parametrize(
     "bad",
     [
-        {"pose_slow_m": (0.005, 0.003)},
-        {"pose_slow_s": (0.0, 10.0)},
-        {"pose_slow_rad": (-0.1, 0.1)},
+        {"pose_drift_m": (0.005, 0.003)},
+        {"pose_drift_time_s": (0.0, 10.0)},
+        {"pose_drift_rad": (-0.1, 0.1)},
         {"pose_outliers": 1.5},
     ],
 )

@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 import pytest
 
-from wakewise.api import trials as api
+from wakewise import api
 from wakewise.core.errors import InputError
 from wakewise.experiments.trials.stages import report_attempt
 from wakewise.ui.cli.main import run
 
-CLI = Path(__file__).parents[3] / "src" / "wakewise" / "cli"
+CLI = Path(__file__).parents[3] / "src" / "wakewise" / "ui" / "cli"
 # What the command is asked for is the page itself, so that without it there is no result.
 PAGE_IS_THE_RESULT = {
     ("campaign", "write_campaign"),

@@ -70,7 +70,7 @@ def test_a_named_world_is_told_by_its_water(tmp_path: Path) -> None:
 
 def test_a_world_from_outside_is_not_vouched_for(tmp_path: Path) -> None:
     """Given in Python or named, it is its maker's to judge, even if it calls itself as a world of ours does."""
-    given = flown(tmp_path / "a", world="still-tank", replaced={"world": "still-tank (lab.<b>.Pool)"})
+    given = flown(tmp_path / "a", world="still-tank", overrides={"world": "still-tank (lab.<b>.Pool)"})
     named = flown(tmp_path / "b", world="lab.water:pool")
     for trial, name in ((given, "lab.&lt;b&gt;.Pool"), (named, "lab.water:pool")):
         text = limits_section({"one": trial})

@@ -58,7 +58,7 @@ def test_a_method_or_part_from_outside_is_named_and_hides_no_setting(made_up: Pa
         made_up,
         tmp_path,
         method="mylab.steering:make",
-        replaced={"estimator": "mylab.Filter"},
+        overrides={"estimator": "mylab.Filter"},
         tank={"size_m": [6, 5, 1.6]},
     )
     (folder / "metrics.json").unlink()

@@ -37,5 +37,5 @@ def test_a_heavy_vehicle_is_told_of_and_one_in_trim_is_not() -> None:
     )
     assert trim_html(Told(scenario, hover(0.1))) == ""
     assert trim_html(Told(None, hover(3.0))) == trim_html(Told(scenario, None)) == ""
-    given = scenario.model_copy(update={"replaced": {"vehicle": "mine"}})
+    given = scenario.model_copy(update={"overrides": {"vehicle": "mine"}})
     assert trim_html(Told(given, hover(3.0))) == ""

@@ -48,7 +48,12 @@ def test_a_cloud_from_maps_on_disk_is_the_same_to_the_byte(relief_photos, tmp_pa
     """With no room in memory at all; nothing of them is left in the folder."""
     folder, _ = relief_photos
     settings = ReconstructionSettings(
-        detector="opencv", max_features=1000, first_octave=0, agreeing_views=1, mesh=False, lens_check=False
+        detector="opencv",
+        max_features=1000,
+        first_octave=0,
+        agreeing_views=1,
+        mesh=False,
+        check_shared_intrinsics=False,
     )
     for name, held in (("memory", 10**9), ("disk", 0)):
         monkeypatch.setattr(dense.DepthStore.__init__, "__defaults__", (held,))

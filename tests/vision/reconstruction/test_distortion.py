@@ -78,7 +78,9 @@ def test_photographs_of_a_fisheye_become_a_model(wide_photos, tmp_path, known):
     """Cameras within 1 % of their spread and points on the ball, with the lens known and with its kind alone."""
     folder, truth = wide_photos
     lens = Lens(width=320, height=240, params=FISHEYE, fisheye=True) if known else None
-    asked = ReconstructionSettings(detector="opencv", max_features=2500, lens="fisheye", mesh=False, lens_check=False)
+    asked = ReconstructionSettings(
+        detector="opencv", max_features=2500, lens="fisheye", mesh=False, check_shared_intrinsics=False
+    )
     model = reconstruct(folder, tmp_path, asked, lens=lens, reference_positions=truth, progress=no_progress)
     assert model.registered_images == 8
     sparse = pycolmap.Reconstruction(tmp_path / "sparse")

@@ -33,7 +33,9 @@ def test_a_photo_without_features_is_like_none():
 
 
 def mapped(folder, out, pairs, look_alikes=0):
-    settings = ReconstructionSettings(detector="opencv", max_features=1000, first_octave=0, lens_check=False)
+    settings = ReconstructionSettings(
+        detector="opencv", max_features=1000, first_octave=0, check_shared_intrinsics=False
+    )
     photos, database = read_photos(folder), out / "database.db"
     matched = match_photos(
         folder, photos, database, settings, focal_px=FOCAL, pairs=pairs, progress=no_progress, look_alikes=look_alikes

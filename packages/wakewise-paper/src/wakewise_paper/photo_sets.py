@@ -212,7 +212,7 @@ def judge(
         model = reconstruct(
             photos.folder,
             folder,
-            settings.model_copy(update={"mesh": False, "lens_check": False}),  # one camera took them all
+            settings.model_copy(update={"mesh": False, "check_shared_intrinsics": False}),  # one camera took them all
             focal_px=photos.focal_px,
             reference_positions=photos.references,
             reference_rotations=photos.rotations,

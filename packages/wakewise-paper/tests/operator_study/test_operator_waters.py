@@ -26,15 +26,15 @@ def test_three_seeds_have_every_trim_and_course_once_and_nine_every_pair(world):
 @pytest.mark.parametrize("world", world_names())
 def test_a_water_lies_within_what_its_world_draws(world):
     """Trim in its own third of the range, current as fast as the world has it; other fields are the world's own."""
-    draws = load_world(world).draws
-    low, high = (-1.0, 1.0) if TRIM not in draws else draws[TRIM].between
+    draws = load_world(world).randomize
+    low, high = (-1.0, 1.0) if TRIM not in draws else draws[TRIM].uniform
     for seed in (1, 2, 3):
         water = water_of(world, seed)
         third = (high - low) / 3.0
         begins = low + third * TRIMS.index(water.trim)
         assert begins - 1e-6 <= water.trim_N <= begins + third + 1e-6
         if CURRENT in draws:
-            slow, fast = draws[CURRENT].level
+            slow, fast = draws[CURRENT].horizontal
             assert slow - 1e-6 <= math.hypot(*water.current_W_m_s) <= fast + 1e-6
         else:
             assert water.current_W_m_s is None and CURRENT not in water.fields

@@ -101,7 +101,7 @@ def test_the_second_judge_flies_the_same_hovers_in_both_waters(made_up, capsys):
     """Every judged world and method in tank and lattice; gains are within one water and null where a flight failed."""
     trials = judge_trials(2)
     assert {t.flow for t in trials.values()} == {"tank", "lattice"} and len(trials) == 2 * 3 * 3 * 2
-    assert {t.scenario().target.sway for t in judge_trials(1, ("close",)).values()} == {"none"}
+    assert {t.scenario().target.elasticity for t in judge_trials(1, ("close",)).values()} == {"none"}
     found = bench.run(BenchOptions(seeds=1, models=0, judge=1, worlds=("close",), methods=("dp",), store=made_up))
     table = found["judge"]["close"]
     assert table["wake-aware"]["tank_less_pct"] == pytest.approx(75.0) == table["wake-aware"]["lattice_less_pct"]

@@ -52,7 +52,7 @@ def external_parts(scenario: Scenario) -> dict[str, str]:
     for name, named in (
         ("vehicle", scenario.vehicle),
         ("target", scenario.target.kind),
-        ("controls", scenario.controls or ""),
+        ("control_log", scenario.control_log or ""),
     ):
         path = Path(named).expanduser()
         if named and path.is_file():

@@ -294,7 +294,7 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
             folder / "images",
             folder,
             # One camera took them all: whether they share a lens, which takes longer than all else, is no question.
-            parts.scenario.reconstruction.model_copy(update={"mesh": False, "lens_check": False}),
+            parts.scenario.reconstruction.model_copy(update={"mesh": False, "check_shared_intrinsics": False}),
             lens=read_lens(folder),
             reference_positions=dict(zip(names, centres, strict=True)),
             reference_rotations=dict(zip(names, rotations, strict=True)),

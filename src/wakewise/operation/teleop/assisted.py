@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
 
 DIAL_PER_S = 2.0
-"""How fast the obedience follows its dial, in natural logarithms a second: from end to end in 2.3 s."""
+"""How fast the tracking weight follows its dial, in natural logarithms a second: from end to end in 2.3 s."""
 MEAN_S, LEAST_M_S = 2.0, 0.01
 """Time over which deviations are averaged, and the mean command below which there is nothing to deviate from."""
 SAID_EVERY_S = 3.0
@@ -171,8 +171,10 @@ class AssistedPilot:
         wished = math.log(state.w_track / PAPER_W_TRACK)
         most = math.inf if first else DIAL_PER_S * self.dt_s
         self._dial += min(max(wished - self._dial, -most), most)
-        obedience = math.exp(self._dial)
-        return self.motion.goal(obedience=obedience, stray=deviation_limit(PAPER_W_TRACK * obedience))
+        scale = math.exp(self._dial)
+        return self.motion.goal(
+            tracking_weight_scale=scale, max_tracking_deviation=deviation_limit(PAPER_W_TRACK * scale)
+        )
 
     @property
     def leg(self) -> str:

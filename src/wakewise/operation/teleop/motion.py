@@ -59,11 +59,17 @@ class MotionReference:
         sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
         return np.array([p - r * sp, q * cr + r * sr * cp, -q * sr + r * cr * cp])
 
-    def goal(self, obedience: float = 1.0, stray: float | None = None) -> Goal:
+    def goal(self, tracking_weight_scale: float = 1.0, max_tracking_deviation: float | None = None) -> Goal:
         """As the controllers take it."""
         X_WB = self.X_WB
         twist = np.concatenate([X_WB.R.T @ self.velocity_W_m_s, self.omega_B_rad_s])
-        return Goal(X_WB=X_WB, nu_B=twist, tilt_rad=self.tilt_rad, obedience=obedience, stray=stray)
+        return Goal(
+            X_WB=X_WB,
+            nu_B=twist,
+            tilt_rad=self.tilt_rad,
+            tracking_weight_scale=tracking_weight_scale,
+            max_tracking_deviation=max_tracking_deviation,
+        )
 
     def camera(self, aim: CameraAim) -> tuple[Array, Array]:
         """Place of the camera in W, and its velocity against the body's place, shape (3,) each."""

@@ -67,10 +67,10 @@ def replay_input(parts: Parts, folder: Path) -> None:
     InputError
         If it names none, or they cannot be read.
     """
-    if parts.scenario.controls is None:
+    if parts.scenario.control_log is None:
         _ = parts.pilot  # which says so
         return
-    hands = read_input(Path(parts.scenario.controls))
+    hands = read_input(Path(parts.scenario.control_log))
     end_s = hands.end_s if isinstance(hands, ControlLog) else 0.0
     if isinstance(hands, ScriptedInput):
         end_s = hands.moments[-1].at_s + AFTER_S

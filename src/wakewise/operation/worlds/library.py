@@ -24,13 +24,13 @@ class WorldField(Settings):
     """One field of a world: its value or from where it is drawn, and the source of the number."""
 
     value: Any = Field(None, description="what the field is")
-    draw: FieldDistribution | None = Field(None, description="from where the seed draws it")
+    randomize: FieldDistribution | None = Field(None, description="from where the seed draws it")
     source: str = Field(..., min_length=3, description="where the number comes from")
 
     @model_validator(mode="after")
     def _has_one(self) -> WorldField:
-        if (self.value is None) == (self.draw is None):
-            raise ValueError("gives value and draw or neither, must give one of them")
+        if (self.value is None) == (self.randomize is None):
+            raise ValueError("gives value and randomize or neither, must give one of them")
         return self
 
 
@@ -53,12 +53,12 @@ class NamedWorld:
     @property
     def values(self) -> dict[str, Any]:
         """Values by dotted field."""
-        return {name: field.value for name, field in self.file.fields.items() if field.draw is None}
+        return {name: field.value for name, field in self.file.fields.items() if field.randomize is None}
 
     @property
-    def draws(self) -> dict[str, FieldDistribution]:
-        """Draws by dotted field."""
-        return {name: field.draw for name, field in self.file.fields.items() if field.draw is not None}
+    def randomize(self) -> dict[str, FieldDistribution]:
+        """Distributions by dotted field."""
+        return {name: field.randomize for name, field in self.file.fields.items() if field.randomize is not None}
 
     def layer(self) -> dict[str, Any]:
         """The world as a layer of a scenario: a tree of values, with its draws."""
@@ -69,7 +69,7 @@ class NamedWorld:
             for parent in parents:
                 branch = branch.setdefault(parent, {})
             branch[leaf] = value
-        return tree | {"draws": {name: draw.model_dump(exclude_none=True) for name, draw in self.draws.items()}}
+        return tree | {"randomize": {name: draw.model_dump(exclude_none=True) for name, draw in self.randomize.items()}}
 
 
 @functools.cache

@@ -75,8 +75,8 @@ def _check_held(parts: Parts, name: str) -> None:
     """Refuse a target that gives way where nothing moves it."""
     if parts.yielding is not None:
         raise InputError(
-            f"flow: '{name}' holds its target still, target.sway and target.loose move it; "
-            "take target.sway=none, or the tank"
+            f"flow: '{name}' holds its target still, target.elasticity and target.unanchored move it; "
+            "take target.elasticity=none, or the tank"
         )
 
 

@@ -10,7 +10,7 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.checks import instance_of
 from wakewise.core.errors import InputError
 
-AS_BELIEVED, DRAWN = "as-believed", "drawn"
+NOMINAL, RANDOM = "nominal", "random"
 """What a true vehicle's drag is called besides its cases by name: the believed set, and one of all, drawn."""
 
 
@@ -86,7 +86,7 @@ class DragCase:
     def __post_init__(self) -> None:
         instance_of(self.name, str, "drag_cases: name")
         instance_of(self.source, str, f"drag_cases.{self.name}: source")
-        if self.name in (AS_BELIEVED, DRAWN):
+        if self.name in (NOMINAL, RANDOM):
             raise InputError(f"drag_cases: {self.name} is not a name for a case, choose another")
         freeze(self, linear_damping=(6, 6), quadratic_damping=(6, 6))
         require_linear_damping(self.linear_damping)

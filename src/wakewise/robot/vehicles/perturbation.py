@@ -12,7 +12,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.robot.vehicles.hydrodynamics import AS_BELIEVED, DRAWN, Hydrodynamics
+from wakewise.robot.vehicles.hydrodynamics import NOMINAL, RANDOM, Hydrodynamics
 from wakewise.robot.vehicles.vehicle import Vehicle
 
 
@@ -89,16 +89,16 @@ def possible_drags(vehicle: Vehicle, case: str) -> tuple[str, ...]:
     InputError
         If the vehicle has no such case.
     """
-    names = (AS_BELIEVED, *(c.name for c in vehicle.drag_cases))
-    if case not in (*names, DRAWN):
+    names = (NOMINAL, *(c.name for c in vehicle.drag_cases))
+    if case not in (*names, RANDOM):
         raise InputError(
-            f"tank.mismatch.drag: {case!r}, {vehicle.name} has no such case, allowed {', '.join((*names, DRAWN))}"
+            f"tank.mismatch.drag: {case!r}, {vehicle.name} has no such case, allowed {', '.join((*names, RANDOM))}"
         )
-    return names if case == DRAWN else (case,)
+    return names if case == RANDOM else (case,)
 
 
 def with_drag(vehicle: Vehicle, case: str, rng: np.random.Generator | None = None) -> Vehicle:
-    """The vehicle with the drag of a case: its name, `as-believed`, or `drawn`, which takes one of all, each alike.
+    """The vehicle with the drag of a case: its name, `nominal`, or `random`, which takes one of all, each alike.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def with_drag(vehicle: Vehicle, case: str, rng: np.random.Generator | None = Non
     """
     names = possible_drags(vehicle, case)
     case = names[int((rng or np.random.default_rng(0)).integers(len(names)))]
-    if case == AS_BELIEVED:
+    if case == NOMINAL:
         return vehicle
     chosen = next(c for c in vehicle.drag_cases if c.name == case)
     water = replace(
@@ -118,7 +118,7 @@ def with_drag(vehicle: Vehicle, case: str, rng: np.random.Generator | None = Non
 
 def with_each_drag(vehicle: Vehicle) -> tuple[Vehicle, ...]:
     """The vehicle with each set of drag that it may have, the believed one first."""
-    return tuple(with_drag(vehicle, case) for case in possible_drags(vehicle, DRAWN))
+    return tuple(with_drag(vehicle, case) for case in possible_drags(vehicle, RANDOM))
 
 
 def drag_coefficients(vehicle: Vehicle, speed_m_s: float) -> Array:

@@ -258,16 +258,16 @@ def open_route(centre_W_m: Array, duration_s: float, name: str = "free") -> Rout
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RoutePilot:
-    """A `Pilot` that follows a route by the clock; `stray` as of its goals."""
+    """A `Pilot` that follows a route by the clock; `max_tracking_deviation` as of its goals."""
 
     route: Route
     aim: CameraAim | Pose
-    stray: float | None = None
+    max_tracking_deviation: float | None = None
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:  # noqa: ARG002  (a clock needs no estimate)
         """Wished body pose and twist now, and angle of the camera's joint."""
         X_WB, nu_B, tilt = self.route.wished(time_s, self._aim)
-        return Goal(X_WB=X_WB, nu_B=nu_B, tilt_rad=tilt, stray=self.stray)
+        return Goal(X_WB=X_WB, nu_B=nu_B, tilt_rad=tilt, max_tracking_deviation=self.max_tracking_deviation)
 
     @cached_property
     def _aim(self) -> CameraAim:

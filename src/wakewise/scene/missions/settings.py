@@ -38,7 +38,7 @@ class MissionSettings(Settings):
     settle_s: float = Field(
         12.0, ge=0.0, le=120.0, description="hover before the first leg, until the integral knows trim and current"
     )
-    stray: float | None = Field(
+    max_tracking_deviation: float | None = Field(
         0.02,
         gt=0.0,
         le=1.0,

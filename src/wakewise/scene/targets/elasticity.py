@@ -244,7 +244,7 @@ class BendingModes:
         mesh = target.mesh
         if not mesh.is_closed:
             raise InputError(
-                f"target.sway: {target.name} has an open mesh, which has no sections; a closed one is needed"
+                f"target.elasticity: {target.name} has an open mesh, which has no sections; a closed one is needed"
             )
         places = mesh.vertices_m * [1.0, 1.0, -1.0] + [0.0, 0.0, target.bed_z_m]
         stem, heights = _stems(places, mesh.faces)
@@ -254,7 +254,8 @@ class BendingModes:
             parts.append(_modes(places, mesh.faces[own], float(height), tissue, water_kg_m3))
         if any(float(part["stiffness_N_m"].min()) <= 0.0 for part in parts):
             raise InputError(
-                f"target.sway: {target.name} of {tissue.stiffness_Pa:g} Pa and {tissue.density_kg_m3:g} kg/m3 cannot "
+                f"target.elasticity: {target.name} of {tissue.stiffness_Pa:g} Pa and {tissue.density_kg_m3:g} "
+                "kg/m3 cannot "
                 "stand upright; a stiffer or lighter one can"
             )
         columns = {name: np.stack([part[name] for part in parts]) for name in parts[0]}
@@ -338,7 +339,7 @@ def _stems(places: Array, faces: IntArray) -> tuple[IntArray, Array]:
     top = np.full(len(names), -np.inf)
     np.maximum.at(top, label, places[used, 2])
     if not len(names):
-        raise InputError(f"target.sway: nothing of the target stands more than {1e3 * FOOT_M:g} mm above the bed")
+        raise InputError(f"target.elasticity: nothing of the target stands more than {1e3 * FOOT_M:g} mm above the bed")
     high = top >= LEAST_SHARE * top.max()
     number = np.where(high, np.cumsum(high) - 1, -1)
     stem = np.full(n, -1, dtype=np.int64)
@@ -357,7 +358,7 @@ def _modes(
     tip = int(_TIP_SHARE * NODES)
     second[tip:] = second[tip]
     if not np.all(np.linalg.eigvalsh(second)[:, 0] > 0.0):
-        raise InputError("target.sway: the mesh has gaps: a level section through a stem cuts nothing")
+        raise InputError("target.elasticity: the mesh has gaps: a level section through a stem cuts nothing")
     softness = np.linalg.inv(second)
     corners = places[faces]
     vectors = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -454,4 +455,4 @@ TISSUES: dict[str, TissueProperties] = {
     "seagrass": SEAGRASS,
     "soft-coral": SOFT_CORAL,
 }
-"""Tissues by the names of `target.sway`; a procedural target of the same name has the shape that goes with it."""
+"""Tissues by the names of `target.elasticity`; a procedural target of the same name has the shape that goes with it."""

@@ -99,10 +99,10 @@ class Sensors:
         def drawn(span: Span, stream: np.random.Generator) -> float:
             return float(stream.uniform(*span))
 
-        self._place_off = GaussMarkovProcess(drawn(s.pose_slow_m, place), drawn(s.pose_slow_s, place), place)
-        self._turn_off = GaussMarkovProcess(drawn(s.pose_slow_rad, turn), drawn(s.pose_slow_s, turn), turn)
-        self._track_off = GaussMarkovProcess(drawn(s.tracking_slow_m, track), drawn(s.pose_slow_s, track), track)
-        self._stamp_late_s = drawn(s.pose_stamp_late_s, when)
+        self._place_off = GaussMarkovProcess(drawn(s.pose_drift_m, place), drawn(s.pose_drift_time_s, place), place)
+        self._turn_off = GaussMarkovProcess(drawn(s.pose_drift_rad, turn), drawn(s.pose_drift_time_s, turn), turn)
+        self._track_off = GaussMarkovProcess(drawn(s.tracking_drift_m, track), drawn(s.pose_drift_time_s, track), track)
+        self._stamp_late_s = drawn(s.pose_timestamp_delay_s, when)
         self._far_rng, self._walk_rng = far, walk
         self._depth_bias_m = float(depth.normal(0.0, s.depth_bias_m))
 

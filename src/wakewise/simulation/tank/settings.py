@@ -31,7 +31,7 @@ from wakewise.core.settings import Settings
 _PLAIN: dict[str, float | None] = {
     "load_kg_m2": 0.0,
     "suspended_mg_l": 0.0,
-    "firm_load_kg_m2": 0.0,
+    "consolidated_load_kg_m2": 0.0,
     "threshold_Pa": None,
     "settling_m_s": None,
     "erosion_kg_m2_s": 5e-5,
@@ -49,7 +49,7 @@ SILTS: dict[str, dict[str, float | None]] = {
     # deep is clear after 35 s, and no thruster keeps it up. What it tests is sand on the bed, not turbid water.
     "caco3-50mg": _PLAIN | {"suspended_mg_l": 50.0, "grain_m": 3e-4, "grain_density_kg_m3": 2710.0},
     "fresh-mud": _PLAIN | _MUD | {"load_kg_m2": 5.0, "threshold_Pa": 0.106},
-    "fluff": _PLAIN | _MUD | {"load_kg_m2": 1.1, "threshold_Pa": 0.035, "firm_load_kg_m2": 1.0},
+    "fluff": _PLAIN | _MUD | {"load_kg_m2": 1.1, "threshold_Pa": 0.035, "consolidated_load_kg_m2": 1.0},
     "sand": _PLAIN | {"load_kg_m2": 20.0, "grain_m": 2.5e-4, "grain_density_kg_m3": 2710.0},
 }
 """Fields that a kind of silt sets, unless they are given as well."""
@@ -184,7 +184,7 @@ class SiltSettings(Settings):
         "caco3-50mg clears in 35 s",
     )
     load_kg_m2: float = Field(0.1, ge=0.0, le=20.0, description="loose fine silt on the bed, 0 for a clean bed")
-    firm_load_kg_m2: float = Field(
+    consolidated_load_kg_m2: float = Field(
         0.0,
         ge=0.0,
         le=20.0,
@@ -193,7 +193,7 @@ class SiltSettings(Settings):
     grain_m: float = Field(20e-6, ge=1e-6, le=1e-3, description="grain diameter of the silt")
     grain_density_kg_m3: float = Field(2710.0, gt=1150.0, le=8000.0, description="density of the grains (calcite 2710)")
     suspended_mg_l: float = Field(0.0, ge=0.0, le=5000.0, description="evenly in the water at the start")
-    pickup: Literal["auto", "partheniades", "van-rijn"] = Field(
+    erosion_law: Literal["auto", "partheniades", "van-rijn"] = Field(
         "auto", description="law of erosion; auto takes van Rijn's for sand, from 62.5 um on"
     )
     erosion_kg_m2_s: float = Field(5e-5, ge=0.0, le=1e-2, description="Partheniades' erosion rate M")
@@ -209,9 +209,10 @@ class SiltSettings(Settings):
 
     @model_validator(mode="after")
     def _firm_part_fits(self) -> SiltSettings:
-        if self.firm_load_kg_m2 > self.load_kg_m2:
+        if self.consolidated_load_kg_m2 > self.load_kg_m2:
             raise ValueError(
-                f"firm_load_kg_m2: {self.firm_load_kg_m2:g}, is a part of load_kg_m2 and so at most {self.load_kg_m2:g}"
+                f"consolidated_load_kg_m2: {self.consolidated_load_kg_m2:g}, is a part of load_kg_m2 and so at "
+                f"most {self.load_kg_m2:g}"
             )
         return self
 
@@ -260,17 +261,19 @@ class SensorSettings(Settings):
     pose_outages_s: tuple[tuple[float, float], ...] = Field(
         (), description="spans of time (from, to) in which there is no pose at all"
     )
-    pose_slow_m: Span = Field(
+    pose_drift_m: Span = Field(
         (0.003, 0.005), description="its position's lasting error, from and to, one sigma per axis"
     )
-    pose_slow_rad: Span = Field((0.0015, 0.0035), description="its attitude's lasting error, likewise")
-    pose_slow_s: Span = Field((10.0, 60.0), description="how long the lasting errors of pose and tracking last")
-    pose_stamp_late_s: Span = Field((0.005, 0.02), description="by how much its time stamp is later than the picture")
+    pose_drift_rad: Span = Field((0.0015, 0.0035), description="its attitude's lasting error, likewise")
+    pose_drift_time_s: Span = Field((10.0, 60.0), description="how long the lasting errors of pose and tracking last")
+    pose_timestamp_delay_s: Span = Field(
+        (0.005, 0.02), description="by how much its time stamp is later than the picture"
+    )
     pose_outliers: float = Field(0.01, ge=0.0, le=1.0, description="chance that a pose is far off")
     tracking_rate_hz: float = Field(10.0, ge=0.0, le=500.0, description="rate of optical tracking, 0 for none")
     tracking_noise_m: float = Field(0.005, ge=0.0, le=1.0, description="its position noise, one sigma per axis")
     tracking_latency_s: float = Field(0.03, ge=0.0, le=1.0, description="from the instant it shows to its arrival")
-    tracking_slow_m: Span = Field((0.003, 0.005), description="its lasting error, from and to, one sigma per axis")
+    tracking_drift_m: Span = Field((0.003, 0.005), description="its lasting error, from and to, one sigma per axis")
     imu_rate_hz: float = Field(50.0, gt=0.0, le=2000.0, description="rate of the inertial unit")
     gyro_noise_rad_s: float = Field(0.002, ge=0.0, le=1.0, description="gyro's white noise per sample, one sigma")
     gyro_bias_rad_s: float = Field(
@@ -290,14 +293,16 @@ class SensorSettings(Settings):
     )
     tilt_noise_rad: float = Field(0.002, ge=0.0, le=0.2, description="its noise, one sigma")
 
-    @field_validator("pose_slow_m", "pose_slow_rad", "pose_slow_s", "pose_stamp_late_s", "tracking_slow_m")
+    @field_validator(
+        "pose_drift_m", "pose_drift_rad", "pose_drift_time_s", "pose_timestamp_delay_s", "tracking_drift_m"
+    )
     @classmethod
     def _from_less_to_more(cls, span: Span) -> Span:
         if span[0] > span[1]:
             raise ValueError(f"from {span[0]:g} to {span[1]:g}, the first must not be more than the second")
         return span
 
-    @field_validator("pose_slow_s")
+    @field_validator("pose_drift_time_s")
     @classmethod
     def _lasts(cls, span: Span) -> Span:
         if span[0] < 0.1:
@@ -320,9 +325,9 @@ class MismatchSettings(Settings):
     trim_range_N: float = Field(1.0, ge=0.0, le=50.0, description="a drawn trim lies between minus and plus this")
     mass_pct: float = Field(5.0, ge=0.0, le=90.0, description="plant's mass differs by up to this")
     drag: str = Field(
-        "as-believed",
+        "nominal",
         min_length=1,
-        description="plant's drag: as-believed, a case of the vehicle's file by name, or drawn for any of them; "
+        description="plant's drag: nominal, a case of the vehicle's file by name, or random for any of them; "
         "damping_pct comes on top",
     )
     damping_pct: float = Field(30.0, ge=0.0, le=90.0, description="plant's drag differs by up to this")

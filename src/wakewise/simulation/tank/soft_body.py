@@ -239,14 +239,17 @@ def check_sway(
     slowest, known = float(sway.frequency_Hz[:, 0].min()), fastest_Hz(step_s)
     if slowest > known:
         raise InputError(
-            f"target.sway: {target.name} swings at {slowest:.3g} Hz or more, but water known each {1e3 * step_s:g} ms "
-            f"moves what swings below {known:g} Hz; too stiff: let target.sway be none, or target.stiffness_Pa less"
+            f"target.elasticity: {target.name} swings at {slowest:.3g} Hz or more, but water known each "
+            f"{1e3 * step_s:g} ms "
+            f"moves what swings below {known:g} Hz; too stiff: let target.elasticity be none, or "
+            "target.stiffness_Pa less"
         )
     tips = static_deflection_m(SurfaceElements.of(target, sway), sway, drag * density_kg_m3, water_m_s)
     share = float((np.linalg.norm(tips, axis=1) / sway.height_m).max())
     if share > MAX_DEFLECTION_SHARE:
         raise InputError(
-            f"target.sway: a current of {np.linalg.norm(water_m_s):.2g} m/s bends {target.name} by {share:.2g} of its "
+            f"target.elasticity: a current of {np.linalg.norm(water_m_s):.2g} m/s bends {target.name} by "
+            f"{share:.2g} of its "
             f"height, the theory of its bending holds to {MAX_DEFLECTION_SHARE:g}; too soft: "
             f"let target.stiffness_Pa be more"
         )
@@ -267,8 +270,9 @@ def check_loose(target: Target, yielding: TargetCompliance, water_m_s: Array, de
     pushed, holds = float(np.hypot(push_N[0], push_N[1])), yielding.loose.friction * yielding.loose.weight_N
     if pushed > holds:
         raise InputError(
-            f"target.loose: a current of {np.linalg.norm(water_m_s):.2g} m/s pushes {target.name} with {pushed:.2g} N, "
-            f"friction holds {holds:.2g} N; let target.loose.weight_N be more"
+            f"target.unanchored: a current of {np.linalg.norm(water_m_s):.2g} m/s pushes {target.name} with "
+            f"{pushed:.2g} N, "
+            f"friction holds {holds:.2g} N; let target.unanchored.weight_N be more"
         )
 
 

@@ -170,10 +170,10 @@ class Tank:
             settings.density_kg_m3,
             silt.erosion_kg_m2_s,
             silt.threshold_Pa,
-            silt.pickup,
+            silt.erosion_law,
             settling_m_s=silt.settling_m_s,
             stress_intensity=STRESS_INTENSITY,
-            firm_kg_m2=silt.firm_load_kg_m2,
+            firm_kg_m2=silt.consolidated_load_kg_m2,
         )
         self._swell = _swell(self.ambient, laws)
         self._silt = Silt(laws, silt.load_kg_m2, settings.size_m, MAX_SILT_PARTICLES, silt_rng, self._swell)

@@ -105,7 +105,7 @@ def allocate(
 
     from wakewise import api
     from wakewise.allocation import min_norm_allocation
-    from wakewise.api.thrusts import layout_of, pose_of, view_of
+    from wakewise.api import layout_of, pose_of, view_of
     from wakewise.core.errors import InputError
     from wakewise.robot.importers import any_vehicle
     from wakewise.scene.targets import Region

@@ -95,7 +95,7 @@ def probe_command(
     """
     import numpy as np
 
-    from wakewise.api.thrusts import pose_of
+    from wakewise.api import pose_of
     from wakewise.core.errors import InputError
     from wakewise.robot.vehicles import load_vehicle
     from wakewise.simulation.tank import TankSettings

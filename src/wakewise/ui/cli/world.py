@@ -45,7 +45,7 @@ def show(name: Name, seed: Seed = None, json: Json = False) -> None:
     from wakewise.operation.worlds.library import load_world
 
     world = load_world(name)
-    drawn = sample_fields(world.draws, seed) if seed is not None else {}
+    drawn = sample_fields(world.randomize, seed) if seed is not None else {}
     if json:
         fields: dict[str, Any] = {}
         for dotted, entry in world.file.fields.items():
@@ -60,7 +60,7 @@ def show(name: Name, seed: Seed = None, json: Json = False) -> None:
     for column in ("field", "value", *(() if seed is None else (f"seed {seed}",)), "source"):
         table.add_column(column)
     for dotted, entry in world.file.fields.items():
-        value = _shown(entry.value) if entry.draw is None else f"drawn: {entry.draw}"
+        value = _shown(entry.value) if entry.randomize is None else f"drawn: {entry.randomize}"
         now = () if seed is None else (_shown(drawn.get(dotted, entry.value)),)
         table.add_row(dotted, value, *now, " ".join(entry.source.split()))
     print_table(table)

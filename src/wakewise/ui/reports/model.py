@@ -250,7 +250,7 @@ def _found(truth: TrialMesh, settings: Scenario, bed_z_m: float) -> Target:
     middle = 0.5 * (truth.vertices_m.min(axis=0) + truth.vertices_m.max(axis=0))
     radius_m = float(np.linalg.norm(truth.vertices_m - middle, axis=1).max())
     target = Target(name="found", mesh=mesh, centre_W_m=middle, radius_m=radius_m, bed_z_m=bed_z_m)
-    return target_with_error(target, settings.survey, Seeds(settings.seed).survey()[0])
+    return target_with_error(target, settings.calibration_error, Seeds(settings.seed).survey()[0])
 
 
 def _painted(coverage: Coverage, vertices_W_m: Array) -> tuple[Array, BoolArray]:

@@ -252,7 +252,7 @@ def limits_section(trials: Mapping[str, Trial]) -> str:
 
 def _water_html(trial: Trial) -> str:
     """What is wrong with the water of one trial."""
-    replaced = trial.scenario.get("replaced")
+    replaced = trial.scenario.get("overrides")
     if isinstance(replaced, Mapping) and "world" in replaced:
         return _from_outside(str(replaced["world"]))
     if trial.settings is None:

@@ -317,7 +317,7 @@ def _again(trial: Trial) -> str:
         known.append(line.lstrip("# ").strip())
     command = f"wakewise scan {shlex.quote(f'{trial.name}/scenario.yaml')} --out {shlex.quote(f'{trial.name}-again')}"
     how = "The scenario file holds every setting; the same seed gives the same flight."
-    if trial.scenario.get("replaced"):
+    if trial.scenario.get("overrides"):
         command = f"ww.trial(parts.replace(...), {trial.name + '-again'!r})"
         how = (
             "Some parts were given in Python, which a scenario file cannot hold: run the script that gave them. The "

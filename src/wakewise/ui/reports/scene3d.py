@@ -275,7 +275,7 @@ def _body_poses(trial: Trial) -> list[Pose]:
 
 def vehicle_of(trial: Trial) -> Vehicle | None:
     """Vehicle that the scenario names; None if it is not known here."""
-    name, replaced = trial.scenario.get("vehicle"), trial.scenario.get("replaced") or {}
+    name, replaced = trial.scenario.get("vehicle"), trial.scenario.get("overrides") or {}
     if not isinstance(name, str) or "vehicle" in replaced:
         return None
     try:

@@ -94,7 +94,7 @@ class Trial:
     @property
     def outside(self) -> str:
         """In words what of the flight was not the package's own; empty if all of it was."""
-        replaced = self.scenario.get("replaced")
+        replaced = self.scenario.get("overrides")
         named = self.method in (*METHODS, "unknown method") or (
             isinstance(replaced, Mapping) and "controller" in replaced
         )

@@ -130,7 +130,7 @@ def map_photos(
                 "from one place"
             )
         own, regrouped = None, None
-        if settings.lens_check and photos >= LEAST_FOR_CHECK and given is None:
+        if settings.check_shared_intrinsics and photos >= LEAST_FOR_CHECK and given is None:
             own = fit_per_photo_intrinsics(folder, copy, room, settings, photos, progress)
             regrouped = _by_own_lens(copy, own) if settings.refine_camera else None
             if regrouped is not None:

@@ -51,7 +51,7 @@ class ReconstructionSettings(Settings):
         description="fit focal length and distortion to the photos, from EXIF or a given camera on; false keeps a "
         "given camera as it is",
     )
-    lens_check: bool = Field(
+    check_shared_intrinsics: bool = Field(
         default=True,
         description="map once more with a lens for each photo, which tells photos of several lenses that nobody told "
         "of, and parts them; not of a flight's photographs, which one camera took",

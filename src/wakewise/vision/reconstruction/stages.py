@@ -138,7 +138,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "map": (
         "mapper",
         "refine_camera",
-        "lens_check",
+        "check_shared_intrinsics",
         "known_cameras",
         "reprojection_px",
         "position_priors",

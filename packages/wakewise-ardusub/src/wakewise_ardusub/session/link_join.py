@@ -111,7 +111,7 @@ RATE_HZ = 10.0
 """Control steps a second; the autopilot's own loop goes on beneath."""
 SEA = {
     "control.rate_hz": RATE_HZ,
-    "survey.place_m": 0.0,
+    "calibration_error.target_position_m": 0.0,
     "estimation.position_std_m": 0.02,
     "estimation.attitude_std_rad": 0.02,
     "estimation.gyro_std_rad_s": 0.01,

@@ -251,7 +251,7 @@ def parts_of(trial: OperatorTrial) -> Parts:
             X_BC=parts.vehicle.X_BC,
             target_W_m=target.centre_W_m,
             dt_s=dt_s,
-            seed=parts.control.person or 0,
+            seed=parts.control.operator_seed or 0,
         )
     else:
         X_WB = start_pose(course, target, water.azimuth_rad, standoff_m, parts.vehicle.X_BC)

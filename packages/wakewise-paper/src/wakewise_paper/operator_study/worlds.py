@@ -66,14 +66,14 @@ def water_of(name: str, seed: int) -> OperatorWorld:
     def rng(what: str) -> np.random.Generator:
         return np.random.default_rng([own, 37, zlib.crc32(what.encode())])
 
-    drawn, flows = world.draws.get(TRIM), world.draws.get(CURRENT)
+    drawn, flows = world.randomize.get(TRIM), world.randomize.get(CURRENT)
     low, high = _range(drawn)
     third = (high - low) / len(TRIMS)
     begins = low + third * TRIMS.index(trim)
     azimuth = float(rng("azimuth").uniform(-np.pi, np.pi))
     current = None
-    if flows is not None and flows.level is not None:
-        current = current_W_m_s(side, azimuth, float(rng("current").uniform(*flows.level)), rng("side"))
+    if flows is not None and flows.horizontal is not None:
+        current = current_W_m_s(side, azimuth, float(rng("current").uniform(*flows.horizontal)), rng("side"))
     return OperatorWorld(
         world=name,
         seed=own,
@@ -88,4 +88,4 @@ def water_of(name: str, seed: int) -> OperatorWorld:
 
 def _range(drawn: FieldDistribution | None) -> tuple[float, float]:
     """Of a world's trim: what it draws from, else the default of the plant."""
-    return (-TRIM_RANGE_N, TRIM_RANGE_N) if drawn is None or drawn.between is None else drawn.between
+    return (-TRIM_RANGE_N, TRIM_RANGE_N) if drawn is None or drawn.uniform is None else drawn.uniform

@@ -38,7 +38,7 @@ class TableWorld:
         Of the library.
     fields : dict
         Of a scenario, by their dotted names, over the world's.
-    draws : dict
+    randomize : dict
         What the seed draws beyond the world's own draws.
     circular : bool
         Planner and water are one law: figures say what a method does, not what water does.
@@ -48,17 +48,17 @@ class TableWorld:
     title: str
     world: str
     fields: dict[str, Any] = field(default_factory=dict)
-    draws: dict[str, Any] = field(default_factory=dict)
+    randomize: dict[str, Any] = field(default_factory=dict)
     circular: bool = False
 
     @property
     def told(self) -> dict[str, Any]:
         """Fields for `Scenario.preset`."""
-        draws = {"draws": self.draws} if self.draws else {}
+        draws = {"randomize": self.randomize} if self.randomize else {}
         return {"world": self.world, **self.fields, **draws}
 
 
-_STILL_TARGET = {"target.sway": "none"}
+_STILL_TARGET = {"target.elasticity": "none"}
 _OWN = {
     PAPER: TableWorld(
         name=PAPER,
@@ -68,7 +68,7 @@ _OWN = {
         | {"flow": "paper"}
         | {f"control.wake.{key}": value for key, value in PAPER_WAKE.items()}
         | {f"control.levers.{key}": value for key, value in OFF.items()},
-        draws={"tank.mismatch.trim_N": [-3.3, -1.0]},
+        randomize={"tank.mismatch.trim_N": [-3.3, -1.0]},
         circular=True,
     ),
     LATTICE: TableWorld(
@@ -90,7 +90,7 @@ _OWN = {
         world="reef",
         # A stony coral, as the paper's were: the reef's gorgonian bends beyond its theory from about 0.35 m/s on.
         fields={"imaging.water_type": "5C", "target.kind": "branching"},
-        draws={"tank.current.velocity_m_s": {"level": [0.1, 0.5]}},
+        randomize={"tank.current.velocity_m_s": {"horizontal": [0.1, 0.5]}},
     ),
 }
 

@@ -135,7 +135,7 @@ def scenario_parts(name: str, vehicle: str, method: str, seed: int) -> Parts:
         "seed": what.seed,
         "tank.mismatch.trim_N": what.trim_N,
         "tank.current.velocity_m_s": what.current_W_m_s,
-        "draws": {key: draw.model_dump(exclude_none=True) for key, draw in draws.items()},
+        "randomize": {key: draw.model_dump(exclude_none=True) for key, draw in draws.items()},
     }
     parts = Scenario.preset("quick", **told).parts()
     if file.course == "nadir":

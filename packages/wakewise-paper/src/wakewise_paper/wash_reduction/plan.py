@@ -148,7 +148,7 @@ def runs(scenario: str) -> bool:
         return True
     world = load_world(scenario.removeprefix(WORLD))
     field = "tank.current.velocity_m_s"
-    return field in world.draws or any(world.values.get(field, ()))
+    return field in world.randomize or any(world.values.get(field, ()))
 
 
 def flight_s(trial: WashTrial) -> float:

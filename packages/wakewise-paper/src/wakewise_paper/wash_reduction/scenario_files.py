@@ -151,7 +151,7 @@ def fields_of(name: str) -> tuple[dict[str, Any], dict[str, FieldDistribution]]:
         name=name,
         file=WorldFile(title=file.title, why=file.why, fields=fields),
     )
-    return world.values, world.draws
+    return world.values, world.randomize
 
 
 def names_of(wished: tuple[str, ...] | None) -> tuple[str, ...]:

@@ -66,7 +66,7 @@ class WorldTrial:
 
     def scenario(self) -> Scenario:
         """The quick preset in that world: what `wakewise scan --world` flies. Other flows hold the target still."""
-        held = {} if self.flow is None else {"target.sway": "none"}
+        held = {} if self.flow is None else {"target.elasticity": "none"}
         return Scenario.preset("quick", world=self.world, method=self.method, seed=self.seed, flow=self.flow, **held)
 
 
