@@ -71,6 +71,7 @@ results: setup
 docs: setup
 	$(BIN)/python tools/write_docs.py
 	$(BIN)/python tools/draw_hardware.py
+	$(BIN)/python tools/draw_layers.py
 
 lock: setup
 	$(BIN)/uv pip compile pyproject.toml --extra all --extra gamepad --extra links --extra ros --extra dask --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o requirements.lock
