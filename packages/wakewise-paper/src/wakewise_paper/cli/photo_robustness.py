@@ -1,4 +1,4 @@
-"""`wakewise degrade`: models from ever worse photographs, until there is none."""
+"""`wakewise photo-robustness`: models from ever worse photographs, until there is none."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def degrade(
     """
     from wakewise.core.optional_dependencies import need
 
-    need("wakewise degrade", "photos", "reports")
+    need("wakewise photo-robustness", "photos", "reports")
     from wakewise.operation import load_scenario
     from wakewise.ui.cli.options import overrides
     from wakewise_paper.photo_robustness import FACTORS, degrade

@@ -15,7 +15,8 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.simulation.lattice import CASES, DiskJet, LatticeCase, LatticeRun, load_mean_field
+from wakewise.simulation.lattice import (CASES, DiskJet, LatticeCase, load_mean_field)
+from wakewise_paper.lattice_reference.run import LatticeRun
 from wakewise.simulation.water import Water
 from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.wake.learned import EDGES, MEMORY_S, JetPoints, history_bins, remembered

@@ -16,9 +16,10 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise_paper.flight_batches import Key
 from wakewise_paper.wash_reduction.energy_optimum import ENERGIES, choose_under_budget
-from wakewise_paper.wash_reduction.summary_table import TROUBLE_M_S
 
 SPEED = "target_speed_mean_m_s"
+TROUBLE_M_S = 0.010
+"""What `dp` leaves where there is trouble, more than."""
 RESAMPLES = 4000
 LEAST_M_S = 0.5e-3
 """Speeds below count as this in logarithms: the tank merges rings with errors of up to three times that, and a flight

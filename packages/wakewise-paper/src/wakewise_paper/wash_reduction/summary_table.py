@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from wakewise_paper.wash_reduction.figures import SPEED, Row, log_reduction_pct, pairs_of, ratio
+from wakewise_paper.wash_reduction.figures import SPEED, TROUBLE_M_S, Row, log_reduction_pct, pairs_of, ratio
 
-TROUBLE_M_S, CALM_M_S = 0.010, 0.005
-"""What `dp` leaves where there is trouble, more than; and where there is none, less than."""
+CALM_M_S = 0.005
+"""What `dp` leaves where there is no trouble, less than."""
 POSITION_SHARE, POSITION_MM = 1.05, 0.2
 """The camera may be off by so much of what `dp` leaves, and so much more."""
 SILT, SWAY, PLACE, ENERGY = "ray_optical_depth", "sway_rms_mm", "camera_rmse_mm", "energy_kJ"
