@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     )
     from wakewise.wake.influence import InfluenceModel
     from wakewise.wake.jets import AxialJet, GaussianJet, PaperJet, PowerJet, RoundJet
-    from wakewise.wake.models import WakeSettings, bed_of, free_jet, model_names, wake_model
+    from wakewise.wake.learned import bed_of, free_jet
+    from wakewise.wake.models import WakeSettings, model_names, wake_model
     from wakewise.wake.wall_jet import ImpingingJet
 
 __all__ = [

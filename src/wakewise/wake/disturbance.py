@@ -62,7 +62,7 @@ from wakewise.wake.finite_difference import FiniteDifferenceWake
 from wakewise.wake.gram import FAST, dot, gram_slope_sum, gram_sum, stage_sum
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.kernels import as_tuple, own_constants, section_of
-from wakewise.wake.models import free_jet
+from wakewise.wake.learned import free_jet
 from wakewise.wake.wall_jet import ImpingingJet, floor_gram_sum, floor_stage_sum
 
 

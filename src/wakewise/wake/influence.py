@@ -17,7 +17,7 @@ from wakewise.core.jit.njit import njit
 from wakewise.wake.advected_jets import CrossFlow
 from wakewise.wake.disturbance import SUPERPOSITIONS, Superposition, gram, scattered_jet_gram
 from wakewise.wake.jets import AxialJet, JetLaw
-from wakewise.wake.models import free_jet
+from wakewise.wake.learned import free_jet
 
 if TYPE_CHECKING:
     from wakewise.robot.vehicles import Vehicle

@@ -35,8 +35,9 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
+from wakewise.core.interfaces import WakeModel
 from wakewise.core.size_limits import check_arrays
-from wakewise.wake.wall_jet import WALL_SPEED, wall_velocity
+from wakewise.wake.wall_jet import WALL_SPEED, ImpingingJet, wall_velocity
 
 EDGES = np.array([0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.4, 3.5, 6.0])
 """Delays in t* between which the thrust is averaged: finer than a tenth of t* a jet's own front is blurred."""
@@ -383,3 +384,18 @@ def shipped() -> Network:
 def learned_wake(bed_z_m: float | None = None) -> LearnedWake:
     """The model `learned`, with wall jets on a bed if its depth is given."""
     return LearnedWake(network=shipped(), bed_z_m=bed_z_m)
+
+
+# Beside both kinds of model and without pydantic, which computers on vehicles lack.
+
+
+def bed_of(wake: WakeModel) -> float | None:
+    """Depth of the bed (m) that a model knows of; None for models of free jets."""
+    return wake.bed_z_m if isinstance(wake, ImpingingJet | LearnedWake) else None
+
+
+def free_jet(wake: WakeModel) -> WakeModel:
+    """The free jet of a model, without its floor."""
+    if isinstance(wake, ImpingingJet):
+        return wake.jet
+    return wake.free if isinstance(wake, LearnedWake) else wake

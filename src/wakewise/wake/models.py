@@ -14,8 +14,6 @@ fitted to a flow (`wakewise wake fit`), which any scenario file can carry instea
   sqrt(T / (rho A)) at its middle and momentum T / rho: x0 = K sqrt(A) = 3.33 D and b0 = R sqrt(2) = 0.707 D.
 - `learned`: a rival, a small network trained on the tank's water and the lattice (`wakewise.wake.learned`); it takes no
   numbers, and its derivatives are differences.
-
-What a wake model knows of a bed, and what it says without one.
 """
 
 from __future__ import annotations
@@ -33,7 +31,7 @@ from wakewise.core.interfaces import WakeModel
 from wakewise.core.plugins import find, names, offered
 from wakewise.core.settings import Settings
 from wakewise.wake.jets import AxialJet, GaussianJet, PaperJet, PowerJet, RoundJet
-from wakewise.wake.learned import LearnedWake, learned_wake
+from wakewise.wake.learned import learned_wake
 from wakewise.wake.wall_jet import ImpingingJet
 
 ModelName = Literal["paper", "paper-calibrated", "fitted", "linear", "jet", "jet-fitted"]
@@ -198,15 +196,3 @@ def _from_outside(name: str) -> WakeModel:
     own: dict[str, Any] = dict.fromkeys((*_RECIPES, *RIVALS))
     make: Callable[[], WakeModel] = find("wake model", name, own).maker
     return make()
-
-
-def bed_of(wake: WakeModel) -> float | None:
-    """Depth of the bed (m) that a model knows of; None for models of free jets."""
-    return wake.bed_z_m if isinstance(wake, ImpingingJet | LearnedWake) else None
-
-
-def free_jet(wake: WakeModel) -> WakeModel:
-    """The free jet of a model, without its floor."""
-    if isinstance(wake, ImpingingJet):
-        return wake.jet
-    return wake.free if isinstance(wake, LearnedWake) else wake
