@@ -56,7 +56,7 @@ test test-all: setup
 	$(BIN)/lint-imports
 	@$(BIN)/mypy > $(VENV)/types.txt 2>&1 & types=$$!; \
 	{ sh tools/browser.sh; $(BIN)/pytest --collect-only -qq > /dev/null 2>&1; } & beside=$$!; \
-	$(BIN)/wakewise warm; kernels=$$?; wait $$beside; \
+	$(BIN)/wakewise compile; kernels=$$?; wait $$beside; \
 	test $$kernels -eq 0 && OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder $(if $(filter test,$@),-m "not slow" --hypothesis-profile=ci); \
 	tests=$$?; wait $$types; types=$$?; cat $(VENV)/types.txt; test $$tests -eq 0 -a $$types -eq 0
 

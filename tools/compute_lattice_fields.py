@@ -12,17 +12,18 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from wakewise.simulation.lattice import CASES, compute_mean_field, compute_run, find_case, save_mean_field
-from wakewise.simulation.lattice.crossing import (
-    crossing_field,
-    is_crossing,
-    is_past_box,
-    past_field,
-    save_crossing,
-    save_past_box,
-)
-from wakewise.simulation.lattice.meanfield import DATA, SHIPPED, convergence
+from wakewise.simulation.lattice import CASES, find_case
+from wakewise.simulation.lattice.meanfield import DATA
 from wakewise.ui.cli.console import ProgressBars
+from wakewise_paper.lattice_reference.crossing_jets import crossing_field, is_crossing, save_crossing
+from wakewise_paper.lattice_reference.jet_past_box import is_past_box, past_field, save_past_box
+from wakewise_paper.lattice_reference.mean_field import (
+    SHIPPED,
+    compute_mean_field,
+    compute_run,
+    convergence,
+    save_mean_field,
+)
 
 
 def main() -> None:

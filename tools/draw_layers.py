@@ -95,9 +95,12 @@ def page() -> str:
     lines = [
         "# Architecture",
         "",
-        "`make docs` writes this page from the source; a test fails when it is stale. An arrow means \"imports\". Arrows that",
-        "follow from others are left out. No arrow points up: import contracts in `pyproject.toml` hold this in `make test`.",
-        "The controller cannot see the simulated truth: `simulation` never imports `wake`, `planning` or `control`, and these",
+        "`make docs` writes this page from the source; a test fails when it is stale. An arrow means "
+        '"imports". Arrows that',
+        "follow from others are left out. No arrow points up: import contracts in `pyproject.toml` hold this in "
+        "`make test`.",
+        "The controller cannot see the simulated truth: `simulation` never imports `wake`, `planning` or "
+        "`control`, and these",
         "never import `simulation`. They meet in `operation`.",
         "",
         "```mermaid",

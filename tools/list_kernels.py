@@ -1,4 +1,4 @@
-"""List the kernels that commands call from Python, with their types, for `wakewise warm` (about five minutes).
+"""List the kernels that commands call from Python, with their types, for `wakewise compile` (about five minutes).
 
     python tools/list_kernels.py
 

@@ -12,7 +12,7 @@ from wakewise_benchmarks.command import show_traps
 @pytest.mark.slow
 def test_some_traps_are_right_or_said(capsys: pytest.CaptureFixture[str]) -> None:
     """A good set is right, mixed-up names are a failure in words; the table has a row each."""
-    assert "traps" in BENCHES
+    assert "adversarial-photos" in BENCHES
     found = adversarial_photos.run(BenchOptions(scenarios=("none", "names-mixed-up")))
     assert found["traps"]["none"]["verdict"] == "right" and found["traps"]["none"]["said"] == []
     assert found["traps"]["none"]["off_pct"] < 1.0

@@ -1,6 +1,6 @@
 """`wakewise bench`: speed and quality of one part, side by side with a peer.
 
-What `wakewise bench traps` prints: a row a trap, and how many were silent.
+What `wakewise bench adversarial-photos` prints: a row a trap, and how many were silent.
 """
 
 from __future__ import annotations
@@ -192,7 +192,7 @@ def bench(
             show_operator(result)
         elif each == "worlds":
             show_worlds(result)
-        elif each == "traps":
+        elif each == "adversarial-photos":
             show_traps(result)
         else:
             _show(result, "  ")

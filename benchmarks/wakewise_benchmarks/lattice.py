@@ -12,11 +12,11 @@ from numba import float32
 
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.simulation.lattice import load_mean_field
-from wakewise.simulation.lattice.engines import why_no_gpu
 from wakewise.simulation.lattice.kernel import step
-from wakewise.simulation.lattice.reference_step import twin_step
 from wakewise.simulation.lattice.stencil import OPEN, PERIODIC, box, plane_row, smagorinsky_factor, still_water
 from wakewise_benchmarks.plain_lattice import make_sweep, two_lattices
+from wakewise_paper.lattice_reference.engines import why_no_gpu
+from wakewise_paper.lattice_reference.numpy_step import twin_step
 
 CELLS = (128, 110, 110)
 """Far more than the caches hold, and their nineteen rows lie half a page apart, which is hard on a plain loop."""
@@ -94,7 +94,7 @@ def _rates(options: BenchOptions, rounds: int = 9) -> dict[str, Any]:
 
 
 def _gpu_rate() -> float:
-    from wakewise.simulation.lattice.cuda_engine import giga_updates_per_s
+    from wakewise_paper.lattice_reference.cuda_engine import giga_updates_per_s
 
     return giga_updates_per_s()
 

@@ -33,16 +33,23 @@ BENCHES = {
     "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",
     "link": "physics behind a firmware, the relay, the loop at sea, noise, and what every loss leads to",
     "tank": "the world of a trial against the clock",
-    "traps": "photographs that deceive: of each the model is right, or says that it is not",
+    "adversarial-photos": "photographs that deceive: of each the model is right, or says that it is not",
     "worlds": "what each method leaves of each world in which users have the trouble, models included",
 }
-"""Name of each bench and what it measures; the module of that name in this folder holds it, or one of `_STUDIES`."""
+"""Name of each bench and what it measures; the module of that name in this folder holds it, or one of `_MODULES`."""
 
-_STUDIES = {
+_MODULES = {
+    "adversarial-photos": "wakewise_benchmarks.adversarial_photos",
+    "cold": "wakewise_benchmarks.startup_time",
     "gentle": "wakewise_paper.wash_reduction.bench",
     "operator": "wakewise_paper.operator_study.bench",
     "worlds": "wakewise_paper.world_study.bench",
 }
+
+
+def module_of(name: str) -> str:
+    """Dotted name of the module that holds a bench."""
+    return _MODULES.get(name, f"wakewise_benchmarks.{name}")
 
 
 def run_bench(name: str, options: BenchOptions) -> dict[str, Any]:
@@ -55,7 +62,7 @@ def run_bench(name: str, options: BenchOptions) -> dict[str, Any]:
     """
     if name not in BENCHES:
         raise InputError(f"bench {name!r}: no such bench, allowed {', '.join(BENCHES)}")
-    result: dict[str, Any] = import_module(_STUDIES.get(name, f"wakewise_benchmarks.{name}")).run(options)
+    result: dict[str, Any] = import_module(module_of(name)).run(options)
     return result
 
 

@@ -32,7 +32,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     helps = [_took_s(_COMMAND, "--help") for _ in range(REPEATS)]
     with tempfile.TemporaryDirectory() as folder:
         options.progress(1, 10, "compiling everything")
-        compiled = json.loads(_output(_COMMAND, "warm", "--json", cache=Path(folder, "all")))
+        compiled = json.loads(_output(_COMMAND, "compile", "--json", cache=Path(folder, "all")))
         options.progress(5, 10, "a first flight")
         first = _took_s(_FLIGHT, cache=Path(folder, "flight"))
         options.progress(9, 10, "a second flight")

@@ -98,7 +98,7 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Run(r"wakewise evaluate .*", slow=True, shows="rmse_mm"),
     Run(r"wakewise calibrate BOARD_PHOTOS .*", shows="focal"),
     Run(r"wakewise colour PHOTOS"),
-    Run(r"wakewise degrade", also=("--levels", "silt=0", "--out", "runs/degraded", *BRIEF), slow=True),
+    Run(r"wakewise photo-robustness", also=("--levels", "silt=0", "--out", "runs/degraded", *BRIEF), slow=True),
     Elsewhere(r"wakewise nerf .*", "packages/wakewise-nerf/tests/test_nerf_pipeline.py", '"nerf"'),
     # Vehicles, wakes, water, worlds.
     Run(r"wakewise vehicle check bluerov2-heavy", shows="rank"),

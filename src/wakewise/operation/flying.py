@@ -247,7 +247,8 @@ class _Notice:
             self.told = True
             minutes = max(1, round((total - done) / 60.0 / min(4, os.cpu_count() or 1)))
             print(
-                f"wakewise: compiling kernels, some {minutes} min; only this time (wakewise warm does so beforehand)",
+                f"wakewise: compiling kernels, some {minutes} min; only this time (wakewise compile does so "
+                "beforehand)",
                 file=sys.stderr,
                 flush=True,
             )

@@ -54,8 +54,8 @@ def test_evaluate_prints_figures_with_their_definitions_and_colours_errors(capsy
         (["calibrate", ".", "--board", "eleven"], 2, "COLUMNSxROWS"),
         (["calibrate", ".", "--marker-mm", "9"], 2, "markers must"),
         (["reconstruct", ".", "--set", "magic=1"], 2, "no such field"),
-        (["degrade", "--levels", "silt"], 2, "FACTOR=A,B"),
-        (["degrade", "--levels", "fog=0,1"], 2, "fog"),
+        (["photo-robustness", "--levels", "silt"], 2, "FACTOR=A,B"),
+        (["photo-robustness", "--levels", "fog=0,1"], 2, "fog"),
     ],
 )
 def test_what_cannot_be_done_is_told_in_one_line(arguments: list[str], code: int, words: str, capsys: Capsys) -> None:

@@ -57,7 +57,7 @@ _COMMANDS = (
     Command(VEHICLES, "allocate", allocate.allocate),
     Command(VEHICLES, "wake", wake.app),
     Command(STUDIES, "campaign", campaign.app),
-    Command(STUDIES, "warm", precompile.warm),
+    Command(STUDIES, "compile", precompile.warm),
     *installed_commands(),
 )
 

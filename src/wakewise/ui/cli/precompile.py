@@ -1,4 +1,4 @@
-"""`wakewise warm`: compile all kernels once, so that no command has to."""
+"""`wakewise compile`: compile all kernels once, so that no command has to."""
 
 from __future__ import annotations
 
