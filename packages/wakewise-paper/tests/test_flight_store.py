@@ -21,7 +21,9 @@ def test_flights_are_kept_by_what_was_flown(tmp_path, monkeypatch):
     """The same trial is found again as it was, another is not, and `fresh` finds none; nonsense counts as not flown."""
     monkeypatch.setattr(flight_batches, "compile_kernels", lambda **_: None)
     store = FlightStore(tmp_path / "c")
-    trial = WashTrial(scenario="orbit/paper", method="dp", seed=1, control=(("levers.drift", False), ("w", (1.0, 2.0))))
+    trial = WashTrial(
+        scenario="orbit/paper", method="dp", seed=1, control=(("allocation.advection", False), ("w", (1.0, 2.0)))
+    )
     assert store.load(trial, FLY) is None
     flown.clear()
     rows, failures, known = flight_batches.fly_all({("a", "b", 1): trial}, FLY, store, BenchOptions(), lambda _: Here())

@@ -5,8 +5,7 @@ import pytest
 from statsmodels.stats.proportion import proportion_confint
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.campaigns.statistics import stratified_bootstrap, wilson
-from wakewise.experiments.campaigns.statistics.intervals import interquartile_mean, ratio_of_sums
+from wakewise.experiments.campaigns.statistics import ratio_of_sums, stratified_bootstrap, wilson
 
 
 @pytest.mark.parametrize(("k", "n"), [(0, 1), (0, 20), (7, 20), (20, 20), (197, 200)])
@@ -47,13 +46,6 @@ def test_columns_of_a_pair_stay_together():
     theirs = np.array([1.0, 10.0, 100.0])
     value, ends = stratified_bootstrap(np.column_stack([0.3 * theirs, theirs]), None, ratio_of_sums)
     assert (value, ends.low, ends.high) == (pytest.approx(0.3), pytest.approx(0.3), pytest.approx(0.3))
-
-
-def test_the_interquartile_mean_is_not_moved_by_the_outer_quarters():
-    """Of 4 values it is the mean of the middle two; of 5 the cut ones count as much as lies inside; of 1 itself."""
-    assert interquartile_mean(np.array([-99.0, 2.0, 4.0, 1e6])[None, :, None]) == pytest.approx([3.0])
-    assert interquartile_mean(np.array([0.0, 1.0, 2.0, 3.0, 4.0])[None, :, None]) == pytest.approx([2.0])
-    assert interquartile_mean(np.array([[[7.0]]])) == pytest.approx([7.0])
 
 
 def test_one_trial_has_no_interval_and_no_trials_no_value():

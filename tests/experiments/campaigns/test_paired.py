@@ -5,8 +5,7 @@ import pytest
 from statsmodels.stats.weightstats import DescrStatsW
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.campaigns.statistics import paired_test
-from wakewise.experiments.campaigns.statistics.intervals import hedges_correction
+from wakewise.experiments.campaigns.statistics import hedges_correction, paired_test
 
 
 def test_the_t_test_and_its_interval_are_statsmodels():

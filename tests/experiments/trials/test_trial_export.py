@@ -14,6 +14,7 @@ from wakewise.core.geometry import quat_from_euler
 from wakewise.experiments.exports import GeodeticOrigin
 from wakewise.experiments.trials.export import EXPORTS, export_trial
 from wakewise.ui.cli.main import run
+from wakewise.vision.reconstruction import OrientedPointCloud, write_cloud
 
 Capsys = pytest.CaptureFixture[str]
 POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
@@ -64,6 +65,52 @@ def test_each_format_is_written_once_and_again(trial: Path) -> None:
         "/true/pose": 6, "/estimated/pose": 6, "/tf": 16, "/thrusts": 6, "/wrench": 6,
         "/camera/image/compressed": 2, "/camera/camera_info": 2,
     }  # fmt: skip
+
+
+def test_an_export_for_trainers_lists_split_water_and_dense_points(trial: Path, tmp_path: Path, capsys: Capsys) -> None:
+    """export.json: what is held out, the water of the trial's scenario, dense points; null with a reason otherwise."""
+    assert run(["export", str(trial), "--to", "colmap", "--out", str(tmp_path / "bare"), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    told = json.loads((tmp_path / "bare" / "export.json").read_text())
+    assert (said["train"], said["held_out"], said["dense_points"]) == (1, 1, 0)
+    assert told["water"]["attenuation_per_m"] is None
+    assert "scenario.yaml" in told["water"]["why"]
+    assert (told["dense"], "dense.ply" in told["why"]["dense"]) == (None, True)
+    (trial / "scenario.yaml").write_text("imaging: {water_type: 3C}\n")
+    points = np.random.default_rng(0).normal(size=(200, 3))
+    write_cloud(trial / "dense.ply", OrientedPointCloud(points_m=points, normals=0 * points, colours=0 * points))
+    words = [
+        "export",
+        str(trial),
+        "--to",
+        "nerfstudio",
+        "--out",
+        str(tmp_path / "full"),
+        "--held-out",
+        "2",
+        "--seed",
+        "5",
+    ]
+    assert run(words) == 0
+    assert "water (trial): attenuation 1.16, 1.24, 1.51 /m in red, green, blue" in capsys.readouterr().out
+    told = json.loads((tmp_path / "full" / "export.json").read_text())
+    assert (told["dense"], told["dense_points"]) == ("dense_pc.ply", 200)
+    assert told["water"]["attenuation_per_m"] == {"red": 1.16, "green": 1.235, "blue": 1.514}
+    assert told["split"]["held_out"] == [one["name"] for one in told["views"] if one["held_out"]]
+    flat = json.loads((tmp_path / "full" / told["undistorted"] / "transforms.json").read_text())
+    assert [Path(path).name for path in flat["test_filenames"]] == told["split"]["held_out"]
+    assert (flat["k1"], flat["k2"], flat["p1"], flat["p2"]) == (0.0, 0.0, 0.0, 0.0)
+    for frame in flat["frames"]:
+        assert (tmp_path / "full" / told["undistorted"] / frame["file_path"]).is_file()
+
+
+def test_water_of_estimated_poses_is_fitted_or_said_to_be_unknown(trial: Path, tmp_path: Path) -> None:
+    """Without a model there are no ranges to fit the water by; what the scenario says is not told of."""
+    (trial / "scenario.yaml").write_text("imaging: {water_type: 3C}\n")
+    done = export_trial(trial, "colmap", out=tmp_path / "out", poses="estimated")
+    assert done.water is not None
+    assert (done.water.source, done.water.attenuation_per_m) == (None, None)
+    assert "no reconstruction" in str(done.water.why)
 
 
 def test_estimated_poses_go_with_the_camera_as_the_crew_knows_it(trial: Path, tmp_path: Path) -> None:
@@ -130,6 +177,8 @@ def test_a_folder_that_holds_something_is_not_replaced(trial: Path, tmp_path: Pa
         (["export", "trial", "--to", "qgc-plan"], "LAT,LON"),
         (["export", "trial", "--to", "qgc-plan", "--origin", "here"], "36.52,-6.28"),
         (["export", "trial", "--to", "qgc-plan", "--origin", "91,0"], "-89 to 89"),
+        (["export", "trial", "--to", "tum", "--seed", "1"], "nerfstudio and colmap only"),
+        (["export", "trial", "--to", "colmap", "--held-out", "1"], "one photograph in 2 and more"),
         (["export", "empty", "--to", "tum"], "no steps.parquet"),
         (["export", "empty", "--to", "rosbag2"], "no steps.parquet"),
         (["export", "empty", "--to", "colmap"], "no images.csv"),

@@ -7,8 +7,14 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.simulation.lattice import find_case
-from wakewise_paper.lattice_reference.crossing_jets import (crossing_field, crossing_place, is_crossing, load_crossing, save_crossing)
-from wakewise.simulation.lattice.meanfield import DATA
+from wakewise_paper.lattice_reference.crossing_jets import (
+    DATA,
+    crossing_field,
+    crossing_place,
+    is_crossing,
+    load_crossing,
+    save_crossing,
+)
 from wakewise_paper.lattice_reference.run import LatticeRun
 
 SHIPPED = ("crossing", "crossing-40", "crossing-110")

@@ -12,17 +12,16 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.simulation.lattice import DiskJet, LatticeCase
-from wakewise_paper.lattice_reference.run import LatticeRun
+from wakewise.simulation.lattice.stencil import OPEN
 from wakewise_paper.lattice_reference import engines
 from wakewise_paper.lattice_reference.engines import DEVICES, CpuEngine, make_engine
-from wakewise.simulation.lattice.stencil import OPEN
+from wakewise_paper.lattice_reference.run import LatticeRun
 
 SIDE_BY_SIDE = """
 import numpy as np
 from numba import cuda
-from wakewise.simulation.lattice.engines import ProcessorEngine
-from wakewise_paper.lattice_reference.engines import make_engine
 from wakewise.simulation.lattice.stencil import OPEN, WALL
+from wakewise_paper.lattice_reference.engines import CpuEngine, make_engine
 
 rng = np.random.default_rng(0)
 cells = (4, 5, 6)
@@ -30,7 +29,7 @@ water = (np.linspace(0.52, 0.6, 6), np.linspace(0.0, 0.1, 56).reshape(7, 8), 0.3
 faces = np.array([OPEN, WALL, OPEN, WALL, WALL, OPEN])
 start = (1e-2 * rng.standard_normal((19, *cells))).astype(np.float32)
 pushes = [(np.array([[2, 3, 3], [1, 2, 6]]), np.array([[1e-3, 0.0, -2e-4], [0.0, 5e-4, 0.0]]))]
-card, processor = make_engine("cuda", *water, faces), ProcessorEngine(*water, faces)
+card, processor = make_engine("cuda", *water, faces), CpuEngine(*water, faces)
 assert type(card).__name__ == "CudaEngine"
 for engine in (card, processor):
     engine.restore(start, np.zeros((8, *cells)))

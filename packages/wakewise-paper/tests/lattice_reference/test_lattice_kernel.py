@@ -7,10 +7,21 @@ import numpy as np
 import pytest
 
 from wakewise.simulation.lattice.cases import DiskJet, LatticeCase
-from wakewise.simulation.lattice.kernel import (push, step, velocity, wrap)
+from wakewise.simulation.lattice.kernel import push, step, velocity, wrap
+from wakewise.simulation.lattice.stencil import (
+    OPEN,
+    OPPOSITE,
+    PERIODIC,
+    VELOCITIES,
+    WALL,
+    WEIGHTS,
+    box,
+    plane_row,
+    smagorinsky_factor,
+    still_water,
+)
 from wakewise_paper.lattice_reference.numpy_step import equilibrium, twin_step
 from wakewise_paper.lattice_reference.run import LatticeRun
-from wakewise.simulation.lattice.stencil import (OPEN, OPPOSITE, PERIODIC, VELOCITIES, WALL, WEIGHTS, box, plane_row, smagorinsky_factor, still_water)
 
 EDDIES = smagorinsky_factor(0.12)
 

@@ -21,7 +21,21 @@ import numpy as np
 import pytest
 
 from wakewise.simulation.lattice import MeanField, load_mean_field
-from wakewise_paper.lattice_reference.mean_field import (angular_flux, axis_speed, convergence, decay, decay_constant, entrainment, front_constant, half_width, momentum_flux, smooth_axis_speed, spreading, volume_flux, wall_jet_constant)
+from wakewise_paper.lattice_reference.mean_field import (
+    angular_flux,
+    axis_speed,
+    convergence,
+    decay,
+    decay_constant,
+    entrainment,
+    front_constant,
+    half_width,
+    momentum_flux,
+    smooth_axis_speed,
+    spreading,
+    volume_flux,
+    wall_jet_constant,
+)
 
 
 def _gaussian(K=6.5, width=0.094):

@@ -13,12 +13,10 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.simulation.lattice import (DiskJet, LatticeCase, case_hash, find_case)
-from wakewise_paper.lattice_reference.run import LatticeRun
-from wakewise_paper.lattice_reference.mean_field import compute_mean_field, compute_run
+from wakewise.simulation.lattice import DiskJet, LatticeCase, case_hash, find_case
 from wakewise_paper.lattice_reference.crossing_jets import crossing_figures
-from wakewise_paper.lattice_reference.mean_field import momentum_flux
-from wakewise_paper.lattice_reference.run import Disk
+from wakewise_paper.lattice_reference.mean_field import compute_mean_field, compute_run, momentum_flux
+from wakewise_paper.lattice_reference.run import Disk, LatticeRun
 
 SMALL = LatticeCase(
     name="small",

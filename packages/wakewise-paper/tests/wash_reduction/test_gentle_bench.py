@@ -20,8 +20,8 @@ from wakewise_paper.wash_reduction.plan import (
     METHODS,
     NONE,
     flown_methods,
-    lever_settings,
-    lever_trial,
+    mechanism_settings,
+    mechanism_trial,
     only_name,
     planned_trials,
     selected_mechanisms,
@@ -34,7 +34,7 @@ SHARE = {"dp": 1.0, "no-forward-jets": 0.4, "wake-aware": 0.1}
 
 
 def made_up(trial):
-    """Figures that depend on the trial alone: less without a lever."""
+    """Figures that depend on the trial alone: less without a mechanism."""
     worse = 1.0 + len(trial.control) + trial.wrong_current
     return ROW | {SPEED: 0.02 * trial.seed * SHARE.get(trial.method, 0.8) * worse}
 
@@ -58,9 +58,9 @@ def here(monkeypatch):
 
 
 def test_the_answer_has_the_keys_that_were_promised(here, tmp_path, capsys):
-    """Scenarios with methods, reductions and levers; headline; flows; a picture of them."""
+    """Scenarios with methods, reductions and mechanisms; headline; flows; a picture of them."""
     found = gentle.run(
-        BenchOptions(seeds=3, scenarios=("orbit/paper", "world/mud", "paper"), levers=("all",), store=tmp_path)
+        BenchOptions(seeds=3, scenarios=("orbit/paper", "world/mud", "paper"), mechanisms=("all",), store=tmp_path)
     )
     json.dumps(found, allow_nan=False)
     assert set(found) >= {"scenarios", "headline", "flows", "flights", "failed", "why"}
@@ -73,15 +73,15 @@ def test_the_answer_has_the_keys_that_were_promised(here, tmp_path, capsys):
         assert row[key] == 1.0
     assert row["rmse_mm"] is None and "bench worlds" in row["why"]["rmse_mm"]
     for name in MECHANISMS:
-        assert scenario["levers"][name]["left_out_pct"] == pytest.approx(50.0)
-        assert scenario["levers"][name]["alone_pct"] > 0.0
+        assert scenario["mechanisms"][name]["left_out_pct"] == pytest.approx(50.0)
+        assert scenario["mechanisms"][name]["alone_pct"] > 0.0
     trouble = found["headline"]["trouble"]
     assert trouble["flights"] == 6 and trouble["worst_world_pct"] == pytest.approx(90.0)
     assert trouble["wrong_current_keeps_pct"] == pytest.approx(100.0 * 80.0 / 90.0)
     assert found["flows"]["paper"]["circular"] is True
     show_gentle(found)
     said = capsys.readouterr().out
-    assert "headline" in said and "orbit/paper" in said and "levers" in said and "circular" in said
+    assert "headline" in said and "orbit/paper" in said and "mechanisms" in said and "circular" in said
     draw_gentle(found, tmp_path / "gentle.png")
     assert (tmp_path / "gentle.png").stat().st_size > 10_000
     with pytest.raises(InputError, match="ending"):
@@ -131,17 +131,17 @@ def test_a_method_that_is_not_made_is_left_out_with_a_reason():
 
 
 def test_each_lever_is_left_out_once_and_flown_alone_once():
-    """All levers' settings are accepted, none is without effect, and left out and alone differ."""
-    table = lever_settings(tuple(MECHANISMS))
+    """All mechanisms' settings are accepted, none is without effect, and left out and alone differ."""
+    table = mechanism_settings(tuple(MECHANISMS))
     assert set(table) == {NONE, *(without_name(n) for n in MECHANISMS), *(only_name(n) for n in MECHANISMS)}
     usual = ControlSettings()
     for settings in table.values():
-        control = parts_of(lever_trial("calm/paper", settings, 1)).scenario.control
+        control = parts_of(mechanism_trial("calm/paper", settings, 1)).scenario.control
         assert control != usual
     assert (
         selected_mechanisms(None) == ()
         and selected_mechanisms(("all",)) == tuple(MECHANISMS)
-        and lever_settings(()) == {}
+        and mechanism_settings(()) == {}
     )
 
 
@@ -156,7 +156,7 @@ def test_wishes_are_checked():
     with pytest.raises(InputError, match="allowed: dp"):
         gentle.run(BenchOptions(methods=("magic",)))
     with pytest.raises(InputError, match="allowed: none"):
-        gentle.run(BenchOptions(levers=("magic",)))
+        gentle.run(BenchOptions(mechanisms=("magic",)))
     with pytest.raises(InputError, match="allowed: orbit"):
         gentle.run(BenchOptions(scenarios=("magic",)))
     with pytest.raises(InputError, match="seeds: 0"):

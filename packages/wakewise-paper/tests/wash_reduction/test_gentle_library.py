@@ -45,7 +45,7 @@ def test_methods_and_levers_of_one_seed_meet_the_same_world():
         for trial in (
             WashTrial(scenario=scenario, method="wake-aware", seed=2),
             WashTrial(scenario=scenario, method="wake-aware" + TRIM, seed=2),
-            WashTrial(scenario=scenario, method="wake-aware", seed=2, control=(("levers.drift", False),)),
+            WashTrial(scenario=scenario, method="wake-aware", seed=2, control=(("allocation.advection", False),)),
             WashTrial(scenario=scenario, method="wake-aware", seed=2, wrong_current=True),
         ):
             other = parts_of(trial)
@@ -59,7 +59,7 @@ def test_a_wrong_current_is_wrong_by_what_it_says():
     """A third too fast or too slow, and turned by 30 deg to either side; the seeds draw all four."""
     ways = set()
     for seed in range(30):
-        north, east, down = wrong_current((0.1, 0.0, 0.0), seed)["levers.drift_m_s"]
+        north, east, down = wrong_current((0.1, 0.0, 0.0), seed)["allocation.current_m_s"]
         assert down == 0.0 and abs(east / north) == pytest.approx(3**-0.5, rel=1e-3)
         ways.add((round((north**2 + east**2) ** 0.5, 3), east > 0.0))
     assert ways == {(0.13, True), (0.13, False), (0.07, True), (0.07, False)}

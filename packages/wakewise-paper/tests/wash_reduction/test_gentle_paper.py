@@ -17,7 +17,7 @@ VEHICLE = load_vehicle("paper")
 def test_its_methods_believe_in_the_papers_model_without_levers():
     """The paper's cost and its model, smoothed at the edge."""
     control = paper_scenario(PaperWashTrial(method="wake-aware", seed=1)).control
-    assert control.wake.model == PAPER_WAKE["model"] and not any(getattr(control.levers, name) for name in OFF)
+    assert control.wake.model == PAPER_WAKE["model"] and not any(getattr(control.allocation, name) for name in OFF)
 
 
 def test_the_papers_world_is_the_papers_model():

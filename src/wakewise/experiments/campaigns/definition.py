@@ -110,7 +110,10 @@ _WORK = {
     "fly": "wakewise.experiments.campaigns.flights:fly_stage",
     "model": "wakewise.experiments.campaigns.flights:model_stage",
 }
-_SOURCES = {"fly": (*FLIES, "campaigns/flights.py"), "model": (*PHOTOGRAPHS, "campaigns/flights.py")}
+_SOURCES = {
+    "fly": (*FLIES, "experiments/campaigns/flights.py"),
+    "model": (*PHOTOGRAPHS, "experiments/campaigns/flights.py"),
+}
 
 
 class Campaign(Settings):

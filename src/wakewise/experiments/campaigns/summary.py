@@ -17,9 +17,9 @@ from wakewise.experiments.campaigns.statistics import (
     WORST,
     paired_test,
     probability_of_improvement,
+    ratio_of_sums,
     stratified_bootstrap,
 )
-from wakewise.experiments.campaigns.statistics.intervals import ratio_of_sums
 from wakewise.experiments.campaigns.table import Results, varying_factors
 
 Place = Mapping[str, Any]

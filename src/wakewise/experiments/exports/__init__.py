@@ -1,8 +1,10 @@
 """Files that other tools open: trajectories, photographs with their poses, ROS 2 bags, missions, allocation matrices.
 
-Start reading in `records.py` (what comes in) and `records.py` (how NED/FRD becomes ENU/FLU, z up, OpenGL); then a file
-per format: `colmap.py`, `colmap.py`, `colmap.py` (with `colmap.py`), `rosbag2.py`, `qgc_plan.py`,
-`auv_controllers.py`.
+- `records.py`: what exports are made from, and the frames NED/FRD, ENU/FLU, z up, OpenGL.
+- `colmap.py`: COLMAP models, nerfstudio's transforms.json, TUM trajectories.
+- `training_data.py`: held-out split, undistorted photographs, dense points and water for trainers of fields and splats.
+- `rosbag2.py`: ROS 2 bags. `qgc_plan.py`: QGroundControl plans. `auv_controllers.py`: allocation matrices for ROS 2.
+- `croissant.py`: metadata and check sums of data sets.
 """
 
 from typing import TYPE_CHECKING

@@ -19,8 +19,8 @@ Format: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats
 from __future__ import annotations
 
 import json
-import shutil
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +31,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
 from wakewise.core.geometry import Pose
 from wakewise.experiments.exports.records import Photographs, SparsePoints, Trajectory, flu_of, opengl_camera
+from wakewise.experiments.exports.training_data import place_picture
 
 _POINT = struct.Struct("<Q3d3BdQ")
 _IMAGE = struct.Struct("<I7dI")
@@ -92,7 +93,7 @@ def _observations(path: Path, numbers: IntArray) -> dict[str, tuple[Array, IntAr
     return seen
 
 
-_OPENCV = 4  # COLMAP's number of the camera model
+_PINHOLE, _OPENCV = 1, 4  # COLMAP's numbers of the camera models
 _NONE = (np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
 
 
@@ -111,18 +112,23 @@ class _Model:
     errors_px: Array
 
 
-def write_colmap(folder: Path, photographs: Photographs, cloud: SparsePoints | None = None) -> int:
-    """Write images/, sparse/0/ (binary) and sparse_text/ into a folder that is there and empty.
+def write_colmap(
+    folder: Path, photographs: Photographs, cloud: SparsePoints | None = None, held_out: Sequence[str] = ()
+) -> int:
+    """Write images/, sparse/0/ (binary) and sparse_text/ into a folder that is there.
 
     Returns how many observations of points it holds. Errors of points are those of the poses and the camera written
-    here, not of the model that the points are from.
+    here, not of the model that the points are from. A camera without distortion is a PINHOLE. Held-out photographs are
+    named in sparse/0/test.txt, where trainers of splats look for them.
     """
-    (folder / "images").mkdir()
+    (folder / "images").mkdir(exist_ok=True)
     for file in photographs.files:
-        shutil.copyfile(file, folder / "images" / file.name)
+        place_picture(file, folder / "images" / file.name)
     model = _model(photographs, cloud)
     _write_binary(folder / "sparse" / "0", photographs, model, cloud)
     _write_text(folder / "sparse_text", photographs, model, cloud)
+    if held_out:
+        (folder / "sparse" / "0" / "test.txt").write_text("\n".join(held_out) + "\n", encoding="utf-8")
     return sum(map(len, model.points))
 
 
@@ -148,6 +154,12 @@ def _model(photographs: Photographs, cloud: SparsePoints | None) -> _Model:
     return _Model([(X_CW.q, X_CW.p_m) for X_CW in inverses], pixels, points, tracks, errors)
 
 
+def _camera(photographs: Photographs) -> tuple[str, Array]:
+    """COLMAP's camera model and its parameters."""
+    distorted = bool(photographs.params[4:].any())
+    return ("OPENCV", photographs.params) if distorted else ("PINHOLE", photographs.params[:4])
+
+
 def _projected(points_C_m: Array, params: Array) -> Array:
     """Pixels, shape (n, 2), of points before a camera with OpenCV's distortion."""
     fx, fy, cx, cy, k1, k2, p1, p2 = params
@@ -162,7 +174,9 @@ def _projected(points_C_m: Array, params: Array) -> Array:
 def _write_binary(folder: Path, photographs: Photographs, model: _Model, cloud: SparsePoints | None) -> None:
     folder.mkdir(parents=True)
     size = (photographs.width, photographs.height)
-    (folder / "cameras.bin").write_bytes(struct.pack("<QIiQQ8d", 1, 1, _OPENCV, *size, *photographs.params))
+    model_name, params = _camera(photographs)
+    kind = _PINHOLE if model_name == "PINHOLE" else _OPENCV
+    (folder / "cameras.bin").write_bytes(struct.pack(f"<QIiQQ{len(params)}d", 1, 1, kind, *size, *params))
     with (folder / "images.bin").open("wb") as file:
         file.write(struct.pack("<Q", len(model.poses)))
         for k, (q, t) in enumerate(model.poses):
@@ -182,7 +196,8 @@ def _write_binary(folder: Path, photographs: Photographs, model: _Model, cloud: 
 
 def _write_text(folder: Path, photographs: Photographs, model: _Model, cloud: SparsePoints | None) -> None:
     folder.mkdir(parents=True)
-    camera = f"1 OPENCV {photographs.width} {photographs.height} {_numbers(photographs.params)}\n"
+    name, params = _camera(photographs)
+    camera = f"1 {name} {photographs.width} {photographs.height} {_numbers(params)}\n"
     (folder / "cameras.txt").write_text(f"# CAMERA_ID MODEL WIDTH HEIGHT PARAMS\n{camera}", encoding="utf-8")
     lines = ["# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line of X Y POINT3D_ID of what was seen in it"]
     for k, (q, t) in enumerate(model.poses):
@@ -206,13 +221,18 @@ def _numbers(values: Array) -> str:
 _NAMES = ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "p1", "p2")
 
 
-def write_nerfstudio(folder: Path, photographs: Photographs, cloud: SparsePoints | None = None) -> None:
-    """Write transforms.json, images/ and, with a cloud, sparse_pc.ply into a folder that is there and empty."""
-    (folder / "images").mkdir()
+def write_nerfstudio(
+    folder: Path, photographs: Photographs, cloud: SparsePoints | None = None, held_out: Sequence[str] = ()
+) -> None:
+    """Write transforms.json, images/ and, with a cloud, sparse_pc.ply into a folder that is there.
+
+    Held-out photographs are nerfstudio's `test_filenames` and `val_filenames`, the others its `train_filenames`.
+    """
+    (folder / "images").mkdir(exist_ok=True)
     frames = []
     matrices = opengl_camera(photographs.track.p_W_m, photographs.track.q)
     for file, matrix in zip(photographs.files, matrices, strict=True):
-        shutil.copyfile(file, folder / "images" / file.name)
+        place_picture(file, folder / "images" / file.name)
         frames.append({"file_path": f"images/{file.name}", "transform_matrix": matrix.tolist()})
     head = {
         "camera_model": "OPENCV",
@@ -223,6 +243,14 @@ def write_nerfstudio(folder: Path, photographs: Photographs, cloud: SparsePoints
     if cloud is not None:
         _write_ply(folder / "sparse_pc.ply", cloud)
         head["ply_file_path"] = "sparse_pc.ply"
+    if held_out:
+        paths = [frame["file_path"] for frame in frames]
+        judged = [f"images/{name}" for name in held_out]
+        head |= {
+            "train_filenames": [path for path in paths if path not in judged],
+            "val_filenames": judged,
+            "test_filenames": judged,
+        }
     text = json.dumps({**head, "frames": frames}, indent=2, allow_nan=False)
     (folder / "transforms.json").write_text(text + "\n", encoding="utf-8")
 

@@ -1,4 +1,4 @@
-"""A trial's folder as files that other tools open: reads the folder, and hands arrays to `links.exports`."""
+"""A trial's folder as files that other tools open: reads the folder, and hands arrays to `experiments.exports`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 import polars as pl
 
 from wakewise.core.arrays import Array
-from wakewise.core.errors import InputError
+from wakewise.core.errors import InputError, MissingExtra
 from wakewise.core.files import whole_folder
 from wakewise.core.optional_dependencies import need
 from wakewise.experiments.exports import (
@@ -28,6 +28,14 @@ from wakewise.experiments.exports import (
     write_plan,
     write_tum,
 )
+from wakewise.experiments.exports.training_data import (
+    HELD_OUT_ONE_IN,
+    UNDISTORTED,
+    WaterAttenuation,
+    held_out_names,
+    undistorted,
+    write_dense,
+)
 
 EXPORTS = ("nerfstudio", "colmap", "tum", "rosbag2", "qgc-plan")
 """What a trial can be exported to."""
@@ -40,15 +48,23 @@ _WRENCH = ("X_N", "Y_N", "Z_N", "K_Nm", "M_Nm", "N_Nm")
 
 @dataclass(frozen=True, kw_only=True)
 class ExportResult:
-    """What was written, and where."""
+    """What was written, and where; `water` of nerfstudio and colmap only."""
 
     to: str
     path: Path
     holds: dict[str, int]
+    water: WaterAttenuation | None = None
 
 
 def export_trial(
-    folder: Path, to: str, *, out: Path | None = None, poses: str = "true", origin: GeodeticOrigin | None = None
+    folder: Path,
+    to: str,
+    *,
+    out: Path | None = None,
+    poses: str = "true",
+    origin: GeodeticOrigin | None = None,
+    held_out: int | None = None,
+    seed: int | None = None,
 ) -> ExportResult:
     """Export a trial.
 
@@ -64,8 +80,11 @@ def export_trial(
     poses : str
         nerfstudio and colmap: "true" ones with the true camera, or "estimated" ones with the camera as the crew
         knows it. The others hold both, as far as they are there.
-    origin : Origin, optional
+    origin : GeodeticOrigin, optional
         qgc-plan: where the world's origin lies.
+    held_out, seed : int, optional
+        nerfstudio and colmap: one photograph in `held_out` (8) is held out from training, drawn by `seed` (0); 0 holds
+        none out.
 
     Raises
     ------
@@ -86,14 +105,18 @@ def export_trial(
         return _plan(folder, out or folder / "export" / "route.plan", origin)
     if origin is not None:
         raise InputError(f"--origin: goes with --to qgc-plan only, not with {to}")
+    if (held_out is not None or seed is not None) and to not in ("nerfstudio", "colmap"):
+        raise InputError(f"--held-out, --seed: go with --to nerfstudio and colmap only, not with {to}")
     path = out or folder / "export" / to
     if path.exists() and not path.is_dir():
         raise InputError(f"--out {path}: is a file, must be a folder that does not exist yet, or an empty one")
     if out is not None and path.is_dir() and any(path.iterdir()):
         raise InputError(f"--out {path}: is not empty; give a folder that does not exist yet")
     make: dict[str, Callable[[Path, Path], dict[str, int]]] = {"tum": _tum, "rosbag2": _bag}
-    holds = make[to](folder, path) if to in make else _photographs(folder, path, to, poses)
-    return ExportResult(to=to, path=path, holds=holds)
+    if to in make:
+        return ExportResult(to=to, path=path, holds=make[to](folder, path))
+    one_in = HELD_OUT_ONE_IN if held_out is None else held_out
+    return _training_data(folder, path, to, poses, one_in, seed or 0)
 
 
 def _tum(folder: Path, path: Path) -> dict[str, int]:
@@ -126,18 +149,85 @@ def _bag(folder: Path, path: Path) -> dict[str, int]:
     return {"messages": messages, "photographs": 0 if photographs is None else len(photographs.files)}
 
 
-def _photographs(folder: Path, path: Path, to: str, poses: str) -> dict[str, int]:
+def _training_data(folder: Path, path: Path, to: str, poses: str, one_in: int, seed: int) -> ExportResult:
     photographs = _photographs_of(folder, poses)
+    names = [file.name for file in photographs.files]
+    judged = held_out_names(names, one_in, seed)
+    water = _known_water(folder) if poses == "true" else _estimated_water(folder, names)
     cloud: SparsePoints | None = None
     with suppress(FileNotFoundError):
         cloud = read_points(folder / "sparse" / "points3D.bin")
-    holds = {"photographs": len(photographs.files), "points": 0 if cloud is None else len(cloud.points_W_m)}
+    holds = {"photographs": len(names), "points": 0 if cloud is None else len(cloud.points_W_m)}
+    z_up = to == "nerfstudio"
+    dense = "dense_pc.ply" if z_up else "dense.ply"
     with whole_folder(path) as temporary:
+        flat = undistorted(photographs, cloud, temporary / UNDISTORTED)
         if to == "colmap":
-            holds["observations"] = write_colmap(temporary, photographs, cloud)
+            holds["observations"] = write_colmap(temporary, photographs, cloud, judged)
+            write_colmap(temporary / UNDISTORTED, *flat, judged)
         else:
-            write_nerfstudio(temporary, photographs, cloud)
-    return holds
+            write_nerfstudio(temporary, photographs, cloud, judged)
+            write_nerfstudio(temporary / UNDISTORTED, *flat, judged)
+        there = (folder / "dense.ply").is_file()
+        holds["dense_points"] = write_dense(folder / "dense.ply", temporary / dense, z_up=z_up) if there else 0
+        holds |= {"train": len(names) - len(judged), "held_out": len(judged)}
+        silt = _silt_per_m(folder)
+        facts = {
+            "format": to,
+            "poses": poses,
+            "world": "m; x north, y west, z up" if z_up else "m; x north, y east, z down",
+            "undistorted": UNDISTORTED,
+            "dense": dense if there else None,
+            **holds,
+            "split": {"one_in": one_in, "seed": seed, "held_out": list(judged)},
+            "water": water.figures(),
+            "views": [{"name": name, "held_out": name in judged, "silt_per_m": silt.get(name)} for name in names],
+            "why": {} if there else {"dense": f"{folder} holds no dense.ply"},
+        }
+        (temporary / "export.json").write_text(json.dumps(facts, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return ExportResult(to=to, path=path, holds=holds, water=water)
+
+
+def _known_water(folder: Path) -> WaterAttenuation:
+    """Optics of the clear water that the trial was rendered with; silt is told of by photograph."""
+    from wakewise.operation import read_scenario
+
+    try:
+        water = read_scenario(folder / "scenario.yaml").imaging.water()
+    except InputError as fault:
+        return WaterAttenuation(source=None, why=str(fault))
+    return WaterAttenuation(
+        source="trial", attenuation_per_m=water.signal_per_m, veil_per_m=water.veil_per_m, veil=water.veil
+    )
+
+
+def _estimated_water(folder: Path, names: list[str]) -> WaterAttenuation:
+    """Optics fitted to the photographs and the ranges of the trial's own model."""
+    try:
+        need("the water of photographs", "photos")
+        from wakewise.vision.texturing.photo_colours import estimate_water
+
+        fit, why = estimate_water(folder / "images", names, folder)
+    except MissingExtra as fault:
+        return WaterAttenuation(source=None, why=str(fault))
+    if fit is None:
+        return WaterAttenuation(source=None, why=why)
+    return WaterAttenuation(
+        source="estimated", attenuation_per_m=fit.signal_per_m, veil_per_m=fit.veil_per_m, veil=fit.veil
+    )
+
+
+def _silt_per_m(folder: Path) -> dict[str, float]:
+    """Mean beam attenuation by silt between camera and target, 1/m, by photograph; of rendered photographs only."""
+    table = _images(folder)
+    if "turbidity_per_m" not in table.columns:
+        return {}
+    values = table["turbidity_per_m"].cast(pl.Float64, strict=False)
+    return {
+        Path(name).name: value
+        for name, value in zip(table["name"], values, strict=True)
+        if value is not None and np.isfinite(value)
+    }
 
 
 def _plan(folder: Path, path: Path, origin: GeodeticOrigin | None) -> ExportResult:

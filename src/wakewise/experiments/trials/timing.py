@@ -27,8 +27,8 @@ class BenchOptions:
         Flights per method of a bench that flies; seeds 1 to this.
     methods, scenarios : tuple of str or None
         Which of them such a bench flies; None for all.
-    levers : tuple of str or None
-        Levers that such a bench switches, one by one; None for none of them.
+    mechanisms : tuple of str or None
+        Mechanisms that such a bench switches, one by one; None for none of them.
     worlds : tuple of str or None
         Which worlds such a bench flies in; None for all.
     w_tracks : tuple of float or None
@@ -52,7 +52,7 @@ class BenchOptions:
     seeds: int = 10
     methods: tuple[str, ...] | None = None
     scenarios: tuple[str, ...] | None = None
-    levers: tuple[str, ...] | None = None
+    mechanisms: tuple[str, ...] | None = None
     worlds: tuple[str, ...] | None = None
     w_tracks: tuple[float, ...] | None = None
     models: int = 1

@@ -1,4 +1,4 @@
-"""Shows what `wakewise bench gentle` found: the headline, a table for each scenario, the levers."""
+"""Shows what `wakewise bench gentle` found: the headline, a table for each scenario, the mechanisms."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _CALM = (
 
 
 def show_gentle(result: dict[str, Any]) -> None:
-    """The headline first, then a table per scenario with a row per method, then levers and the paper's world."""
+    """The headline first, then a table per scenario with a row per method, then mechanisms and the paper's world."""
     from rich.table import Table
 
     _show_headline(result["headline"])
@@ -60,9 +60,11 @@ def show_gentle(result: dict[str, Any]) -> None:
             less = reduction(row.get("reduction_vs_dp_pct"), row.get("reduction_vs_dp_interval_pct"))
             table.add_row(method, *cells, less, reduction(worst))
         print_table(table)
-    levers = sorted({lever for scenario in result["scenarios"].values() for lever in scenario["levers"]})
-    if levers:
-        _show_levers(result["scenarios"], levers)
+    mechanisms = sorted(
+        {mechanism for scenario in result["scenarios"].values() for mechanism in scenario["mechanisms"]}
+    )
+    if mechanisms:
+        _show_mechanisms(result["scenarios"], mechanisms)
     if result["bound"]:
         _show_bound(result["bound"])
     for flow, figures in result["flows"].items():
@@ -105,16 +107,16 @@ def _show_headline(headline: dict[str, Any]) -> None:
             )
 
 
-def _show_levers(scenarios: dict[str, Any], levers: list[str]) -> None:
-    """What each lever is worth, scenario by scenario: left out, alone."""
+def _show_mechanisms(scenarios: dict[str, Any], mechanisms: list[str]) -> None:
+    """What each mechanism is worth, scenario by scenario: left out, alone."""
     from rich.table import Table
 
-    table = Table(title="levers: slower by, all others on / alone", title_justify="left")
+    table = Table(title="mechanisms: slower by, all others on / alone", title_justify="left")
     table.add_column("scenario")
-    for lever in levers:
-        table.add_column(lever, justify="right", no_wrap=True)
+    for mechanism in mechanisms:
+        table.add_column(mechanism, justify="right", no_wrap=True)
     for name, scenario in scenarios.items():
-        cells = [scenario["levers"].get(lever, {}) for lever in levers]
+        cells = [scenario["mechanisms"].get(mechanism, {}) for mechanism in mechanisms]
         table.add_row(name, *(f"{reduction(c.get('left_out_pct'))} / {reduction(c.get('alone_pct'))}" for c in cells))
     print_table(table)
 

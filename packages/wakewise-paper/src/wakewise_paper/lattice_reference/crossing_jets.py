@@ -6,7 +6,6 @@ angles), and none across it.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,15 +13,17 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from wakewise.core.arrays import Array, BoolArray, freeze
+from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
 from wakewise.simulation.lattice.cases import LatticeCase, case_hash, find_case
-from wakewise.simulation.lattice.meanfield import DATA
 from wakewise_paper.lattice_reference.run import LatticeRun
 
+DATA = Path(__file__).parent / "data"
+"""Folder of the fields that ship with the package."""
+
 AWAY_D = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
-"""Distances behind the crossing at which the mean flow is looked at."""
+"""Distances behind the crossing at which the mean flow is evaluated."""
 
 _REACH_D = 4.0
 _STEP_D = 0.05
@@ -197,5 +198,3 @@ def speeds_at(run: LatticeRun, means: Array, points_D: Array, direction: Array) 
     cells = ((points_D - run.case.low_D) * run.case.cells_per_D - 0.5).T
     parts = [map_coordinates(mean, cells, order=1, cval=np.nan) for mean in means]
     return np.asarray(direction @ np.stack(parts))
-
-

@@ -19,9 +19,9 @@ from numba import cuda, float32, float64
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.simulation.lattice.collision import collide, collide_forced
-from wakewise_paper.lattice_reference.engines import MOMENTS
 from wakewise.simulation.lattice.faces import pull_outside_domain
-from wakewise.simulation.lattice.stencil import (OPEN, VELOCITIES, Lattice, smagorinsky_factor)
+from wakewise.simulation.lattice.stencil import OPEN, VELOCITIES, Lattice, smagorinsky_factor
+from wakewise_paper.lattice_reference.engines import MOMENTS
 
 WARP = 32
 

@@ -22,7 +22,16 @@ from wakewise.core.jit.njit import njit, prange
 from wakewise.core.optional_dependencies import has, how_to_install
 from wakewise.simulation.lattice.cases import LatticeCase
 from wakewise.simulation.lattice.kernel import push, step, velocity
-from wakewise.simulation.lattice.stencil import (OPPOSITE, VELOCITIES, Lattice, box, origin, plane_row, plane_size, still_water)
+from wakewise.simulation.lattice.stencil import (
+    OPPOSITE,
+    VELOCITIES,
+    Lattice,
+    box,
+    origin,
+    plane_row,
+    plane_size,
+    still_water,
+)
 
 MOMENTS = 8
 """What is averaged in every cell: p, u, v, w, uu, vv, ww, vw."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.simulation.lattice.stencil import (HERMITE, SHAPES, VELOCITIES, WEIGHTS)
+from wakewise.simulation.lattice.stencil import HERMITE, SHAPES, VELOCITIES, WEIGHTS
 
 
 def twin_step(g: Array, tau_x: Array, tau_yz: Array, eddies: float) -> Array:

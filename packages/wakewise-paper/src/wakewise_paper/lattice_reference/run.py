@@ -13,9 +13,9 @@ from scipy.ndimage import map_coordinates
 from wakewise.core.arrays import Array, IntArray, frozen
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_file
-from wakewise.simulation.lattice.cases import (AXES, DiskJet, LatticeCase, case_hash)
-from wakewise_paper.lattice_reference.engines import make_engine, solid_cells
+from wakewise.simulation.lattice.cases import AXES, DiskJet, LatticeCase, case_hash
 from wakewise.simulation.lattice.stencil import OPEN, WALL, smagorinsky_factor
+from wakewise_paper.lattice_reference.engines import make_engine, solid_cells
 
 DISK_THICKNESS_D = 0.2
 """Thickness of the layer that the disk's force is spread over, the same on every grid."""

@@ -15,11 +15,11 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.simulation.lattice import (CASES, DiskJet, LatticeCase, load_mean_field)
-from wakewise_paper.lattice_reference.run import LatticeRun
+from wakewise.simulation.lattice import CASES, DiskJet, LatticeCase, load_mean_field
 from wakewise.simulation.water import Water
 from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.wake.learned import EDGES, MEMORY_S, JetPoints, history_bins, remembered
+from wakewise_paper.lattice_reference.run import LatticeRun
 
 DIAMETER_M = 0.06
 WIDTHS, LIVES = (0.094, 0.177), (1.0, 1.7)

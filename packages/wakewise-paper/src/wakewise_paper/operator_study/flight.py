@@ -270,7 +270,7 @@ def fly_trial(trial: OperatorTrial) -> dict[str, float | None]:
     heard, pilot = parts.controller, parts.pilot
     assert isinstance(heard, ControllerProbe)
     assert isinstance(pilot, AssistedPilot)
-    # One yardstick for all methods: what the levers know, in the current that the estimator finds.
+    # One yardstick for all methods: what the mechanisms know, in the current that the estimator finds.
     watch = allocation_context(parts.vehicle, parts.region, parts.wake, parts.control)
     rows: list[tuple[Array, ...]] = []
     D: list[float] = []

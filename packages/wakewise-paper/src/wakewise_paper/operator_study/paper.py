@@ -1,7 +1,7 @@
 """The same in the paper's own world, circular: the planner's model is the water
 (`wakewise.operation.worlds.quasi_steady_world`).
 
-`wake-aware` against `mpc` at the same weight, same commands, same seeds, by the paper's cost alone (no levers). The
+`wake-aware` against `mpc` at the same weight, same commands, same seeds, by the paper's cost alone (no mechanisms). The
 operator asks for 0.1 m/s, reached at 0.1 m/s2. Two courses. `front`: sideways, up, back and down in front of the
 target, camera on it, where spare thrusters alone can keep every jet off it. `over`: to and fro above the target in a
 vehicle that sinks by the largest unknown trim; its lift blows at the target whatever the spare thrusters do, and only
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.control import ControlSettings, LeverSettings, make_controller
+from wakewise.control import AllocationSettings, ControlSettings, make_controller
 from wakewise.control.velocity_reference import (
     PAPER_W_TRACK,
     VelocityCommand,
@@ -162,7 +162,7 @@ def fly_trial(trial: PaperOperatorTrial) -> dict[str, float | None]:
     course, seed = PAPER_COURSES[trial.course], trial.seed
     vehicle, tank = load_vehicle("paper"), TankSettings()
     target, region = paper_place(tank.size_m[2])
-    base = ControlSettings(wake=WakeSettings(**PAPER_WAKE), levers=LeverSettings(**OFF))
+    base = ControlSettings(wake=WakeSettings(**PAPER_WAKE), allocation=AllocationSettings(**OFF))
     control = base.model_copy(update={"plan": scaled_tracking(base.plan, trial.w_track)})
     plant_rng, _ = np.random.default_rng([seed, 13]).spawn(2)
     trim_N = float(plant_rng.uniform(-tank.mismatch.trim_range_N, tank.mismatch.trim_range_N))

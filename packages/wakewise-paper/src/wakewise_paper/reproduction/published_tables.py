@@ -178,7 +178,7 @@ def operator_claims(w_tracks: tuple[float, ...]) -> list[PublishedFigure]:
                     "dp",
                     quoted,
                     "> 60 % less at 5" if quoted else UNQUOTED,
-                    "D by what the levers know" if figure == "disturbance" else WASH,
+                    "D by what the mechanisms know" if figure == "disturbance" else WASH,
                     asked=60.0 if at_5 and quoted is None else None,
                     method=method,
                 )

@@ -11,16 +11,17 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.experiments.campaigns.statistics import (
+    RESAMPLES,
     WORST,
     Interval,
     holm,
     paired_test,
     pairs_needed,
     probability_of_improvement,
+    ratio_of_sums,
     stratified_bootstrap,
     wilson,
 )
-from wakewise.experiments.campaigns.statistics.intervals import RESAMPLES, ratio_of_sums
 from wakewise.experiments.campaigns.summary import by_target
 from wakewise.experiments.campaigns.task import TrialOutcome
 from wakewise_paper.reproduction.claim import ORDER, PublishedFigure

@@ -67,7 +67,7 @@ _OWN = {
         fields=_STILL_TARGET
         | {"flow": "paper"}
         | {f"control.wake.{key}": value for key, value in PAPER_WAKE.items()}
-        | {f"control.levers.{key}": value for key, value in OFF.items()},
+        | {f"control.allocation.{key}": value for key, value in OFF.items()},
         randomize={"tank.mismatch.trim_N": [-3.3, -1.0]},
         circular=True,
     ),

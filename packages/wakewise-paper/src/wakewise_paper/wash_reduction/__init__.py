@@ -1,4 +1,4 @@
-"""What each method and each lever does to the target's water where users have the trouble (see `bench.py`).
+"""What each method and each mechanism does to the target's water where users have the trouble (see `bench.py`).
 
 `scenarios/` and `scenario_files.py` say what is flown, `scenario_files.py` which trim and current a seed has,
 `routes.py` how it is flown, `flight.py` flies it, `figures.py` and `summary_table.py` say what it gave.

@@ -1,4 +1,4 @@
-"""What each method does to the target's water where users have the trouble, and what each lever is worth there.
+"""What each method does to the target's water where users have the trouble, and what each mechanism is worth there.
 
 Scenarios are files (`scenarios/`), stratified over trim and the side of the current (`strata.py`); the library's
 worlds count as scenarios, too. Seed k of a scenario is one world for all methods, so flights are compared in pairs;
@@ -63,15 +63,15 @@ def run(options: BenchOptions) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If a scenario, method or lever is not known.
+        If a scenario, method or mechanism is not known.
     """
     wished = options.scenarios
     scenarios = names_of(None if wished is None else tuple(name for name in wished if name != PAPER))
     with_paper = wished is None or PAPER in wished
     methods, reasons = flown_methods(options.methods)
-    levers = selected_mechanisms(options.levers)
+    mechanisms = selected_mechanisms(options.mechanisms)
     began = time.monotonic()
-    trials = planned_trials(scenarios, methods, levers, options.seeds)
+    trials = planned_trials(scenarios, methods, mechanisms, options.seeds)
     folder = options.store or store_folder()
     store = FlightStore(folder, options.fresh)
     expected = sum(flight_s(trial) for trial in trials.values() if store.load(trial, _FLY) is None)
@@ -94,7 +94,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     failed = {(failure.name, (failure.flow, failure.seed)) for failure in failures}
     trims = {(scenario, seed): trim_of(scenario, seed) for scenario, _, seed in trials}
     return {
-        "scenarios": {name: scenario_figures(name, methods, levers, rows, failures) for name in scenarios},
+        "scenarios": {name: scenario_figures(name, methods, mechanisms, rows, failures) for name in scenarios},
         "headline": headline(by_method(rows), trims, failed),
         "bound": bound_figures(bounds) if options.bound else None,
         "flows": {PAPER: paper_figures(papers, methods)} if with_paper else {},
@@ -104,7 +104,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
         "failures": [vars(failure) for failure in (*failures, *lost, *unbound)],
         "flight_cpu_s": _cpu_s(rows),
         "wall_s": time.monotonic() - began,
-        "why": reasons | why(levers, with_paper),
+        "why": reasons | why(mechanisms, with_paper),
     }
 
 
@@ -118,7 +118,7 @@ def bound_trials(scenarios: tuple[str, ...], seeds: int) -> dict[Key, BoundTrial
 
 
 def by_method(rows: Mapping[Key, Row]) -> dict[str, dict[tuple[str, int], Row]]:
-    """Rows by method or lever, then by scenario and seed."""
+    """Rows by method or mechanism, then by scenario and seed."""
     found: dict[str, dict[tuple[str, int], Row]] = {}
     for (scenario, name, seed), row in rows.items():
         found.setdefault(name, {})[scenario, seed] = row
@@ -128,11 +128,13 @@ def by_method(rows: Mapping[Key, Row]) -> dict[str, dict[tuple[str, int], Row]]:
 def scenario_figures(
     scenario: str,
     methods: tuple[str, ...],
-    levers: tuple[str, ...],
+    mechanisms: tuple[str, ...],
     rows: Mapping[Key, Row],
     failures: list[FlightFailure],
 ) -> dict[str, Any]:
-    """Table of one scenario: methods, what `wake-aware` is worth, levers; flights that failed are with their method."""
+    """Table of one scenario: methods, what `wake-aware` is worth, mechanisms; flights that failed are with their
+    method.
+    """
     here: dict[str, dict[int, Row]] = {}
     for (where, name, seed), row in rows.items():
         if where == scenario:
@@ -162,7 +164,7 @@ def scenario_figures(
     }
     for rival in RIVALS:
         answer |= against(here.get(rival, {}), ours, rival, strata)
-    answer["levers"] = {name: lever_figures(name, here, strata) for name in levers}
+    answer["mechanisms"] = {name: mechanism_figures(name, here, strata) for name in mechanisms}
     answer["why"] = {key: "not flown by both" for key, value in answer.items() if key.endswith("pct") and value is None}
     return answer
 
@@ -179,8 +181,8 @@ def against(base: Mapping[int, Row], ours: Mapping[int, Row], rival: str, strata
     }
 
 
-def lever_figures(name: str, here: Mapping[str, Mapping[int, Row]], strata: Mapping[int, str]) -> dict[str, Any]:
-    """What a lever is worth here: with it and without, all others on; it alone and none."""
+def mechanism_figures(name: str, here: Mapping[str, Mapping[int, Row]], strata: Mapping[int, str]) -> dict[str, Any]:
+    """What a mechanism is worth here: with it and without, all others on; it alone and none."""
     answer: dict[str, Any] = {}
     for key, base, ours in (
         ("left_out", without_name(name), "wake-aware"),
@@ -218,12 +220,12 @@ def paper_figures(rows: Mapping[Key, Row], methods: tuple[str, ...]) -> dict[str
     return answer
 
 
-def why(levers: tuple[str, ...], with_paper: bool) -> dict[str, str]:
+def why(mechanisms: tuple[str, ...], with_paper: bool) -> dict[str, str]:
     """Reasons of what was not flown."""
     reasons = {} if with_paper else {PAPER: "this flow was left out"}
     for name in MECHANISMS:
-        if name not in levers:
-            reasons[name] = "this lever was not switched; --levers all, or its name"
+        if name not in mechanisms:
+            reasons[name] = "this mechanism was not switched; --mechanisms all, or its name"
     return reasons
 
 

@@ -305,7 +305,7 @@ def candidates(flown: RecordedFlight) -> tuple[Array, dict[str, int]]:
         named["rule"] = len(rows)
         rows.append(np.array([min_norm_allocation(rule, wrench).thrusts_N for wrench in flown.least_N @ rule.B.T]))
     parts = flown.parts
-    region = with_bed_points(parts.region, parts.control.levers, bed_of(parts.wake))
+    region = with_bed_points(parts.region, parts.control.allocation, bed_of(parts.wake))
     watch = allocation_context(parts.vehicle, region, parts.wake, parts.control)
     for name, one in (("belief", watch), ("belief_any", replace(watch, allocator=replace(watch.allocator, law=None)))):
         named[name] = len(rows)

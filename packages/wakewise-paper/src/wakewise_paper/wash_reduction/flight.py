@@ -189,7 +189,7 @@ def wrong_current(current_W_m_s: tuple[float, ...], seed: int) -> dict[str, Any]
     north, east, down = current_W_m_s
     c, s = np.cos(turn), np.sin(turn)
     stated = (share * (c * north - s * east), share * (s * north + c * east), down)
-    return {"levers.drift_m_s": tuple(round(float(v), 6) for v in stated)}
+    return {"allocation.current_m_s": tuple(round(float(v), 6) for v in stated)}
 
 
 def fly_trial(trial: WashTrial) -> dict[str, float | None]:

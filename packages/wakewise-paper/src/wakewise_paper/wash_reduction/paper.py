@@ -26,8 +26,8 @@ WATER_EVERY_S = 0.25
 """How often the water is asked about in the flights of the benches."""
 PAPER_WAKE: dict[str, Any] = {"model": "paper-calibrated", "edge_width_deg": 3.0, "floor": False}
 """What controllers believe in the paper's world: its own model with a smooth edge."""
-OFF = {"spare": False, "meet": False, "drift": False}
-"""The paper's cost: no levers."""
+OFF = {"null_space": False, "merging_jets": False, "advection": False}
+"""The paper's cost: no mechanisms."""
 METHODS = ("dp", "mpc", "wake-aware")
 SEEDS = 3
 FIGURES = (
@@ -51,9 +51,9 @@ class PaperWashTrial:
 
 
 def paper_scenario(trial: PaperWashTrial) -> Scenario:
-    """Everything at its default but for the levers, which are off, the belief, the method and the seed."""
+    """Everything at its default but for the mechanisms, which are off, the belief, the method and the seed."""
     told = {"method": trial.method, "seed": trial.seed, "world": "paper"}
-    return check_scenario(told | {"control": {"wake": PAPER_WAKE, "levers": OFF}}, "gentle bench")
+    return check_scenario(told | {"control": {"wake": PAPER_WAKE, "allocation": OFF}}, "gentle bench")
 
 
 @lru_cache(maxsize=2)

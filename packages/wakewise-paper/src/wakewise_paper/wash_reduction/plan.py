@@ -1,6 +1,6 @@
-"""Which flights the bench makes: methods, wrong currents and levers, in scenarios and worlds, seed by seed.
+"""Which flights the bench makes: methods, wrong currents and mechanisms, in scenarios and worlds, seed by seed.
 
-Levers of `wake-aware` that the bench switches, one by one.
+Mechanisms of `wake-aware` that the bench switches, one by one.
 
 Each is held against the method without it, all others on (left out), and against the method without any (alone).
 """
@@ -20,23 +20,24 @@ from wakewise_paper.wash_reduction.summary_table import WRONG
 Settings = dict[str, Any]
 
 MECHANISMS: dict[str, Settings] = {
-    "drift": {"levers.drift": False},
-    "jets that meet": {"levers.meet": False},
-    "floor": {"wake.floor": False},
-    "doubt": {"levers.doubt": False},
-    "posture": {"levers.posture": False},
-    "thrift": {"levers.thrift": False},
+    "advection": {"allocation.advection": False},
+    "merging-jets": {"allocation.merging_jets": False},
+    "wall-jets": {"wake.floor": False},
+    "direction-uncertainty": {"allocation.direction_uncertainty": False},
+    "attitude": {"allocation.optimize_attitude": False},
+    "power-limit": {"allocation.power_limit": False},
 }
-"""Fields of `ControlSettings` that take a lever away, by its name. Sharing out (`levers.spare`) is no lever of its own:
+"""Fields of `ControlSettings` that take a mechanism away, by its name. Sharing out (`allocation.null_space`) is no
+mechanism of its own:
 the others need it."""
 
-NONE = "wake-aware, no levers"
+NONE = "wake-aware, no mechanisms"
 LEVER_SEEDS = 3
-"""Levers fly the first seeds only, which have all trims and all sides once."""
+"""Mechanisms fly the first seeds only, which have all trims and all sides once."""
 
 
 def selected_mechanisms(wished: tuple[str, ...] | None) -> tuple[str, ...]:
-    """Names of the levers to switch; none if not given, `all` for all.
+    """Names of the mechanisms to switch; none if not given, `all` for all.
 
     Raises
     ------
@@ -46,20 +47,20 @@ def selected_mechanisms(wished: tuple[str, ...] | None) -> tuple[str, ...]:
     names = () if wished is None or wished == ("none",) else wished
     for name in names:
         if name not in (*MECHANISMS, "all"):
-            raise InputError(f"levers: '{name}' is not known, allowed: none, all, {', '.join(MECHANISMS)}")
+            raise InputError(f"mechanisms: '{name}' is not known, allowed: none, all, {', '.join(MECHANISMS)}")
     return tuple(MECHANISMS) if "all" in names else tuple(name for name in MECHANISMS if name in names)
 
 
 def without(*names: str) -> Settings:
-    """Fields that take these levers away."""
+    """Fields that take these mechanisms away."""
     merged: Settings = {}
     for name in names:
         merged |= MECHANISMS[name]
     return merged
 
 
-def lever_settings(names: tuple[str, ...]) -> dict[str, Settings]:
-    """Settings of the flights that judge some levers, by what the flight is called."""
+def mechanism_settings(names: tuple[str, ...]) -> dict[str, Settings]:
+    """Settings of the flights that judge some mechanisms, by what the flight is called."""
     if not names:
         return {}
     table = {NONE: without(*MECHANISMS)}
@@ -70,12 +71,12 @@ def lever_settings(names: tuple[str, ...]) -> dict[str, Settings]:
 
 
 def without_name(name: str) -> str:
-    """What the flight without a lever is called."""
+    """What the flight without a mechanism is called."""
     return f"wake-aware without {name}"
 
 
 def only_name(name: str) -> str:
-    """What the flight with a lever alone is called."""
+    """What the flight with a mechanism alone is called."""
     return f"wake-aware, {name} alone"
 
 
@@ -117,9 +118,9 @@ def flown_methods(wished: tuple[str, ...] | None) -> tuple[tuple[str, ...], dict
 
 
 def planned_trials(
-    scenarios: tuple[str, ...], methods: tuple[str, ...], levers: tuple[str, ...], seeds: int
+    scenarios: tuple[str, ...], methods: tuple[str, ...], mechanisms: tuple[str, ...], seeds: int
 ) -> dict[Key, WashTrial]:
-    """Flights to make, seed by seed, so that a run that is stopped has whole seeds; dearest levers last."""
+    """Flights to make, seed by seed, so that a run that is stopped has whole seeds; dearest mechanisms last."""
     trials: dict[Key, WashTrial] = {}
     for seed in range(1, seeds + 1):
         for scenario in scenarios:
@@ -129,15 +130,15 @@ def planned_trials(
                 trials[scenario, WRONG, seed] = WashTrial(
                     scenario=scenario, method="wake-aware", seed=seed, wrong_current=True
                 )
-    table = lever_settings(levers) if "wake-aware" in methods else {}
+    table = mechanism_settings(mechanisms) if "wake-aware" in methods else {}
     for seed in range(1, min(seeds, LEVER_SEEDS) + 1):
         for scenario in scenarios:
             for name, settings in table.items():
-                trials[scenario, name, seed] = lever_trial(scenario, settings, seed)
+                trials[scenario, name, seed] = mechanism_trial(scenario, settings, seed)
     return trials
 
 
-def lever_trial(scenario: str, settings: Settings, seed: int) -> WashTrial:
+def mechanism_trial(scenario: str, settings: Settings, seed: int) -> WashTrial:
     """Flight of `wake-aware` with some fields changed."""
     return WashTrial(scenario=scenario, method="wake-aware", seed=seed, control=tuple(sorted(settings.items())))
 

@@ -1,16 +1,17 @@
-"""Intervals: of a share (Wilson), and of anything else by drawing the trials anew within their strata.
+"""Statistics of many trials: paired differences, shares, bootstrap intervals, several tests at once, sample sizes.
 
-Several tests at once: p-values as they must be read when the best of many is looked at.
+SciPy computes Wilson's interval (`binomtest`), the paired t-test (`ttest_rel`), the signed-rank test (`wilcoxon`), the
+Mann-Whitney statistic (`mannwhitneyu`), the distributions behind power (`nct`) and the draws of every bootstrap
+(`bootstrap`). Ours are:
 
-Trials without figures: left out, as the paper does, or counted as failures, as trials of medicines do.
+- strata: `scipy.stats.bootstrap` draws each sample by itself, so a stratum is a sample of row numbers. Rows stay whole,
+  and a ratio whose denominator is 0 in a draw leaves that draw out, where SciPy would return NaN;
+- Holm's correction: SciPy has Benjamini-Hochberg alone (`false_discovery_control`);
+- Hedges' correction, power of pairs and the number of trials needed: SciPy has `power` by simulation alone;
+- probability of improvement and performance profiles (Agarwal et al. 2021, doi 10.48550/arXiv.2108.13264), and
+  reductions by logarithms, which SciPy does not have.
 
-A method that fails on the hard seeds looks better by what is left. So both are told wherever a model is judged.
-
-Two methods on the same seeds: is one better, and by how much in units of the spread between pairs.
-
-Whole distributions held against each other, where a mean would hide what most trials do.
-
-How many trials a question needs, and how small a difference a number of them can show.
+Arrays in, plain records out. Nothing is drawn but from a given seed.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from math import isnan, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import optimize, special, stats
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
@@ -63,19 +64,6 @@ def ratio_of_sums(drawn: Array) -> Array:
         return np.asarray(drawn[:, :, 0].sum(axis=1) / drawn[:, :, 1].sum(axis=1))
 
 
-def interquartile_mean(drawn: Array) -> Array:
-    """Mean of the middle half of the first column, shape (draws,): less moved by a lucky flight than the mean.
-
-    The share of a value that a quartile cuts counts as much as lies inside, as in Agarwal et al. 2021
-    (doi 10.48550/arXiv.2108.13264); of one value it is the value.
-    """
-    ordered = np.sort(drawn[:, :, 0], axis=1)
-    n = ordered.shape[1]
-    edges = np.arange(n + 1) / n
-    inside = np.clip(np.minimum(edges[1:], 0.75) - np.maximum(edges[:-1], 0.25), 0.0, None)
-    return np.asarray(ordered @ (inside / inside.sum()))
-
-
 def stratified_bootstrap(
     rows: Sequence[float] | Sequence[Sequence[float]] | Array,
     strata: Sequence[Hashable] | None = None,
@@ -85,22 +73,11 @@ def stratified_bootstrap(
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> tuple[float, Interval | None]:
-    """A statistic of trials and its percentile interval, by drawing trials anew, each stratum as often as it is there.
+    """A statistic of trials and its percentile interval, by drawing trials anew within each stratum.
 
-    Parameters
-    ----------
-    rows : array_like, shape (n,) or (n, columns)
-        Columns of one row stay together, so that pairs stay pairs.
-    strata : sequence of n hashables, optional
-        Such as the target of each trial. Where a stratum holds a single trial all are drawn from together, since
-        within it nothing could vary.
-    statistic : callable
-        From rows drawn, shape (draws, n, columns).
-
-    Returns
-    -------
-    float, Interval or None
-        None of a single row, which says nothing of the next.
+    `rows` have shape (n,) or (n, columns), finite; columns of one row stay together, so pairs stay pairs. `strata` name
+    the stratum of each row, such as its target. If a stratum holds a single row, all rows are one stratum, since
+    nothing could vary within it. The interval of a single row is None.
 
     Raises
     ------
@@ -118,15 +95,101 @@ def stratified_bootstrap(
     groups = [np.flatnonzero([where == name for where in names]) for name in dict.fromkeys(names)]
     if min(len(group) for group in groups) < 2:
         groups = [np.arange(len(values))]
-    rng = np.random.default_rng(seed)
-    picked = np.concatenate([group[rng.integers(len(group), size=(resamples, len(group)))] for group in groups], axis=1)
-    drawn = statistic(values[picked])
+
+    def drawn_statistic(*picked: Array, axis: int = -1) -> Array:
+        del axis  # the last: SciPy hands over row numbers of shape (draws, rows of a stratum)
+        return statistic(values[np.atleast_2d(np.concatenate(picked, axis=-1))])
+
+    drawn = stats.bootstrap(
+        groups, drawn_statistic, n_resamples=resamples, vectorized=True, method="percentile", rng=seed
+    ).bootstrap_distribution
     drawn = drawn[np.isfinite(drawn)]
     if len(drawn) == 0:
         return value, None
     tail = 50.0 * (1.0 - confidence)
     low, high = np.percentile(drawn, [tail, 100.0 - tail])
     return value, Interval(float(low), float(high))
+
+
+# Reductions over pairs ---------------------------------------------------------------------------------------------
+
+LEAST_M_S = 0.5e-3
+"""Speeds below count as this in logarithms, m/s: the tank merges vortex rings with errors of up to three times that,
+and the logarithm of a flight that leaves nothing would dominate a mean."""
+
+Figures = Mapping[str, float | None]
+Pairs = list[tuple[float, float, Hashable]]
+"""Theirs, ours and the stratum, trial by trial."""
+
+
+def pairs_of(
+    base: Mapping[Any, Figures], other: Mapping[Any, Figures], figure: str, strata: Mapping[Any, Hashable]
+) -> Pairs:
+    """Values of a figure where both trials of a key have it, with the stratum of that key."""
+    found: Pairs = []
+    for key in sorted(set(base) & set(other), key=str):
+        theirs, ours = base[key].get(figure), other[key].get(figure)
+        if theirs is not None and ours is not None and np.isfinite(theirs) and np.isfinite(ours):
+            found.append((float(theirs), float(ours), strata.get(key, "")))
+    return found
+
+
+def log_reduction_pct(pairs: Pairs, unanswered: int = 0) -> tuple[float | None, Interval | None, float | None]:
+    """Mean reduction 1 - exp(mean ln(ours / theirs)) in percent, its interval, and the reduction of the worst pair.
+
+    `unanswered` counts trials of ours that failed where the other's did not: each counts as no reduction.
+    """
+    if not pairs and not unanswered:
+        return None, None, None
+    logs = [float(np.log(max(ours, LEAST_M_S) / max(theirs, LEAST_M_S))) for theirs, ours, _ in pairs]
+    logs += [0.0] * unanswered
+    strata = [where for _, _, where in pairs] + ["failed"] * unanswered
+    value, interval = stratified_bootstrap(logs, strata, lambda drawn: 100.0 * (1.0 - np.exp(mean_of(drawn))))
+    return value, interval, 100.0 * (1.0 - float(np.exp(max(logs))))
+
+
+def ratio(pairs: Pairs) -> tuple[float | None, Interval | None]:
+    """Sum of ours over the sum of theirs, and its interval; None where the sum of theirs is 0."""
+    values = np.array([(ours, theirs) for theirs, ours, _ in pairs], dtype=np.float64).reshape(-1, 2)
+    if len(values) == 0 or not values[:, 1].sum() > 0.0:
+        return None, None
+    return stratified_bootstrap(values, [where for _, _, where in pairs], ratio_of_sums)
+
+
+def reduction_pct(
+    base: Mapping[Any, Figures],
+    other: Mapping[Any, Figures],
+    figure: str,
+    strata: Mapping[Any, Hashable] | None = None,
+) -> tuple[float | None, Interval | None]:
+    """Reduction of the mean of a figure, in percent of the base's, over the keys that both have; and its interval."""
+    return as_reduction(*ratio(pairs_of(base, other, figure, strata or {})))
+
+
+def as_reduction(value: float | None, ends: Interval | None) -> tuple[float | None, Interval | None]:
+    """A ratio and its interval as a reduction in percent."""
+    if value is None:
+        return None, None
+    return 100.0 * (1.0 - value), None if ends is None else Interval(100.0 * (1.0 - ends[1]), 100.0 * (1.0 - ends[0]))
+
+
+def mean_figures(rows: Iterable[Figures], keys: Iterable[str], worst: Sequence[str] = ()) -> dict[str, Any]:
+    """Number of trials (`flights`), and of each figure its mean (KEY) and interval (KEY_interval) over trials.
+
+    Figures in `worst` are the largest of all trials instead and have no interval. None where no trial has the figure.
+    """
+    listed = list(rows)
+    answer: dict[str, Any] = {"flights": len(listed)}
+    for key in keys:
+        known = [float(v) for v in (row.get(key) for row in listed) if v is not None and np.isfinite(v)]
+        if key in worst:
+            answer[key], answer[f"{key}_interval"] = max(known, default=None), None
+        else:
+            answer[key], answer[f"{key}_interval"] = stratified_bootstrap(known) if known else (None, None)
+    return answer
+
+
+# Several tests at once ---------------------------------------------------------------------------------------------
 
 
 def bonferroni(p: Sequence[float] | Array) -> Array:
@@ -164,6 +227,9 @@ def _checked(p: Sequence[float] | Array) -> Array:
     return values
 
 
+# Trials without figures: left out, as the paper does, or counted as the worst, as trials of medicines do. A method that
+# fails on the hard seeds looks better by what is left, so both are shown wherever a model is judged.
+
 WORST: dict[str, float] = {"rmse_mm": 20.0, "completeness_pct": 0.0, "completeness_visible_pct": 0.0, "success": 0.0}
 """What a trial counts as that was to make a model and made none: the cap of the RMSE, nothing covered, no success."""
 
@@ -189,52 +255,33 @@ def as_worst(rows: Iterable[Row | None], figure: str, worst: Mapping[str, float]
     return np.array([least if v is None or not np.isfinite(v) else float(v) for v in known], dtype=np.float64)
 
 
-FEWEST = 2
-"""A single pair has no spread."""
+# Two methods on the same seeds -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)
 class PairedTest:
-    """What pairs say of a difference, ours less theirs.
+    """Tests and effect sizes of paired differences, ours less theirs; all but `n` and `mean` are None of one pair.
 
-    Parameters
-    ----------
-    n : int
-        Pairs.
-    mean, low, high : float
-        Mean difference and its 95 % interval by Student's t; the ends are None of a single pair.
-    t, p_t : float or None
-        Paired t-test, two-sided. None of a single pair; of differences that are all alike p is 0, or 1 where all are 0.
-    p_wilcoxon : float or None
-        Signed-rank test, two-sided, exact up to 50 pairs without ties; zeros are left out (Wilcoxon's way). None of a
-        single pair.
-    d_z : float or None
-        Cohen's d for pairs: mean over the standard deviation of the differences (Cohen 1988; Lakens 2013,
-        doi 10.3389/fpsyg.2013.00863). None where that is zero.
-    g_z : float or None
-        The same with Hedges' correction for few pairs, exact (Hedges 1981).
+    `low` and `high` are the 95 % interval of the mean by Student's t. `t`, `p_t`: paired t-test, two-sided; of
+    differences that are all alike t is None and p is 0, or 1 where all are 0. `p_wilcoxon`: signed-rank test,
+    two-sided, exact up to 50 pairs without ties, zeros left out. `d_z`: Cohen's d for pairs, mean over the standard
+    deviation of the differences (Cohen 1988; Lakens 2013, doi 10.3389/fpsyg.2013.00863), None where that is zero.
+    `g_z`: the same with Hedges' correction for few pairs, exact (Hedges 1981).
     """
 
     n: int
     mean: float
-    low: float | None
-    high: float | None
-    t: float | None
-    p_t: float | None
-    p_wilcoxon: float | None
-    d_z: float | None
-    g_z: float | None
+    low: float | None = None
+    high: float | None = None
+    t: float | None = None
+    p_t: float | None = None
+    p_wilcoxon: float | None = None
+    d_z: float | None = None
+    g_z: float | None = None
 
 
 def paired_test(ours: Sequence[float] | Array, theirs: Sequence[float] | Array, confidence: float = 0.95) -> PairedTest:
-    """Test pairs; row k of both is one seed.
-
-    Parameters
-    ----------
-    ours, theirs : array_like, shape (n,)
-        Finite.
-    confidence : float
-        Of the interval.
+    """Test the differences of pairs, shape (n,) each and finite; row k of both is one seed.
 
     Raises
     ------
@@ -248,44 +295,39 @@ def paired_test(ours: Sequence[float] | Array, theirs: Sequence[float] | Array, 
     if not np.isfinite(difference).all():
         raise InputError("pairs: a value is not finite; leave such pairs out, or let them count as the worst")
     n, mean = len(a), float(difference.mean())
-    if n < FEWEST:
-        return PairedTest(n=n, mean=mean, low=None, high=None, t=None, p_t=None, p_wilcoxon=None, d_z=None, g_z=None)
+    if n < 2:
+        return PairedTest(n=n, mean=mean)
+    signed_rank = float(stats.wilcoxon(difference).pvalue) if difference.any() else 1.0
+    p_wilcoxon = 1.0 if isnan(signed_rank) else signed_rank
     spread = float(difference.std(ddof=1))
-    half = float(stats.t.ppf(0.5 + 0.5 * confidence, n - 1)) * spread / sqrt(n)
     if spread <= 1e-12 * float(np.abs(difference).max(initial=0.0)):  # all alike: t is infinite, or there is nothing
-        t, p_t, d_z = None, 1.0 if mean == 0.0 else 0.0, None
-    else:
-        t = mean / (spread / sqrt(n))
-        p_t, d_z = 2.0 * float(stats.t.sf(abs(t), n - 1)), mean / spread
+        p_t = 1.0 if mean == 0.0 else 0.0
+        return PairedTest(n=n, mean=mean, low=mean, high=mean, p_t=p_t, p_wilcoxon=p_wilcoxon)
+    test = stats.ttest_rel(a, b)
+    ends = test.confidence_interval(confidence)
+    d_z = mean / spread
     return PairedTest(
         n=n,
         mean=mean,
-        low=mean - half,
-        high=mean + half,
-        t=t,
-        p_t=p_t,
-        p_wilcoxon=_wilcoxon(difference),
+        low=float(ends.low),
+        high=float(ends.high),
+        t=float(test.statistic),
+        p_t=float(test.pvalue),
+        p_wilcoxon=p_wilcoxon,
         d_z=d_z,
-        g_z=None if d_z is None else d_z * hedges_correction(n - 1),
+        g_z=d_z * hedges_correction(n - 1),
     )
 
 
 def hedges_correction(freedom: int) -> float:
     """J(m) = Gamma(m/2) / (sqrt(m/2) Gamma((m-1)/2)), by which d of m degrees of freedom is too large (Hedges 1981)."""
-    from scipy.special import gammaln
-
     if freedom < 2:
         return 0.0  # the limit: of two pairs nothing is left of d
     m = float(freedom)
-    return float(np.exp(gammaln(0.5 * m) - gammaln(0.5 * (m - 1.0))) / np.sqrt(0.5 * m))
+    return float(np.exp(special.gammaln(0.5 * m) - special.gammaln(0.5 * (m - 1.0))) / np.sqrt(0.5 * m))
 
 
-def _wilcoxon(difference: Array) -> float:
-    if not difference.any():
-        return 1.0
-    p = float(stats.wilcoxon(difference).pvalue)
-    return 1.0 if isnan(p) else p
-
+# Whole distributions beside each other, where a mean hides what most trials do -------------------------------------
 
 Groups = Mapping[Any, Sequence[float] | Array]
 """Values of trials by target, world or other stratum."""
@@ -294,10 +336,9 @@ Groups = Mapping[Any, Sequence[float] | Array]
 def probability_of_improvement(
     ours: Groups, theirs: Groups, *, less_is_better: bool = True, seed: int = 0
 ) -> tuple[float, Interval | None]:
-    """How likely a trial of ours is better than one of theirs on a stratum drawn evenly, and its 95 % interval.
+    """Probability that a trial of ours is better than one of theirs in a stratum drawn evenly, and its 95 % interval.
 
-    Ties count half (Mann-Whitney's U over n m, averaged over strata; Agarwal et al. 2021,
-    doi 10.48550/arXiv.2108.13264). One half: neither.
+    Ties count half: Mann-Whitney's U over n m, averaged over strata. One half means neither is better.
 
     Raises
     ------
@@ -323,6 +364,11 @@ def probability_of_improvement(
     return value, Interval(float(low), float(high))
 
 
+def _wins(ours: Array, theirs: Array) -> Array:
+    """1 where ours is less, one half where both are alike; shape (n, m)."""
+    return np.asarray((ours[:, None] < theirs[None]) + 0.5 * (ours[:, None] == theirs[None]))
+
+
 def performance_profile(values: Sequence[float] | Array, thresholds: Sequence[float] | Array) -> Array:
     """Share of trials whose figure is at most each threshold, shape of `thresholds`; a trial that is NaN never is.
 
@@ -337,16 +383,13 @@ def performance_profile(values: Sequence[float] | Array, thresholds: Sequence[fl
     return np.asarray((known[:, None] <= np.asarray(thresholds, dtype=np.float64)[None]).mean(axis=0))
 
 
-def _wins(ours: Array, theirs: Array) -> Array:
-    """1 where ours is less, one half where both are alike; shape (n, m)."""
-    return np.asarray((ours[:, None] < theirs[None]) + 0.5 * (ours[:, None] == theirs[None]))
-
+# How many trials a question needs, and how small a difference a number of them can show -----------------------------
 
 MOST = 100_000
 
 
 def power_of_pairs(d_z: float, n: int, alpha: float = 0.05) -> float:
-    """Chance that n pairs show a true effect d_z by a two-sided paired t-test (noncentral t).
+    """Probability that n pairs show a true effect d_z by a two-sided paired t-test (noncentral t).
 
     Raises
     ------
