@@ -108,7 +108,7 @@ def test_the_computers_faults_are_told_in_one_line(
 
 ENDED = """
 import sys, time
-from wakewise import reconstruction
+from wakewise.vision import reconstruction
 from wakewise.ui.cli.main import main
 from wakewise.core.files import whole_file
 

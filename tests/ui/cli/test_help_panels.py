@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from wakewise.ui.cli.commands import PANELS
 from wakewise.ui.cli.main import _COMMANDS, _commands, run
 
 COMPLETE = "import sys; from wakewise.ui.cli.main import main; sys.argv = ['wakewise']; main()"
@@ -15,11 +16,10 @@ def test_every_command_stands_in_one_panel(capsys: pytest.CaptureFixture[str]) -
     """The five panels hold all commands, each once, and the help shows them so."""
     assert run(["--help"]) == 0
     text = capsys.readouterr().out
-    names = [name for _, name, _ in _COMMANDS]
+    names = [name for panel, name, _ in _COMMANDS if panel in PANELS]
     assert sorted(names) == sorted(_commands().commands) and len(set(names)) == len(names)
-    panels = list(dict.fromkeys(panel for panel, _, _ in _COMMANDS))
-    assert len(panels) == 5
-    for here, following in zip(panels, [*panels[1:], None], strict=True):
+    assert len(PANELS) == 5
+    for here, following in zip(PANELS, [*PANELS[1:], None], strict=True):
         start = text.index(f"\n{here}:\n")
         section = text[start : text.index(f"\n{following}:\n") if following else None]
         shown = [line.split()[0] for line in section.splitlines()[2:] if line.strip()]

@@ -66,7 +66,7 @@ def test_it_is_ready_once_a_picture_was_drawn(monkeypatch: pytest.MonkeyPatch) -
         def warm(self) -> None:
             done.append("drawn")
 
-    monkeypatch.setattr(live_camera, "Easel", Slow)
+    monkeypatch.setattr(live_camera, "PictureRenderer", Slow)
     monkeypatch.setattr(live_camera.os, "nice", lambda _: 0)
     monkeypatch.setattr(live_camera, "_write", lambda _, message: done.append(message.decode()))
     begin = pickle.dumps((None, None, 480))
