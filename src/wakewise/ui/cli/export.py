@@ -13,7 +13,7 @@ import typer
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import ProgressBars, print_json
-from wakewise.ui.cli.options import Json
+from wakewise.ui.cli.options import Json, seed_option
 
 LISTED = 5
 """Trials that were left out are listed up to so many; DATASHEET.md lists all."""
@@ -174,6 +174,24 @@ Answers = Annotated[
         show_default=False,
     ),
 ]
+HeldOut = Annotated[
+    int | None,
+    typer.Option(
+        "--held-out",
+        metavar="N",
+        help="nerfstudio, colmap: hold one photograph in N out from training, spread over the path; 0 for none; 8.",
+        show_default=False,
+    ),
+]
+SplitSeed = Annotated[
+    int | None,
+    typer.Option(
+        "--seed",
+        callback=seed_option,
+        help="nerfstudio, colmap: draws held-out photographs; 0.",
+        show_default=False,
+    ),
+]
 Check = Annotated[bool, typer.Option("--check", help="dataset: hold a data set against its check sums instead.")]
 
 
@@ -185,6 +203,8 @@ def export(
     poses: Poses = "true",
     origin: At = None,
     frame: Frame = "fsd",
+    held_out: HeldOut = None,
+    seed: SplitSeed = None,
     licence: Licence = None,
     creator: Creator = None,
     name: Name = None,
@@ -201,6 +221,8 @@ def export(
     north-east-down. A bag's times count from the begin of the flight or the log, so they begin near 0. COLMAP's points
     have the observations of the trial's own model, and errors with the poses that are written. A plan has a waypoint
     per photograph at its depth; satellites place none of them to a decimetre.
+    For trainers of fields and splats, nerfstudio and colmap also hold undistorted photographs, dense points, a held-out
+    split, and the attenuation of the water per colour channel, all listed in export.json.
     With --vehicle, write its allocation matrix as ROS 2's auv_controllers take it.
 
     A data set takes all trials of a folder, what a controller could know apart from the truth, with Croissant metadata,
@@ -219,16 +241,21 @@ def export(
     if to == "dataset":
         if trial is None or vehicle is not None:
             raise InputError("export --to dataset: give the folder of a campaign, of trials or of one, and no vehicle")
+        if held_out is not None or seed is not None:
+            raise InputError("--held-out, --seed: go with --to nerfstudio and colmap only, not with dataset")
         if origin is not None or poses != "true" or frame != "fsd":
             raise InputError("export --to dataset: no --origin, --poses or --frame; it keeps all poses as they are")
         export_dataset(trial, out, words, json)
         return
     words.refuse_beside(to or "FORMAT")
+    water = None
     if to == "auv_controllers":
         if vehicle is None or trial is not None:
             raise InputError("export --to auv_controllers: give --vehicle NAME and no trial")
         if origin is not None:
             raise InputError("--origin: goes with --to qgc-plan only, not with auv_controllers")
+        if held_out is not None or seed is not None:
+            raise InputError("--held-out, --seed: go with --to nerfstudio and colmap only, not with auv_controllers")
         path, holds = _allocation(vehicle, out, frame)
     else:
         if trial is None or vehicle is not None:
@@ -239,13 +266,18 @@ def export(
         from wakewise.experiments.trials.export import export_trial
 
         place = None if origin is None else GeodeticOrigin(*_two(origin))
-        done = export_trial(trial, to, out=out, poses=poses, origin=place)
-        path, holds = done.path, done.holds
+        done = export_trial(trial, to, out=out, poses=poses, origin=place, held_out=held_out, seed=seed)
+        path, holds, water = done.path, done.holds, done.water
     if json:
-        print_json({"to": to, "path": str(path), **holds})
+        print_json({"to": to, "path": str(path), **holds} | ({} if water is None else {"water": water.figures()}))
         return
     told = ", ".join(f"{count} {what.replace('_', ' ')}" for what, count in holds.items())
     typer.echo(f"{path}: {told}")
+    if water is not None and water.attenuation_per_m is not None:
+        red, green, blue = water.attenuation_per_m
+        typer.echo(f"water ({water.source}): attenuation {red:.3g}, {green:.3g}, {blue:.3g} /m in red, green, blue")
+    elif water is not None:
+        typer.echo(f"water: attenuation is not known ({water.why})")
 
 
 def _allocation(vehicle: str, out: Path | None, frame: str) -> tuple[Path, dict[str, int]]:

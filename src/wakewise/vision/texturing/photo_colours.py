@@ -117,18 +117,7 @@ def correct_photos(
     depths, why_not = _depths(model, names)
     fit: WaterFit | None = None
     if depths is not None:
-        have = [name for name in names if name in depths.views]
-        some = have[:: max(1, len(have) // FIT_PHOTOS)][:FIT_PHOTOS]
-        pairs = []
-        for k, name in enumerate(some):
-            progress(k, len(some) + len(names), "fitting the water")
-            image = _read(photos / name)
-            if depths.knows(name, image.shape[:2]):
-                pairs.append((image, depths.ranges_m(name, image.shape[:2])))
-        try:
-            fit = fit_water(pairs)
-        except InputError as fault:
-            why_not = str(fault)
+        fit, why_not = _fitted(photos, names, depths, progress)
     physical = deep = clear = 0
     for k, name in enumerate(names):
         progress(k, len(names), name)
@@ -157,6 +146,36 @@ def correct_photos(
         clear=clear,
         renamed=sum(copy == f"{name}.jpg" for name, copy in targets.items()),
     )
+
+
+def estimate_water(photos: Path, names: Sequence[str], model: Path) -> tuple[WaterFit | None, str | None]:
+    """Optics of the water, fitted to photographs and the ranges of their model; None with the reason.
+
+    Raises
+    ------
+    InputError
+        If a photograph cannot be read.
+    """
+    depths, why_not = _depths(model, list(names))
+    return (None, why_not) if depths is None else _fitted(photos, names, depths, no_progress)
+
+
+def _fitted(
+    photos: Path, names: Sequence[str], depths: RangeMaps, progress: Callable[..., None]
+) -> tuple[WaterFit | None, str | None]:
+    """`fit_water` of up to `FIT_PHOTOS` photographs that the model knows, spread over the set."""
+    have = [name for name in names if name in depths.views]
+    some = have[:: max(1, len(have) // FIT_PHOTOS)][:FIT_PHOTOS]
+    pairs = []
+    for k, name in enumerate(some):
+        progress(k, len(some) + len(names), "fitting the water")
+        image = _read(photos / name)
+        if depths.knows(name, image.shape[:2]):
+            pairs.append((image, depths.ranges_m(name, image.shape[:2])))
+    try:
+        return fit_water(pairs), None
+    except InputError as fault:
+        return None, str(fault)
 
 
 def copy_names(names: Sequence[str]) -> dict[str, str]:
