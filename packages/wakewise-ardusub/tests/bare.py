@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 SOURCES = (Path(__file__).parents[1] / "src", Path(__file__).parents[3] / "src")
@@ -25,15 +26,15 @@ def command(code: str, *arguments: str) -> list[str]:
     return [sys.executable, "-W", "error", "-c", GATE + code, *arguments]
 
 
-def environment() -> dict[str, str]:
+def environment(sources: Sequence[Path] = SOURCES) -> dict[str, str]:
     """Both packages from their sources, whatever is installed."""
-    return os.environ | {"PYTHONPATH": os.pathsep.join(map(str, SOURCES))}
+    return os.environ | {"PYTHONPATH": os.pathsep.join(map(str, sources))}
 
 
-def bare(code: str, *arguments: str) -> str:
+def bare(code: str, *arguments: str, sources: Sequence[Path] = SOURCES) -> str:
     """Run code there; what it printed."""
     done = subprocess.run(
-        command(code, *arguments), env=environment(), capture_output=True, text=True, check=False, timeout=120
+        command(code, *arguments), env=environment(sources), capture_output=True, text=True, check=False, timeout=120
     )
     assert done.returncode == 0, done.stderr
     return done.stdout

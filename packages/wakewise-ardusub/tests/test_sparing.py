@@ -25,15 +25,16 @@ from pathlib import Path
 from wakewise.core.jit.njit import COMPILED
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise_ardusub.vehicle_summary import read_vehicle_summary
-from wakewise_ardusub.wash_savings import SHARES, Sparing, bow_ball, influence_model
+from wakewise_ardusub.wash_savings import SHARES, WashSavingsCalculator, bow_ball, influence_model
 assert not COMPILED
 asked = json.loads(Path(sys.argv[1]).read_text())
-craft = read_craft(Path(sys.argv[2]))
+craft = read_vehicle_summary(Path(sys.argv[2]))
 points = bow_ball(craft.bow_m, craft.camera_z_m, 0.4)
-sparing = Sparing(craft, np.array(asked["directions"]))
+sparing = WashSavingsCalculator(craft, np.array(asked["directions"]))
 told = []
 for pose in asked["poses"]:
-    gram = look(craft, points, np.ones(len(points))).gram(Pose(np.array(pose[:3]), quat_from_euler(*pose[3:])))
+    X_WB = Pose(np.array(pose[:3]), quat_from_euler(*pose[3:]))
+    gram = influence_model(craft, points, np.ones(len(points))).gram(X_WB)
     for pulses, volts in asked["rows"]:
         spared = sparing.judge(np.array(pulses), sparing.supply_V(volts), gram)
         told.append([[spared.disturbance[s], spared.thrusts_N[s].tolist()] for s in SHARES])
@@ -86,7 +87,7 @@ def test_the_meters_whole_program_needs_numpy_and_pymavlink_only() -> None:
         "import wakewise_ardusub.wash_meter.embedded, pymavlink.dialects.v20.ardupilotmega\n"
         "print(sorted({m.partition('.')[0] for m in set(sys.modules) - before} - set(sys.stdlib_module_names)))"
     )
-    assert set(json.loads(found.replace("'", '"'))) <= {"fastcrc", "numpy", "pymavlink", "wakewise"}
+    assert set(json.loads(found.replace("'", '"'))) <= {"fastcrc", "numpy", "pymavlink", "wakewise", "wakewise_ardusub"}
 
 
 def test_a_layout_that_needs_solvers_is_refused_by_a_small_computer(tmp_path: Path) -> None:
@@ -99,10 +100,10 @@ from pathlib import Path
 import numpy as np
 from wakewise.core.errors import InputError
 from wakewise_ardusub.vehicle_summary import read_vehicle_summary
-from wakewise_ardusub.wash_savings import Sparing
-craft = read_craft(Path(sys.argv[1]))
+from wakewise_ardusub.wash_savings import WashSavingsCalculator
+craft = read_vehicle_summary(Path(sys.argv[1]))
 try:
-    Sparing(craft, np.ones(craft.count))
+    WashSavingsCalculator(craft, np.ones(craft.count))
 except InputError as fault:
     print(fault)
 """

@@ -5,7 +5,9 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
+import shutil
 import subprocess
+import zipfile
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -102,6 +104,7 @@ def test_every_label_leads_to_who_publishes_it(labels: dict[str, str]) -> None:
     assert "OWNER" not in "".join(labels.values())
     for link in (*json.loads(labels["links"]).values(), labels["readme"]):
         assert "/reef-lab/wakewise" in link
+    assert (ROOT / labels["readme"].partition("{tag}/")[2]).samefile(FOLDER / "README.md")
     readme = (FOLDER / "README.md").read_text(encoding="utf-8")
     assert f"git tag {labels['version']}" in readme
     assert f"wakewise-gentle-meter:{labels['version']}" in readme
@@ -150,6 +153,8 @@ def test_every_source_that_is_copied_is_there(instructions: list[tuple[str, str]
     entry = next(said for name, said in instructions if name == "ENTRYPOINT")
     assert json.loads(entry) == ["python3", "/opt/wakewise/entry.py"]
     assert "packages/wakewise-ardusub/extensions/blueos/entry.py" in sources
+    links = re.findall(r"\]\((?!https?:)([^)#]+)", (FOLDER / "README.md").read_text(encoding="utf-8"))
+    assert all((FOLDER / link).exists() for link in links), links
     assert not any(word in said for _, said in instructions for word in ("curl", "wget", "ADD http"))
 
 
@@ -165,7 +170,38 @@ def test_what_is_installed_is_what_the_meter_imports(instructions: list[tuple[st
         "print(*({m.partition('.')[0] for m in set(sys.modules) - before} - set(sys.stdlib_module_names)))"
     )
     # fastcrc is taken by pymavlink where it is there.
-    assert {"numpy", "wakewise", "fastcrc", *pinned} == {"fastcrc", *found.split()}
+    assert {"numpy", "wakewise", "wakewise_ardusub", "fastcrc", *pinned} == {"fastcrc", *found.split()}
+
+
+def test_what_pip_builds_of_the_copies_runs_the_meter(instructions: list[tuple[str, str]], tmp_path: Path) -> None:
+    """Wheels of the copied files hold all that the meter imports and the files of its page."""
+    builder = pytest.importorskip("hatchling.builders.wheel").WheelBuilder
+    for name, said in instructions:
+        *sources, to = said.split()
+        if name == "COPY" and "requirements.txt" not in said and to.startswith("/build/"):
+            for source in sources:
+                place = tmp_path / to.lstrip("/") / (Path(source).name if to.endswith("/") else "")
+                place.parent.mkdir(parents=True, exist_ok=True)
+                copy = shutil.copytree if (ROOT / source).is_dir() else shutil.copy
+                copy(ROOT / source, place)
+    installs = next(said for name, said in instructions if name == "RUN" and "rm -rf /build" in said)
+    for folder in re.findall(r" (/build\S*)", installs.partition("&&")[0]):
+        (wheel,) = builder(str(tmp_path / folder.lstrip("/"))).build(directory=str(tmp_path), versions=["standard"])
+        with zipfile.ZipFile(wheel) as archive:
+            archive.extractall(tmp_path / "site")
+    craft = FOLDER / "craft" / "bluerov2-heavy.json"
+    found = bare(
+        "from pathlib import Path\n"
+        "from wakewise_ardusub.vehicle_summary import read_vehicle_summary\n"
+        "from wakewise_ardusub.wash_meter.embedded import main\n"
+        "from wakewise_ardusub.wash_meter.server import PAGE\n"
+        "print(read_vehicle_summary(Path(sys.argv[1])).name, PAGE, *sorted(path.name for path in PAGE.iterdir()))",
+        str(craft),
+        sources=[tmp_path / "site"],
+    ).split()
+    assert found[0] == "bluerov2-heavy"
+    assert Path(found[1]).is_relative_to(tmp_path / "site")
+    assert {"index.html", "meter.js", "past.js", "meter.css"} <= set(found[2:])
 
 
 @pytest.mark.parametrize("name", ["bluerov2", "bluerov2-heavy"])

@@ -408,7 +408,7 @@ def test_a_wheel_brings_the_script(tmp_path: Path) -> None:
     """Built as it is published, the package has the script where it is read from."""
     from hatchling.builders.wheel import WheelBuilder
 
-    root = Path(__file__).parents[4]
+    root = Path(__file__).parents[2]
     (wheel,) = WheelBuilder(str(root)).build(directory=str(tmp_path), versions=["standard"])
     with zipfile.ZipFile(wheel) as archive:
         inside = archive.read("wakewise_ardusub/link/script/wakewise.lua").decode("utf-8")

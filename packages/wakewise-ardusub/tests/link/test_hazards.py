@@ -17,7 +17,7 @@ from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 
-ROOT = Path(__file__).parents[4]
+ROOT, TESTS = Path(__file__).parents[4], Path(__file__).parents[1]
 ROW = re.compile(r"^\|.*\| `(test_\w+)(?:\[(.+)\])?` \|$", re.MULTILINE)
 
 
@@ -27,7 +27,7 @@ def test_every_row_names_a_test_that_exists():
     rows = [line for line in text.splitlines() if line.startswith("| ")][1:]
     found = ROW.findall(text)
     assert len(found) == len(rows) >= 25
-    files = {path: path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py")}
+    files = {path: path.read_text(encoding="utf-8") for path in TESTS.rglob("test_*.py")}
     for name, case in found:
         homes = [body for body in files.values() if re.search(rf"^def {name}\(", body, re.MULTILINE)]
         assert homes, name

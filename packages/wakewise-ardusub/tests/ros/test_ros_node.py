@@ -23,7 +23,8 @@ from fake_ros import Node, Parameter, install
 from wakewise.experiments.exports import tam_yaml
 from wakewise.robot.vehicles import load_vehicle
 
-PACKAGE = Path(__file__).parents[4] / "packages/wakewise-ardusub/ros2" / "wakewise_ros"
+ROOT = Path(__file__).parents[4]
+PACKAGE = ROOT / "packages/wakewise-ardusub/ros2/wakewise_ros"
 HEAVY = load_vehicle("bluerov2-heavy")
 NEW_IN_NUMPY_2 = (
     "acosh?|asinh?|atan[2h]?|bitwise_count|bitwise_invert|bitwise_left_shift|bitwise_right_shift|bool|concat|isdtype|"
@@ -282,13 +283,13 @@ def test_a_stamped_reference_is_one_parameter_away(make: Callable[..., Any]) -> 
 
 def test_what_the_readme_installs_is_what_the_node_imports() -> None:
     """NumPy below 2, as Jazzy has it, and the packages that an allocation loads; it uses no name of NumPy 2 alone."""
-    names = "Answer, Field, Target, ThrustAllocator, body_points, cloud_points, failed_thrusters, pose_of, read_frame"
+    names = "NodeAllocation, PointField, ProtectedPoints, ThrustAllocator, body_points, cloud_points, failed_thrusters"
     code = (
         "import sys, json; import numpy as np\n"
-        f"from wakewise_ardusub.ros import {names}, world_points, wrench_for, wrench_of\n"
+        f"from wakewise_ardusub.ros import {names}, pose_of, read_frame, world_points, wrench_for, wrench_of\n"
         "from wakewise.robot.vehicles import load_vehicle; from wakewise.wake import wake_model\n"
         "made = dict(vehicle=load_vehicle('bluerov2-heavy'), wake=wake_model('jet'))\n"
-        "ahead = Target(points_m=np.array([[2.0, 0.0, 0.0]]), weights=np.ones(1), on_body=True)\n"
+        "ahead = ProtectedPoints(points_m=np.array([[2.0, 0.0, 0.0]]), weights=np.ones(1), on_body=True)\n"
         "for told in ({}, {'failed': (4,)}, {'priority': 'ZKMN,XY'}):\n"
         "    ThrustAllocator(**made, **told)(np.ones(6), ahead)\n"
         "print(json.dumps({name: module.__file__ for name, module in sys.modules.items() "
@@ -298,7 +299,7 @@ def test_what_the_readme_installs_is_what_the_node_imports() -> None:
     files: dict[str, str] = json.loads(done.stdout)
     whose = packages_distributions()
     loaded = {package.lower() for name in files for package in whose.get(name.partition(".")[0], [])}
-    core = tomllib.loads((PACKAGE.parents[1] / "pyproject.toml").read_text())["project"]["dependencies"]
+    core = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
     readme = (PACKAGE / "README.md").read_text()
     told = set(re.findall(r"'([\w<>=.]+)'", readme.partition("pip install 'numpy<2'")[2].partition("&&")[0]))
     wanted = {line for line in core if re.split("[<>=]", line)[0] in loaded and not line.startswith("numpy")}
@@ -325,7 +326,7 @@ def test_the_shipped_file_tells_every_parameter_its_default(node_module: ModuleT
                 imported |= {alias.name.partition(".")[0] for alias in line.names}
     tree = ET.parse(PACKAGE / "package.xml")
     depends = {element.text for element in tree.iter("exec_depend")}
-    ours = imported - set(sys.stdlib_module_names) - {"wakewise", "numpy"}
+    ours = imported - set(sys.stdlib_module_names) - {"wakewise", "wakewise_ardusub", "numpy"}
     assert ours | {"python3-numpy"} == depends
     setup = (PACKAGE / "setup.py").read_text()
     for path in ("launch/allocator.launch.py", "config/bluerov2_heavy.yaml", "package.xml"):

@@ -197,7 +197,7 @@ class Deaf:
 
 def session_of(folder, monkeypatch, **wardens) -> VehicleSession:
     """A session that compiles nothing and hears nothing by itself."""
-    monkeypatch.setattr("wakewise_ardusub.session.session.warm", lambda jobs, progress: None)
+    monkeypatch.setattr("wakewise_ardusub.session.session.compile_kernels", lambda jobs, progress: None)
     return VehicleSession(
         scenario=Scenario(vehicle="bluerov2-heavy", method="dp").replace(**SEA),
         receiving=Deaf(),
@@ -240,7 +240,7 @@ def test_a_flight_begins_where_the_vehicle_is_when_its_parts_are_made(tmp_path, 
         session.warden.known = replace(known, place_W_m=place_W_m)
         return 0.0
 
-    monkeypatch.setattr("wakewise_ardusub.session.session.rehearse", moved)
+    monkeypatch.setattr("wakewise_ardusub.session.session.run_warm_up", moved)
     sea = session._prepared()
     assert sea.parts.start.X_WB.p_m == pytest.approx(before.X_WB.p_m + np.array([0.2, 0.0, 0.3]))
 

@@ -44,12 +44,12 @@ def meter_of(craft: VehicleSummary, parameters: dict[str, float] | None = None) 
 def tape(file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Message]:
     """Messages of a telemetry log in their order, on its mended clock."""
     found: list[Message] = []
-    clock = LogClock()
+    clock, record_message = LogClock(), mavlink.record_message
 
     def keep(gather: Any, stamp_s: float, system: int, component: int, name: str, fields: dict[str, Any]) -> None:
         boot = fields.get("time_boot_ms") if component == mavlink.AUTOPILOT and name in mavlink.WANTED else None
         found.append((clock.at(stamp_s, None if boot is None else 1e-3 * boot), system, component, name, fields))
-        mavlink.record_message(gather, stamp_s, system, component, name, fields)
+        record_message(gather, stamp_s, system, component, name, fields)
 
     monkeypatch.setattr(mavlink, "record_message", keep)
     read_log(file)
