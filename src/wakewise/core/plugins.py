@@ -62,9 +62,9 @@ def find(kind: str, name: str, own: Mapping[str, T]) -> ResolvedPlugin[T]:
     if name in offered:
         point = offered[name]
         package = f"{point.dist.name} {point.dist.version}" if point.dist is not None else point.value
-        return ResolvedPlugin(_loaded(kind, name, point.value), package)
+        return ResolvedPlugin(load(kind, name, point.value), package)
     if ":" in name:
-        return ResolvedPlugin(_loaded(kind, name, name), name)
+        return ResolvedPlugin(load(kind, name, name), name)
     known = names(kind, own)
     close = difflib.get_close_matches(name, known, 1)
     hint = f"did you mean {close[0]}? " if close else ""
@@ -86,7 +86,14 @@ def _offered(group: str) -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=group)}
 
 
-def _loaded(kind: str, name: str, target: str) -> Any:
+def load(kind: str, name: str, target: str) -> Any:
+    """What `target`, as ``package.module:name``, is; the working folder is looked through, too.
+
+    Raises
+    ------
+    InputError
+        If it cannot be imported; `kind` and `name` say what it was to be.
+    """
     module, _, attribute = target.partition(":")
     if not module or not attribute:
         raise InputError(f"{kind} '{name}': must be package.module:name")

@@ -15,7 +15,7 @@ import polars as pl
 import pytest
 
 from wakewise.experiments.campaigns import definition, task
-from wakewise.experiments.campaigns.definition import keep_plan
+from wakewise.experiments.campaigns.definition import keep_campaign
 from wakewise.experiments.campaigns.store import open_store
 from wakewise.ui.cli.main import run as command
 
@@ -103,7 +103,7 @@ def test_no_cell_of_a_csv_is_a_formula(cheap_work: Path, capsys: pytest.CaptureF
     Path("small.yaml").write_text(f"{FILE}variations: {{{told}}}\n")
     campaign = definition.load_campaign(Path("small.yaml"))
     open_store(Path("runs/small"))
-    keep_plan(Path("runs/small"), campaign, definition.planned_trials(campaign))
+    keep_campaign(Path("runs/small"), campaign, definition.planned_trials(campaign))
     for suffix in ("csv", "parquet"):
         assert command(["campaign", "table", "small.yaml", "--write", f"all.{suffix}", "--json"]) == 0
     capsys.readouterr()

@@ -1,12 +1,9 @@
 """A campaign as people write it: methods x targets x worlds x vehicles x variations x seeds, as YAML.
 
-Every combination is a scenario, checked before the first trial is made, and a trial of its own.
-
-What of a scenario is not the package's own, and which version of it: files by their bytes, packages by number.
-
-It goes into a trial's key, so that a controller that was changed is flown anew.
-
-What a campaign's folder was made for: its trials by name, and the version that makes them.
+Every combination is a scenario, checked before the first trial is made, and a trial of its own (`planned_trials`). A
+program that lists trials itself, as the studies of wakewise-paper do, makes `PlannedTrial`s directly. What a folder was
+made for is kept in its plan.json (`keep_plan`). Files and modules from outside the package are part of a trial's key,
+files by their bytes and packages by their source, so that a controller that was changed is flown anew.
 """
 
 from __future__ import annotations
@@ -20,9 +17,9 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from wakewise.control import MAKERS
 from wakewise.core.errors import InputError
@@ -30,8 +27,9 @@ from wakewise.core.files import name_fault, write_json
 from wakewise.core.plugins import find
 from wakewise.core.safe_yaml import yaml_file
 from wakewise.core.settings import Seed, Settings
+from wakewise.experiments.campaigns.flights import FLY, MODEL
 from wakewise.experiments.campaigns.store import read_store
-from wakewise.experiments.campaigns.task import FLIES, PHOTOGRAPHS, Task, source_version
+from wakewise.experiments.campaigns.task import FLIES, PHOTOGRAPHS, Task, function_named, source_version
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
 from wakewise.scene.targets import coral_kinds
 
@@ -106,14 +104,12 @@ FACTORS = ("method", "target", "world", "vehicle", "variation", "seed")
 MOST_TRIALS = 100_000
 AS_IS = "as-is"
 """Name of the variation that changes nothing."""
-_WORK = {
-    "fly": "wakewise.experiments.campaigns.flights:fly_stage",
-    "model": "wakewise.experiments.campaigns.flights:model_stage",
-}
-_SOURCES = {
-    "fly": (*FLIES, "experiments/campaigns/flights.py"),
-    "model": (*PHOTOGRAPHS, "experiments/campaigns/flights.py"),
-}
+FLIGHT_SOURCES = (*FLIES, "experiments/campaigns/flights.py")
+"""Sources that can change the figures of a flight of a campaign."""
+MODEL_SOURCES = (*PHOTOGRAPHS, "experiments/campaigns/flights.py")
+"""Sources that can change a model made from a flight's photographs."""
+_WORK = {"fly": FLY, "model": MODEL}
+_SOURCES = {"fly": FLIGHT_SOURCES, "model": MODEL_SOURCES}
 
 
 class Campaign(Settings):
@@ -127,6 +123,14 @@ class Campaign(Settings):
     stages: Literal["fly", "model"] = Field(
         "model", description="fly: the flight and the water; model: photographs, model and its figures, too"
     )
+    setup: dict[str, dict[str, Any]] = Field(
+        default={},
+        description="package.module:function with its arguments: (parts, **arguments) -> parts, such as a route; fly",
+    )
+    probes: dict[str, dict[str, Any]] = Field(
+        default={}, description="package.module:Class with its arguments: a FlightProbe, which adds figures; fly"
+    )
+    duration_s: float | None = Field(None, gt=0.0, description="only the first part of each flight; fly")
     keep: Literal["figures", "all"] = Field(
         "figures", description="what stays of a trial: its figures and record, or its photographs and model, too"
     )
@@ -176,6 +180,12 @@ class Campaign(Settings):
             raise ValueError(f"names a folder, so {fault}")
         return value
 
+    @model_validator(mode="after")
+    def _of_flights(self) -> Self:
+        if self.stages != "fly" and (self.setup or self.probes or self.duration_s is not None):
+            raise ValueError("setup, probes and duration_s are of `stages: fly`")
+        return self
+
     @property
     def all_seeds(self) -> tuple[int, ...]:
         """The seeds of every combination."""
@@ -220,6 +230,13 @@ def planned_trials(campaign: Campaign, source: str = "campaign") -> list[Planned
     InputError
         If there are too many, or a combination is no scenario; the combination and the field are named.
     """
+    outside: dict[str, str] = {}
+    for name in (*campaign.setup, *campaign.probes):
+        try:
+            function_named(name)
+        except InputError as fault:
+            raise InputError(f"{source}: {fault}") from None
+        outside[f"{name.partition(':')[0]} source"] = module_digest(name.partition(":")[0])
     cells = list(_cells(campaign))
     seeds = campaign.all_seeds
     count = len(cells) * len(seeds)
@@ -227,7 +244,7 @@ def planned_trials(campaign: Campaign, source: str = "campaign") -> list[Planned
         raise InputError(f"{source}: {count} trials, at most {MOST_TRIALS} in one campaign")
     there: set[str] = set()
     resolved = [(cell, *_resolved(campaign, cell, seeds[0], source, there)) for cell in cells]
-    return [_trial(campaign, cell, scenario, outside, seed) for seed in seeds for cell, scenario, outside in resolved]
+    return [_trial(campaign, cell, scenario, outside | own, seed) for seed in seeds for cell, scenario, own in resolved]
 
 
 @dataclass(frozen=True)
@@ -283,6 +300,9 @@ def _trial(campaign: Campaign, cell: _Cell, scenario: Scenario, outside: dict[st
         "scenario": scenario.model_copy(update={"seed": seed, "name": campaign.name}).model_dump(mode="json"),
         "keep": campaign.keep,
     }
+    for name in ("setup", "probes", "duration_s"):
+        if value := getattr(campaign, name):
+            settings[name] = value
     if outside:
         settings["outside"] = outside
     shown = [str(value) for key, value in factors.items() if _tells_apart(campaign, key)]
@@ -343,19 +363,7 @@ class PlanEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class CampaignPlan:
-    """What a campaign's folder was made for.
-
-    Parameters
-    ----------
-    name : str
-    campaign : mapping
-        The campaign file, resolved.
-    wakewise : str
-        Version of the package.
-    sources : str
-        Hash of the sources that matter.
-    trials : tuple of PlanEntry
-    """
+    """What a campaign's folder was made for: its file, resolved, the package's version, the hash of its sources."""
 
     name: str
     campaign: Mapping[str, Any]
@@ -364,8 +372,8 @@ class CampaignPlan:
     trials: tuple[PlanEntry, ...]
 
 
-def keep_plan(folder: Path, campaign: Campaign, trials: Sequence[PlannedTrial]) -> None:
-    """Write the plan into a campaign's folder, in place of an earlier one of the same version.
+def keep_campaign(folder: Path, campaign: Campaign, trials: Sequence[PlannedTrial]) -> None:
+    """Write the plan of a campaign file into its folder, in place of an earlier one of the same version.
 
     Raises
     ------
@@ -380,11 +388,16 @@ def keep_plan(folder: Path, campaign: Campaign, trials: Sequence[PlannedTrial]) 
                 f"--out {folder}: holds trials of another version (Wakewise {before.wakewise}, sources "
                 f"{before.sources[:8]}; now {version('wakewise')}, {sources[:8]}); give another --out"
             )
+    keep_plan(folder, campaign.name, trials, campaign.model_dump(mode="json"))
+
+
+def keep_plan(folder: Path, name: str, trials: Sequence[PlannedTrial], campaign: Mapping[str, Any]) -> None:
+    """Write what a folder was made for: `wakewise campaign status|table|page` read it."""
     told = {
-        "name": campaign.name,
-        "campaign": campaign.model_dump(mode="json"),
+        "name": name,
+        "campaign": dict(campaign),
         "wakewise": version("wakewise"),
-        "sources": sources,
+        "sources": source_version(trials[0].task.sources),
         "trials": [{"key": one.task.key, "name": one.task.name, "factors": dict(one.factors)} for one in trials],
     }
     write_json(folder / PLAN, told, lasting=True)

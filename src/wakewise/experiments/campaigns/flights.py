@@ -1,6 +1,8 @@
 """Work of a campaign's trials: fly a scenario and judge the water, or make its whole trial with photographs and model.
 
-Figures are those of `wakewise scan` (see `wakewise.experiments.trials.metrics`).
+A study adds to a flight what a scenario file cannot say: *setup* functions change its parts (route, start, pilot) and
+*probes* watch its steps and give figures of their own. Both are named as `package.module:name` in the campaign or in
+the settings of a trial. All other figures are those of `wakewise scan` (see `wakewise.experiments.trials.metrics`).
 """
 
 from __future__ import annotations
@@ -15,36 +17,101 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.experiments.campaigns.task import Figures, WorkProgress
+from wakewise.core.interfaces import TruthProvider
+from wakewise.experiments.campaigns.task import Figures, WorkProgress, function_named
 from wakewise.experiments.trials.metrics import UNITS, MetricsCollector, add_reference_values
-from wakewise.operation import Scenario, fly
+from wakewise.operation import Parts, Scenario, fly
 from wakewise.operation.flight_log import timings_of
+from wakewise.operation.flying import WATER_EVERY_S
+from wakewise.operation.loop import Step
 from wakewise.operation.scenario import check_scenario
 from wakewise.scene.missions import SETTLING
 from wakewise.vision.evaluation import flight_figures
 
+FLY = f"{__name__}:fly_stage"
+MODEL = f"{__name__}:model_stage"
 _FLIGHT = ("steps.parquet", "metrics.json", "scenario.yaml")
 """What stays of a trial of which only figures are kept, beside a few pictures."""
 _STAGES = ("compile", "plan", "fly", "photograph", "reconstruct", "evaluate", "mesh", "colours")
 _LOADING = 50  # first steps, whose solve times are those of loading
 
 
+class FlightProbe:
+    """Watches a flight and gives figures of it; derive from it and name the class under `probes`.
+
+    It is made as `Probe(parts, folder, **arguments)` before the first step; `folder` is the trial's, for files that a
+    probe leaves.
+    """
+
+    def __init__(self, parts: Parts, folder: Path) -> None:
+        self.parts, self.folder = parts, folder
+
+    def step(self, step: Step, witness: TruthProvider | None) -> None:
+        """Look at one control step; `witness` is the true world, None of a real vehicle."""
+
+    def figures(self, steps: pl.DataFrame) -> Mapping[str, Any]:
+        """Figures by name, from all steps of the flight (`settled` leaves out its settling)."""
+        del steps
+        return {}
+
+
 def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress) -> Figures:
-    """Figures of one flight: the water at the target, errors, energy; no photograph is made."""
+    """Figures of one flight: the water at the target, errors, energy, and those of probes; no photograph is made.
+
+    `settings` hold `scenario` (see `scenario_of`) and may hold `setup` and `probes` (names with their arguments),
+    `duration_s` (only the first part), `water_every_s` and `keep` ("none" leaves no steps.parquet). With a setup the
+    route is not checked against bed and target: whoever makes a route keeps it clear.
+    """
     began, worked = time.monotonic(), time.process_time()
-    flight = fly(scenario_of(settings), progress=progress)
-    judged = flight.steps.filter(pl.col("leg") != SETTLING)
+    gathered: dict[str, Any] = {}
+    parts = scenario_of(settings).parts()
+    setup = settings.get("setup") or {}
+    for name, arguments in setup.items():
+        changed = function_named(name)(parts, **arguments)
+        parts, more = changed if isinstance(changed, tuple) else (changed, {})
+        if not isinstance(parts, Parts):
+            raise InputError(f"setup {name}: gave {type(parts).__name__}, must give the parts of a flight")
+        gathered |= more
+    probes = [function_named(name)(parts, folder, **own) for name, own in (settings.get("probes") or {}).items()]
+
+    def watch(step: Step, witness: TruthProvider | None) -> None:
+        for probe in probes:
+            probe.step(step, witness)
+
+    flight = fly(
+        parts,
+        checked=not setup,
+        duration_s=settings.get("duration_s"),
+        water_every_s=settings.get("water_every_s") or WATER_EVERY_S,
+        watch=watch if probes else None,
+        progress=progress,
+    )
+    judged = settled(flight.steps)
     gathering = MetricsCollector()
-    gathering.add(flight_figures(judged))
-    add_reference_values(gathering, flight.parts, judged)
+    flown = flight_figures(judged)
+    gathering.add(flown)
+    if not setup:
+        add_reference_values(gathering, flight.parts, judged)
     solve_ms = timings_of(flight.recorder.log.frame().lazy())["solve_ms"].to_numpy()
     solve_ms = solve_ms[min(_LOADING, len(solve_ms) // 2) :]
     gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})
+    if setup or probes:  # a study may show figures of a flight that tables of campaigns do not have
+        gathered |= flown
+    for probe in probes:
+        gathered |= probe.figures(flight.steps)
     gathering.add({"wall_s": time.monotonic() - began, "cpu_s": time.process_time() - worked})
-    with whole_file(folder / "steps.parquet") as path:
-        flight.steps.write_parquet(path, compression="zstd")
-    return _plain(gathering.figures)
+    if settings.get("keep") != "none":
+        with whole_file(folder / "steps.parquet") as path:
+            flight.steps.write_parquet(path, compression="zstd")
+    return _plain(gathering.figures) | gathered
+
+
+def settled(steps: pl.DataFrame) -> pl.DataFrame:
+    """Steps from the first leg on; all steps of a flight that ended before."""
+    judged = steps.filter(pl.col("leg") != SETTLING)
+    return judged if judged.height else steps
 
 
 def model_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress) -> Figures:
@@ -68,8 +135,10 @@ def model_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgres
 
 
 def scenario_of(settings: Mapping[str, Any]) -> Scenario:
-    """The scenario that a trial's settings hold."""
-    return check_scenario(dict(settings["scenario"]), "trial")
+    """The scenario of a trial: `scenario` holds all of its fields, or dotted ones over a `preset`."""
+    fields = dict(settings["scenario"])
+    preset = settings.get("preset")
+    return Scenario.preset(preset, **fields) if preset else check_scenario(fields, "trial")
 
 
 def _plain(figures: Mapping[str, Any]) -> dict[str, float | str | None]:
@@ -82,7 +151,7 @@ def _plain(figures: Mapping[str, Any]) -> dict[str, float | str | None]:
 
 
 class _Stages:
-    """Tells of a trial's stages as one progress."""
+    """Shows the stages of a trial as one progress."""
 
     def __init__(self, progress: WorkProgress) -> None:
         self._progress = progress
@@ -99,4 +168,4 @@ class _Stages:
         yield advance
 
     def skipped(self, name: str) -> None:
-        """Nothing to tell."""
+        """A stage that an earlier run made changes nothing."""

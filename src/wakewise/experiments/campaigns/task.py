@@ -13,11 +13,12 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from wakewise.core.errors import InputError
+from wakewise.core.plugins import load
 
 FLIES = (
     "allocation",
@@ -41,9 +42,9 @@ _SOURCES = {".py", ".yaml", ".csv", ".json"}
 _ROOT = Path(__file__).parents[2]
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def source_version(parts: tuple[str, ...] = FLIES) -> str:
-    """Hash of the source of these parts of the package: files or folders, from the package's root.
+    """Hash of source files: files or folders below this package, or `PACKAGE:PATH` below another installed one.
 
     Raises
     ------
@@ -52,14 +53,23 @@ def source_version(parts: tuple[str, ...] = FLIES) -> str:
     """
     digest = hashlib.sha256()
     for part in parts:
-        place = _ROOT / part
+        package, colon, inside = part.rpartition(":")
+        root = _root(package) if colon else _ROOT
+        place = root / inside
         if not place.exists():
-            raise InputError(f"sources: '{part}' is no part of the package")
+            raise InputError(f"sources: '{part}' is no part of {package or 'wakewise'}")
         files = [place] if place.is_file() else sorted(place.rglob("*"))
         for file in (f for f in files if f.suffix in _SOURCES):
-            digest.update(file.relative_to(_ROOT).as_posix().encode())
+            digest.update(file.relative_to(root).as_posix().encode())
             digest.update(file.read_bytes())
     return digest.hexdigest()
+
+
+def _root(package: str) -> Path:
+    found = find_spec(package)
+    if found is None or found.origin is None:
+        raise InputError(f"sources: there is no package '{package}'")
+    return Path(found.origin).parent
 
 
 Figure = float | None | str
@@ -162,9 +172,5 @@ def function_named(name: str) -> Callable[..., Any]:
     InputError
         If it cannot be imported.
     """
-    module, _, function = name.partition(":")
-    try:
-        found: Callable[..., Any] = getattr(import_module(module), function)
-    except (ImportError, AttributeError) as fault:
-        raise InputError(f"work '{name}': cannot be loaded, {fault}") from fault
+    found: Callable[..., Any] = load("work", name, name)
     return found

@@ -108,7 +108,7 @@ def run_campaign(
     from wakewise.core.jit.precompile import compile_kernels
     from wakewise.core.optional_dependencies import need
     from wakewise.experiments.campaigns import load_campaign, planned_trials, run
-    from wakewise.experiments.campaigns.definition import keep_plan
+    from wakewise.experiments.campaigns.definition import keep_campaign
     from wakewise.experiments.campaigns.run import check_bounds
     from wakewise.experiments.campaigns.store import RESUME_HINT, open_store
     from wakewise.experiments.campaigns.table import group_table, results, status
@@ -132,7 +132,7 @@ def run_campaign(
         trials = planned_trials(campaign, str(file))
     folder = out or child_path(Path("runs"), campaign.name, f"{file}: name")
     open_store(folder)
-    keep_plan(folder, campaign, trials)
+    keep_campaign(folder, campaign, trials)
     with bars.stage("compile") as progress:  # else each of the workers would
         compile_kernels(jobs, progress)
     with bars.stage("trials") as progress:
