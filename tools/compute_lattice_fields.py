@@ -12,10 +12,9 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from wakewise.simulation.lattice import CASES, find_case
-from wakewise.simulation.lattice.meanfield import DATA
+from wakewise.simulation.lattice import CASES, find_case, meanfield
 from wakewise.ui.cli.console import ProgressBars
-from wakewise_paper.lattice_reference.crossing_jets import crossing_field, is_crossing, save_crossing
+from wakewise_paper.lattice_reference.crossing_jets import DATA, crossing_field, is_crossing, save_crossing
 from wakewise_paper.lattice_reference.jet_past_box import is_past_box, past_field, save_past_box
 from wakewise_paper.lattice_reference.mean_field import (
     SHIPPED,
@@ -31,7 +30,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", nargs="*", default=list(SHIPPED), help=f"of {', '.join(CASES)}; default: %(default)s")
     parser.add_argument("--cache", type=Path, required=True, help="folder for checkpoints, 0.3 GB per case")
-    parser.add_argument("--out", type=Path, default=DATA, help="where the tables go; default: the package's own data")
+    parser.add_argument("--out", type=Path, help="where the tables go; default: the packages' own data")
     options = parser.parse_args()
     bars = ProgressBars()
     for name in options.cases:
@@ -40,9 +39,9 @@ def main() -> None:
             with bars.stage(f"{name}, {case.cells_per_D} cells per diameter") as progress:
                 run = compute_run(case, options.cache, progress)
             if is_crossing(case):
-                save_crossing(options.out / f"{name}.npz", crossing_field(run))
+                save_crossing((options.out or DATA) / f"{name}.npz", crossing_field(run))
             else:
-                save_past_box(options.out / f"{name}.npz", past_field(run))
+                save_past_box((options.out or DATA) / f"{name}.npz", past_field(run))
             continue
         tables = []
         for cells in (case.cells_per_D, SHIPPED.get(name)):
@@ -52,7 +51,7 @@ def main() -> None:
         fine = tables[0]
         if len(tables) > 1:
             fine = replace(fine, figures=fine.figures | convergence(fine, tables[1]))
-        save_mean_field(options.out / f"{name}.npz", fine)
+        save_mean_field((options.out or meanfield.DATA) / f"{name}.npz", fine)
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ def test_a_size_is_refused_where_nothing_is_scaled(kind: str, size_m: float) -> 
 
 def test_a_mesh_file_is_scaled_and_has_no_seed(box: str) -> None:
     assert ww.load_target(box, size_m=0.6).mesh.extent_m.max() == pytest.approx(0.6)
-    with pytest.raises(InputError, match="seed: 3, a mesh file has but one"):
+    with pytest.raises(InputError, match="seed: 3, a mesh file has only one individual"):
         ww.load_target(box, seed=3)
     for size_m in (-1.0, 0.0, 100.0, float("nan")):
         with pytest.raises(InputError, match="target size"):

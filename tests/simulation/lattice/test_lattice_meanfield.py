@@ -8,8 +8,9 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.simulation.lattice import LatticeFlow, MeanField, case_hash, find_case, load_mean_field
-from wakewise.simulation.lattice.engines import around_axis
-from wakewise.simulation.lattice.meanfield import read_mean_field, save_mean_field
+from wakewise.simulation.lattice.meanfield import read_mean_field
+from wakewise_paper.lattice_reference.engines import around_axis
+from wakewise_paper.lattice_reference.mean_field import save_mean_field
 
 AREA_M2 = math.pi * 0.06**2 / 4
 DENSITY = 998.0

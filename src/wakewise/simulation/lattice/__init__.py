@@ -1,38 +1,27 @@
-"""An oracle for the wakes: a lattice-Boltzmann solver for jets in a box, and the mean fields it computed.
+"""Lattice Boltzmann solver (D3Q19) for jets in a box of water, and the stored mean fields of its reference cases.
 
-The water of a trial is made of parcels (`wakewise.simulation.water`), which are laws of jets put together. The lattice
-knows no law of jets: it solves for the flow of a pushing disk, and laws, parcels and wake models are held against it.
+It shares no jet law with the water of the tank (`wakewise.simulation.water`) nor with the wake models, so both can be
+compared with it. The reference computations themselves are in `wakewise_paper.lattice_reference`.
 
-Start reading in `cases.py` (what was computed) and `flow.py` (its velocity at points). `kernel.py` is the solver with
-its parts `stencil.py`, `collision.py`, `faces.py` and `streaming_stores.py`, and `reference_step.py` its readable twin;
-`engines.py` picks that or a graphics card (`cuda_engine.py`, `cuda_engine.py`). `run.py` and `meanfield.py` are a
-computation, `forced_lattice.py` with `forced_lattice.py` water for a flight, `engines.py` solid boxes,
-`engines.py` and `meanfield.py` what is kept of it, `meanfield.py` what it says of the laws of round jets, `crossing.py`
-of jets that cross and `crossing.py` past a box.
+- `kernel.py`: one time step, streaming and collision fused; `stencil.py`: the D3Q19 velocities, weights and layout.
+- `collision.py`: regularised collision with a Smagorinsky eddy viscosity; `faces.py`: open and solid boundaries.
+- `streaming_stores.py`: store instructions that bypass the cache.
+- `forced_lattice.py`: the solver as the water of a flight, forced by the thrusters' actuator disks.
+- `cases.py`: records of the reference cases; `meanfield.py`: the stored time average of a case.
+- `flow.py`: steady velocity of several thrusters' jets from that average.
 """
 
 from wakewise.simulation.lattice.cases import CASES, DiskJet, LatticeCase, case_hash, find_case
 from wakewise.simulation.lattice.flow import LatticeFlow
-from wakewise.simulation.lattice.meanfield import (
-    MeanField,
-    compute_mean_field,
-    compute_run,
-    load_mean_field,
-    save_mean_field,
-)
-from wakewise.simulation.lattice.run import LatticeRun
+from wakewise.simulation.lattice.meanfield import MeanField, load_mean_field
 
 __all__ = [
     "CASES",
     "DiskJet",
     "LatticeCase",
     "LatticeFlow",
-    "LatticeRun",
     "MeanField",
     "case_hash",
-    "compute_mean_field",
-    "compute_run",
     "find_case",
     "load_mean_field",
-    "save_mean_field",
 ]

@@ -10,7 +10,7 @@ current). `plant.py` is the vehicle with `tether.py`, `plant.py` and `contact.py
 silt and its laws, `settings.py` beds by name; `soft_body.py` moves a soft or loose target, `flakes.py` what drifts
 before the camera; `water_truth.py` and `water_truth.py` are what a flight is judged by, `station_keeping.py` what is
 refused beforehand, `validation_limits.py` what the water gets wrong; `probe.py` and `probe.py` the truth for outsiders
-(`wakewise tank probe`), `prescribed_motion.py` the water of a vehicle led along a way.
+(`wakewise tank probe`).
 """
 
 from wakewise.simulation.tank.ambient import build_ambient

@@ -1,7 +1,7 @@
 """The most that sharing thrusts out could gain in a flight, by the tank's own water: no controller's belief is in it.
 
 A flight of `dp` is taken as it was, its true way and the wrench that its thrusters made, and its water is made anew
-with other thrusts of the same wrench (`wakewise.simulation.tank.prescribed_motion`): each of some 80 sharings
+with other thrusts of the same wrench (`wakewise_paper.wash_reduction.prescribed_motion`): each of some 80 sharings
 (`candidate_allocations.py`), the bow rule's, and what the belief of `wake-aware` would have flown, with its bound on
 power and without. Then one who knows all of these waters chooses a sharing for each `STRETCH_S` of the flight within a
 bound on energy (`choosing.py`).
@@ -51,10 +51,10 @@ from wakewise.operation import Parts, fly
 from wakewise.operation.loop import Step
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.missions import SETTLING
-from wakewise.simulation.tank.prescribed_motion import PrescribedMotionTank, PrescribedPath
 from wakewise.simulation.tank.tank import TankWorld, tank_ambient, tank_points
 from wakewise.wake import bed_of
 from wakewise_paper.wash_reduction.flight import WashTrial, parts_of
+from wakewise_paper.wash_reduction.prescribed_motion import PrescribedMotionTank, PrescribedPath
 
 HALF, BEYOND = 0.5, 1.4
 """Shares of the way from the least thrusts to an inner and to an outermost rest that are looked at besides."""

@@ -5,8 +5,8 @@ import pytest
 
 from wakewise.core.geometry import quat_from_rotvec
 from wakewise.operation import Scenario, fly
-from wakewise.simulation.tank.prescribed_motion import PrescribedMotionTank, PrescribedPath
 from wakewise.simulation.tank.tank import tank_ambient, tank_points
+from wakewise_paper.wash_reduction.prescribed_motion import PrescribedMotionTank, PrescribedPath
 
 _STATE = (
     ("x_m", "y_m", "z_m"),

@@ -1,9 +1,8 @@
-"""The tank's own water for a vehicle that is led along a way, its thrusters pushing as told: wash without a controller.
+"""The tank's water for a vehicle on a prescribed path with prescribed thrusts: wash without a controller.
 
-What a flight's motion needs of its thrusters is a wrench, and the water that their jets set in motion does not push the
-hull (but for `tank.jets.inflow_loss`, which is left out here). So any thrusts of the same wrench would have made the
-same flight, and the water answers alone how much of its wash they would have made. Silt, sensors and lags are left out:
-thrusts are what the thrusters give.
+The jets do not act on the hull in the tank (except through `tank.jets.inflow_loss`, which is left out here). All
+thrusts of one wrench therefore give the same flight, and the water alone gives the wash of other thrusts. Silt, sensors
+and lags are left out: the thrusts are applied as given.
 """
 
 from __future__ import annotations
