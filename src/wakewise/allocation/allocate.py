@@ -50,34 +50,23 @@ _DISTURBANCE = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Allocation:
-    """Thrusts for one wrench, and how they were found.
+    """Thrusts for one wrench, and how they were found."""
 
-    Parameters
-    ----------
-    thrusts_N : ndarray, shape (n,)
-    wrench_B, requested_B : ndarray, shape (6,)
-        What the thrusts make, and what was asked for.
-    disturbance : float or None
-        D = s' G s in (m/s)^2, None where no Gram matrix was given.
-    method : str
-        "pseudo-inverse" (least thrusts); "unique" (no thruster to spare); "lines" (the null space splits into lines,
-        each searched exactly); "convex" (a quadratic program, where squares of speeds add up); "boxes" (branch and
-        bound, any layout).
-    gap : float
-        How far the weighted cost may lie above its global minimum, relative: proven by a lower bound, zero for
-        "pseudo-inverse" and "unique". Up to 1e-5 counts as closed; more means that the budget of "boxes" was spent.
-    scale : float
-        Share of the attainable part of the requested wrench that the limits allow in its own direction: 1 if all of
-        it, 0 where nothing of the wrench is made. What thrusters that failed or are not there cannot make at all is no
-        part of it: `given_up` says what of the wrench is not made.
-    """
-
-    thrusts_N: Array
+    thrusts_N: Array  # shape (n,)
+    # wrench_B, requested_B: shape (6,): what the thrusts make, and what was asked for.
     wrench_B: Array
     requested_B: Array
-    disturbance: float | None
+    disturbance: float | None  # D = s' G s in (m/s)^2, None where no Gram matrix was given
+    # "pseudo-inverse" (least thrusts); "unique" (no thruster to spare); "lines" (the null space splits into lines, each
+    # searched exactly); "convex" (a quadratic program, where squares of speeds add up); "boxes" (branch and bound, any
+    # layout).
     method: str
+    # How far the weighted cost may lie above its global minimum, relative: proven by a lower bound, zero for
+    # "pseudo-inverse" and "unique". Up to 1e-5 counts as closed; more means that the budget of "boxes" was spent.
     gap: float
+    # Share of the attainable part of the requested wrench that the limits allow in its own direction: 1 if all of it, 0
+    # where nothing of the wrench is made. What thrusters that failed or are not there cannot make at all is no part of
+    # it: `given_up` says what of the wrench is not made.
     scale: float
 
     def __post_init__(self) -> None:
@@ -131,24 +120,13 @@ class Weights:
 def pseudo_inverse(B: Array, wrench_B: Array, lower_N: Array, upper_N: Array) -> Allocation:
     """Least thrusts that make a wrench within limits.
 
-    Parameters
-    ----------
-    B : ndarray, shape (6, n)
-        Wrench per newton of each thruster.
-    wrench_B : ndarray, shape (6,)
-    lower_N, upper_N : ndarray, shape (n,)
-        Limits; both zero for a thruster that has failed.
+    - `B`, shape (6, n): wrench per newton of each thruster.
+    - `lower_N`, `upper_N`, shape (n,): limits; both zero for a thruster that has failed.
+    - Shapes: `wrench_B` (6,).
 
-    Returns
-    -------
-    Allocation
-        If the plain pseudo-inverse breaks a limit, the null space is used to stay within; if no thrusts within limits
-        make the wrench, the largest share of it in the same direction is made (`scale`).
-
-    Raises
-    ------
-    InputError
-        As `compile_layout`, and if the wrench is not six finite numbers.
+    If the plain pseudo-inverse breaks a limit, the null space is used to stay within; if no thrusts within limits make
+    the wrench, the largest share of it in the same direction is made (`scale`). Raises InputError as `compile_layout`,
+    and if the wrench is not six finite numbers.
     """
     return min_norm_allocation(compile_layout(B, lower_N, upper_N), wrench_B)
 
@@ -212,25 +190,14 @@ def min_wash_allocation(
     diagonal Gram matrix makes the problem convex; everything else is left to branch and bound, whose gap is what it
     reached within its budget. The cost never exceeds that of `min_norm_allocation`.
 
-    Parameters
-    ----------
-    layout : Layout
-    wrench_B : ndarray, shape (6,)
-    gram : ndarray, shape (2 n, 2 n)
-        Of `wakewise.wake.gram`: jets of T > 0 first, jets of T < 0 after.
-    weights : Weights
-    previous_N : ndarray, shape (n,), optional
-        Thrusts of the step before; zeros if not given.
-    priority : str, optional
-        As `min_norm_allocation`.
-    budget : int
-        Most boxes to look at, where the layout needs branch and bound.
+    - `gram`, shape (2 n, 2 n): of `wakewise.wake.gram`: jets of T > 0 first, jets of T < 0 after.
+    - `previous_N`, shape (n,): thrusts of the step before; zeros if not given.
+    - `priority`: as `min_norm_allocation`.
+    - `budget`: most boxes to look at, where the layout needs branch and bound.
+    - Shapes: `wrench_B` (6,).
 
-    Raises
-    ------
-    InputError
-        If the wrench, the Gram matrix or the previous thrusts have a wrong shape or are not finite, the priority is not
-        a list of axes, or the budget is less than 1.
+    Raises InputError if the wrench, the Gram matrix or the previous thrusts have a wrong shape or are not finite, the
+    priority is not a list of axes, or the budget is less than 1.
     """
     if type(layout) is not Layout or type(weights) is not Weights or type(budget) is not int or budget < 1:
         instance_of(layout, Layout, "layout")

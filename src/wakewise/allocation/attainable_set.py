@@ -43,10 +43,7 @@ def largest_feasible_share(layout: Layout, thrusts: Array) -> tuple[Array, float
 def parse_priority(text: str) -> tuple[tuple[int, ...], ...]:
     """Groups of axes in order, such as "ZKMN,XY": what comes first is given up last; axes not named come at the end.
 
-    Raises
-    ------
-    InputError
-        If a letter is no axis, or comes twice.
+    Raises InputError if a letter is no axis, or comes twice.
     """
     if not isinstance(text, str):
         raise InputError(f"priority: {quoted(text)}, must be a text such as 'ZKMN,XY'")

@@ -307,22 +307,13 @@ def global_minimum(
 ) -> tuple[Array, float, int]:
     """Minimum of the cost over T = start + null lambda within limits.
 
-    Parameters
-    ----------
-    G : ndarray, shape (2 n, 2 n)
-    starts : ndarray, shape (r, n)
-        Thrusts within limits that make the wrench; descents from them give the first answer.
-    null : ndarray, shape (n, k)
-        Orthonormal columns.
-    lower, upper, previous : ndarray, shape (n,)
-    weights : ndarray, shape (3,)
-    budget : int
-        Most boxes to look at.
+    - `starts`, shape (r, n): thrusts within limits that make the wrench; descents from them give the first answer.
+    - `null`, shape (n, k): orthonormal columns.
+    - `budget`: most boxes to look at.
+    - Shapes: `G` (2 n, 2 n); `lower`, `upper`, `previous` (n,); `weights` (3,).
 
-    Returns
-    -------
-    thrusts, gap, boxes
-        The gap is absolute, in the units of the cost: no thrusts of this wrench cost less than the result's cost - gap.
+    Returns the gap is absolute, in the units of the cost: no thrusts of this wrench cost less than the result's cost -
+    gap.
     """
     n, k = null.shape
     best, value = starts[0].copy(), np.inf

@@ -16,14 +16,9 @@ def convex_allocation(
 ) -> tuple[Array, float] | None:
     """Least cost at the wrench of `start`, shape (n,), and its proven gap (absolute); None if the solver fails.
 
-    Parameters
-    ----------
-    B : ndarray, shape (6, n)
-    start, lower, upper, previous : ndarray, shape (n,)
-    gram : ndarray, shape (2 n, 2 n)
-        Diagonal.
-    weights : ndarray, shape (3,)
-        (w_D, w_u, w_p).
+    - `gram`, shape (2 n, 2 n): diagonal.
+    - `weights`, shape (3,): (w_D, w_u, w_p).
+    - Shapes: `B` (6, n); `start`, `lower`, `upper`, `previous` (n,).
     """
     import daqp  # nobody else here needs it, and 32-bit computers have none
 

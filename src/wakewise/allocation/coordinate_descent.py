@@ -50,14 +50,9 @@ def start_directions(k: int) -> Array:
 def feasible_starts(start: Array, previous: Array, null: Array, directions: Array, lower: Array, upper: Array) -> Array:
     """The least thrusts, the previous ones brought to this wrench, and points along directions, shape (r + 2, n).
 
-    Parameters
-    ----------
-    start, previous : ndarray, shape (n,)
-        Least thrusts and those of before.
-    null : ndarray, shape (n, k)
-        Orthonormal columns.
-    directions : ndarray, shape (r, k)
-    lower, upper : ndarray, shape (n,)
+    - `start`, `previous`, shape (n,): least thrusts and those of before.
+    - `null`, shape (n, k): orthonormal columns.
+    - Shapes: `directions` (r, k); `lower`, `upper` (n,).
     """
     n, k = null.shape
     many = directions.shape[0]

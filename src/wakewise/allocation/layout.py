@@ -59,11 +59,8 @@ def compile_layout(B: Array, lower_N: Array, upper_N: Array) -> Layout:
     Where the thrusters cannot make every wrench, the nearest is taken, with moments measured against forces at the
     thrusters' own lever arm (root mean square), so that newtons and newton metres can be added.
 
-    Raises
-    ------
-    InputError
-        On a wrong shape, on numbers that are not finite, on a lower limit above the upper one, on limits that exclude
-        zero thrust, or on more than 8 spare thrusters.
+    Raises InputError on a wrong shape, on numbers that are not finite, on a lower limit above the upper one, on limits
+    that exclude zero thrust, or on more than 8 spare thrusters.
     """
     B = frozen(B, (6, None), "allocation matrix")
     n = B.shape[1]

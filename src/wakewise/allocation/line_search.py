@@ -153,22 +153,13 @@ def line_minimum(
 ) -> tuple[float, float, float]:
     """Global minimum of f(base + t direction) over t in [low, high].
 
-    Parameters
-    ----------
-    G : ndarray, shape (2 n, 2 n)
-    base, direction, previous : ndarray, shape (n,)
-    counted : ndarray of bool, shape (n,)
-        Which of the thrusters that do not move along the line enter f through their cross terms; terms that hold no
-        moving thruster are constant and left out.
-    weights : ndarray, shape (3,)
-        (w_D, w_u, w_p).
-    incumbent : float
-        A value of f to beat (infinite if none); t is NaN when the line has nothing lower.
+    - `counted`, shape (n,): which of the thrusters that do not move along the line enter f through their cross terms;
+      terms that hold no moving thruster are constant and left out.
+    - `weights`, shape (3,): (w_D, w_u, w_p).
+    - `incumbent`: a value of f to beat (infinite if none); t is NaN when the line has nothing lower.
+    - Shapes: `G` (2 n, 2 n); `base`, `direction`, `previous` (n,).
 
-    Returns
-    -------
-    t, value, gap : float
-        `value` (without the constant terms) exceeds the true minimum of the line by at most `gap`.
+    Returns `t, value, gap`: `value` (without the constant terms) exceeds the true minimum of the line by at most `gap`.
     """
     n = base.size
     moving, m = np.empty(n, np.int64), 0

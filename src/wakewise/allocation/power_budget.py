@@ -146,26 +146,13 @@ def best_by_power(
 ) -> Allocation:
     """Of what lies between the least thrusts and the gentlest found: the shares that are worth their power most.
 
-    Parameters
-    ----------
-    layout : Layout
-    found : Allocation
-    least_N : ndarray, shape (n,)
-        Thrusts of the same wrench; where they alone need more than `most_W`, they are the answer.
-    law : PowerLaw
-    most_W : float
-        Bound on the thrusters' power.
-    calm : float
-        Cost of what counts as calm, in the units of the weights.
-    gram : ndarray, shape (2 n, 2 n)
-    weights : Weights
-    previous_N : ndarray, shape (n,), optional
-        As `min_wash_allocation`.
+    - `least_N`, shape (n,): thrusts of the same wrench; where they alone need more than `most_W`, they are the answer.
+    - `most_W`: bound on the thrusters' power.
+    - `calm`: cost of what counts as calm, in the units of the weights.
+    - `previous_N`, shape (n,): as `min_wash_allocation`.
+    - Shapes: `gram` (2 n, 2 n).
 
-    Returns
-    -------
-    Allocation
-        With the gap of `found`, which is that of the minimum of cost alone.
+    With the gap of `found`, which is that of the minimum of cost alone.
     """
     G, base = np.array(gram), np.array(least_N, dtype=np.float64)
     previous = np.zeros(len(base)) if previous_N is None else np.array(previous_N, dtype=np.float64)

@@ -109,15 +109,10 @@ def _rows(P: Array, first: int, second: int, size: int) -> tuple[Array, Array]:
 def correct_by_sum(mean: Array, P: Array, measured: Array, first: int, second: int, std: float, gate: float) -> float:
     """Correct by what a sensor tells of the mean itself: a place, a depth, a rate, and its own slow error on top.
 
-    Parameters
-    ----------
-    mean, P : ndarray, shape (E + 1,) and (E, E)
-    measured : ndarray, shape (m,)
-    first, second : int
-        Where what it tells and its slow error begin among the errors; `NOTHING` for a sensor without one.
-    std : float
-        Its white noise.
-    gate : float
+    - `first`, `second`: where what it tells and its slow error begin among the errors; `NOTHING` for a sensor without
+      one.
+    - `std`: its white noise.
+    - Shapes: `mean`, `P` (E + 1,) and (E, E); `measured` (m,).
     """
     size = measured.shape[0]
     PH, S = _rows(P, first, second, size)
@@ -145,20 +140,12 @@ def correct_by_pose(
 ) -> tuple[float, float]:
     """Correct by a camera's pose; returns the distance, and the scale of the model's noise from now on.
 
-    Parameters
-    ----------
-    mean, P : ndarray, shape (E + 1,) and (E, E)
-    p_m, q : ndarray, shape (3,) and (4,)
-        The pose.
-    slow : int
-        Where the camera's slow error, shift in W and turn in B, begins among the errors, or `NOTHING`.
-    std_m, std_rad : float
-        White noise.
-    gate : float
-    leaning : ndarray, shape (6,)
-        Running mean of the normalised innovations; taken on in place.
-    scale : float
-        Scale of the model's noise so far.
+    - `p_m`, `q`, shape (3,) and (4,): the pose.
+    - `slow`: where the camera's slow error, shift in W and turn in B, begins among the errors, or `NOTHING`.
+    - `std_m`, `std_rad`: white noise.
+    - `leaning`, shape (6,): running mean of the normalised innovations; taken on in place.
+    - `scale`: scale of the model's noise so far.
+    - Shapes: `mean`, `P` (E + 1,) and (E, E).
     """
     PH, S = _rows(P, 0, slow, 6)
     expected_p, expected_q, residual = mean[:3].copy(), mean[3:7].copy(), np.empty(6)

@@ -45,18 +45,9 @@ def current_of_force(packed: Array, q: Array, north_N: float, east_N: float) -> 
 
     Newton's method; drag grows ever faster with speed, so it cannot run away.
 
-    Parameters
-    ----------
-    packed : ndarray
-        The vehicle's numbers (see `wakewise.robot.vehicles.kernels`).
-    q : ndarray, shape (4,)
-        Attitude q_WB at rest.
-    north_N, east_N : float
-
-    Returns
-    -------
-    ndarray, shape (6,)
-        North and east in m/s, then d force / d current row by row in N s/m; all NaN where none was found.
+    `packed`: the vehicle's numbers (see `wakewise.robot.vehicles.kernels`). `q`, shape (4,): attitude q_WB at rest.
+    Returns shape (6,): North and east in m/s, then d force / d current row by row in N s/m; all NaN where none was
+    found.
     """
     size = np.sqrt(north_N**2 + east_N**2)
     c = np.zeros(2)
@@ -144,16 +135,12 @@ def current_if_known(
 ) -> tuple[Array, Array] | None:
     """Level current and its covariance, shapes (3,) and (3, 3), or None while it is not known to `KNOWN_M_S`.
 
-    Parameters
-    ----------
-    sets : ndarray, shape (k, 20, 6)
-        Numbers of the vehicle with each drag that it may have, each alike; the nominal one first.
-    rest_q : ndarray, shape (4,)
-        Attitude that the force is told for.
-    force_W_N, force_covariance : ndarray, shape (3,) and (3, 3)
-        Force at rest that the model does not explain, and how sure that is.
-    drag_std : float
-        Relative error of each drag.
+    - `sets`, shape (k, 20, 6): numbers of the vehicle with each drag that it may have, each alike; the nominal one
+      first.
+    - `rest_q`, shape (4,): attitude that the force is told for.
+    - `force_W_N`, `force_covariance`, shape (3,) and (3, 3): force at rest that the model does not explain, and how
+      sure that is.
+    - `drag_std`: relative error of each drag.
     """
     # Drag without a linear part has no slope at rest: its current is told from four forces about the one found, whose
     # mean and covariance are right (S. J. Julier and J. K. Uhlmann, Proc. IEEE 92 (2004) 401).

@@ -399,18 +399,12 @@ def advance(
 ) -> float:
     """Move mean, covariance and thrusts on in place from a time to another, command by command; returns when it is.
 
-    Parameters
-    ----------
-    packed, allocation : ndarray, shape (20, 6) and (6, n)
-        The vehicle (see `wakewise.robot.vehicles.kernels`).
-    lag_s : ndarray, shape (n,)
-        Time constants of the thrusters, whose thrusts are `thrusts_N`, shape (n,).
-    rest_q : ndarray, shape (4,)
-        Attitude that the unmodelled load is told for.
-    since_s, commands_N : ndarray, shape (k,) and (k, n)
-        From when which thrusts were commanded, one at least.
-    noise, spread, lasts_s : ndarray
-        As `predict` has them; the model's part of the noise, its first four, is `scale` times as large.
+    - `packed`, `allocation`, shape (20, 6) and (6, n): the vehicle (see `wakewise.robot.vehicles.kernels`).
+    - `lag_s`, shape (n,): time constants of the thrusters, whose thrusts are `thrusts_N`, shape (n,).
+    - `rest_q`, shape (4,): attitude that the unmodelled load is told for.
+    - `since_s`, `commands_N`, shape (k,) and (k, n): from when which thrusts were commanded, one at least.
+    - `noise`, `spread`, `lasts_s`: as `predict` has them; the model's part of the noise, its first four, is `scale`
+      times as large.
     """
     loud = noise.copy()
     for i in range(4):

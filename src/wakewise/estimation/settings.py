@@ -43,61 +43,45 @@ class Priors:
     on 10 kg are 6e-4 m/s2, lasting the 0.1 s of the thruster's lag, as white noise 6e-4 sqrt(2 x 0.1) = 3e-4
     m/s2/sqrt(Hz); with arms of 0.15 m on 0.1 kg m2 about 0.004 rad/s2/sqrt(Hz). When more happens than that, the filter
     notices and lets the noise grow (`error_state`).
-
-    Parameters
-    ----------
-    gyro_bias_std_rad_s, accelerometer_bias_std_m_s2 : float
-        Bias at the start.
-    gyro_bias_walk_rad_s2, accelerometer_bias_walk_m_s3 : float
-        Random walk of the bias (rad/s/sqrt(s), m/s2/sqrt(s)).
-    acceleration_noise_m_s2, turning_noise_rad_s2 : float
-        White error of the modelled acceleration and turning (m/s2/sqrt(Hz), rad/s2/sqrt(Hz)).
-    gain_std, drag_std, inertia_std : float
-        Relative error of each thruster's gain, and per degree of freedom of drag and of mass with added mass.
-    current_std_m_s : float
-        Steady current.
-    lasting_s : float
-        Time over which gains, drag, inertia and current may change.
-    pose_slow_std_m, pose_slow_std_rad, tracking_slow_std_m, slow_s : float
-        Error of a pose and of a tracked place that lasts, 0 for none, and how long it lasts: 4 mm and 0.15 deg for half
-        a minute, what refraction, calibration and map leave at a metre (an estimate).
-    depth_bias_std_m : float
-        Constant error of the depth, 0 for none: 3 cm after it was set to zero at the surface.
-    force_std_N, moment_std_N_m : float
-        Unmodelled force and moment at the start.
-    force_walk_N, moment_walk_N_m : float
-        Their random walk (N/sqrt(s), N m/sqrt(s)).
-    start_std_m, start_std_rad, start_std_m_s, start_std_rad_s : float
-        Error of the first position, attitude, velocity and body rate.
-    settle_s : float
-        How long measurements are waited for, so that late ones are taken in order.
-    gate_patience : int
-        Poses left out in a row after which the filter starts over.
     """
 
+    # gyro_bias_std_rad_s, accelerometer_bias_std_m_s2: bias at the start.
     gyro_bias_std_rad_s: float = 0.005
     accelerometer_bias_std_m_s2: float = 0.1
+    # gyro_bias_walk_rad_s2, accelerometer_bias_walk_m_s3: random walk of the bias (rad/s/sqrt(s), m/s2/sqrt(s)).
     gyro_bias_walk_rad_s2: float = 1e-4
     accelerometer_bias_walk_m_s3: float = 1e-3
+    # acceleration_noise_m_s2, turning_noise_rad_s2: white error of the modelled acceleration and turning
+    # (m/s2/sqrt(Hz), rad/s2/sqrt(Hz)).
     acceleration_noise_m_s2: float = 0.0003
     turning_noise_rad_s2: float = 0.004
+    # gain_std, drag_std, inertia_std: relative error of each thruster's gain, and per degree of freedom of drag and of
+    # mass with added mass.
     gain_std: float = 0.04
     drag_std: float = 0.2
     inertia_std: float = 0.1
-    current_std_m_s: float = 0.05
-    lasting_s: float = 1e5
+    current_std_m_s: float = 0.05  # steady current
+    lasting_s: float = 1e5  # time over which gains, drag, inertia and current may change
+    # pose_slow_std_m, pose_slow_std_rad, tracking_slow_std_m, slow_s: error of a pose and of a tracked place that
+    # lasts, 0 for none, and how long it lasts: 4 mm and 0.15 deg for half a minute, what refraction, calibration and
+    # map leave at a metre (an estimate).
     pose_slow_std_m: float = 0.004
     pose_slow_std_rad: float = 0.0026
     tracking_slow_std_m: float = 0.004
     slow_s: float = 30.0
+    # Constant error of the depth, 0 for none: 3 cm after it was set to zero at the surface.
     depth_bias_std_m: float = 0.03
+    # force_std_N, moment_std_N_m: unmodelled force and moment at the start.
     force_std_N: float = 1.0
     moment_std_N_m: float = 0.1
+    # force_walk_N, moment_walk_N_m: their random walk (N/sqrt(s), N m/sqrt(s)).
     force_walk_N: float = 0.004
     moment_walk_N_m: float = 0.001
+    # start_std_m, start_std_rad, start_std_m_s, start_std_rad_s: error of the first position, attitude, velocity and
+    # body rate.
     start_std_m: float = 0.03
     start_std_rad: float = 0.05
     start_std_m_s: float = 0.03
     start_std_rad_s: float = 0.02
-    settle_s: float = 0.035
-    gate_patience: int = 15
+    settle_s: float = 0.035  # how long measurements are waited for, so that late ones are taken in order
+    gate_patience: int = 15  # poses left out in a row after which the filter starts over

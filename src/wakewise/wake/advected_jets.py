@@ -77,20 +77,11 @@ _TINY = 1e-12
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CrossFlow:
-    """The water that jets are sent into, and how hard they are sent.
+    """The water that jets are sent into, and how hard they are sent."""
 
-    Parameters
-    ----------
-    current_W_m_s : ndarray, shape (3,)
-    unsure_m_s : float
-        Standard deviation of each component of the current.
-    thrusts_N : ndarray, shape (m,)
-        Guess of the thrusts, see `guessed`.
-    """
-
-    current_W_m_s: Array
-    unsure_m_s: float
-    thrusts_N: Array
+    current_W_m_s: Array  # shape (3,)
+    unsure_m_s: float  # standard deviation of each component of the current
+    thrusts_N: Array  # shape (m,): guess of the thrusts, see `guessed`
 
     def __post_init__(self) -> None:
         freeze(self, current_W_m_s=(3,), thrusts_N=(None,))
@@ -162,13 +153,9 @@ def _rates(kind, numbers, own, s, grown, root, e, current, along, current2, near
 def trace_plume(kind, parameters, own, origin, e, thrust, current, unsure, curve):  # type: ignore[no-untyped-def]
     """Sections of one plume into `curve`, (SECTIONS + 1, 7): X, t, s, speed over still water's at s, and width so.
 
-    Parameters
-    ----------
-    kind, parameters, own
-        The jet's law and its disk's constants (`kernels.own_constants`), shape (6,).
-    origin, e, current : ndarray, shape (3,)
-    thrust, unsure : float
-        In N, more than 0; in m/s.
+    - `kind`, `parameters`, `own`: the jet's law and its disk's constants (`kernels.own_constants`), shape (6,).
+    - `thrust`, `unsure`: in N, more than 0; in m/s.
+    - Shapes: `origin`, `e`, `current` (3,).
     """
     numbers = as_tuple(parameters)
     root = np.sqrt(thrust)

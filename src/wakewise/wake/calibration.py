@@ -99,10 +99,7 @@ FAMILIES: dict[str, WakeFamily] = {
 def family(name: str) -> WakeFamily:
     """The family of a wake model that can be fitted.
 
-    Raises
-    ------
-    InputError
-        If there is no such model, or nothing of it can be fitted.
+    Raises InputError if there is no such model, or nothing of it can be fitted.
     """
     fittable = [each.name for each in FAMILIES.values() if each.parameters]
     if name not in fittable:
@@ -200,22 +197,12 @@ def calibrate(
 ) -> WakeCalibration:
     """Fit the free parameters of a model on training rows and score it on the others.
 
-    Parameters
-    ----------
-    family : WakeFamily
-    samples : JetSamples
-    rng : numpy Generator
-        Draws the split (if none is given) and the bootstrap.
-    split : Split, optional
-    region : JetRegion, optional
-        Fit only on points in it; scores always use all rows.
-    bootstrap : int
-        Resamples of thrusts and of cells of 1 cm (whole cells, since neighbouring points err together); 0 for none.
+    - `rng`: draws the split (if none is given) and the bootstrap.
+    - `region`: fit only on points in it; scores always use all rows.
+    - `bootstrap`: resamples of thrusts and of cells of 1 cm (whole cells, since neighbouring points err together); 0
+      for none.
 
-    Raises
-    ------
-    InputError
-        If rows are too few or the model has no free parameters.
+    Raises InputError if rows are too few or the model has no free parameters.
     """
     if not family.parameters:
         raise InputError(f"wake model '{family.name}': has no free parameters, it cannot be fitted")
@@ -270,10 +257,7 @@ def calibrate(
 def calibrated_values(family: WakeFamily, samples: JetSamples) -> tuple[Array, tuple[str, ...]]:
     """Parameters fitted to all rows, shape (p,), without a test, and the names of those that were held.
 
-    Raises
-    ------
-    InputError
-        If the points tell none of them.
+    Raises InputError if the points tell none of them.
     """
     free, held = _identifiable(family, samples, [])
     values, _, _ = _solve(family, samples, family.start, free)
@@ -422,17 +406,8 @@ def is_likely(ratio: float) -> bool:
 def flux_over_thrust(jet: AxialJet, along_m: Array, area_m2: float) -> Array:
     """Momentum flux through planes across a free jet over its thrust, in fresh water.
 
-    Parameters
-    ----------
-    jet : AxialJet
-    along_m : ndarray, shape (n,)
-        Distances of the planes from the disk, more than 0.
-    area_m2 : float
-        Of the disk.
-
-    Returns
-    -------
-    ndarray, shape (n,)
+    `along_m`, shape (n,): distances of the planes from the disk, more than 0. `area_m2`: of the disk. Returns shape
+    (n,).
     """
     edge = _REACH * (along_m[:, None] + np.sqrt(area_m2))
     # Finer near the axis, where the speed is.
@@ -444,10 +419,7 @@ def flux_over_thrust(jet: AxialJet, along_m: Array, area_m2: float) -> Array:
 def momentum_law(samples: JetSamples, model: AxialJet) -> MomentumLaw:
     """Momentum flux over thrust of measured speeds and of the model that was fitted to them.
 
-    Raises
-    ------
-    InputError
-        If that of the speeds lies where no jet's does: their unit or the thrusts' is another.
+    Raises InputError if that of the speeds lies where no jet's does: their unit or the thrusts' is another.
     """
     planes = np.quantile(samples.x_m, np.linspace(0.05, 0.95, 19))
     area = samples.disk_area_m2

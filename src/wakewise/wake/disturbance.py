@@ -69,10 +69,7 @@ from wakewise.wake.wall_jet import ImpingingJet, floor_gram_sum, floor_stage_sum
 def same_sizes(points: Array, weights: Array, origins: Array, axes: Array, areas: Array) -> None:
     """Refuse arrays whose shapes do not belong together.
 
-    Raises
-    ------
-    InputError
-        Naming the array, its shape and the one it should have.
+    Raises InputError: naming the array, its shape and the one it should have.
     """
     m = len(areas)
     if points.ndim == 2 and points.shape[1] == 3 and weights.shape == points.shape[:1] and areas.ndim == 1:
@@ -155,23 +152,14 @@ def gram_with_derivatives(
 ) -> GramDerivatives:
     """G of D = s' G s (see `wakewise.wake.gram`) and how it changes with the vehicle's pose.
 
-    Parameters
-    ----------
-    model : WakeModel
-        One of this room, or one from outside, whose derivatives are central differences
-        (`wakewise.wake.finite_difference`).
-    region_points_W : ndarray, shape (n, 3)
-    weights : ndarray, shape (n,)
-    X_WB : Pose
-    positions_B_m, axes_B : ndarray, shape (m, 3)
-        Centres of the thrusters' disks and unit force axes (for T > 0), on the body.
-    areas_m2 : ndarray, shape (m,)
-    superposition : "coherent" or "incoherent"
+    - `model`: one of this room, or one from outside, whose derivatives are central differences
+      (`wakewise.wake.finite_difference`).
+    - `positions_B_m`, `axes_B`, shape (m, 3): centres of the thrusters' disks and unit force axes (for T > 0), on the
+      body.
+    - Shapes: `region_points_W` (n, 3); `weights` (n,); `areas_m2` (m,).
 
-    Raises
-    ------
-    InputError
-        If shapes do not belong together, something is not finite, a weight is negative or an area not positive.
+    Raises InputError if shapes do not belong together, something is not finite, a weight is negative or an area not
+    positive.
     """
     one_of(superposition, SUPERPOSITIONS, "superposition")
     same_sizes(region_points_W, weights, positions_B_m, axes_B, areas_m2)
@@ -316,29 +304,16 @@ def gram(
 ) -> Array:
     """Matrix G of D = s' G s at given thruster places, symmetric and positive semidefinite.
 
-    Parameters
-    ----------
-    model : WakeModel
-    region_points_W : ndarray, shape (n, 3)
-    weights : ndarray, shape (n,)
-    origins_W, axes_W : ndarray, shape (m, 3)
-        Centres of the thrusters' disks and unit *force* axes (for T > 0), in the world.
-    areas_m2 : ndarray, shape (m,)
-    superposition : "coherent" or "incoherent"
-        How jets that meet add up; incoherent leaves the diagonal alone.
-    flow : Flow, optional
-        What carries the jets, at the thrusts of its guess (see `carried`); still water where it is not given, and for
-        models from outside.
+    - `origins_W`, `axes_W`, shape (m, 3): centres of the thrusters' disks and unit *force* axes (for T > 0), in the
+      world.
+    - `superposition`: how jets that meet add up; incoherent leaves the diagonal alone.
+    - `flow`: what carries the jets, at the thrusts of its guess (see `carried`); still water where it is not given, and
+      for models from outside.
+    - Shapes: `region_points_W` (n, 3); `weights` (n,); `areas_m2` (m,).
 
-    Returns
-    -------
-    ndarray, shape (2 m, 2 m), in (m/s)^2/N
-        Row i is thruster i with T > 0 (jet along -axis), row m + i the same thruster with T < 0 (jet along +axis).
-
-    Raises
-    ------
-    InputError
-        If shapes do not belong together, something is not finite, a weight is negative or an area not positive.
+    Returns shape (2 m, 2 m), in (m/s)^2/N: row i is thruster i with T > 0 (jet along -axis), row m + i the same
+    thruster with T < 0 (jet along +axis). Raises InputError if shapes do not belong together, something is not finite,
+    a weight is negative or an area not positive.
     """
     if str(superposition) not in SUPERPOSITIONS:
         one_of(superposition, SUPERPOSITIONS, "superposition")
@@ -376,10 +351,7 @@ def unit_velocity(
 
     NaN passes: a controller whose Gram matrix is not finite does without, and a flight goes on.
 
-    Raises
-    ------
-    InputError
-        If it is no array of numbers of that shape.
+    Raises InputError if it is no array of numbers of that shape.
     """
     answer = model.unit_velocity(points_W_m, origins_W_m, directions_W, areas_m2)
     shape = (len(origins_W_m), len(points_W_m), 3)
@@ -473,20 +445,13 @@ def carried_velocity(
 def scattered_jet_gram(points, weights, origins, axes, areas, kind, parameters):  # type: ignore[no-untyped-def]
     """Mean of D per newton of each jet if it goes astray, shape (2 m,), in (m/s)^2/N.
 
-    Parameters
-    ----------
-    points, weights : ndarray, shape (n, 3) and (n,)
-        Of a region, in the world.
-    origins, axes, areas : ndarray, shape (m, 3), (m, 3) and (m,)
-        Centres of the disks, unit force axes (for T > 0) and areas.
-    kind, parameters
-        The jet's law (`AxialJet.law`).
+    - `points`, `weights`, shape (n, 3) and (n,): of a region, in the world.
+    - `origins`, `axes`, `areas`, shape (m, 3), (m, 3) and (m,): centres of the disks, unit force axes (for T > 0) and
+      areas.
+    - `kind`, `parameters`: the jet's law (`AxialJet.law`).
 
-    Returns
-    -------
-    ndarray, shape (2 m,)
-        Slot i is thruster i with T > 0 (jet along -axis), slot m + i the same with T < 0. As a diagonal matrix it is G
-        of D = s' G s, as in `wakewise.wake.disturbance.gram`.
+    Returns shape (2 m,): slot i is thruster i with T > 0 (jet along -axis), slot m + i the same with T < 0. As a
+    diagonal matrix it is G of D = s' G s, as in `wakewise.wake.disturbance.gram`.
     """
     m, n = origins.shape[0], points.shape[0]
     own, numbers, d = own_constants(kind, parameters, areas), as_tuple(parameters), np.zeros(2 * m)

@@ -27,30 +27,17 @@ MOST_POINTS = 100
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FiniteDifferenceWake:
-    """A wake model over weighted points, seen from a body; nothing in it is compiled.
-
-    Parameters
-    ----------
-    model : WakeModel
-    points_W_m : ndarray, shape (P, 3)
-    weights : ndarray, shape (P,)
-    positions_B_m, axes_B : ndarray, shape (m, 3)
-        Centres of the thrusters' disks and unit force axes (for T > 0), on the body.
-    areas_m2 : ndarray, shape (m,)
-    coherent : bool
-        Velocities of jets that meet add up; else squares of speeds do.
-    smooth_N : float
-        Thrust below which the root is rounded off, see `wakewise.wake.smooth_roots`.
-    """
+    """A wake model over weighted points, seen from a body; nothing in it is compiled."""
 
     model: WakeModel
-    points_W_m: Array
-    weights: Array
+    points_W_m: Array  # shape (P, 3)
+    weights: Array  # shape (P,)
+    # positions_B_m, axes_B: shape (m, 3): centres of the thrusters' disks and unit force axes (for T > 0), on the body.
     positions_B_m: Array
     axes_B: Array
-    areas_m2: Array
-    coherent: bool = True
-    smooth_N: float = 0.0
+    areas_m2: Array  # shape (m,)
+    coherent: bool = True  # velocities of jets that meet add up; else squares of speeds do
+    smooth_N: float = 0.0  # thrust below which the root is rounded off, see `wakewise.wake.smooth_roots`
 
     def velocities(self, X_WB: Pose) -> Array:
         """Velocity per square root of newton in B, shape (2 m, P, 3): row i with T_i > 0, row m + i with T_i < 0."""

@@ -48,10 +48,7 @@ def write_fit(
 def read_wake_settings(path: Path) -> WakeSettings:
     """Settings of a wake model from a file of `wakewise wake fit`, with or without the heads `control:` and `wake:`.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read or a field is wrong.
+    Raises InputError if the file cannot be read or a field is wrong.
     """
     try:
         tree: Any = read_yaml(path.read_text(encoding="utf-8"))

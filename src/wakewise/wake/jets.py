@@ -50,20 +50,12 @@ class AxialJet(ABC):
     def speed(self, along_m: ArrayLike, across_m: ArrayLike, thrust_N: ArrayLike, area_m2: ArrayLike) -> Array:
         """Speed in m/s of single jets, one per element; the arguments broadcast against each other.
 
-        Parameters
-        ----------
-        along_m, across_m : array_like
-            Distance from the disk's centre along the jet (negative: upstream, where the water is still), and off its
-            axis. The second must not be negative.
-        thrust_N : array_like
-            Its sign does not matter: the jet points where `along_m` counts.
-        area_m2 : array_like
-            Disk area, more than 0.
+        - `along_m`, `across_m`: distance from the disk's centre along the jet (negative: upstream, where the water is
+          still), and off its axis. The second must not be negative.
+        - `thrust_N`: its sign does not matter: the jet points where `along_m` counts.
+        - `area_m2`: disk area, more than 0.
 
-        Raises
-        ------
-        InputError
-            For a negative distance off the axis, a disk without area, or NaN.
+        Raises InputError for a negative distance off the axis, a disk without area, or NaN.
         """
         given = (np.asarray(a, dtype=np.float64) for a in (along_m, across_m, thrust_N, area_m2))
         along, across, thrust, area = (np.array(a) for a in np.broadcast_arrays(*given))
@@ -81,17 +73,9 @@ class AxialJet(ABC):
     def split_speed(self, points_W_m: Array, origins_W_m: Array, axes_W: Array, areas_m2: Array) -> Array:
         """Speed per square root of newton at every point, for either sign of every thrust.
 
-        Parameters
-        ----------
-        points_W_m : ndarray, shape (n, 3)
-        origins_W_m, axes_W : ndarray, shape (m, 3)
-            Centre of each thruster's disk and unit axis of its *force* for T > 0.
-        areas_m2 : ndarray, shape (m,)
-
-        Returns
-        -------
-        ndarray, shape (n, 2 m), in m/s/sqrt(N)
-            Column i: thruster i with T > 0, whose jet goes along -axis. Column m + i: T < 0, along +axis.
+        `origins_W_m`, `axes_W`, shape (m, 3): centre of each thruster's disk and unit axis of its *force* for T > 0.
+        Shapes: `points_W_m` (n, 3); `areas_m2` (m,). Returns shape (n, 2 m), in m/s/sqrt(N): column i: thruster i with
+        T > 0, whose jet goes along -axis. Column m + i: T < 0, along +axis.
         """
         speed = np.zeros((len(points_W_m), 2 * len(origins_W_m)))
         kernels.fill_split_speed(points_W_m, origins_W_m, axes_W, areas_m2, *self.law, speed)
@@ -107,10 +91,7 @@ class AxialJet(ABC):
 def check_ranges(record: object, what: str, **ranges: tuple[float, float]) -> None:
     """Refuse a dataclass whose number lies outside its range, or is NaN.
 
-    Raises
-    ------
-    InputError
-        Naming the model, the field, the value and what is allowed.
+    Raises InputError: naming the model, the field, the value and what is allowed.
     """
     for field in fields(record):  # type: ignore[arg-type]
         if field.name in ranges:
@@ -137,17 +118,12 @@ class RoundJet(AxialJet):
     the decay law within 1 % at 10 D. The water is still upstream of the disk; the slow inflow towards the jet's sides
     is left out, and so are walls (see `wakewise.wake.wall_jet`) and the time a jet needs to
     arrive.
-
-    Parameters
-    ----------
-    water_density_kg_m3 : float
-    half_width_slope : float
-        Radius of half the centreline speed over distance. 0.096 is N. R. Panchapakesan and J. L. Lumley, J. Fluid Mech.
-        246 (1993) 197, doi 10.1017/S0022112093000096; H. J. Hussein, S. P. Capp and W. K. George, J. Fluid Mech. 258
-        (1994) 31, doi 10.1017/S002211209400323X, have 0.094 to 0.102. For a propeller's jet see `of_propeller`.
     """
 
     water_density_kg_m3: float = FRESH_WATER_KG_M3
+    # Radius of half the centreline speed over distance. 0.096 is N. R. Panchapakesan and J. L. Lumley, J. Fluid Mech.
+    # 246 (1993) 197, doi 10.1017/S0022112093000096; H. J. Hussein, S. P. Capp and W. K. George, J. Fluid Mech. 258
+    # (1994) 31, doi 10.1017/S002211209400323X, have 0.094 to 0.102. For a propeller's jet see `of_propeller`.
     half_width_slope: float = 0.096
 
     def __post_init__(self) -> None:
@@ -192,21 +168,13 @@ class GaussianJet(AxialJet):
 
     Lengths at the disk are in disk diameters D, so that a fit made with one disk can be carried to another. Momentum is
     not conserved by construction: `momentum_ratio` tells what the numbers carry.
-
-    Parameters
-    ----------
-    decay : float
-        K; a round jet has 6.5 to 7.0 (Hussein et al. 1994), one widened by swirl about half of it.
-    virtual_origin_diameters, start_width_diameters : float
-        x0 / D and b0 / D.
-    half_width_slope : float
-        Growth of the radius of half the centreline speed.
     """
 
-    decay: float
+    decay: float  # K; a round jet has 6.5 to 7.0 (Hussein et al. 1994), one widened by swirl about half of it.
+    # virtual_origin_diameters, start_width_diameters: X0 / D and b0 / D.
     virtual_origin_diameters: float
     start_width_diameters: float
-    half_width_slope: float
+    half_width_slope: float  # growth of the radius of half the centreline speed
     water_density_kg_m3: float = FRESH_WATER_KG_M3
 
     def __post_init__(self) -> None:
@@ -279,31 +247,17 @@ class PaperJet(AxialJet):
 
 @dataclass(frozen=True, kw_only=True)
 class PowerJet(AxialJet):
-    """A cone with free numbers; the defaults are the paper's, so that each model states only what it changes.
+    """A cone with free numbers; the defaults are the paper's, so that each model states only what it changes."""
 
-    Parameters
-    ----------
-    label : str
-        Name used in scenario files and tables.
-    gain : float
-        G. The reference distance is one number with it (G r_ref^p), so it is fixed and never fitted.
-    decay_power, cosine_power : float
-        p and m.
-    soft_radius_m : float
-        r_s, which keeps the speed finite at the disk.
-    half_angle_rad : float
-        theta_c, the middle of the edge.
-    edge_width_rad : float
-        Full width of the edge, 0 for a sharp one. Within it s = 3 t^2 - 2 t^3, with t linear in cos(theta) from the
-        outer to the inner end: the first derivative is continuous.
-    """
-
-    label: str
-    gain: float = 1.0
+    label: str  # name used in scenario files and tables
+    gain: float = 1.0  # G. The reference distance is one number with it (G r_ref^p), so it is fixed and never fitted.
+    # decay_power, cosine_power: P and m.
     decay_power: float = 2.0
     cosine_power: float = 4.0
-    soft_radius_m: float = 0.0
-    half_angle_rad: float = np.pi / 4
+    soft_radius_m: float = 0.0  # r_s, which keeps the speed finite at the disk
+    half_angle_rad: float = np.pi / 4  # theta_c, the middle of the edge
+    # Full width of the edge, 0 for a sharp one. Within it s = 3 t^2 - 2 t^3, with t linear in cos(theta) from the outer
+    # to the inner end: the first derivative is continuous.
     edge_width_rad: float = 0.0
     water_density_kg_m3: float = FRESH_WATER_KG_M3
 

@@ -158,12 +158,8 @@ class JetPoints:
 def remembered(times_s: Array, thrusts_N: Array, now_s: float, memory_s: float) -> float:
     """Largest thrust that pushed in the last `memory_s`; 0 if none did.
 
-    Parameters
-    ----------
-    times_s : ndarray, shape (k,)
-        Rising; row i of the thrusts holds until the next time, the last one on.
-    thrusts_N : ndarray, shape (k,)
-        Not negative.
+    `times_s`, shape (k,): rising; row i of the thrusts holds until the next time, the last one on. `thrusts_N`, shape
+    (k,): not negative.
     """
     ends = np.append(times_s[1:], np.inf)
     felt = (times_s < now_s) & (ends > now_s - memory_s)
@@ -173,15 +169,9 @@ def remembered(times_s: Array, thrusts_N: Array, now_s: float, memory_s: float) 
 def history_bins(times_s: Array, thrusts_N: Array, now_s: float, delays_s: Array, greatest_N: float) -> Array:
     """Mean thrust between the edges of delay over the greatest, shape (n, len(EDGES) - 1); at rest before the start.
 
-    Parameters
-    ----------
-    times_s, thrusts_N : ndarray, shape (k,)
-        As for `remembered`.
-    now_s : float
-    delays_s : ndarray, shape (n,)
-        t* of each point.
-    greatest_N : float
-        More than 0.
+    - `times_s`, `thrusts_N`, shape (k,): as for `remembered`.
+    - `delays_s`, shape (n,): t* of each point.
+    - `greatest_N`: more than 0.
     """
     ends = np.append(times_s[times_s < now_s], now_s)
     count = len(ends) - 1
@@ -209,17 +199,10 @@ _ROWS, _COLUMNS = 96, 257  # of the table, by log R and by the angle's root; wit
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LearnedWake:
-    """A trained network as a wake model.
-
-    Parameters
-    ----------
-    network : Network
-    bed_z_m : float or None
-        Depth of a bed along which jets run out as in `wakewise.wake.wall_jet`; None for free jets alone.
-    water_density_kg_m3 : float
-    """
+    """A trained network as a wake model."""
 
     network: Network
+    # Depth of a bed along which jets run out as in `wakewise.wake.wall_jet`; None for free jets alone.
     bed_z_m: float | None = None
     water_density_kg_m3: float = FRESH_WATER_KG_M3
     _table: Array = field(init=False, repr=False)
@@ -280,20 +263,13 @@ class LearnedWake:
     ) -> Array:
         """Velocity of one jet that pushed as told, free of any floor, shape (n, 3), in m/s.
 
-        Parameters
-        ----------
-        points_W_m : ndarray, shape (n, 3)
-        origin_W_m, direction_W : ndarray, shape (3,)
-            Middle of the disk and unit direction of the jet; a thruster that turns round has two jets.
-        area_m2 : float
-        times_s, thrusts_N : ndarray, shape (k,)
-            Rising times; each thrust holds from its time to the next, the last one on. Not negative.
-        now_s : float
+        - `origin_W_m`, `direction_W`, shape (3,): middle of the disk and unit direction of the jet; a thruster that
+          turns round has two jets.
+        - `times_s`, `thrusts_N`, shape (k,): rising times; each thrust holds from its time to the next, the last one
+          on. Not negative.
+        - Shapes: `points_W_m` (n, 3).
 
-        Raises
-        ------
-        InputError
-            If times do not rise or a thrust is negative.
+        Raises InputError if times do not rise or a thrust is negative.
         """
         if len(times_s) != len(thrusts_N) or np.any(np.diff(times_s) <= 0.0):
             raise InputError(f"wake model learned: {len(times_s)} times, {len(thrusts_N)} thrusts, must rise and pair")
@@ -358,10 +334,7 @@ def save_network(path: Path, network: Network, words: str) -> None:
 def load_network(path: Path = SHIPPED) -> Network:
     """Read a network.
 
-    Raises
-    ------
-    InputError
-        If the file is missing or is none.
+    Raises InputError if the file is missing or is none.
     """
     try:
         check_arrays(path)

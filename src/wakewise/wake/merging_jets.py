@@ -81,15 +81,9 @@ class _Sent(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MergingJetsModel(InfluenceModel):
-    """An `InfluenceModel` whose Gram matrix also holds what pairs of jets become where they meet.
+    """An `InfluenceModel` whose Gram matrix also holds what pairs of jets become where they meet."""
 
-    Parameters
-    ----------
-    pairs : tuple of (int, int)
-        Thrusters whose jets are looked at.
-    """
-
-    pairs: tuple[tuple[int, int], ...] = field(default=())
+    pairs: tuple[tuple[int, int], ...] = field(default=())  # thrusters whose jets are looked at
 
     def gram(self, X_WB: Pose, flow: CrossFlow | None = None) -> Array:
         """Matrix G of D = s' G s, shape (2 n, 2 n); in a flow what two jets become takes their own place."""

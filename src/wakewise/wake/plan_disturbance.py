@@ -75,10 +75,7 @@ def wake_table(
 ) -> PackedWakeModel:
     """Table of a wake model over weighted points; arguments as for `wakewise.wake.gram_with_derivatives`.
 
-    Raises
-    ------
-    InputError
-        If the model is not one of `wakewise.wake`, or there are no points with weight.
+    Raises InputError if the model is not one of `wakewise.wake`, or there are no points with weight.
     """
     floor = wake if isinstance(wake, ImpingingJet) else None
     jet = floor.jet if floor is not None else wake

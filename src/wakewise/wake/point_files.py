@@ -102,11 +102,8 @@ class _Layout:
 def read_point_table(path: Path) -> PointTable:
     """Columns of a file of velocities at points.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a needed unit is not said, a column is unknown in a file of our own columns, or a
-        row holds something else than numbers; the message names the line.
+    Raises InputError if the file cannot be read, a needed unit is not said, a column is unknown in a file of our own
+    columns, or a row holds something else than numbers; the message names the line.
     """
     layout = _layout(path, _lines(path))
     columns = [_column(path, label, layout.of_a_program) for label in layout.labels]

@@ -126,19 +126,10 @@ def read_samples(path: Path, disk_diameter_m: float | None = None, thrust_N: flo
     Vectors that are NaN, empty or masked, and points upstream of the disk, are left out with a warning that counts
     them.
 
-    Parameters
-    ----------
-    path : Path
-    disk_diameter_m : float, optional
-        Needed if the file has no column of that name.
-    thrust_N : float, optional
-        Thrust of all rows; needed if the file has no column of that name.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, a needed column is not there or is unknown, a row holds something that is not a finite
-        number, a negative radius or a thrust that is not positive (the message names the line), or no row is left.
+    `disk_diameter_m`: needed if the file has no column of that name. `thrust_N`: thrust of all rows; needed if the file
+    has no column of that name. Raises InputError if the file is missing, a needed column is not there or is unknown, a
+    row holds something that is not a finite number, a negative radius or a thrust that is not positive (the message
+    names the line), or no row is left.
     """
     table = read_point_table(path)
     column = table.columns

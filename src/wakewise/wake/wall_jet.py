@@ -59,18 +59,10 @@ ROUND_DECAY = RoundJet().decay
 
 @dataclass(frozen=True, kw_only=True)
 class ImpingingJet:
-    """A free jet and the wall jet that it becomes on the bed; implements `wakewise.core.interfaces.WakeModel`.
+    """A free jet and the wall jet that it becomes on the bed; implements `wakewise.core.interfaces.WakeModel`."""
 
-    Parameters
-    ----------
-    jet : AxialJet
-        What the jet does on its way.
-    bed_z_m : float
-        The bed is the plane z = bed_z_m of the world (z down). Points below it are taken as on it.
-    """
-
-    jet: AxialJet
-    bed_z_m: float
+    jet: AxialJet  # what the jet does on its way
+    bed_z_m: float  # the bed is the plane z = bed_z_m of the world (z down). Points below it are taken as on it.
     water_density_kg_m3: float = FRESH_WATER_KG_M3
 
     def __post_init__(self) -> None:

@@ -19,17 +19,10 @@ AimBy = Literal["auto", "pitch", "tilt", "both"]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CameraAim:
-    """A camera on a body, and what it is aimed with.
+    """A camera on a body, and what it is aimed with."""
 
-    Parameters
-    ----------
-    X_BC : Pose
-        Camera mount at no tilt.
-    joint : TiltJoint or None
-        What tilts the camera as far as its stops; the body pitches for the rest. None: the body pitches for all.
-    """
-
-    X_BC: Pose
+    X_BC: Pose  # camera mount at no tilt
+    # What tilts the camera as far as its stops; the body pitches for the rest. None: the body pitches for all.
     joint: TiltJoint | None = None
 
     def tilt(self, pitch_rad: float, pitch_rate_rad_s: float = 0.0) -> tuple[float, float]:
@@ -66,10 +59,7 @@ class CameraAim:
 def aim_of(vehicle: Vehicle, by: AimBy = "auto") -> CameraAim:
     """What a vehicle's camera is aimed with: `auto` takes the joint where there is one, and pitch beyond its stops.
 
-    Raises
-    ------
-    InputError
-        If the tilt is asked of a camera that has no joint.
+    Raises InputError if the tilt is asked of a camera that has no joint.
     """
     if by in ("tilt", "both") and vehicle.tilt is None:
         raise InputError(f"mission.aim: {by}, the camera of {vehicle.name} has no tilt joint, allowed auto or pitch")

@@ -59,23 +59,12 @@ def check_clearance(
 ) -> float:
     """Least clearance of the hull along the route, in metres.
 
-    Parameters
-    ----------
-    route : Route
-    aim : CameraAim or Pose
-        What the camera is aimed with, or its fixed mount.
-    size_m : ndarray, shape (3,)
-        Length, width and height of the hull.
-    bounds : TankBounds
-    target_W_m : ndarray, shape (n, 3)
-        Points of the target, dense enough to stand for it (its mesh's vertices).
-    clearance_m : float
-        What is asked for.
+    - `aim`: what the camera is aimed with, or its fixed mount.
+    - `size_m`, shape (3,): length, width and height of the hull.
+    - `target_W_m`, shape (n, 3): points of the target, dense enough to stand for it (its mesh's vertices).
+    - `clearance_m`: what is asked for.
 
-    Raises
-    ------
-    InputError
-        Naming the field of the mission to change, the leg, what it would touch and by how much.
+    Raises InputError: naming the field of the mission to change, the leg, what it would touch and by how much.
     """
     least = np.inf
     for time_s in np.arange(route.starts_s[0], route.duration_s, 0.25):
@@ -100,10 +89,8 @@ def check_clearance(
 def check_tilt(route: Route, aim: CameraAim, *, stops_suffice: bool = False) -> None:
     """Refuse a route that the camera's joint cannot follow; `stops_suffice` asks it to be aimed by tilt alone.
 
-    Raises
-    ------
-    InputError
-        Naming the field of the mission to change, the leg, the tilt or its rate, and what the joint can do.
+    Raises InputError: naming the field of the mission to change, the leg, the tilt or its rate, and what the joint can
+    do.
     """
     joint = aim.joint
     if joint is None:

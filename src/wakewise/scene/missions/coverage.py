@@ -39,41 +39,20 @@ HALF = 0.5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Coverage:
-    """What has been seen so far; each photograph makes a new one, at least as good.
-
-    Parameters
-    ----------
-    patches : SurfacePatches
-    need : VisibilityCriteria
-    centres_W_m : ndarray, shape (k, 3)
-        Where the photographs that count were taken from.
-    shows : ndarray of bool, shape (k, n)
-        Which samples each of them shows well.
-    partners : ndarray of uint8, shape (k, n)
-        With how many others it makes a pair at each sample.
-    level : ndarray of uint8, shape (n,)
-        How far each sample has come: 0, `SHOWN`, `PAIRED` or `WELL`.
-    views : CandidateViews
-        From where the next photographs could be taken.
-    joins : ndarray of uint8, shape (c, n)
-        With how many photographs each of them would make a pair at each sample.
-    photos, blurred : int
-        Photographs taken, and those of them that were not sharp enough to count.
-    sharpest : float
-        Sharpness of the sharpest so far.
-    """
+    """What has been seen so far; each photograph makes a new one, at least as good."""
 
     patches: SurfacePatches
     need: VisibilityCriteria = field(default_factory=VisibilityCriteria)
-    centres_W_m: Array
-    shows: BoolArray
-    partners: Counts
-    level: Counts
-    views: CandidateViews
-    joins: Counts
+    centres_W_m: Array  # shape (k, 3): where the photographs that count were taken from
+    shows: BoolArray  # shape (k, n): which samples each of them shows well
+    partners: Counts  # shape (k, n): with how many others it makes a pair at each sample
+    level: Counts  # shape (n,): how far each sample has come: 0, `SHOWN`, `PAIRED` or `WELL`
+    views: CandidateViews  # from where the next photographs could be taken
+    joins: Counts  # shape (c, n): with how many photographs each of them would make a pair at each sample
+    # photos, blurred: photographs taken, and those of them that were not sharp enough to count.
     photos: int = 0
     blurred: int = 0
-    sharpest: float = 0.0
+    sharpest: float = 0.0  # sharpness of the sharpest so far
 
     @classmethod
     def begin(
@@ -96,19 +75,9 @@ class Coverage:
     def seen(self, X_WC: Pose, camera: CameraIntrinsics, sharpness: float | None = None) -> Coverage:
         """The coverage with one photograph more.
 
-        Parameters
-        ----------
-        X_WC : Pose
-            Where it was taken from, as it is believed.
-        camera : CameraIntrinsics
-        sharpness : float, optional
-            In any unit that is higher for sharper ones and the same for all of a flight. A photograph less than
-            `VisibilityCriteria.sharp` times as sharp as the sharpest before it does not count. None: it is sharp.
-
-        Raises
-        ------
-        InputError
-            If the sharpness is negative or not finite.
+        `X_WC`: where it was taken from, as it is believed. `sharpness`: in any unit that is higher for sharper ones and
+        the same for all of a flight. A photograph less than `VisibilityCriteria.sharp` times as sharp as the sharpest
+        before it does not count. None: it is sharp. Raises InputError if the sharpness is negative or not finite.
         """
         if sharpness is not None and not (math.isfinite(sharpness) and sharpness >= 0.0):
             raise InputError(f"sharpness: {sharpness!r}, allowed 0 or more, or None where it is not known")
@@ -270,33 +239,18 @@ GRAZING_RAD = math.radians(87.0)
 
 @dataclass(frozen=True, kw_only=True)
 class CoverageGaps:
-    """Shares of the surface that are not seen well, 0 to 1, by the first reason that holds; they add up to the rest.
+    """Shares of the surface that are not seen well, 0 to 1, by the first reason that holds; they add up to the rest."""
 
-    Parameters
-    ----------
-    unseen : float
-        In no photograph: hidden by the target itself, facing away from all, or outside every picture.
-    poorly : float
-        In some, but only at a slant or from too far.
-    seldom : float
-        Shown well, but not by three that make pairs.
-    """
-
-    unseen: float
-    poorly: float
-    seldom: float
+    unseen: float  # in no photograph: hidden by the target itself, facing away from all, or outside every picture
+    poorly: float  # in some, but only at a slant or from too far
+    seldom: float  # shown well, but not by three that make pairs
 
 
 def find_coverage_gaps(coverage: Coverage, taken_from: Iterable[Pose], lens: CameraIntrinsics) -> CoverageGaps:
     """Sort what is not seen well by why.
 
-    Parameters
-    ----------
-    coverage : Coverage
-        After photographs.
-    taken_from : iterable of Pose
-        X_WC of those of them that were sharp; half of the time of counting them first is spent again.
-    lens : CameraIntrinsics
+    `coverage`: after photographs. `taken_from`: X_WC of those of them that were sharp; half of the time of counting
+    them first is spent again.
     """
     patches = coverage.patches
     lenient = replace(coverage.need, incidence_rad=GRAZING_RAD, pixel_m=math.inf)

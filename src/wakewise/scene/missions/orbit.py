@@ -101,16 +101,8 @@ is felt."""
 def order_downstream_first(orbits: tuple[Orbit, ...], current_W_m_s: Array) -> tuple[Orbit, ...]:
     """The same orbits, each begun at the first of its views from downstream on, in the direction in which it is listed.
 
-    Parameters
-    ----------
-    orbits : tuple of Orbit
-    current_W_m_s : ndarray, shape (3,)
-        Of which the level part counts; below `LEAST_CURRENT_M_S` orbits begin as listed.
-
-    Returns
-    -------
-    tuple of Orbit
-        With the orbits' own azimuths, but for whole turns; each goes on from where the one before ended.
+    `current_W_m_s`, shape (3,): of which the level part counts; below `LEAST_CURRENT_M_S` orbits begin as listed. With
+    the orbits' own azimuths, but for whole turns; each goes on from where the one before ended.
     """
     north, east = float(current_W_m_s[0]), float(current_W_m_s[1])
     if math.hypot(north, east) < LEAST_CURRENT_M_S:

@@ -25,20 +25,11 @@ LEAST_WAY_M, LEAST_TURN_DEG = 0.03, 5.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CandidateViews:
-    """Camera places about a centre, and what a photograph from each would show well.
+    """Camera places about a centre, and what a photograph from each would show well."""
 
-    Parameters
-    ----------
-    centre_W_m : ndarray, shape (3,)
-    places : ndarray, shape (c, 3)
-        Azimuth, elevation (rad) and range (m) of each; see `orbit.py`.
-    shows : ndarray of bool, shape (c, n)
-        Which samples of the patches each shows well.
-    """
-
-    centre_W_m: Array
-    places: Array
-    shows: BoolArray
+    centre_W_m: Array  # shape (3,)
+    places: Array  # shape (c, 3): azimuth, elevation (rad) and range (m) of each; see `orbit.py`
+    shows: BoolArray  # shape (c, n): which samples of the patches each shows well
 
     def __post_init__(self) -> None:
         freeze(self, centre_W_m=(3,), places=(None, 3))
@@ -132,22 +123,11 @@ def reachable_views(
 
     Takes about five milliseconds a view, half a second in all for one range.
 
-    Parameters
-    ----------
-    patches : SurfacePatches
-    camera : CameraIntrinsics
-    centre_W_m : ndarray, shape (3,)
-        What the views look at.
-    ranges_m : tuple of float
-        Distances of the camera from it.
-    aim, size_m, bounds, target_W_m, clearance_m
-        As `check_clearance` has them.
-    need : Need, optional
+    - `centre_W_m`, shape (3,): what the views look at.
+    - `ranges_m`: distances of the camera from it.
+    - `aim`, `size_m`, `bounds`, `target_W_m`, `clearance_m`: as `check_clearance` has them.
 
-    Raises
-    ------
-    InputError
-        If a range is not above zero.
+    Raises InputError if a range is not above zero.
     """
     if not all(math.isfinite(r) and r > 0.0 for r in ranges_m):
         raise InputError(f"coverage: ranges {ranges_m} m, each must be above 0")

@@ -174,17 +174,8 @@ class Route:
 def plan_route(centre_W_m: Array, settings: MissionSettings, current_W_m_s: Array | None = None) -> Route:
     """Settle, approach, then fly each orbit and the climb to the next; photographs on the orbits only.
 
-    Parameters
-    ----------
-    centre_W_m : ndarray, shape (3,)
-    settings : MissionSettings
-    current_W_m_s : ndarray, shape (3,), optional
-        What is known of the current before the flight, for `settings.order`; None if nothing is.
-
-    Raises
-    ------
-    InputError
-        If the flight would take longer than a day.
+    `current_W_m_s`, shape (3,): what is known of the current before the flight, for `settings.order`; None if nothing
+    is. Shapes: `centre_W_m` (3,). Raises InputError if the flight would take longer than a day.
     """
     orbits = layered_orbits(settings)
     if settings.order == "current" and current_W_m_s is not None:

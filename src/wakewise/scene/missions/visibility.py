@@ -51,34 +51,17 @@ class TriangleSurface(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SurfacePatches:
-    """Samples spread evenly over a surface, the patch that each belongs to, and the surface itself, which hides.
+    """Samples spread evenly over a surface, the patch that each belongs to, and the surface itself, which hides."""
 
-    Parameters
-    ----------
-    points_W_m, normals : ndarray, shape (n, 3)
-        Samples, each standing for the same area, and unit outward normals.
-    patch : ndarray of int64, shape (n,)
-        Number of the patch of each sample; every one from 0 on has at least one.
-    area_m2 : float
-        Of the surface that counts.
-    shield_W_m : ndarray, shape (m, 3, 3)
-        Corners of the triangles that hide what lies behind them: the surface, a little coarser.
-    shield_off_m : float
-        How far they may lie off the surface.
-
-    Attributes
-    ----------
-    neighbours : ndarray of int64, shape (p, 2)
-        Samples within `REACH_M` of each other.
-    """
-
+    # points_W_m, normals: shape (n, 3): samples, each standing for the same area, and unit outward normals.
     points_W_m: Array
     normals: Array
-    patch: IntArray
-    area_m2: float
+    patch: IntArray  # shape (n,): number of the patch of each sample; every one from 0 on has at least one
+    area_m2: float  # of the surface that counts
+    # Shape (m, 3, 3): corners of the triangles that hide what lies behind them: the surface, a little coarser.
     shield_W_m: Array
-    shield_off_m: float = 0.0
-    neighbours: IntArray = field(init=False)
+    shield_off_m: float = 0.0  # how far they may lie off the surface
+    neighbours: IntArray = field(init=False)  # shape (p, 2): samples within `REACH_M` of each other
 
     def __post_init__(self) -> None:
         freeze(self, points_W_m=(None, 3), normals=(None, 3), shield_W_m=(None, 3, 3))
@@ -126,19 +109,12 @@ def patches_of(
 ) -> SurfacePatches:
     """Cut the part of a surface that counts in evaluations into patches of about the same area.
 
-    Parameters
-    ----------
-    surface : TriangleSurface
-        In the world: a target's mesh where it is believed to be, or a model's.
-    bed_z_m : float, optional
-        Depth of the bed; what stands less than `CLEARANCE_M` above it does not count. None: all counts.
-    count, per_patch : int
-        Patches, and samples of each in the mean; where the surface lies patchily there are somewhat fewer.
+    - `surface`: in the world: a target's mesh where it is believed to be, or a model's.
+    - `bed_z_m`: depth of the bed; what stands less than `CLEARANCE_M` above it does not count. None: all counts.
+    - `count`, `per_patch`: patches, and samples of each in the mean; where the surface lies patchily there are somewhat
+      fewer.
 
-    Raises
-    ------
-    InputError
-        If nothing of it counts, or `count` or `per_patch` is below 1.
+    Raises InputError if nothing of it counts, or `count` or `per_patch` is below 1.
     """
     if count < 1 or per_patch < 1:
         raise InputError(f"coverage: {count} patches of {per_patch} samples, both must be at least 1")
@@ -228,31 +204,20 @@ class CameraIntrinsics(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class VisibilityCriteria:
-    """What a place on the surface needs to be in the model.
+    """What a place on the surface needs to be in the model."""
 
-    Parameters
-    ----------
-    incidence_rad : float
-        Largest angle between its normal and the way to a camera that counts. PMVS takes 60 degrees (Y. Furukawa and
-        J. Ponce, TPAMI 32(8), 2010, doi 10.1109/TPAMI.2009.161), evaluations call visible what is seen at less than 78;
-        of 60, 70 and 78 this one was nearest to what our dense stage made of one coral (docs/research-log/0046).
-    pixel_m : float
-        Largest footprint of a pixel: models are held to 3 mm, and a difference of a pixel and a half is what stereo
-        tells apart with some certainty.
-    apart_rad : tuple of float
-        Least and largest angle between the ways to two cameras from which depth comes: what our stereo pairs
-        photographs by. COLMAP's patch-match asks for the same 3 degrees (`filter_min_triangulation_angle`).
-    margin : float
-        Share of the picture's width at its edges in which nothing counts.
-    sharp : float
-        Least sharpness of a photograph that counts, as a share of the sharpest photographs' so far.
-    """
-
+    # Largest angle between its normal and the way to a camera that counts. PMVS takes 60 degrees (Y. Furukawa and J.
+    # Ponce, TPAMI 32(8), 2010, doi 10.1109/TPAMI.2009.161), evaluations call visible what is seen at less than 78; of
+    # 60, 70 and 78 this one was nearest to what our dense stage made of one coral (docs/research-log/0046).
     incidence_rad: float = math.radians(70.0)
+    # Largest footprint of a pixel: models are held to 3 mm, and a difference of a pixel and a half is what stereo tells
+    # apart with some certainty.
     pixel_m: float = 0.002
+    # Least and largest angle between the ways to two cameras from which depth comes: what our stereo pairs photographs
+    # by. COLMAP's patch-match asks for the same 3 degrees (`filter_min_triangulation_angle`).
     apart_rad: tuple[float, float] = (math.radians(3.0), math.radians(35.0))
-    margin: float = 0.01
-    sharp: float = 0.5
+    margin: float = 0.01  # share of the picture's width at its edges in which nothing counts
+    sharp: float = 0.5  # least sharpness of a photograph that counts, as a share of the sharpest photographs' so far
 
     def __post_init__(self) -> None:
         low, high = self.apart_rad
@@ -266,13 +231,7 @@ class VisibilityCriteria:
 def well_visible(patches: SurfacePatches, X_WC: Pose, lens: CameraIntrinsics, need: VisibilityCriteria) -> BoolArray:
     """Which samples a sharp photograph shows well enough, shape (n,).
 
-    Parameters
-    ----------
-    patches : SurfacePatches
-    X_WC : Pose
-        Camera, as it is believed to be.
-    lens : CameraIntrinsics
-    need : VisibilityCriteria
+    `X_WC`: camera, as it is believed to be.
     """
     R, f = X_WC.R, float(lens.focal_px)
     ahead = float((patches.points_W_m.mean(axis=0) - X_WC.p_m) @ R[:, 2])

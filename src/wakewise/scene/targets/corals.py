@@ -172,22 +172,9 @@ Segment = tuple[Array, Array, float, float]
 def coral(kind: str, seed: int = 0) -> Mesh:
     """Procedural coral or soft target of one of the kinds.
 
-    Parameters
-    ----------
-    kind : str
-        "branching", "brain" or "plate", which are stony, or one of `soft_kinds`.
-    seed : int
-        Which colony of that kind.
-
-    Returns
-    -------
-    Mesh
-        Closed, one piece (seagrass: one a blade), z up, standing through z = 0; kept in memory.
-
-    Raises
-    ------
-    InputError
-        If the kind is unknown or the seed negative.
+    `kind`: "branching", "brain" or "plate", which are stony, or one of `soft_kinds`. `seed`: which colony of that kind.
+    Returns closed, one piece (seagrass: one a blade), z up, standing through z = 0; kept in memory. Raises InputError
+    if the kind is unknown or the seed negative.
     """
     if kind not in coral_kinds():
         raise InputError(f"coral '{kind}': unknown, allowed: {', '.join(coral_kinds())}")

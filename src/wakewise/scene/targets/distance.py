@@ -147,10 +147,7 @@ def _boxes(corners: Array, first: IntArray, count: IntArray) -> tuple[Array, Arr
 class MeshDistance:
     """Exact unsigned distance to a triangle mesh, for many points.
 
-    Parameters
-    ----------
-    vertices_m : ndarray, shape (n, 3)
-    faces : ndarray of int, shape (m, 3)
+    Shapes: `vertices_m` (n, 3); `faces` (m, 3).
     """
 
     def __init__(self, vertices_m: Array, faces: IntArray) -> None:

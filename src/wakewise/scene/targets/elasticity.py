@@ -67,18 +67,11 @@ class Sections:
 def sections(places_m: Array, faces: IntArray, heights_m: Array) -> Sections:
     """Cut a closed surface at some heights.
 
-    Parameters
-    ----------
-    places_m : ndarray, shape (n, 3)
-        Vertices; the third coordinate is the height.
-    faces : ndarray, shape (m, 3)
-        Turned alike.
-    heights_m : ndarray, shape (k,)
+    - `places_m`, shape (n, 3): vertices; the third coordinate is the height.
+    - `faces`, shape (m, 3): turned alike.
+    - Shapes: `heights_m` (k,).
 
-    Returns
-    -------
-    Sections
-        Zero where nothing is cut.
+    Returns zero where nothing is cut.
     """
     k = len(heights_m)
     area, second, displaced = np.zeros(k), np.zeros((k, 2, 2)), np.zeros((k, 2, 2))
@@ -190,39 +183,26 @@ class TissueProperties:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BendingModes:
-    """Stems of a target and their modes; make it with `BendingModes.of`.
+    """Stems of a target and their modes; make it with `BendingModes.of`."""
 
-    Parameters
-    ----------
-    height_m : ndarray, shape (k,)
-        Of each of k stems.
-    axes_W : ndarray, shape (k, 2, 2)
-        Level unit vectors (x, y) along which the first and the second mode move.
-    shape, slope, drop : ndarray, shape (k, 2, nodes)
-        At heights evenly spaced from the foot to the tip: how far a place moves along the axis for a tip that moves by
-        one metre, its derivative by height in 1/m, and how far it comes down in 1/m, times the tip's way squared.
-    mass_kg, stiffness_N_m, hardening_N_m3, damping_N_s_m, moved_water_kg : ndarray, shape (k, 2)
-        Of each mode with the tip's way as coordinate q: m q'' + c q' + k q + h q^3 is the load on it, and
-        `moved_water_kg` times the water's acceleration is the part of the load that comes from it.
-    stress_Pa_m : ndarray, shape (k, 2)
-        Largest bending stress per metre of the tip's way.
-    stem : ndarray, shape (n,)
-        Which stem each vertex of the target belongs to, -1 for none.
-    bed_z_m : float
-    """
-
-    height_m: Array
-    axes_W: Array
+    height_m: Array  # shape (k,): of each of k stems
+    axes_W: Array  # shape (k, 2, 2): level unit vectors (x, y) along which the first and the second mode move
+    # shape, slope, drop: shape (k, 2, nodes): at heights evenly spaced from the foot to the tip: how far a place moves
+    # along the axis for a tip that moves by one metre, its derivative by height in 1/m, and how far it comes down in
+    # 1/m, times the tip's way squared.
     shape: Array
     slope: Array
     drop: Array
+    # mass_kg, stiffness_N_m, hardening_N_m3, damping_N_s_m, moved_water_kg: shape (k, 2): of each mode with the tip's
+    # way as coordinate q: m q'' + c q' + k q + h q^3 is the load on it, and `moved_water_kg` times the water's
+    # acceleration is the part of the load that comes from it.
     mass_kg: Array
     stiffness_N_m: Array
     hardening_N_m3: Array
     damping_N_s_m: Array
     moved_water_kg: Array
-    stress_Pa_m: Array
-    stem: IntArray
+    stress_Pa_m: Array  # shape (k, 2): largest bending stress per metre of the tip's way
+    stem: IntArray  # shape (n,): which stem each vertex of the target belongs to, -1 for none
     z_m: Array
     bed_z_m: float
 
@@ -236,10 +216,8 @@ class BendingModes:
     def of(cls, target: Target, tissue: TissueProperties, water_kg_m3: float) -> BendingModes:
         """Stems and modes of a target.
 
-        Raises
-        ------
-        InputError
-            If nothing of the target stands free of the bed, its mesh is open, or it falls over by its own weight.
+        Raises InputError if nothing of the target stands free of the bed, its mesh is open, or it falls over by its own
+        weight.
         """
         mesh = target.mesh
         if not mesh.is_closed:

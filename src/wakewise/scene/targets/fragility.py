@@ -45,21 +45,13 @@ COARSE = 3000
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fragility:
-    """How delicate a mesh is, vertex by vertex.
+    """How delicate a mesh is, vertex by vertex."""
 
-    Parameters
-    ----------
-    thickness_m : ndarray, shape (n,)
-        Of the flesh under each vertex; at most the mesh's diameter, which it is where no ray leaves again.
-    curvature_per_m : ndarray, shape (n,)
-        Mean curvature, positive where convex; 0 at the rim of an open mesh, where it has no value.
-    score : ndarray, shape (n,)
-        0 robust to 1 delicate.
-    """
-
+    # Shape (n,): of the flesh under each vertex; at most the mesh's diameter, which it is where no ray leaves again.
     thickness_m: Array
+    # Shape (n,): mean curvature, positive where convex; 0 at the rim of an open mesh, where it has no value.
     curvature_per_m: Array
-    score: Array
+    score: Array  # shape (n,): 0 robust to 1 delicate
 
     def __post_init__(self) -> None:
         n = len(self.score)
@@ -76,17 +68,8 @@ class Fragility:
 def find_fragility(mesh: Mesh, marked: Array | None = None) -> Fragility:
     """Find the delicate features of a mesh.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        In any frame; outward faces.
-    marked : ndarray, shape (n,), optional
-        Scores of what a person marked; the higher of found and marked counts.
-
-    Raises
-    ------
-    InputError
-        If the marks are not one per vertex or outside 0 to 1, or the mesh has no area.
+    `mesh`: in any frame; outward faces. `marked`, shape (n,): scores of what a person marked; the higher of found and
+    marked counts. Raises InputError if the marks are not one per vertex or outside 0 to 1, or the mesh has no area.
     """
     n = len(mesh.vertices_m)
     if not mesh.face_areas_m2.sum() > 0.0:
@@ -217,20 +200,12 @@ LARGEST_M = 10.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FragilityMarks:
-    """Balls inside which the surface is delicate.
+    """Balls inside which the surface is delicate."""
 
-    Parameters
-    ----------
-    centres_m : ndarray, shape (k, 3)
-        In the frame of the mesh that `load_mesh` and `coral` give: z up, bed at z = 0, metres.
-    radii_m : ndarray, shape (k,)
-    weights : ndarray, shape (k,)
-        Score inside the ball, 0 to 1.
-    """
-
+    # Shape (k, 3): in the frame of the mesh that `load_mesh` and `coral` give: z up, bed at z = 0, metres.
     centres_m: Array
-    radii_m: Array
-    weights: Array
+    radii_m: Array  # shape (k,)
+    weights: Array  # shape (k,): score inside the ball, 0 to 1
 
     def __post_init__(self) -> None:
         k = len(self.centres_m)
@@ -255,11 +230,8 @@ class FragilityMarks:
 def read_marks(path: Path | str) -> FragilityMarks:
     """Read marks from a CSV file with the columns x_m, y_m, z_m, radius_m and weight (1 where left out).
 
-    Raises
-    ------
-    InputError
-        If the file is missing or empty, a column is missing or unknown, or a value is no number, not finite or out of
-        range; the message names the line.
+    Raises InputError if the file is missing or empty, a column is missing or unknown, or a value is no number, not
+    finite or out of range; the message names the line.
     """
     path = Path(path)
     try:
@@ -309,21 +281,9 @@ def _value(path: Path, line: int, name: str, row: list[str], place: dict[str, in
 def read_vertex_scores(path: Path | str, mesh: Mesh) -> Array | None:
     """Scores of a mesh's vertices from the property `delicate` of the PLY file that the mesh was loaded from.
 
-    Parameters
-    ----------
-    path : Path or str
-    mesh : Mesh
-        As `load_mesh` gave it: moved, scaled and merged, so that each vertex takes the score of the file's nearest.
-
-    Returns
-    -------
-    ndarray, shape (n,), or None
-        None if the file has no such property.
-
-    Raises
-    ------
-    InputError
-        If the file is unreadable, or a score is not finite or outside 0 to 1.
+    `mesh`: as `load_mesh` gave it: moved, scaled and merged, so that each vertex takes the score of the file's nearest.
+    Shape (n,): none if the file has no such property. Raises InputError if the file is unreadable, or a score is not
+    finite or outside 0 to 1.
     """
     path = Path(path)
     if path.suffix.lower() != ".ply":

@@ -34,20 +34,11 @@ class FacelessFileError(InputError):
 class Mesh:
     """A triangle mesh in metres; whose frame it is in is for the owner to say.
 
-    Parameters
-    ----------
-    vertices_m : ndarray, shape (n, 3)
-    faces : ndarray of int64, shape (m, 3)
-        Vertex numbers, counter-clockwise seen from outside.
-
-    Raises
-    ------
-    InputError
-        If there is no face, a face names a vertex that does not exist, or a coordinate is not finite.
+    Raises InputError if there is no face, a face names a vertex that does not exist, or a coordinate is not finite.
     """
 
-    vertices_m: Array
-    faces: IntArray
+    vertices_m: Array  # shape (n, 3)
+    faces: IntArray  # shape (m, 3): vertex numbers, counter-clockwise seen from outside
 
     def __post_init__(self) -> None:
         freeze(self, vertices_m=(None, 3))
@@ -99,22 +90,10 @@ class Mesh:
 def load_mesh(path: Path | str, size_m: float | None = None) -> Mesh:
     """Read a target from a mesh file (PLY, STL, OBJ, OFF or GLB).
 
-    Parameters
-    ----------
-    path : Path or str
-    size_m : float, optional
-        Largest dimension wanted, in metres. Without it the file is taken to be in metres.
-
-    Returns
-    -------
-    Mesh
-        In a local frame with z up: centred in x and y, base at z = 0, faces oriented outward. An open scan stays open.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, empty, unreadable, holds no faces, a vertex that is not finite or nothing of any extent;
-        if `size_m` is not a size that a target has, or if none is given and the file's own is not one.
+    `size_m`: largest dimension wanted, in metres. Without it the file is taken to be in metres. In a local frame with z
+    up: centred in x and y, base at z = 0, faces oriented outward. An open scan stays open. Raises InputError if the
+    file is missing, empty, unreadable, holds no faces, a vertex that is not finite or nothing of any extent; if
+    `size_m` is not a size that a target has, or if none is given and the file's own is not one.
     """
     path = Path(path)
     smallest, largest = PLAUSIBLE_SIZE_M
@@ -141,10 +120,7 @@ def load_mesh(path: Path | str, size_m: float | None = None) -> Mesh:
 def read_mesh(path: Path | str) -> Mesh:
     """Read a mesh file just as it is: no moving, scaling, merging or turning of faces.
 
-    Raises
-    ------
-    InputError
-        If the file is missing, empty, unreadable, holds no faces or a vertex that is not finite.
+    Raises InputError if the file is missing, empty, unreadable, holds no faces or a vertex that is not finite.
     """
     path = path_of(path, "mesh file")
     vertices, faces = _read(path)

@@ -27,10 +27,7 @@ _NEVER = 1e-300
 class Rays:
     """Casts rays at one mesh.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        In any frame; faces of no area are never met.
+    `mesh`: in any frame; faces of no area are never met.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -46,17 +43,9 @@ class Rays:
     def first(self, starts_m: Array, directions: Array) -> tuple[IntArray, Array]:
         """The first face that each ray meets, and how far off.
 
-        Parameters
-        ----------
-        starts_m, directions : ndarray, shape (n, 3)
-            In the mesh's frame; distances are in lengths of the direction.
-
-        Returns
-        -------
-        face : ndarray of int64, shape (n,)
-            Number of the face, the lowest of several at one distance; -1 where nothing is met.
-        distance : ndarray, shape (n,)
-            Greater than 0; infinite where nothing is met.
+        `starts_m`, `directions`, shape (n, 3): in the mesh's frame; distances are in lengths of the direction. Returns
+        `face`, shape (n,): number of the face, the lowest of several at one distance; -1 where nothing is met. Returns
+        `distance`, shape (n,): greater than 0; infinite where nothing is met.
         """
         face = np.full(len(starts_m), -1, dtype=np.int64)
         distance = np.full(len(starts_m), np.inf)

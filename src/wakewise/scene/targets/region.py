@@ -67,18 +67,11 @@ NEGLIGIBLE = 1e-3
 def cell_middles(points: Array, weights: Array, cells: int) -> tuple[Array, Array]:
     """Cut points into cells of equal weight, halving across the longest side; give the cells' centroids and weights.
 
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-    weights : ndarray, shape (n,)
-        Positive.
-    cells : int
-        At most n.
+    - `weights`, shape (n,): positive.
+    - `cells`: at most n.
+    - Shapes: `points` (n, 3).
 
-    Returns
-    -------
-    tuple of ndarray, shapes (cells, 3) and (cells,)
-        Total weight and first moment are those of the points.
+    Returns shapes (cells, 3) and (cells,): total weight and first moment are those of the points.
     """
     middles, totals = np.empty((cells, 3)), np.empty(cells)
 
@@ -107,15 +100,7 @@ def centroidal(points: Array, weights: Array, count: int, rounds: int = 15) -> t
     moment of the clusters, which Lloyd's iteration makes small (Q. Du, V. Faber and M. Gunzburger, SIAM Rev. 41 (1999)
     637, doi 10.1137/S0036144599352836).
 
-    Parameters
-    ----------
-    points, weights : ndarray, shapes (n, 3) and (n,)
-    count : int
-        At most n.
-
-    Returns
-    -------
-    tuple of ndarray, shapes (count, 3) and (count,)
+    `count`: at most n. Shapes: `points`, `weights` (n, 3) and (n,). Returns shapes (count, 3) and (count,).
     """
     middles, totals = cell_middles(points, weights, count)
     for _ in range(rounds):
@@ -133,21 +118,12 @@ def relaxed(
 ) -> tuple[Array, Array]:
     """Move free points and all weights so that random tubes are summed well over the measure that cells stand for.
 
-    Parameters
-    ----------
-    points, weights : ndarray, shapes (n, 3) and (n,)
-        Where to start.
-    free : ndarray of bool, shape (n,)
-        Points that may move.
-    cells, cell_weights : ndarray, shapes (m, 3) and (m,)
-        The measure, finely.
-    rounds : int
-        Iterations of L-BFGS-B at most.
+    - `points`, `weights`, shapes (n, 3) and (n,): where to start.
+    - `free`, shape (n,): points that may move.
+    - `cells`, `cell_weights`, shapes (m, 3) and (m,): the measure, finely.
+    - `rounds`: iterations of L-BFGS-B at most.
 
-    Returns
-    -------
-    tuple of ndarray, shapes (n, 3) and (n,)
-        Weights are positive and have the measure's total.
+    Returns shapes (n, 3) and (n,): weights are positive and have the measure's total.
     """
     n, total = len(points), float(cell_weights.sum())
     unit = total / n
@@ -209,14 +185,8 @@ def sampling_error_pct(sample: Array, reference: Array, negligible: float = NEGL
     Relative to the reference where it matters; where the reference is below `negligible` times the largest of all, the
     error is relative to that bound instead, since nobody cares by what factor nothing differs from nothing.
 
-    Parameters
-    ----------
-    sample, reference : ndarray, shape (n,)
-        D of the same poses and thrusts, each divided by the total weight of its points.
-
-    Returns
-    -------
-    ndarray, shape (n,)
+    `sample`, `reference`, shape (n,): D of the same poses and thrusts, each divided by the total weight of its points.
+    Returns shape (n,).
     """
     sample, reference = np.asarray(sample, dtype=np.float64), np.asarray(reference, dtype=np.float64)
     if sample.shape != reference.shape or len(reference) == 0 or not reference.max() > 0.0:
@@ -272,21 +242,11 @@ _KRONECKER = 1.2207440846057596 ** -np.arange(1.0, 4.0)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Region:
-    """Points of the water that must stay still.
+    """Points of the water that must stay still."""
 
-    Parameters
-    ----------
-    points_W_m : ndarray, shape (n, 3)
-        In the world, above the bed; those on the surface come first.
-    weights : ndarray, shape (n,)
-        Positive; each times the squared speed at its point adds to D.
-    distance_m : ndarray, shape (n,)
-        To the target's surface; 0 for the points on it.
-    """
-
-    points_W_m: Array
-    weights: Array
-    distance_m: Array
+    points_W_m: Array  # shape (n, 3): in the world, above the bed; those on the surface come first
+    weights: Array  # shape (n,): positive; each times the squared speed at its point adds to D
+    distance_m: Array  # shape (n,): to the target's surface; 0 for the points on it
 
     def __post_init__(self) -> None:
         n = len(self.points_W_m)
@@ -299,20 +259,13 @@ class Region:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DenseQuadrature:
-    """The region as very many weighted points, surface first: what few points are to stand for.
+    """The region as very many weighted points, surface first: what few points are to stand for."""
 
-    Parameters
-    ----------
-    points_W_m : ndarray, shape (n, 3)
-    weights : ndarray, shape (n,)
-        Those of the surface add up to 1/2 (without a gain), those of the water to 1/2 * mean of exp(-d / 5 cm).
-    on_surface : int
-        How many of the points lie on the surface.
-    """
-
-    points_W_m: Array
+    points_W_m: Array  # shape (n, 3)
+    # Shape (n,): those of the surface add up to 1/2 (without a gain), those of the water to 1/2 * mean of exp(-d / 5
+    # cm).
     weights: Array
-    on_surface: int
+    on_surface: int  # how many of the points lie on the surface
 
     def __post_init__(self) -> None:
         n = len(self.points_W_m)
@@ -327,26 +280,12 @@ def sample_region(
     A fine measure of the region is cut into clusters; points are set at their middles, moved a little and weighed so
     that jets from any side are summed well. Points end on the surface or in the water, never in the flesh.
 
-    Parameters
-    ----------
-    target : Target
-    n : int
-        Number of points; the paper takes 150 for a simple and 300 for a branching target.
-    rng : numpy.random.Generator
-    delicacy : Delicacy, optional
-        Of the target's mesh, one score per vertex.
-    gain : float
-        How many times more the most delicate feature counts, 0 to 100.
+    - `n`: number of points; the paper takes 150 for a simple and 300 for a branching target.
+    - `delicacy`: of the target's mesh, one score per vertex.
+    - `gain`: how many times more the most delicate feature counts, 0 to 100.
 
-    Returns
-    -------
-    Region
-        A function of target, n and the generator's state alone.
-
-    Raises
-    ------
-    InputError
-        If n is outside 2 to 10,000, the gain out of range or given without features, or the features of another mesh.
+    Returns a function of target, n and the generator's state alone. Raises InputError if n is outside 2 to 10,000, the
+    gain out of range or given without features, or the features of another mesh.
     """
     if not POINTS_ALLOWED[0] <= n <= POINTS_ALLOWED[1]:
         raise InputError(f"region points {n}: allowed {POINTS_ALLOWED[0]} to {POINTS_ALLOWED[1]}")
@@ -386,20 +325,11 @@ def region_measure(
 ) -> DenseQuadrature:
     """Very many evenly spread points of surface and water with the paper's weights; a reference for fewer.
 
-    Parameters
-    ----------
-    target : Target
-    on_surface, in_water : int
-        How many of each.
-    rng, delicacy, gain
-        As in `sample_region`.
-    solid : Solid, optional
-        Of the target's mesh, where it is at hand.
+    - `on_surface`, `in_water`: how many of each.
+    - `rng`, `delicacy`, `gain`: as in `sample_region`.
+    - `solid`: of the target's mesh, where it is at hand.
 
-    Raises
-    ------
-    InputError
-        As `sample_region`.
+    Raises InputError as `sample_region`.
     """
     if not GAIN_ALLOWED[0] <= gain <= GAIN_ALLOWED[1]:
         raise InputError(f"delicate gain {gain:g}: allowed {GAIN_ALLOWED[0]:g} to {GAIN_ALLOWED[1]:g}")

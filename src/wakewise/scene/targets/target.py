@@ -23,26 +23,13 @@ from wakewise.scene.targets.mesh import Mesh, load_mesh
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Target:
-    """What must be photographed and stay undisturbed.
-
-    Parameters
-    ----------
-    name : str
-    mesh : Mesh
-        In the world (NED, z down).
-    centre_W_m : ndarray, shape (3,)
-        Middle of the box round the part that stands above the bed.
-    radius_m : float
-        Of the smallest sphere about `centre_W_m` that holds the part above the bed.
-    bed_z_m : float
-        Depth of the bed; what of the mesh lies deeper is buried.
-    """
+    """What must be photographed and stay undisturbed."""
 
     name: str
-    mesh: Mesh
-    centre_W_m: Array
-    radius_m: float
-    bed_z_m: float
+    mesh: Mesh  # in the world (NED, z down)
+    centre_W_m: Array  # shape (3,): middle of the box round the part that stands above the bed
+    radius_m: float  # of the smallest sphere about `centre_W_m` that holds the part above the bed
+    bed_z_m: float  # depth of the bed; what of the mesh lies deeper is buried
 
     def __post_init__(self) -> None:
         freeze(self, centre_W_m=(3,))
@@ -60,20 +47,11 @@ def place_on_bed(name: str, mesh_up: Mesh, bed_z_m: float, xy_m: Sequence[float]
 
     The frame is turned by pi about x, (x, y, z) to (x, -y, -z), which is a rotation and so mirrors nothing.
 
-    Parameters
-    ----------
-    name : str
-    mesh_up : Mesh
-        In a local z-up frame; its z = 0 is laid on the bed.
-    bed_z_m : float
-        Depth of the bed in the world.
-    xy_m : array_like, shape (2,)
-        Where the local origin goes.
+    - `mesh_up`: in a local z-up frame; its z = 0 is laid on the bed.
+    - `bed_z_m`: depth of the bed in the world.
+    - `xy_m`, shape (2,): where the local origin goes.
 
-    Raises
-    ------
-    InputError
-        If nothing of the mesh stands above the bed.
+    Raises InputError if nothing of the mesh stands above the bed.
     """
     north, east = (float(v) for v in xy_m)
     vertices_W = mesh_up.vertices_m * np.array([1.0, -1.0, -1.0]) + np.array([north, east, bed_z_m])
@@ -99,22 +77,13 @@ MeshMaker = Callable[[int], Mesh]
 def find_target(kind: str | Path, bed_z_m: float, seed: int = 0, size_m: float | None = None) -> Target:
     """The target of that name, standing on the bed.
 
-    Parameters
-    ----------
-    kind : str or Path
-        A procedural coral, the path of a mesh file, a name that an installed package offers (entry points
-        `wakewise.scene.targets`), or ``package.module:make``; see `MeshMaker`.
-    bed_z_m : float
-        Depth of the bed, more than 0.
-    seed : int
-        Which individual of a procedural one, 0 to 2^63 - 1.
-    size_m : float, optional
-        Scale a mesh file's largest extent to this; a procedural one has its own size.
+    - `kind`: a procedural coral, the path of a mesh file, a name that an installed package offers (entry points
+      `wakewise.scene.targets`), or ``package.module:make``; see `MeshMaker`.
+    - `bed_z_m`: depth of the bed, more than 0.
+    - `seed`: which individual of a procedural one, 0 to 2^63 - 1.
+    - `size_m`: scale a mesh file's largest extent to this; a procedural one has its own size.
 
-    Raises
-    ------
-    InputError
-        If there is no such target, its file is not usable, or a number is none that it can have.
+    Raises InputError if there is no such target, its file is not usable, or a number is none that it can have.
     """
     depth_m = finite_number(bed_z_m, "bed_z_m", above=0.0)
     name, mesh = find_mesh(kind, seed, size_m)

@@ -39,34 +39,18 @@ T D forwards, 0.20 to 0.22 at 4 to 8 N; of this a brushless motor with its contr
 
 @dataclass(frozen=True, kw_only=True)
 class DiskJet:
-    """One actuator disk.
+    """One actuator disk."""
 
-    Parameters
-    ----------
-    position_D : tuple of three
-        Centre of the disk, the origin being the disk of the case's first jet.
-    along : int
-        +1 or -1: the jet blows along plus or minus its axis.
-    strength : float
-        Momentum flux over that of a jet with exit speed U0: thrust over the unit thrust.
-    torque : float
-        Q / (T D), turning the water about the axis; 0 for a jet without swirl.
-    axis : str
-        x, y or z.
-    start, stop : float
-        When it pushes, in D / U0.
-    turn_deg : float
-        How far its axis, x, is turned about z, towards y.
-    """
-
+    # Centre of the disk, the origin being the disk of the case's first jet.
     position_D: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    along: int = 1
-    strength: float = 1.0
-    torque: float = 0.0
-    axis: str = "x"
+    along: int = 1  # +1 or -1: the jet blows along plus or minus its axis
+    strength: float = 1.0  # momentum flux over that of a jet with exit speed U0: thrust over the unit thrust
+    torque: float = 0.0  # Q / (T D), turning the water about the axis; 0 for a jet without swirl
+    axis: str = "x"  # X, y or z
+    # start, stop: when it pushes, in D / U0.
     start: float = 0.0
     stop: float = float("inf")
-    turn_deg: float = 0.0
+    turn_deg: float = 0.0  # how far its axis, x, is turned about z, towards y
 
     @property
     def direction(self) -> tuple[float, float, float]:
@@ -80,50 +64,29 @@ class DiskJet:
 
 @dataclass(frozen=True, kw_only=True)
 class LatticeCase:
-    """Jets in a box of still water with open faces, perhaps a floor that the first jet strikes, and solid boxes.
-
-    Parameters
-    ----------
-    name : str
-    jets : tuple of DiskJet
-    low_D, high_D : tuple of three
-        Corners of the box; every side must be a whole number of cells.
-    floor : bool
-        Whether the face at high x is a solid floor (half-way bounce-back); the others are open.
-    sponge_D : float
-        Thickness of the sponge before the open face at high x, in which viscosity grows; before the other open
-        faces, where water comes in slowly, it is one diameter.
-    cells_per_D : int
-    develop, average : float
-        Time before and during averaging, in D / U0.
-    reynolds : float
-        U0 D / nu.
-    smagorinsky : float
-        Smagorinsky's constant with the cell as filter width.
-    lattice_speed : float
-        U0 in cells per step; small against the lattice's speed of sound, 0.577.
-    unsteadiness : float
-        Rms of the disk's load over its mean, in patches of about D / 4 that live D / (2 U0): blades do not push
-        evenly, and a disk that did would send a laminar core.
-    seed : int
-    boxes_D : tuple of pairs of corners
-        Solid boxes in the water, low and high corner of each: cells whose middles they hold (half-way bounce-back).
-    """
+    """Jets in a box of still water with open faces, perhaps a floor that the first jet strikes, and solid boxes."""
 
     name: str
     jets: tuple[DiskJet, ...]
+    # low_D, high_D: corners of the box; every side must be a whole number of cells.
     low_D: tuple[float, float, float]
     high_D: tuple[float, float, float]
-    floor: bool = False
+    floor: bool = False  # whether the face at high x is a solid floor (half-way bounce-back); the others are open
+    # Thickness of the sponge before the open face at high x, in which viscosity grows; before the other open faces,
+    # where water comes in slowly, it is one diameter.
     sponge_D: float = 1.5
     cells_per_D: int = 10
+    # develop, average: time before and during averaging, in D / U0.
     develop: float = 40.0
     average: float = 80.0
-    reynolds: float = 1.0e4
-    smagorinsky: float = 0.12
-    lattice_speed: float = 0.15
+    reynolds: float = 1.0e4  # U0 D / nu
+    smagorinsky: float = 0.12  # smagorinsky's constant with the cell as filter width
+    lattice_speed: float = 0.15  # U0 in cells per step; small against the lattice's speed of sound, 0.577
+    # Rms of the disk's load over its mean, in patches of about D / 4 that live D / (2 U0): blades do not push evenly,
+    # and a disk that did would send a laminar core.
     unsteadiness: float = 0.15
     seed: int = 0
+    # Solid boxes in the water, low and high corner of each: cells whose middles they hold (half-way bounce-back).
     boxes_D: tuple[tuple[_Corner, _Corner], ...] = ()
 
     def __post_init__(self) -> None:
@@ -295,10 +258,7 @@ the thrust."""
 def find_case(name: str) -> LatticeCase:
     """Look a case up.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name.
+    Raises InputError if there is none of that name.
     """
     if name not in CASES:
         raise InputError(f"lattice case {name!r}: no such case, allowed {', '.join(CASES)}")

@@ -36,13 +36,7 @@ def collide(f: Populations, tau0: float, eddies: float) -> Populations:
 
     Plain Python, so that one text is compiled for processors (`kernel`) and for graphics cards (`cuda_kernel`).
 
-    Parameters
-    ----------
-    f : tuple of nineteen
-    tau0 : float
-        Relaxation time of the water itself.
-    eddies : float
-        `smagorinsky_factor`.
+    `tau0`: relaxation time of the water itself. `eddies`: `smagorinsky_factor`.
     """
     f0, f1, f2, f3, f4, f5, f6, f7, f8, f9, f10, f11, f12, f13, f14, f15, f16, f17, f18 = f
     xy_same, xy_cross = f7 + f8, f9 + f10
@@ -111,18 +105,11 @@ def collide_forced(
     The velocity includes half the force, u = (sum f c + F/2) / rho, and the source (1 - 1/(2 tau)) w [3 c.F + 4.5 Q :
     (u F + F u)] joins the collision (doi:10.1103/PhysRevE.65.046308); with F = 0 this is `collide`.
 
-    Parameters
-    ----------
-    g : ndarray, shape (19,)
-        Populations that came.
-    tau0, eddies : float
-        As in `collide`.
-    force : ndarray, shape (3,)
-        Over the density of rest, cells per step squared.
-    u, stress, drift : ndarray, shapes (3,), (3, 3) and (3, 3)
-        Room to work.
-    went : ndarray, shape (19,)
-        The result.
+    - `g`, shape (19,): populations that came.
+    - `tau0`, `eddies`: as in `collide`.
+    - `force`, shape (3,): over the density of rest, cells per step squared.
+    - `u`, `stress`, `drift`, shapes (3,), (3, 3) and (3, 3): room to work.
+    - `went`, shape (19,): the result.
     """
     excess = 0.0
     for a in range(3):

@@ -21,30 +21,18 @@ class LatticeFlow:
     w / sqrt(|w|). What the lattice shows of jets that meet head-on or cross, the flow sideways, this sum does not have;
     there, compute the case itself.
 
-    Parameters
-    ----------
-    table : MeanField
-    origins_W_m, directions_W : ndarray, shape (m, 3)
-        Centre of each disk, and where its jet blows (opposite to the force on the vehicle); scaled to unit length.
-    thrusts_N : ndarray, shape (m,)
-        Magnitudes; a thruster in reverse has its direction turned.
-    areas_m2 : ndarray, shape (m,)
-        Disk areas, which are the areas of the ducted exits.
-    turns : ndarray, shape (m,)
-        +1 where the table's swirl is as it is, right-handed about the jet, -1 where the screw turns the other way.
-    density_kg_m3 : float
-
-    Raises
-    ------
-    InputError
-        If shapes disagree, a thrust is negative, an area is not positive or a direction has no length.
+    Raises InputError if shapes disagree, a thrust is negative, an area is not positive or a direction has no length.
     """
 
     table: MeanField
+    # origins_W_m, directions_W: shape (m, 3): centre of each disk, and where its jet blows (opposite to the force on
+    # the vehicle); scaled to unit length.
     origins_W_m: Array
     directions_W: Array
-    thrusts_N: Array
-    areas_m2: Array
+    thrusts_N: Array  # shape (m,): magnitudes; a thruster in reverse has its direction turned
+    areas_m2: Array  # shape (m,): disk areas, which are the areas of the ducted exits
+    # Shape (m,): +1 where the table's swirl is as it is, right-handed about the jet, -1 where the screw turns the other
+    # way.
     turns: Array | None = None
     density_kg_m3: float = FRESH_WATER_KG_M3
 

@@ -39,12 +39,8 @@ from wakewise.simulation.lattice.stencil import (
 def share_out(at: Array, forces: Array, grid: Array) -> IntArray:
     """Share forces, shape (k, 3), between the eight cells about each place; the cells that got some, shape (c, 3).
 
-    Parameters
-    ----------
-    at : ndarray, shape (k, 3)
-        Places in cells, whole numbers at the middles of cells.
-    grid : ndarray, shape (nx, ny, nz, 3)
-        All zero; gets the forces. A share that would fall outside is left out.
+    `at`, shape (k, 3): places in cells, whole numbers at the middles of cells. `grid`, shape (nx, ny, nz, 3): all zero;
+    gets the forces. A share that would fall outside is left out.
     """
     nx, ny, nz = grid.shape[0], grid.shape[1], grid.shape[2]
     cells = np.empty((8 * at.shape[0], 3), np.int64)
@@ -137,27 +133,14 @@ def still_populations(velocity_cells: Array) -> Array:
 class ForcedLattice:
     """Water in a box; `advance` moves it on, `velocity` looks at it.
 
-    Parameters
-    ----------
-    low_W_m : ndarray, shape (3,)
-        Its low corner; z is that of the water's surface.
-    cells : tuple of three
-        Along north, east and down.
-    cell_m : float
-    fastest_m_s : float
-        The fastest jet that is to be expected: it sets the time step.
-    jet_m : float
-        Diameter of such a jet.
-    current_W_m_s : ndarray, shape (3,)
-        Steady current, level.
-    solid : ndarray of bool, shape `cells`
-        Cells of bodies that stand still.
-    density_kg_m3 : float
+    - `low_W_m`, shape (3,): its low corner; z is that of the water's surface.
+    - `cells`: along north, east and down.
+    - `fastest_m_s`: the fastest jet that is to be expected: it sets the time step.
+    - `jet_m`: diameter of such a jet.
+    - `current_W_m_s`, shape (3,): steady current, level.
+    - `solid`, shape `cells`: cells of bodies that stand still.
 
-    Raises
-    ------
-    InputError
-        If the box has too few cells, or a current that is not level or is faster than the fastest jet.
+    Raises InputError if the box has too few cells, or a current that is not level or is faster than the fastest jet.
     """
 
     def __init__(
@@ -213,10 +196,7 @@ class ForcedLattice:
     def advance(self, points_W_m: Array, forces_N: Array) -> None:
         """One step under forces on the water, both shape (k, 3); what lies outside the box is left out.
 
-        Raises
-        ------
-        StageError
-            If the flow has blown up.
+        Raises StageError if the flow has blown up.
         """
         _, ny, nz = self.cells
         self._fill_halo()
@@ -250,10 +230,7 @@ class ForcedLattice:
     def field_m_s(self) -> Lattice:
         """Velocity of every cell now, shape (3, nx, ny, nz); a view that the next step overwrites.
 
-        Raises
-        ------
-        StageError
-            If the flow has blown up.
+        Raises StageError if the flow has blown up.
         """
         if not self._fresh:
             velocity(self._now, *self.cells[1:], self._field)

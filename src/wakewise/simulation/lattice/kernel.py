@@ -105,20 +105,14 @@ def step(
 ) -> None:
     """Pull populations from neighbours in `src`, collide, write `dst`.
 
-    Parameters
-    ----------
-    src, dst : ndarray of float32, shape (19, nx + 2, size)
-        Made by `still_water`. Slots beside faces in the halo of `src` are filled; what the halo of `dst` holds
-        afterwards means nothing.
-    ny, nz : int
-        Cells inside, without halo, two or more.
-    tau_x, tau_yz : ndarray of float32, shapes (nx + 2,) and (size,)
-        Their sum is the relaxation time of the water itself in each cell: 1/2 + 3 nu, larger in a sponge. See
-        `plane_row` for the second.
-    eddies : float
-        `smagorinsky_factor`.
-    faces : ndarray of int, shape (6,)
-        OPEN, WALL or PERIODIC for low x, high x, low y, ... ; beyond periodic ones the halo of `src` must be filled.
+    - `src`, `dst`, shape (19, nx + 2, size): made by `still_water`. Slots beside faces in the halo of `src` are filled;
+      what the halo of `dst` holds afterwards means nothing.
+    - `ny`, `nz`: cells inside, without halo, two or more.
+    - `tau_x`, `tau_yz`, shapes (nx + 2,) and (size,): their sum is the relaxation time of the water itself in each
+      cell: 1/2 + 3 nu, larger in a sponge. See `plane_row` for the second.
+    - `eddies`: `smagorinsky_factor`.
+    - `faces`, shape (6,): OPEN, WALL or PERIODIC for low x, high x, low y, ... ; beyond periodic ones the halo of `src`
+      must be filled.
     """
     mz, planes, size = nz + 2, src.shape[1], src.shape[2]
     start = origin(nz) + mz + 1
@@ -175,12 +169,8 @@ def push(
 
     Call it right after `step`, with the same arguments.
 
-    Parameters
-    ----------
-    cells : ndarray of int, shape (k, 3)
-        Indices with halo.
-    forces : ndarray, shape (k, 3)
-        Force per cell over the density of rest, cells per step squared.
+    `cells`, shape (k, 3): indices with halo. `forces`, shape (k, 3): force per cell over the density of rest, cells per
+    step squared.
     """
     mz, start = nz + 2, origin(nz)
     g, went = np.empty(19), np.empty(19)

@@ -22,32 +22,16 @@ _TABLES = ("pressure", "axial", "radial", "swirl", "axial_rms", "radial_rms", "s
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeanField:
-    """Mean flow of a case about the axis of its first jet, in units of D, U0 = sqrt(T / (rho A)) and rho U0^2.
-
-    Parameters
-    ----------
-    case : str
-    hash : str
-        `case_hash` of what was computed.
-    cells_per_D : int
-    x_D, r_D : ndarray, shapes (nx,) and (nr,)
-        Evenly spaced; x = 0 is the disk, r = 0 the axis.
-    pressure, axial, radial, swirl, axial_rms, radial_rms, swirl_rms : ndarray, shape (nx, nr)
-        Means over time and angle, and root mean squares of what fluctuates about them. Swirl turns y into z, that is,
-        right-handed about the jet.
-    axis_times, axis_speeds : ndarray, shapes (nt,) and (nt, nx)
-        The speed on the axis while the jet starts (and stops), at times in D / U0.
-    floor_D : float
-        Distance from the disk to a solid floor; infinite without one.
-    figures : dict
-        What was measured on the run: see `wakewise.simulation.lattice.meanfield`.
-    """
+    """Mean flow of a case about the axis of its first jet, in units of D, U0 = sqrt(T / (rho A)) and rho U0^2."""
 
     case: str
-    hash: str
+    hash: str  # `case_hash` of what was computed
     cells_per_D: int
+    # x_D, r_D: shapes (nx,) and (nr,): evenly spaced; x = 0 is the disk, r = 0 the axis.
     x_D: Array
     r_D: Array
+    # pressure, axial, radial, swirl, axial_rms, radial_rms, swirl_rms: shape (nx, nr): means over time and angle, and
+    # root mean squares of what fluctuates about them. Swirl turns y into z, that is, right-handed about the jet.
     pressure: Array
     axial: Array
     radial: Array
@@ -55,9 +39,12 @@ class MeanField:
     axial_rms: Array
     radial_rms: Array
     swirl_rms: Array
+    # axis_times, axis_speeds: shapes (nt,) and (nt, nx): the speed on the axis while the jet starts (and stops), at
+    # times in D / U0.
     axis_times: Array
     axis_speeds: Array
-    floor_D: float = math.inf
+    floor_D: float = math.inf  # distance from the disk to a solid floor; infinite without one
+    # What was measured on the run: see `wakewise.simulation.lattice.meanfield`.
     figures: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -97,10 +84,7 @@ class MeanField:
 def read_mean_field(path: Path) -> MeanField:
     """Read what `save_mean_field` wrote.
 
-    Raises
-    ------
-    InputError
-        If the file is missing or no such table.
+    Raises InputError if the file is missing or no such table.
     """
     try:
         with np.load(path, allow_pickle=False) as data:
@@ -115,10 +99,8 @@ def read_mean_field(path: Path) -> MeanField:
 def load_mean_field(case: str = "swirl", folder: Path = DATA) -> MeanField:
     """Mean field of a case by name, from the package's own data unless told otherwise.
 
-    Raises
-    ------
-    InputError
-        If there is no such case or file, or if the file was computed for other parameters or by another solver.
+    Raises InputError if there is no such case or file, or if the file was computed for other parameters or by another
+    solver.
     """
     wanted = find_case(case)
     table = read_mean_field(folder / f"{case}.npz")

@@ -34,10 +34,7 @@ from wakewise.simulation.water.water import Water
 def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum:
     """Put together what the settings ask for; the generator draws the background turbulence only.
 
-    Raises
-    ------
-    InputError
-        If the series' file is not usable, or the pump's outlet is outside the water.
+    Raises InputError if the series' file is not usable, or the pump's outlet is outside the water.
     """
     length, width, depth = settings.size_m
     parts: list[Current] = []

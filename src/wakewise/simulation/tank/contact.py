@@ -20,14 +20,9 @@ class CollisionGeometry:
     Contact is inelastic and without friction: the hull is set back out of what it is in, along the shortest way for
     the target, and the part of its velocity that points into it is taken away. It is not turned by the blow.
 
-    Parameters
-    ----------
-    hull_m : ndarray, shape (3,)
-        Size of the box in body axes, centred on the body origin.
-    size_m : tuple of three floats
-        Length, width and depth of the tank.
-    target_W_m : ndarray, shape (n, 3)
-        Points on the target's surface, dense enough that the hull meets one.
+    - `hull_m`, shape (3,): size of the box in body axes, centred on the body origin.
+    - `size_m`: length, width and depth of the tank.
+    - `target_W_m`, shape (n, 3): points on the target's surface, dense enough that the hull meets one.
     """
 
     def __init__(self, hull_m: Array, size_m: tuple[float, float, float], target_W_m: Array) -> None:

@@ -34,15 +34,9 @@ class FlakeAdvector(Protocol):
 class Flakes:
     """Flakes of one tank.
 
-    Parameters
-    ----------
-    centre_W_m : ndarray, shape (3,)
-        Of the target.
-    depth_m : float
-        Of the water.
-    ambient : Current
-        The water's own motion.
-    rng : numpy Generator
+    - `centre_W_m`, shape (3,): of the target.
+    - `depth_m`: of the water.
+    - `ambient`: the water's own motion.
     """
 
     def __init__(self, centre_W_m: Array, depth_m: float, ambient: Current, rng: np.random.Generator) -> None:

@@ -196,13 +196,7 @@ def pickup_rate_kg_m2_s(
     measured up to a Shields number of about 1 and is far too high beyond, so it is divided by the Shields number there
     (van Rijn, Bisschop and van Rhee 2019, J. Hydraul. Eng. 145, 04018084).
 
-    Parameters
-    ----------
-    stress_Pa : array_like
-        On the bed; the result has its shape.
-    threshold_Pa : float or array_like
-        One, or one for each stress.
-    grain_m, grain_density_kg_m3, density_kg_m3 : float
+    `stress_Pa`: on the bed; the result has its shape. `threshold_Pa`: one, or one for each stress.
     """
     number = grain_number(grain_m, grain_density_kg_m3, density_kg_m3)
     stress = np.asarray(stress_Pa, dtype=np.float64)
@@ -219,12 +213,7 @@ def beam_attenuation_per_m(concentration_kg_m3: ArrayLike, grain_m: float, densi
     Grains much larger than a wavelength take twice their cross-section from a beam (van de Hulst 1957, Light
     Scattering by Small Particles).
 
-    Parameters
-    ----------
-    concentration_kg_m3 : array_like
-    grain_m : float
-    density_kg_m3 : float
-        Of the grains.
+    `density_kg_m3`: of the grains.
     """
     _check_grain(grain_m, density_kg_m3, 0.0)
     extinction_efficiency = 2.0

@@ -40,16 +40,7 @@ _MOST_GAIN = 1.2  # water that runs against the jet raises thrust; the line hold
 class FailingThrusters:
     """Turns wanted thrusts into what failing thrusters are still driven to; the motors' lag comes after.
 
-    Parameters
-    ----------
-    failures : tuple of ThrusterFailure
-    count : int
-        Thrusters of the vehicle.
-
-    Raises
-    ------
-    InputError
-        If a failure names a thruster that the vehicle has not.
+    `count`: thrusters of the vehicle. Raises InputError if a failure names a thruster that the vehicle has not.
     """
 
     def __init__(self, failures: tuple[ThrusterFailure, ...], count: int) -> None:
@@ -85,14 +76,10 @@ def inflow_factors(thrusts_N: Array, inflow_m_s: Array, areas_m2: Array, density
     T. I. Fossen 2000, Dynamic model for thrust generation of marine propellers, IFAC MCMC): V0 = J0 n D with
     n = sqrt(T(0) / (rho D^4 K_T)). Kept between 0 and 1.2.
 
-    Parameters
-    ----------
-    thrusts_N : ndarray, shape (n,)
-        In still water; only the size counts.
-    inflow_m_s : ndarray, shape (n,)
-        Speed of the water relative to the disk, along the jet that the thruster sends; its own suction left out.
-    areas_m2 : ndarray, shape (n,)
-    density_kg_m3 : float
+    - `thrusts_N`, shape (n,): in still water; only the size counts.
+    - `inflow_m_s`, shape (n,): speed of the water relative to the disk, along the jet that the thruster sends; its own
+      suction left out.
+    - Shapes: `areas_m2` (n,).
     """
     diameters = np.sqrt(4 * areas_m2 / math.pi)
     no_thrust = ADVANCE_OF_NO_THRUST / math.sqrt(KT_STILL) * np.sqrt(np.abs(thrusts_N) / density_kg_m3) / diameters
@@ -115,26 +102,13 @@ class VehiclePlant:
     Thrusters do what their speed controllers can: a command below the least thrust turns no propeller, one above it is
     that of the nearest pulse (`Vehicle.thrust_steps`).
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        True parameters.
-    start : BodyState
-    density_kg_m3 : float
-    ambient : AmbientSum
-        Motion of the water without thrusters.
-    size_m : tuple of three floats
-        Length, width and depth of the tank.
-    target_W_m : ndarray, shape (n, 3)
-        Points on the target's surface.
-    failures : tuple of ThrusterFailure
-    tether : Tether or None
+    - `vehicle`: true parameters.
+    - `ambient`: motion of the water without thrusters.
+    - `size_m`: length, width and depth of the tank.
+    - `target_W_m`, shape (n, 3): points on the target's surface.
 
-    Raises
-    ------
-    InputError
-        If the hull is in the floor, a wall, the air or the target at the start, the cable does not reach it, or a
-        failure names a thruster that it has not.
+    Raises InputError if the hull is in the floor, a wall, the air or the target at the start, the cable does not reach
+    it, or a failure names a thruster that it has not.
     """
 
     def __init__(
@@ -280,13 +254,8 @@ class VehiclePlant:
     def step(self, commands_N: Array, dt_s: float, inflow_W_m_s: Array | None = None) -> None:
         """Move on by one short time step.
 
-        Parameters
-        ----------
-        commands_N : ndarray, shape (n,)
-            Clipped to the limits, and to what the thrusters can hold.
-        dt_s : float
-        inflow_W_m_s : ndarray, shape (n, 3), or None
-            Velocity of the water at the disks without each thruster's own jet; None leaves inflow losses out.
+        `commands_N`, shape (n,): clipped to the limits, and to what the thrusters can hold. `inflow_W_m_s`, shape (n,
+        3): velocity of the water at the disks without each thruster's own jet; None leaves inflow losses out.
         """
         self._step(self._steps_of(np.array(commands_N, dtype=np.float64)), dt_s, inflow_W_m_s)
 

@@ -36,10 +36,8 @@ _LONGEST_S = 36_000.0
 class ThrustHistory:
     """Thrusts that hold from one time to the next, shapes (k,) and (k, n); the last row ends the history.
 
-    Raises
-    ------
-    InputError
-        If there are fewer than two rows, times do not rise, go on for more than ten hours or a value is not finite.
+    Raises InputError if there are fewer than two rows, times do not rise, go on for more than ten hours or a value is
+    not finite.
     """
 
     times_s: Array
@@ -71,10 +69,7 @@ class ThrustHistory:
 def read_table(path: Path, what: str) -> tuple[list[str], Array]:
     """Read a CSV file of finite numbers under one row of names.
 
-    Raises
-    ------
-    InputError
-        In one line, with file and place.
+    Raises InputError: in one line, with file and place.
     """
     try:
         rows = [row for row in csv.reader(path.read_text(encoding="utf-8-sig").splitlines()) if row]
@@ -111,10 +106,7 @@ def read_thrusts(path: Path, vehicle: Vehicle) -> tuple[ThrustHistory, dict[str,
     name is either, the columns are taken in the vehicle's order. Thrusts may be up to 5 % beyond what the vehicle's
     file says that its thrusters give, as those of a trial's tank may be; `probe` itself has no limit.
 
-    Raises
-    ------
-    InputError
-        If the file, a column or a value is bad, or columns and thrusters do not match.
+    Raises InputError if the file, a column or a value is bad, or columns and thrusters do not match.
     """
     header, table = read_table(path, "a CSV with time_s and one thrust in N per thruster")
     if "time_s" not in header:
@@ -149,9 +141,7 @@ def read_thrusts(path: Path, vehicle: Vehicle) -> tuple[ThrustHistory, dict[str,
 def read_points(path: Path) -> Array:
     """Read points of the world, columns x_m, y_m and z_m in any order, shape (n, 3).
 
-    Raises
-    ------
-    InputError
+    Raises InputError.
     """
     header, table = read_table(path, "a CSV with x_m, y_m, z_m")
     missing = [name for name in ("x_m", "y_m", "z_m") if name not in header]
@@ -165,10 +155,7 @@ def read_points(path: Path) -> Array:
 def regular_times(history: ThrustHistory, every_s: float) -> Array:
     """Times at equal steps over a history, its start included, shape (k,).
 
-    Raises
-    ------
-    InputError
-        If the step is not positive, longer than the history, or gives more than a million times.
+    Raises InputError if the step is not positive, longer than the history, or gives more than a million times.
     """
     length = float(history.times_s[-1] - history.times_s[0])
     if not (math.isfinite(every_s) and every_s > 0.0 and length / every_s < 1e6):
@@ -256,35 +243,20 @@ def probe(
     Thrusts are what the thrusters give: there is no lag, no limit and no loss. Water is without walls and surface;
     the floor is a plane through which nothing flows and along which jets that strike it run out.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    X_WB : Pose
-    history : ThrustHistory
-    points_W_m : ndarray, shape (n, 3)
-    times_s : ndarray, shape (k,), or None
-        Rising, within the history; None takes the history's own.
-    floor_z_m : float or None
-        Depth of the floor; None for open water.
-    target : Target or None
-        A body on the floor that turns the flow aside.
-    flow : str
-        ``parcels``, the water that trials fly in; or ``lattice``, means of a solved jet for each thruster, joined by
-        momentum: at each time the steady flow of the thrusts of then, as if they had long been running. The lattice was
-        a box round one jet: nothing is known of points that lie in no running jet's box.
-    turbulence : float
-        Root mean square of the fluctuation on a jet's axis over its mean speed; 0 gives mean jets. Parcels only.
-    swirl : bool
-        Whether parcels spread as a propeller's swirling jet does. Parcels only; the lattice's jet swirls.
-    density_kg_m3 : float
-    seed : int
-        Of the turbulence.
+    - `times_s`, shape (k,): rising, within the history; None takes the history's own.
+    - `floor_z_m`: depth of the floor; None for open water.
+    - `target`: a body on the floor that turns the flow aside.
+    - `flow`: ``parcels``, the water that trials fly in; or ``lattice``, means of a solved jet for each thruster, joined
+      by momentum: at each time the steady flow of the thrusts of then, as if they had long been running. The lattice
+      was a box round one jet: nothing is known of points that lie in no running jet's box.
+    - `turbulence`: root mean square of the fluctuation on a jet's axis over its mean speed; 0 gives mean jets. Parcels
+      only.
+    - `swirl`: whether parcels spread as a propeller's swirling jet does. Parcels only; the lattice's jet swirls.
+    - `seed`: of the turbulence.
+    - Shapes: `points_W_m` (n, 3).
 
-    Raises
-    ------
-    InputError
-        If anything does not fit: points or hull below the floor, the hull in the target, times outside the history,
-        what a flow cannot do.
+    Raises InputError if anything does not fit: points or hull below the floor, the hull in the target, times outside
+    the history, what a flow cannot do.
     """
     if flow not in FLOWS:
         raise InputError(f"flow: '{flow}', allowed are {', '.join(FLOWS)}")

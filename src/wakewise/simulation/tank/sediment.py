@@ -131,19 +131,12 @@ class SiltProperties:
 class Silt:
     """Silt of one tank.
 
-    Parameters
-    ----------
-    laws : SiltProperties
-    load_kg_m2 : float
-        On every part of the bed at the start.
-    size_m : tuple of three floats
-        Length, width and depth of the tank, whose bed is at z = depth and whose middle is at x = y = 0.
-    max_particles : int
-        Above this, pairs of neighbouring particles become one: the mass adds up, the place is that of one of the two,
-        drawn with their masses as odds, which keeps the expected distribution.
-    rng : numpy Generator
-    swell : Swell, optional
-        The wave that is part of the flow, whose thin boundary layer drags on the bed more than its speed lets expect.
+    - `load_kg_m2`: on every part of the bed at the start.
+    - `size_m`: length, width and depth of the tank, whose bed is at z = depth and whose middle is at x = y = 0.
+    - `max_particles`: above this, pairs of neighbouring particles become one: the mass adds up, the place is that of
+      one of the two, drawn with their masses as odds, which keeps the expected distribution.
+    - `swell`: the wave that is part of the flow, whose thin boundary layer drags on the bed more than its speed lets
+      expect.
     """
 
     def __init__(
@@ -232,13 +225,8 @@ class Silt:
     def step(self, flow: Flow, stirred_W_m: Array, dt_s: float) -> None:
         """Erode, carry, mix and settle over dt_s.
 
-        Parameters
-        ----------
-        flow : Flow
-            Water at this instant.
-        stirred_W_m : ndarray, shape (n, 3)
-            Circles on the bed, (x, y, radius), outside which no jet stirs it; only the current acts there.
-        dt_s : float
+        `flow`: water at this instant. `stirred_W_m`, shape (n, 3): circles on the bed, (x, y, radius), outside which no
+        jet stirs it; only the current acts there.
         """
         self._shear(flow, stirred_W_m)
         self._erode(dt_s)

@@ -113,15 +113,9 @@ class Sensors:
     def sample(self, time_s: float, state: Array, force_B_m_s2: Array, turbidity_per_m: float = 0.0) -> None:
         """Take the samples that are due at `time_s`.
 
-        Parameters
-        ----------
-        time_s : float
-        state : ndarray, shape (13,)
-            True position, quaternion (w, x, y, z) and twist.
-        force_B_m_s2 : ndarray, shape (3,)
-            True specific force at the body origin.
-        turbidity_per_m : float
-            Beam attenuation between camera and target.
+        - `state`, shape (13,): true position, quaternion (w, x, y, z) and twist.
+        - `force_B_m_s2`, shape (3,): true specific force at the body origin.
+        - `turbidity_per_m`: beam attenuation between camera and target.
         """
         for kind, due_s in enumerate(self._due_s):
             if due_s <= time_s + _TICK_TOLERANCE_S:
@@ -202,15 +196,9 @@ def _turned(q: Array, turn_rad: Array) -> Array:
 class CameraJoint:
     """A tilt joint with its encoder; a camera without a joint stays at zero and measures nothing.
 
-    Parameters
-    ----------
-    joint : TiltJoint or None
-    tilt_rad : float
-        Where it stands at the start; its stops hold it.
-    settings : SensorSettings
-        Bias and noise of what it measures.
-    rng : numpy Generator
-        Draws both.
+    - `tilt_rad`: where it stands at the start; its stops hold it.
+    - `settings`: bias and noise of what it measures.
+    - `rng`: draws both.
     """
 
     def __init__(

@@ -94,22 +94,12 @@ class SurfaceElements:
 
 @dataclass(eq=False)
 class TargetMotion:
-    """Moves a target through the water's steps.
-
-    Parameters
-    ----------
-    target : Target
-    yielding : TargetCompliance
-    density_kg_m3 : float
-        Of the water.
-    ambient : Current
-        The water's own motion.
-    """
+    """Moves a target through the water's steps."""
 
     target: Target
     yielding: TargetCompliance
-    density_kg_m3: float
-    ambient: Current
+    density_kg_m3: float  # of the water
+    ambient: Current  # the water's own motion
     tips_m: Array = field(init=False)
     speeds_m_s: Array = field(init=False)
     alone_m: Array = field(init=False)
@@ -219,22 +209,12 @@ def check_sway(
 ) -> None:
     """Refuse a target that is too stiff or too soft to be moved by the water's steps.
 
-    Parameters
-    ----------
-    target : Target
-    sway : BendingModes
-    drag : float
-    water_m_s : ndarray, shape (3,)
-        The fastest current that it stands in.
-    density_kg_m3 : float
-        Of the water.
-    step_s : float
-        The water's.
+    - `water_m_s`, shape (3,): the fastest current that it stands in.
+    - `density_kg_m3`: of the water.
+    - `step_s`: the water's.
 
-    Raises
-    ------
-    InputError
-        With the figures: its slowest mode is faster than the water is known, or the current bends it beyond half.
+    Raises InputError: with the figures: its slowest mode is faster than the water is known, or the current bends it
+    beyond half.
     """
     slowest, known = float(sway.frequency_Hz[:, 0].min()), fastest_Hz(step_s)
     if slowest > known:
@@ -258,10 +238,7 @@ def check_sway(
 def check_loose(target: Target, yielding: TargetCompliance, water_m_s: Array, density_kg_m3: float) -> None:
     """Refuse a target that its current, (3,), carries away before any thruster turns.
 
-    Raises
-    ------
-    InputError
-        With the drag and the friction.
+    Raises InputError: with the drag and the friction.
     """
     if yielding.loose is None:
         return

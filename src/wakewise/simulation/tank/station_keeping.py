@@ -27,29 +27,14 @@ _SOME_N, _SOME_N_m = 0.05, 0.005
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StationKeepingDemand:
     """The hardest of the loads that a vehicle was asked to hold against: of water that passes, and of its own weight.
-
-    Parameters
-    ----------
-    passing_B_m_s : ndarray, shape (3,)
-        Velocity of the water past the vehicle, in body axes.
-    drag_N : ndarray, shape (3,)
-        What it puts on the vehicle along each body axis.
-    share : float
-        The largest multiple of the wrench needed that the thrusters give without turning the vehicle.
-    more_drag : float
-        Share by which the drag is taken above that of the vehicle's model.
-    heavy_N : float
-        Weight less buoyancy, positive: it sinks.
-    righting_N_m : float
-        Moment by which weight and buoyancy turn the vehicle out of its attitude.
     """
 
-    passing_B_m_s: Array
-    drag_N: Array
-    share: float
-    more_drag: float = 0.0
-    heavy_N: float = 0.0
-    righting_N_m: float = 0.0
+    passing_B_m_s: Array  # shape (3,): velocity of the water past the vehicle, in body axes
+    drag_N: Array  # shape (3,): what it puts on the vehicle along each body axis
+    share: float  # the largest multiple of the wrench needed that the thrusters give without turning the vehicle
+    more_drag: float = 0.0  # share by which the drag is taken above that of the vehicle's model
+    heavy_N: float = 0.0  # weight less buoyancy, positive: it sinks
+    righting_N_m: float = 0.0  # moment by which weight and buoyancy turn the vehicle out of its attitude
 
     def __post_init__(self) -> None:
         freeze(self, passing_B_m_s=(3,), drag_N=(3,))
@@ -92,22 +77,11 @@ def station_keeping_demand(
     its buoyancy and an upward trim must be met by thrusts within their limits that make no other force and no other
     moment; how many times over they can is a linear program per load. Only the ten largest are looked at.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    passing_B_m_s : ndarray, shape (n, 3)
-        Flows past the vehicle, in body axes.
-    density_kg_m3 : float
-    trim_N : float
-        Buoyancy beyond the vehicle's own.
-    more_drag : float
-    q_WB : ndarray, shape (n, 4), optional
-        Attitude at each flow; level if not given.
+    - `passing_B_m_s`, shape (n, 3): flows past the vehicle, in body axes.
+    - `trim_N`: buoyancy beyond the vehicle's own.
+    - `q_WB`, shape (n, 4): attitude at each flow; level if not given.
 
-    Raises
-    ------
-    StageError
-        If a linear program fails.
+    Raises StageError if a linear program fails.
     """
     body = compile_body(vehicle, density_kg_m3)
     flows = np.round(np.asarray(passing_B_m_s, dtype=np.float64).reshape(-1, 3), 3)
@@ -180,17 +154,8 @@ _BRACKET_M = 0.1  # a cable may be held this far off the hull
 def check_fit(settings: TankSettings, vehicle: Vehicle, route: Sequence[tuple[float, Pose]]) -> None:
     """Refuse failures of thrusters that are not there, or that come too late, and a cable that does not reach.
 
-    Parameters
-    ----------
-    settings : TankSettings
-    vehicle : Vehicle
-    route : sequence of (float, Pose)
-        Times and poses of the body, from start to end.
-
-    Raises
-    ------
-    InputError
-        Naming the field, what was found and what is allowed.
+    `route`: times and poses of the body, from start to end. Raises InputError: naming the field, what was found and
+    what is allowed.
     """
     _check_failures(settings, vehicle, route[-1][0])
     if settings.tether.diameter_m > 0.0:

@@ -106,29 +106,17 @@ log = logging.getLogger(__name__)
 class Tank:
     """The simulated world of a trial (a `Plant`); its truth is for the record and never for the controller.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        The plant's own parameters, which differ from what the controller believes.
-    target : Target
-        Standing on the bed, at the tank's depth.
-    settings : TankSettings
-    start : BodyState
-    rng : numpy Generator
-        Its children serve water, silt, sensors and probes.
-    tilt_rad : float
-        Where the joint of the camera, if it has one, stands at the start.
-    yielding : Yielding, optional
-        How the target gives way to the water; None of one that nothing moves.
-    beside : bool
-        Move water and silt on threads of their own, while the vehicle goes on. It pays where whoever calls `step` does
-        little in between; a controller in Python and they would wait for each other's hold of the interpreter.
+    - `vehicle`: the plant's own parameters, which differ from what the controller believes.
+    - `target`: standing on the bed, at the tank's depth.
+    - `rng`: its children serve water, silt, sensors and probes.
+    - `tilt_rad`: where the joint of the camera, if it has one, stands at the start.
+    - `yielding`: how the target gives way to the water; None of one that nothing moves.
+    - `beside`: move water and silt on threads of their own, while the vehicle goes on. It pays where whoever calls
+      `step` does little in between; a controller in Python and they would wait for each other's hold of the
+      interpreter.
 
-    Raises
-    ------
-    InputError
-        If the vehicle starts in the floor, a wall, the air or the target, the target does not stand on the bed, or
-        the settings' current, pump, cable or failures do not fit.
+    Raises InputError if the vehicle starts in the floor, a wall, the air or the target, the target does not stand on
+    the bed, or the settings' current, pump, cable or failures do not fit.
     """
 
     def __init__(
@@ -255,10 +243,7 @@ class Tank:
     def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
         """Hold commanded thrusts, shape (n,), for dt_s; return what the sensors handed over, oldest sample first.
 
-        Raises
-        ------
-        InputError
-            If the commands do not match the thrusters or are not finite, or dt_s is not positive.
+        Raises InputError if the commands do not match the thrusters or are not finite, or dt_s is not positive.
         """
         commands = np.asarray(thrusts_N, dtype=np.float64)
         n = len(self._plant.vehicle.thrusters)
@@ -484,32 +469,17 @@ class TankTruth:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TankWorld:
-    """A tank that begins alike each time; implements `wakewise.core.interfaces.World`.
+    """A tank that begins alike each time; implements `wakewise.core.interfaces.World`."""
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        True parameters, known to nobody else.
-    target : Target
-    settings : TankSettings
-    start : BodyState
-        Where the vehicle really is when the flight begins.
-    draw : callable
-        Gives the generator of all draws, a fresh one of the same seed at each call.
-    tilt_rad : float
-        Where the camera's joint stands when the flight begins.
-    yielding : Yielding, optional
-        How the target gives way; None of one that nothing moves.
-    """
-
-    vehicle: Vehicle
+    vehicle: Vehicle  # true parameters, known to nobody else
     target: Target
     settings: TankSettings
-    start: BodyState
+    start: BodyState  # where the vehicle really is when the flight begins
+    # Gives the generator of all draws, a fresh one of the same seed at each call.
     draw: Callable[[], np.random.Generator]
     name: str = "tank"
-    tilt_rad: float = 0.0
-    yielding: TargetCompliance | None = None
+    tilt_rad: float = 0.0  # where the camera's joint stands when the flight begins
+    yielding: TargetCompliance | None = None  # how the target gives way; None of one that nothing moves
 
     def tank(self, beside: bool = True) -> Tank:
         """A fresh tank at its start, with all that it knows; its water moves `beside` the vehicle, or after it."""

@@ -31,22 +31,13 @@ class Tether:
     straight bar held at both ends, the force of a segment at the share s of the way goes to the vehicle with weight s.
     Cable paid out beyond the straight line counts as if it lay along it. Beyond its length the cable pulls like a
     spring. Sag, weight and waves along the cable are left out, and so are the jets that blow past it.
-
-    Parameters
-    ----------
-    winch_W_m : ndarray, shape (3,)
-    p_BT_m : ndarray, shape (3,)
-        Where it holds the vehicle, in the body frame.
-    diameter_m, length_m : float
-    density_kg_m3 : float
-        Of the water.
     """
 
-    winch_W_m: Array
-    p_BT_m: Array
+    winch_W_m: Array  # shape (3,)
+    p_BT_m: Array  # shape (3,): where it holds the vehicle, in the body frame
     diameter_m: float
     length_m: float
-    density_kg_m3: float
+    density_kg_m3: float  # of the water
 
     @classmethod
     def of(cls, settings: TankSettings) -> Tether | None:
@@ -68,9 +59,7 @@ class Tether:
     def check_reach(self, X_WB: Pose) -> None:
         """Refuse a start beyond the cable's length.
 
-        Raises
-        ------
-        InputError
+        Raises InputError.
         """
         away = float(np.linalg.norm(X_WB.apply(self.p_BT_m) - self.winch_W_m))
         if away > self.length_m:

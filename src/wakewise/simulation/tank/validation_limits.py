@@ -11,27 +11,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class ValidationLimit:
-    """One law of the water.
+    """One law of the water."""
 
-    Parameters
-    ----------
-    name : str
-        Short, and one of its kind.
-    law : str
-        What is compared: mostly the tank's figure over the law's or the lattice's, so that 1 would be right.
-    source : str
-    asked, reached : tuple of two floats
-        From and to.
-    means : str
-        For a claim that rests on it.
-    """
-
-    name: str
-    law: str
+    name: str  # short, and one of its kind
+    law: str  # what is compared: mostly the tank's figure over the law's or the lattice's, so that 1 would be right
     source: str
+    # asked, reached: from and to.
     asked: tuple[float, float]
     reached: tuple[float, float]
-    means: str
+    means: str  # for a claim that rests on it
 
     @property
     def met(self) -> bool:

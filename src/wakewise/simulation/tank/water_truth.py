@@ -126,16 +126,9 @@ class TargetProbes:
     ) -> WaterTruth:
         """Look at all of them.
 
-        Parameters
-        ----------
-        water : ExcessFlow
-        laws : SiltProperties
-        silt : ScalarGrid or None
-            Concentration in kg/m3; None for clear water.
-        camera_W_m : ndarray, shape (3,)
-        density_kg_m3 : float
-        swell : Swell, optional
-            The wave that is part of the ambient water, at `time_s`.
+        - `silt`: concentration in kg/m3; None for clear water.
+        - `swell`: the wave that is part of the ambient water, at `time_s`.
+        - Shapes: `camera_W_m` (3,).
         """
         excess = water.excess_velocity(self._all_W_m)
         ambient = self._ambient_m_s(water)

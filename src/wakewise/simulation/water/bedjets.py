@@ -70,21 +70,13 @@ class RingBuffers(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class WallJetRings:
-    """Rings of the wall jets on one plane, in its own frame.
+    """Rings of the wall jets on one plane, in its own frame."""
 
-    Parameters
-    ----------
-    centre_m : ndarray, shape (n, 2)
-        Where the jet struck, carried by the current since.
-    radius_m : ndarray, shape (n,)
-    impulse_m4_s : ndarray, shape (n,)
-    lean : ndarray, shape (n, 2)
-        Share of the impulse that goes along the plane, as a vector: its length is below 1, and 0 for an upright jet.
-    """
-
-    centre_m: Array
-    radius_m: Array
-    impulse_m4_s: Array
+    centre_m: Array  # shape (n, 2): where the jet struck, carried by the current since
+    radius_m: Array  # shape (n,)
+    impulse_m4_s: Array  # shape (n,)
+    # Shape (n, 2): share of the impulse that goes along the plane, as a vector: its length is below 1, and 0 for an
+    # upright jet.
     lean: Array
 
     @classmethod
@@ -191,18 +183,13 @@ def packed_velocity(points_W_m: Array, packed: Array, bed_z_m: float, *, exact: 
 def planes_velocity(points_W_m: Array, planes: Array, starts: IntArray, packed: Array, *, exact: bool = False) -> Array:
     """Velocity of packed rings on several planes, shape (n, 3), at points, shape (n, 3).
 
-    Parameters
-    ----------
-    points_W_m : ndarray, shape (n, 3)
-    planes : ndarray, shape (k, 14)
-        Of each: origin, the three rows of the turn from the world into its frame, depth there, and 0 if its rings are
-        those of a wall jet; if it has the same rings on both sides, how many times higher than a wall jet's they are.
-    starts : ndarray of int, shape (k + 1,)
-        Plane i has the rings from starts[i] to starts[i + 1].
-    packed : ndarray, shape (m, 15)
-        See `packed_rings`; each in its plane's frame.
-    exact : bool
-        Sum in double precision.
+    - `planes`, shape (k, 14): of each: origin, the three rows of the turn from the world into its frame, depth there,
+      and 0 if its rings are those of a wall jet; if it has the same rings on both sides, how many times higher than a
+      wall jet's they are.
+    - `starts`, shape (k + 1,): plane i has the rings from starts[i] to starts[i + 1].
+    - `packed`, shape (m, 15): see `packed_rings`; each in its plane's frame.
+    - `exact`: sum in double precision.
+    - Shapes: `points_W_m` (n, 3).
     """
     out = np.zeros((len(points_W_m), 3))
     if len(packed) and len(points_W_m):
@@ -298,17 +285,9 @@ def grow_layers(
 ) -> None:
     """Let rings run out for dt_s, in place. Exact in dt for a speed that falls as 1/R.
 
-    Parameters
-    ----------
-    layers : RingBuffers
-    count : int
-    current_m_s : ndarray, shape (count, 3)
-        Velocity of the current in each ring's plane's frame, which carries the centres.
-    least_m, stretch : ndarray, one of each plane
-        As in `packed_rings`.
-    dt_s : float
-    speed_m_s : ndarray, shape (count,)
-        Layer speed that they had; written.
+    - `current_m_s`, shape (count, 3): velocity of the current in each ring's plane's frame, which carries the centres.
+    - `least_m`, `stretch`: as in `packed_rings`.
+    - `speed_m_s`, shape (count,): layer speed that they had; written.
     """
     speeds = layer_speeds(layers, count)
     for j in range(count):

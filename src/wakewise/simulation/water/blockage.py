@@ -87,29 +87,16 @@ class PackedBlockage(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Blockage:
-    """Sources that keep water out of a body standing on the bed.
+    """Sources that keep water out of a body standing on the bed."""
 
-    Parameters
-    ----------
-    points_m, normals : ndarray, shape (k, 3)
-        On the surface, and outward from it: where the flow across is made least.
-    sources_m : ndarray, shape (s, 3)
-    sigmas_m : ndarray, shape (s,)
-    response : ndarray, shape (s, k)
-        Strengths in m3/s for a unit velocity across the surface at each point.
-    bed_z_m : float
-        The sources are mirrored there.
-    piece_m2 : float
-        Area of the convex hull, or of the surface if that is less, over the number of points.
-    """
-
+    # points_m, normals: shape (k, 3): on the surface, and outward from it: where the flow across is made least.
     points_m: Array
     normals: Array
-    sources_m: Array
-    sigmas_m: Array
-    response: Array
-    bed_z_m: float
-    piece_m2: float
+    sources_m: Array  # shape (s, 3)
+    sigmas_m: Array  # shape (s,)
+    response: Array  # shape (s, k): strengths in m3/s for a unit velocity across the surface at each point
+    bed_z_m: float  # the sources are mirrored there
+    piece_m2: float  # area of the convex hull, or of the surface if that is less, over the number of points
     rows: PackedBlockage = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -368,14 +355,9 @@ def _draw_none(body: PackedBlockage, x: Array, answer: Array) -> None:
 def strike_body(body: PackedBlockage, before: Array, x: Array, flow: Array, sigma: float, impulse: Array) -> float:
     """Turn aside what of a parcel strikes the body on its way from `before` to `x`; the length its impulse loses.
 
-    Parameters
-    ----------
-    before, x, flow : ndarray, shape (3,)
-        Places in m, and where the parcel is going.
-    sigma : float
-        In m.
-    impulse : ndarray, shape (3,)
-        In m4/s, changed in place.
+    - `before`, `x`, `flow`, shape (3,): places in m, and where the parcel is going.
+    - `sigma`: in m.
+    - `impulse`, shape (3,): in m4/s, changed in place.
     """
     size = math.sqrt(impulse[0] ** 2 + impulse[1] ** 2 + impulse[2] ** 2)
     if size == 0.0:

@@ -39,23 +39,16 @@ _ZERO, _HALF, _PER_4_PI = _SINGLE(0.0), _SINGLE(0.5), _SINGLE(1 / (4 * math.pi))
 
 @dataclass(frozen=True, eq=False)
 class ImpulseField:
-    """Impulses at one instant, sorted by cluster.
+    """Impulses at one instant, sorted by cluster."""
 
-    Parameters
-    ----------
-    positions_m, impulses_m4_s : ndarray, shape (k, 3)
-    sigmas_m : ndarray, shape (k,)
-    rows : ndarray of float32, shape (k + c, 12)
-        As the kernel takes them, impulses by cluster and then the clusters: position, impulse over sigma cubed, one
-        over sigma, impulse, the distance beyond which it is a dipole, and nothing.
-    starts : ndarray of int, shape (c + 1,)
-        Cluster i has the impulses from starts[i] to starts[i + 1]. Of few impulses there are no clusters.
-    """
-
+    # positions_m, impulses_m4_s: shape (k, 3)
     positions_m: Array
     impulses_m4_s: Array
-    sigmas_m: Array
+    sigmas_m: Array  # shape (k,)
+    # Shape (k + c, 12): as the kernel takes them, impulses by cluster and then the clusters: position, impulse over
+    # sigma cubed, one over sigma, impulse, the distance beyond which it is a dipole, and nothing.
     rows: np.ndarray
+    # Shape (c + 1,): cluster i has the impulses from starts[i] to starts[i + 1]. Of few impulses there are no clusters.
     starts: IntArray
 
     @classmethod

@@ -27,10 +27,8 @@ _COLUMNS = (("u", "v", "w"), ("u_m_s", "v_m_s", "w_m_s"), ("north_m_s", "east_m_
 class CurrentSeries:
     """A uniform current that changes with time, shapes (n,) and (n, 3); time 0 is the start of the trial.
 
-    Raises
-    ------
-    InputError
-        If there are fewer than two samples, or times do not rise. `velocity` raises it outside the series' time.
+    Raises InputError if there are fewer than two samples, or times do not rise. `velocity` raises it outside the
+    series' time.
     """
 
     name: str
@@ -71,23 +69,16 @@ def read_current_series(
 ) -> CurrentSeries:
     """Read a series and cut out the part from `start_s` to `stop_s`, both in seconds after its first sample.
 
-    Parameters
-    ----------
-    path : Path
-        ``.csv`` with the columns time_s, u, v and optionally w in m/s, along the tank's x, y and z (or u_m_s...; or
-        north_m_s, east_m_s, down_m_s, which are the same axes), or ``.json`` as NOAA's current stations give it:
-        an object ``s`` of speeds in cm/s and an object ``d`` of directions in degrees from north through east, towards
-        which the water runs, both by time in ms.
-    gain : float
-        The cut-out is multiplied by this, to make a tank's current of a tidal one.
-    longest_gap_s : float or None
-        Longest pause between samples; None takes three times the median one. Only the part cut out is looked at.
+    - `path`: ``.csv`` with the columns time_s, u, v and optionally w in m/s, along the tank's x, y and z (or u_m_s...;
+      or north_m_s, east_m_s, down_m_s, which are the same axes), or ``.json`` as NOAA's current stations give it: an
+      object ``s`` of speeds in cm/s and an object ``d`` of directions in degrees from north through east, towards which
+      the water runs, both by time in ms.
+    - `gain`: the cut-out is multiplied by this, to make a tank's current of a tidal one.
+    - `longest_gap_s`: longest pause between samples; None takes three times the median one. Only the part cut out is
+      looked at.
 
-    Raises
-    ------
-    InputError
-        Naming file and place: no such file, another format, missing columns, times that do not rise, gaps, values
-        that are missing or not finite, magnitudes that tell of another unit.
+    Raises InputError: naming file and place: no such file, another format, missing columns, times that do not rise,
+    gaps, values that are missing or not finite, magnitudes that tell of another unit.
     """
     readers = {".csv": _read_csv, ".json": _read_noaa}
     if path.suffix.lower() not in readers:

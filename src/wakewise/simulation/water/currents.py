@@ -204,18 +204,13 @@ class BackgroundTurbulence:
     R. H. Kraichnan 1970, Phys. Fluids 13, 22 (doi 10.1063/1.1692799): u = sum over modes of a x k_hat cos(k.x + w t) +
     b x k_hat sin(k.x + w t), of equal energy, with k normal with 1/L per axis (a spectrum E ~ k^2 exp(-(k L)^2 / 2))
     and w normal with |k| times the rms. It is statistical water: no wall, bed or surface shapes it.
-
-    Parameters
-    ----------
-    wave_numbers_per_m : ndarray, shape (m, 3)
-    cosines_m_s, sines_m_s : ndarray, shape (m, 3)
-    frequencies_rad_s : ndarray, shape (m,)
     """
 
-    wave_numbers_per_m: Array
+    wave_numbers_per_m: Array  # shape (m, 3)
+    # cosines_m_s, sines_m_s: shape (m, 3)
     cosines_m_s: Array
     sines_m_s: Array
-    frequencies_rad_s: Array
+    frequencies_rad_s: Array  # shape (m,)
     _columns: tuple[Array, Array, Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -22,23 +22,12 @@ LEAST_IMAGE_M_S = 5e-5
 
 @dataclass(frozen=True)
 class TankFace:
-    """A plane across one of the world's axes.
-
-    Parameters
-    ----------
-    name : str
-    axis : int
-        0, 1 or 2: the world's axis across the face.
-    side : int
-        +1 where the tank ends towards the axis, -1 where it begins.
-    at_m : float
-        Where on the axis it lies.
-    """
+    """A plane across one of the world's axes."""
 
     name: str
-    axis: int
-    side: int
-    at_m: float
+    axis: int  # 0, 1 or 2: the world's axis across the face
+    side: int  # +1 where the tank ends towards the axis, -1 where it begins
+    at_m: float  # where on the axis it lies
 
     @property
     def depth_m(self) -> float:

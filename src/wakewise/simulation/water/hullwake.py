@@ -27,26 +27,15 @@ _STILL_M_S = 1e-6  # slower water past the hull leaves it without a lee
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HullPush:
-    """What a hull, taken as a box about its origin, did to the water during a step.
+    """What a hull, taken as a box about its origin, did to the water during a step."""
 
-    Parameters
-    ----------
-    p_WB_m : ndarray, shape (3,)
-        Its middle at the end of the step.
-    R_WB : ndarray, shape (3, 3)
-    size_m : ndarray, shape (3,)
-        Of the box, along the body's axes.
-    velocity_W_m_s, through_W_m_s : ndarray, shape (3,)
-        Its velocity, and that through the water without thrusters.
-    impulse_W_N_s : ndarray, shape (3,)
-        The hull's drag on the water over the step: the opposite of the water's on the hull.
-    """
-
-    p_WB_m: Array
-    R_WB: Array
-    size_m: Array
+    p_WB_m: Array  # shape (3,): its middle at the end of the step
+    R_WB: Array  # shape (3, 3)
+    size_m: Array  # shape (3,): of the box, along the body's axes
+    # velocity_W_m_s, through_W_m_s: shape (3,): its velocity, and that through the water without thrusters.
     velocity_W_m_s: Array
     through_W_m_s: Array
+    # Shape (3,): the hull's drag on the water over the step: the opposite of the water's on the hull.
     impulse_W_N_s: Array
 
     def __post_init__(self) -> None:
@@ -79,11 +68,7 @@ def first_wake(strength_m3_s: float, speed_m_s: float, area_m2: float) -> tuple[
 class HullWake:
     """Collects what a hull gives to the water, and sends it as parcels at even distances along its way.
 
-    Parameters
-    ----------
-    stream : int
-        Of the parcels.
-    density_kg_m3 : float
+    `stream`: of the parcels.
     """
 
     def __init__(self, stream: int, density_kg_m3: float) -> None:

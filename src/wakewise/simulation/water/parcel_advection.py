@@ -54,18 +54,14 @@ def advect_parcels(
 ) -> None:
     """Move parcels on, in place, and write the speed of the jets' water where they were, shape (n,).
 
-    Parameters
-    ----------
-    X : ndarray, shape (n, 3)
-    sigma, share, speed, D, start : ndarray, shape (n,)
-    disk, u, ambient : ndarray, shape (n, 3)
-        Velocity of the disk that sent them, of the jets' water and of the ambient water at the parcels.
-    wake : ndarray of bool, shape (n,)
-        Which are of the hull's wake.
-    laws : ndarray, shape (5,)
-        Growth of sigma with the path in the core, beyond it, and of a puff, the time step in s, and the wake's life.
-    walls : ndarray, shape (k, 4)
-        Of each face: axis, place, side, and what is not used here. A parcel that would end behind one is mirrored.
+    - `disk`, `u`, `ambient`, shape (n, 3): velocity of the disk that sent them, of the jets' water and of the ambient
+      water at the parcels.
+    - `wake`, shape (n,): which are of the hull's wake.
+    - `laws`, shape (5,): growth of sigma with the path in the core, beyond it, and of a puff, the time step in s, and
+      the wake's life.
+    - `walls`, shape (k, 4): of each face: axis, place, side, and what is not used here. A parcel that would end behind
+      one is mirrored.
+    - Shapes: `X` (n, 3); `sigma`, `share`, `speed`, `D`, `start` (n,).
     """
     core_spread, puff, dt_s, shorter = laws[0], laws[2], laws[3], 1.0 - 1.0 / laws[4]
     for i in range(sigma.shape[0]):
@@ -119,18 +115,12 @@ def slugs(
 ) -> tuple[IntArray, IntArray, Array, Array, Array]:
     """Parcels sent during a step at equal spacing along the slug of water that passed each disk.
 
-    Parameters
-    ----------
-    impulses_m4_s : ndarray, shape (n, 2)
-        Of the step, forward and reverse, over the water's density.
-    dt_s : float
-    areas_m2, spacing_m : ndarray, shape (n,)
-    waiting_m4_s, waiting_m : ndarray, shape (n, 2)
-        Impulse not yet sent, and the length of the slug that it stands for; updated in place.
+    - `impulses_m4_s`, shape (n, 2): of the step, forward and reverse, over the water's density.
+    - `waiting_m4_s`, `waiting_m`, shape (n, 2): impulse not yet sent, and the length of the slug that it stands for;
+      updated in place.
+    - Shapes: `areas_m2`, `spacing_m` (n,).
 
-    Returns
-    -------
-    Of each parcel, shape (k,): thruster, 1 for reverse thrust, age at the end of the step, exit speed, impulse.
+    Returns shape (k,): thruster, 1 for reverse thrust, age at the end of the step, exit speed, impulse.
     """
     many = count_sent(impulses_m4_s, dt_s, areas_m2, spacing_m, waiting_m)
     thruster, reverse = np.empty(many, np.int64), np.empty(many, np.int64)
@@ -208,21 +198,12 @@ def emit_parcels(
 ) -> int:
     """Write the parcels that were sent during a step behind the first `count`; how many there are then.
 
-    Parameters
-    ----------
-    jets : ParcelBuffers
-    count : int
-    slugs : tuple
-        What `slugs` returned.
-    areas_m2 : ndarray, shape (t,)
-    disks : ndarray, shape (3, t, 3)
-        Where the disks are now, their velocities, and their force axes.
-    ambient : ndarray, shape (t, 3)
-        Velocity of the ambient water at the disks.
-    laws, walls : ndarray
-        As in `advect_parcels`.
-    noise : ndarray, shape (k, 3)
-        Standard normal, for their turbulence.
+    - `slugs`: what `slugs` returned.
+    - `disks`, shape (3, t, 3): where the disks are now, their velocities, and their force axes.
+    - `ambient`, shape (t, 3): velocity of the ambient water at the disks.
+    - `laws`, `walls`: as in `advect_parcels`.
+    - `noise`, shape (k, 3): standard normal, for their turbulence.
+    - Shapes: `areas_m2` (t,).
     """
     thruster, back, age, exit_speed, sent = slugs
     for j in range(age.shape[0]):

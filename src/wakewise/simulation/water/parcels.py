@@ -46,43 +46,22 @@ class ParcelBuffers(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Parcels:
-    """Impulse parcels at one instant, oldest first.
+    """Impulse parcels at one instant, oldest first."""
 
-    Parameters
-    ----------
-    position_m : ndarray, shape (n, 3), in the world
-    impulse_m4_s : ndarray, shape (n, 3)
-        Thrust times time over density, along the jet.
-    sigma_m : ndarray, shape (n,)
-    diameter_m : ndarray, shape (n,)
-        Disk diameter of the thruster that sent it.
-    stream : ndarray of int, shape (n,)
-        Which jet it belongs to: twice the thruster's index, plus one for reverse thrust; then the hull's wake, and then
-        the fans of jets that have met.
-    gust : ndarray, shape (n, 3)
-        Turbulent share of the impulse, a standard normal variable before scaling.
-    disk_m_s : ndarray, shape (n, 3)
-        Velocity of the disk when it was sent: its water starts with it and loses it to what is entrained.
-    share : ndarray, shape (n,)
-        Of the parcel's water, what came through the disk.
-    flow_m_s : ndarray, shape (n, 3)
-        Velocity of the jets' water there when it was last looked at.
-    held_s : ndarray, shape (n,)
-        How long ago that was; infinite if never.
-    start_m_s : ndarray, shape (n,)
-        Speed on the axis of its row where that begins: a jet's exit speed, a wake's first deficit.
-    """
-
-    position_m: Array
-    impulse_m4_s: Array
-    sigma_m: Array
-    diameter_m: Array
+    position_m: Array  # shape (n, 3), in the world
+    impulse_m4_s: Array  # shape (n, 3): thrust times time over density, along the jet
+    sigma_m: Array  # shape (n,)
+    diameter_m: Array  # shape (n,): disk diameter of the thruster that sent it
+    # Shape (n,): which jet it belongs to: twice the thruster's index, plus one for reverse thrust; then the hull's
+    # wake, and then the fans of jets that have met.
     stream: IntArray
-    gust: Array
+    gust: Array  # shape (n, 3): turbulent share of the impulse, a standard normal variable before scaling
+    # Shape (n, 3): velocity of the disk when it was sent: its water starts with it and loses it to what is entrained.
     disk_m_s: Array
-    share: Array
-    flow_m_s: Array
-    held_s: Array
+    share: Array  # shape (n,): of the parcel's water, what came through the disk
+    flow_m_s: Array  # shape (n, 3): velocity of the jets' water there when it was last looked at
+    held_s: Array  # shape (n,): how long ago that was; infinite if never
+    # Shape (n,): speed on the axis of its row where that begins: a jet's exit speed, a wake's first deficit.
     start_m_s: Array
 
     @classmethod
@@ -145,13 +124,8 @@ def parcel_velocity(
 ) -> Array:
     """Velocity of parcels and of their mirror images in the bed, shape (n, 3), at points, shape (n, 3).
 
-    Parameters
-    ----------
-    points_W_m : ndarray, shape (n, 3)
-    positions_m, impulses_m4_s : ndarray, shape (k, 3)
-    sigmas_m : ndarray, shape (k,)
-    bed_z_m : float
-        The plane z = bed_z_m, through which nothing flows; infinite for water without a bed.
+    `bed_z_m`: the plane z = bed_z_m, through which nothing flows; infinite for water without a bed. Shapes:
+    `points_W_m` (n, 3); `positions_m`, `impulses_m4_s` (k, 3); `sigmas_m` (k,).
     """
     room = TankFaces.of(bed_z_m, (math.inf, math.inf), surface=False)
     return confined_velocity(points_W_m, positions_m, impulses_m4_s, sigmas_m, room)

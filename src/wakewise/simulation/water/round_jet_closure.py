@@ -191,14 +191,9 @@ def across_row_m_s(own_m_s: Array, past_m_s: Array) -> Array:
 def bent_spread(spread: float, own_m_s: Array, past_m_s: Array) -> Array:
     """Growth of sigma with the path, shape (n,), of parcels that lie in a row which may be bent over.
 
-    Parameters
-    ----------
-    spread : float
-        Of a jet that moves along its own length.
-    own_m_s : ndarray, shape (n, 3)
-        A parcel's own motion through the water.
-    past_m_s : ndarray, shape (n, 3)
-        Motion of the water past the disk; the row runs along the sum of both.
+    - `spread`: of a jet that moves along its own length.
+    - `own_m_s`, shape (n, 3): a parcel's own motion through the water.
+    - `past_m_s`, shape (n, 3): motion of the water past the disk; the row runs along the sum of both.
     """
     row = own_m_s + past_m_s
     along = np.einsum("ni,ni->n", row, own_m_s) ** 2

@@ -46,31 +46,15 @@ _STEEPEST_GRAZE = math.sin(math.radians(10))  # parcels that come in flatter tha
 
 
 class WaterConstants(NamedTuple):
-    """What stays the same from step to step.
+    """What stays the same from step to step."""
 
-    Parameters
-    ----------
-    drift : ndarray, shape (5,)
-        As in `advect_parcels.drift`; the fourth is the time step in s.
-    wake_stream : int
-        Of the hull's wake: one more than the jets' own.
-    rest_speed : float
-        In m/s.
-    gusty : bool
-    bed_z : float
-    curve : ndarray
-        `space_order.curve()`.
-    constants : ndarray
-        `induction.SINGLE`.
-    """
-
-    drift: Array
-    wake_stream: int
-    rest_speed: float
+    drift: Array  # shape (5,): as in `advect_parcels.drift`; the fourth is the time step in s
+    wake_stream: int  # of the hull's wake: one more than the jets' own
+    rest_speed: float  # in m/s
     gusty: bool
     bed_z: float
-    curve: np.ndarray
-    constants: np.ndarray
+    curve: np.ndarray  # `space_order.curve()`
+    constants: np.ndarray  # `induction.SINGLE`
 
 
 class JetSources(NamedTuple):
@@ -159,25 +143,13 @@ def advance(
 ) -> None:
     """Move the water on by a step, in place.
 
-    Parameters
-    ----------
-    jets, layers : Jets, Layers
-        With room for what is sent, for three of each that cross, and for a ring of each of those.
-    planes : JetPlanes
-    body : PackedBlockage
-    laws : WaterConstants
-    thrusters : JetSources
-    tally : StepCounters
-    places, ambient : ndarray, shape (n + r + t, 3)
-        What `places_of` said, and the ambient water's velocity there, to which the body's answer is added.
-    body_to_ambient : ndarray, shape (s,)
-        The body's answer to the ambient water.
-    disks : ndarray, shape (3, t, 3)
-        As in `advect_parcels.send`.
-    impulses_m4_s : ndarray, shape (t, 2)
-        Forward and reverse, over the water's density.
-    noise : ndarray, shape (n + k, 3)
-        Standard normal: of the parcels that there are and then of those sent.
+    - `jets`, `layers`: with room for what is sent, for three of each that cross, and for a ring of each of those.
+    - `places`, `ambient`, shape (n + r + t, 3): what `places_of` said, and the ambient water's velocity there, to which
+      the body's answer is added.
+    - `body_to_ambient`, shape (s,): the body's answer to the ambient water.
+    - `disks`, shape (3, t, 3): as in `advect_parcels.send`.
+    - `impulses_m4_s`, shape (t, 2): forward and reverse, over the water's density.
+    - `noise`, shape (n + k, 3): standard normal: of the parcels that there are and then of those sent.
     """
     n, r = tally.rows[0], tally.rows[1]
     dt_s, walls = laws.drift[3], planes.walls

@@ -67,33 +67,19 @@ class _Uniform:
 class Water:
     """Flow of a tank with a bed: `velocity` gives the water at this instant, `step` moves it on.
 
-    Parameters
-    ----------
-    disk_areas_m2 : ndarray, shape (n,)
-        One per thruster.
-    density_kg_m3 : float
-    bed_z_m : float
-        Depth of the bed below the surface, z = 0; infinite for open water, without a surface.
-    rng : numpy Generator
-        Source of the turbulence.
-    current_W_m_s : ndarray, shape (3,), or None
-        Steady and uniform; instead of `ambient`.
-    ambient : Current or None
-        The water's own motion.
-    half_size_m : tuple of two floats
-        Walls at |x| and |y| of this; infinite for none.
-    turbulence : float
-        Root mean square of the fluctuating part on a jet's axis over the mean speed, beyond the core.
-    rest_speed_m_s : float
-        Parcels are retired once neither they nor their neighbours move water faster than this at their centre.
-    max_parcels : int
-        Above this, rows are made coarser until they fit, which is logged.
-    spreading : JetSpreading
-        `closure.PLAIN`, or `closure.SWIRLING` for a propeller's wide jet.
-    body : Blockage or None
-        A solid body on the bed.
-    wake_life : float
-        How much longer what is left of a jet lives once it is no longer fed: see `closure`, *Life*.
+    - `disk_areas_m2`, shape (n,): one per thruster.
+    - `bed_z_m`: depth of the bed below the surface, z = 0; infinite for open water, without a surface.
+    - `rng`: source of the turbulence.
+    - `current_W_m_s`, shape (3,): steady and uniform; instead of `ambient`.
+    - `ambient`: the water's own motion.
+    - `half_size_m`: walls at |x| and |y| of this; infinite for none.
+    - `turbulence`: root mean square of the fluctuating part on a jet's axis over the mean speed, beyond the core.
+    - `rest_speed_m_s`: parcels are retired once neither they nor their neighbours move water faster than this at their
+      centre.
+    - `max_parcels`: above this, rows are made coarser until they fit, which is logged.
+    - `spreading`: `closure.PLAIN`, or `closure.SWIRLING` for a propeller's wide jet.
+    - `body`: a solid body on the bed.
+    - `wake_life`: how much longer what is left of a jet lives once it is no longer fed: see `closure`, *Life*.
     """
 
     def __init__(
@@ -221,17 +207,11 @@ class Water:
     ) -> None:
         """Move the water on by dt_s and send what the thrusters pushed meanwhile.
 
-        Parameters
-        ----------
-        dt_s : float
-        origins_before_m, origins_m : ndarray, shape (n, 3)
-            Where the disks were at the start and are at the end of the step.
-        axes_W : ndarray, shape (n, 3)
-            Force axes: forward thrust sends its jet along the negative axis.
-        impulses_N_s : ndarray, shape (n, 2)
-            Integral over the step of forward and of reverse thrust, both positive.
-        hull : HullPush or None
-            What the hull did to the water meanwhile; None for no hull.
+        - `origins_before_m`, `origins_m`, shape (n, 3): where the disks were at the start and are at the end of the
+          step.
+        - `axes_W`, shape (n, 3): force axes: forward thrust sends its jet along the negative axis.
+        - `impulses_N_s`, shape (n, 2): integral over the step of forward and of reverse thrust, both positive.
+        - `hull`: what the hull did to the water meanwhile; None for no hull.
         """
         forward, back = np.asarray(origins_m, dtype=np.float64), np.asarray(origins_before_m, dtype=np.float64)
         disks = np.stack([forward, (forward - back) / dt_s, axes_W])

@@ -28,24 +28,12 @@ from wakewise.simulation.water.stepping import flow_at
 class WaterSnapshot:
     """Flow of all jets and of the ambient water, with the answer of a body to both.
 
-    Parameters
-    ----------
-    time_s : float
-    parcels : Parcels
-        The free jets.
-    rings : WallJetRings
-        The wall jets on the bed.
-    rows : PackedRings
-        All wall jets with their images.
-    room : TankFaces
-    bed_z_m : float
-        Infinite for none.
-    ambient : Current
-    body : Blockage or None
-    gust_scale : float
-        Of the parcels' turbulence; 0 for the mean flow.
-    answer_to_ambient : ndarray, shape (s,), or None
-        The body's answer to the ambient water, where that is known already.
+    - `parcels`: the free jets.
+    - `rings`: the wall jets on the bed.
+    - `rows`: all wall jets with their images.
+    - `bed_z_m`: infinite for none.
+    - `gust_scale`: of the parcels' turbulence; 0 for the mean flow.
+    - `answer_to_ambient`, shape (s,): the body's answer to the ambient water, where that is known already.
     """
 
     def __init__(
