@@ -74,7 +74,7 @@ docs: setup
 	$(BIN)/python tools/draw_layers.py
 
 lock: setup
-	$(BIN)/uv pip compile pyproject.toml --extra all --extra gamepad --extra links --extra ros --extra dask --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o requirements.lock
+	$(BIN)/uv pip compile pyproject.toml packages/wakewise-ardusub/pyproject.toml --extra all --extra gamepad --extra links --extra ros --extra dask --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate --no-emit-package wakewise -o requirements.lock
 
 clean:
 	rm -rf $(VENV) runs dist

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from wakewise.core.optional_dependencies import EXTRAS, how_to_install
+from wakewise_ardusub.optional_dependencies import ARDUSUB
 
-BLOCKED = sorted({module for modules in EXTRAS.values() for module in modules})
+BLOCKED = sorted({module for modules in (*EXTRAS.values(), *ARDUSUB.extras.values()) for module in modules})
 _WITHOUT = f"""
 import sys
 

@@ -6,21 +6,29 @@ from pathlib import Path
 
 import pytest
 
-from wakewise.core.optional_dependencies import EXTRAS, how_to_install
+from wakewise.core.optional_dependencies import LIBRARY, OptionalDependencies
+from wakewise_ardusub.optional_dependencies import ARDUSUB
 
 ROOT = Path(__file__).parents[1]
-STATED = set(tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"])
+PROJECTS = {
+    str(path.parent.relative_to(ROOT)): set(
+        tomllib.loads(path.read_text(encoding="utf-8"))["project"].get("optional-dependencies", {})
+    )
+    for path in (ROOT / "pyproject.toml", *ROOT.glob("packages/*/pyproject.toml"))
+}
+"""Extras of each project by its folder in the clone."""
 OTHERS = {"pyserial", "asyncssh", "numpy", "scipy", "numba", "pydantic", "pyyaml"}
 """Packages of others that a page tells to install, by their names in Python's index."""
 INSTALL = re.compile(r"\bpip3? install\b[ \t]*([^`\n]*)")
-FROM_CLONE = re.compile(r"(?:--no-deps )?-e (?:'\.(?:\[([\w,]+)\])?'|\.(?=\s|$|\)))")
+FOLDER = "|".join(re.escape(folder) for folder in PROJECTS)
+FROM_CLONE = re.compile(rf"(?:--no-deps )?-e (?:'({FOLDER})(?:\[([\w,]+)\])?'|({FOLDER})(?=\s|$|\)))")
 
 
 def _fault(said: str) -> str | None:
     """Why what stands after `pip install` cannot be run; None if it can, in the clone's folder."""
     clone = FROM_CLONE.match(said)
     if clone is not None:
-        unknown = set((clone[1] or "").split(",")) - STATED - {""}
+        unknown = set((clone[2] or "").split(",")) - PROJECTS[clone[1] or clone[3]] - {""}
         return f"no extra {sorted(unknown)}" if unknown else None
     words = re.split(r"&&|[#\")]", said)[0].split()
     if words and {re.split("[<>=]", word.strip("'"))[0] for word in words} <= OTHERS:
@@ -45,20 +53,27 @@ def test_every_install_line_can_be_run_in_a_clone() -> None:
     said = [(path, m[1]) for path in texts for m in INSTALL.finditer(path.read_text(encoding="utf-8"))]
     assert len(said) > 6
     # A hint's extras are filled in where it is printed.
-    faults = {f"{path.relative_to(ROOT)}: {text}": _fault(text.replace("{extras}", "all")) for path, text in said}
+    faults = {
+        f"{path.relative_to(ROOT)}: {text}": _fault(text.replace("{self.folder}", ".").replace("{extras}", "all"))
+        for path, text in said
+    }
     assert {line: fault for line, fault in faults.items() if fault is not None} == {}
 
 
-@pytest.mark.parametrize("extra", EXTRAS)
-def test_every_hint_can_be_run_in_a_clone(extra: str) -> None:
+@pytest.mark.parametrize("owner", [LIBRARY, ARDUSUB], ids=lambda owner: owner.folder)
+def test_every_hint_can_be_run_in_a_clone(owner: OptionalDependencies) -> None:
     """What a missing package's message tells to type."""
-    found = INSTALL.search(how_to_install(extra))
-    assert found is not None
-    assert _fault(found[1]) is None
-    assert extra in STATED
+    for extra in owner.extras:
+        found = INSTALL.search(owner.how_to_install(extra))
+        assert found is not None
+        assert _fault(found[1]) is None
+        assert extra in PROJECTS[owner.folder]
 
 
-@pytest.mark.parametrize("said", ["wakewise", "'wakewise[links]'", "-e '.[no-such]'", "-e '.[nothing]'", "-U wakewise"])
+@pytest.mark.parametrize(
+    "said",
+    ["wakewise", "'wakewise-ardusub[links]'", "-e '.[no-such]'", "-e '.[links]'", "-e '.[nothing]'", "-U wakewise"],
+)
 def test_a_line_that_cannot_be_run_is_found(said: str) -> None:
     """From an index, or with an extra that is not there."""
     assert _fault(said) is not None

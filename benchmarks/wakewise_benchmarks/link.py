@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.core.optional_dependencies import need
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import load_scenario
+from wakewise_ardusub.optional_dependencies import need
 from wakewise_ardusub.physics import PhysicsServer, PulseTable, ServoFrame, write_request
 from wakewise_ardusub.physics.physics import LOOPBACK, open_socket, serve
 from wakewise_ardusub.sitl_plant import SitlPlant

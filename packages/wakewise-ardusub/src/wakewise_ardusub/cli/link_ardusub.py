@@ -148,7 +148,7 @@ def ardusub(
     any loss gives them back by itself. Ctrl-C lets go of the vehicle and ends.
     """
     from wakewise.core.errors import InputError
-    from wakewise.core.optional_dependencies import need
+    from wakewise_ardusub.optional_dependencies import need
 
     if sum((check or params is not None, motor_test)) > 1:
         raise InputError("--check, --motor-test: one after the other, give one")

@@ -181,7 +181,7 @@ def stand_in(
     It is for trying and for tests, and no copy of the firmware: docs/sitl.md says what it does and what it does not.
     """
     from wakewise.core.errors import InputError
-    from wakewise.core.optional_dependencies import need
+    from wakewise_ardusub.optional_dependencies import need
 
     need("wakewise link stand-in", "links", only=("pymavlink", "lupa"))
     from wakewise.robot.importers import any_vehicle
@@ -252,14 +252,14 @@ def _until(seconds: float | None) -> Callable[[], bool]:
 def _depth_watch(stack: ExitStack, where: str) -> DepthMonitor | None:
     """What holds the autopilot's depth against the truth; None, and a line, where nothing can be overheard."""
     from wakewise.core.errors import EnvironmentFailure
-    from wakewise.core.optional_dependencies import has
     from wakewise_ardusub.link.connection import parse_connection
+    from wakewise_ardusub.optional_dependencies import ARDUSUB
     from wakewise_ardusub.physics.depth_monitor import DepthMonitor
 
     if where == "none":
         return None
     _address("--watch", where)
-    if not has("links"):
+    if not ARDUSUB.has("links"):
         typer.echo("the autopilot's depth is not compared: the extra `links` is not installed", err=True)
         return None
     from wakewise_ardusub.link.protocol import DEFAULT_SYSTEM

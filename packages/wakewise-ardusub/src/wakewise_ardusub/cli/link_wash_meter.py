@@ -105,9 +105,9 @@ def meter(
     """
     from wakewise import wake
     from wakewise.core.errors import InputError
-    from wakewise.core.optional_dependencies import need
     from wakewise.robot.vehicles import load_vehicle
     from wakewise_ardusub.link.parameters import read_parameter_file
+    from wakewise_ardusub.optional_dependencies import need
     from wakewise_ardusub.vehicle_summary import VehicleSummary
     from wakewise_ardusub.wash_meter.run import MeterSettings
 

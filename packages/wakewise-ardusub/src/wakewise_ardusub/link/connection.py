@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from wakewise.core.errors import EnvironmentFailure, InputError
-from wakewise.core.optional_dependencies import need
 from wakewise_ardusub.link.protocol import AUTOPILOT_COMPONENT, COMPANION_COMPONENT, DEFAULT_SYSTEM
+from wakewise_ardusub.optional_dependencies import need
 from wakewise_ardusub.sensors.devices import SerialPort
 
 RIGHT = (

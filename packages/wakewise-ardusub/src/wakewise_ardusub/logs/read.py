@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.errors import InputError
-from wakewise.core.optional_dependencies import need
 from wakewise_ardusub.logs.channels import VehicleLog
+from wakewise_ardusub.optional_dependencies import need
 
 FORMATS = "a telemetry log (.tlog), the autopilot's own (.BIN) or BlueOS's recording (.mcap)"
 _FOREIGN = {

@@ -38,4 +38,4 @@ __all__ = [
     "vision_position_estimate",
 ]
 
-lazy_attributes(__name__, "links")
+lazy_attributes(__name__)

@@ -34,10 +34,10 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.core.geometry import Pose, euler_from_quat, quat_from_euler
 from wakewise.core.interfaces import Measurement
-from wakewise.core.optional_dependencies import need
 from wakewise.experiments.exports.records import enu_of, ros_body
 from wakewise_ardusub.link.protocol import DEFAULT_SYSTEM
 from wakewise_ardusub.link.telemetry_adapter import SenderClock
+from wakewise_ardusub.optional_dependencies import need
 from wakewise_ardusub.sensors.devices import read_place
 
 LARGEST_M = 1e5

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from importlib import resources
 from typing import Any, Protocol
 
-from wakewise.core.optional_dependencies import need
+from wakewise_ardusub.optional_dependencies import need
 from wakewise_ardusub.sitl.own_parameters import ParameterTable
 
 LONGEST_WAIT_MS = 600_000
