@@ -70,9 +70,9 @@ Scenarios = Annotated[
         show_default=False,
     ),
 ]
-Levers = Annotated[
+Mechanisms = Annotated[
     str,
-    typer.Option(help="gentle: levers to switch, with commas between, or all; none if not given.", show_default=False),
+    typer.Option(help="gentle: mechanisms to switch, with commas between, or all.", show_default=False),
 ]
 Judge = Annotated[
     int,
@@ -116,7 +116,7 @@ def bench(
     seeds: Seeds = None,
     methods: Methods = "",
     scenarios: Scenarios = "",
-    levers: Levers = "",
+    mechanisms: Mechanisms = "",
     worlds: Worlds = "",
     w_tracks: WTracks = "",
     models: Models = 1,
@@ -160,7 +160,7 @@ def bench(
                 seeds=seeds or _SEEDS.get(each, 10),
                 methods=_listed(methods),
                 scenarios=_listed(scenarios),
-                levers=_listed(levers),
+                mechanisms=_listed(mechanisms),
                 worlds=_listed(worlds),
                 w_tracks=_numbers("--w-tracks", w_tracks),
                 models=models,

@@ -1,6 +1,6 @@
 """How long a control step takes as it is flown: plan, tracker, jets that meet, floor and exact shares together.
 
-The orbit of the planner's bench with its vehicle 3 N heavy, the wake model and levers of a scenario's default (free
+The orbit of the planner's bench with its vehicle 3 N heavy, the wake model and mechanisms of a scenario's default (free
 jets in the plan, floor and meeting jets in the shares), 50 steps a second. The plant has 15 % more drag than is
 believed and tells its true state. Times are the thread's CPU, after a second of warm-up; a `planning` step is one in
 ten that also plans or searches.

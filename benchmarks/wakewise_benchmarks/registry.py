@@ -25,7 +25,8 @@ BENCHES = {
     "disturbance": "the Gram matrix of D against the sum over points",
     "estimator": "the filter in the default tank: error, consistency, ten seconds without a camera",
     "dynamics": "one step of the vehicle, with and without Jacobians, and of many vehicles at once",
-    "gentle": "what each method does to the target's water where users have the trouble, and what each lever is worth",
+    "gentle": "what each method does to the target's water where users have the trouble, and what each "
+    "mechanism is worth",
     "planner": "the planner against the paper's recipe and IPOPT",
     "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
     "operator": "an operator's velocity obeyed and the target's water spared, by w_track, where users have the trouble",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.allocation import min_norm_allocation
-from wakewise.control import ControlSettings, LeverSettings, make_controller
+from wakewise.control import AllocationSettings, ControlSettings, make_controller
 from wakewise.control.null_space_allocation import CURRENT_SPREAD, DOUBT, RESTART_GAIN, allocation_context
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Goal
@@ -22,9 +22,11 @@ AHEAD = Region(
 THRUSTS = np.array([1.0, 0.5, -0.5, -1.0, -0.3, -0.5, -1.2, -1.4])
 
 
-def watch(wake=None, **levers):
+def watch(wake=None, **mechanisms):
     """Eyes on the points ahead."""
-    return allocation_context(VEHICLE, AHEAD, wake or RoundJet(), ControlSettings(levers=LeverSettings(**levers)))
+    return allocation_context(
+        VEHICLE, AHEAD, wake or RoundJet(), ControlSettings(allocation=AllocationSettings(**mechanisms))
+    )
 
 
 class Foreign:
@@ -42,19 +44,19 @@ def estimate(*current_m_s, **of):
 
 
 def test_an_unknown_current_leaves_the_water_still():
-    """None, or the lever off: the matrix is that of the view alone."""
+    """None, or the mechanism off: the matrix is that of the view alone."""
     still = watch().view.gram(Pose(np.zeros(3)))
     np.testing.assert_array_equal(watch().gram(estimate(), THRUSTS), still)
-    np.testing.assert_array_equal(watch(drift=False).gram(estimate(0.05, 0.0, 0.0), THRUSTS), still)
+    np.testing.assert_array_equal(watch(advection=False).gram(estimate(0.05, 0.0, 0.0), THRUSTS), still)
     assert not np.allclose(watch().gram(estimate(0.05, 0.0, 0.0), THRUSTS), still)
 
 
 @pytest.mark.parametrize("current", [(), (0.05, 0.02, 0.0)])
 def test_what_shares_are_chosen_by_is_the_mean_of_two_beliefs(current):
-    """Shares are chosen by both, priced by the reckoned one; the lever off, or a foreign model: that alone."""
+    """Shares are chosen by both, priced by the reckoned one; the mechanism off, or a foreign model: that alone."""
     here, eyes = estimate(*current), watch()
     astray = eyes.view.astray(here.X_WB)
-    sure = watch(doubt=False).influence(here, THRUSTS)
+    sure = watch(direction_uncertainty=False).influence(here, THRUSTS)
     seen = eyes.influence(here, THRUSTS)
     np.testing.assert_allclose(seen.gram, (1.0 - DOUBT) * sure.gram + DOUBT * np.diag(astray), rtol=1e-12)
     np.testing.assert_array_equal(seen.sent, sure.sent)
@@ -64,7 +66,7 @@ def test_what_shares_are_chosen_by_is_the_mean_of_two_beliefs(current):
 
 def test_a_stated_current_is_believed_against_the_estimate():
     """What a user states stands, whatever the estimator finds and however sure it is."""
-    found = watch(drift_m_s=(0.0, 0.02, 0.0)).flow(estimate(0.05, 0.0, 0.0, current_covariance=np.eye(3)), THRUSTS)
+    found = watch(current_m_s=(0.0, 0.02, 0.0)).flow(estimate(0.05, 0.0, 0.0, current_covariance=np.eye(3)), THRUSTS)
     np.testing.assert_array_equal(found.current_W_m_s, [0.0, 0.02, 0.0])
     assert found.unsure_m_s == pytest.approx(CURRENT_SPREAD * 0.02)
 
@@ -121,7 +123,7 @@ def test_where_the_wake_model_gives_nonsense_there_are_no_shares():
         def unit_velocity(self, points, origins, directions, area):
             return np.full((len(origins), len(points), 3), np.nan)
 
-    eyes = watch(Nonsense(), meet=False)
+    eyes = watch(Nonsense(), merging_jets=False)
     assert eyes.search(np.ones(6), estimate(0.1, 0.0, 0.0), np.zeros(8)) is None
 
 
@@ -151,7 +153,7 @@ def test_where_the_current_brings_the_wash_back_shares_are_gentler_for_knowing_i
     """
     wrench, here = np.array([-2.64, 0.93, -3.33, 0.0, -0.28, 0.0]), estimate(-0.017, -0.083, 0.0)
     floor = ImpingingJet(jet=RoundJet(), bed_z_m=0.6)
-    eyes, blind = watch(floor, doubt=False), watch(floor, doubt=False, drift=False)
+    eyes, blind = watch(floor, direction_uncertainty=False), watch(floor, direction_uncertainty=False, advection=False)
     least = min_norm_allocation(eyes.layout, wrench).thrusts_N
     unknowing = blind.restart(wrench, here, least)[0].thrusts_N
     thrusts = least

@@ -24,8 +24,8 @@ from wakewise_paper.wash_reduction.routes import gentle_route
 DT = 0.02
 
 
-def make(vehicle=HEAVY, method="allocation-only", **levers):
-    settings = ControlSettings(levers={"drift": False, **levers})
+def make(vehicle=HEAVY, method="allocation-only", **mechanisms):
+    settings = ControlSettings(allocation={"advection": False, **mechanisms})
     return make_controller(method, vehicle, region(), believed(), settings, OPEN)
 
 
@@ -47,11 +47,11 @@ def flown(controller, goal_at, seconds, down_N):
 
 def test_only_a_camera_with_a_joint_is_posed_and_a_wish_that_cannot_be_is_refused():
     """Null is where there is a joint; false nowhere; true on a fixed camera is refused by its field."""
-    assert make().attitude is not None and make(posture=True).attitude is not None
-    assert make(posture=False).attitude is None
+    assert make().attitude is not None and make(optimize_attitude=True).attitude is not None
+    assert make(optimize_attitude=False).attitude is None
     assert make(vehicle=load_vehicle("paper")).attitude is None
-    with pytest.raises(InputError, match=r"control\.levers\.posture.*no joint"):
-        make(vehicle=load_vehicle("paper"), posture=True)
+    with pytest.raises(InputError, match=r"control\.allocation\.optimize_attitude.*no joint"):
+        make(vehicle=load_vehicle("paper"), optimize_attitude=True)
 
 
 def test_heavy_it_leans_and_the_camera_keeps_its_pose_on_the_way():
@@ -78,7 +78,7 @@ def test_a_lean_is_gone_before_the_mission_comes_near_a_roof():
     highest = low.X_WB.p_m + (stops_s - begins_s) * up_W
     roof = float(highest[2] - 0.5 * HEAVY.size_m[2] - 0.04)
     around = Surroundings(planes=np.array([[0.0, 0.0, 1.0, roof]]))
-    settings = ControlSettings(levers={"drift": False})
+    settings = ControlSettings(allocation={"advection": False})
     controller = make_controller("allocation-only", HEAVY, region(), believed(), settings, around)
 
     def goal_at(t):
@@ -174,13 +174,15 @@ def test_the_motion_stage_sees_the_posed_goal():
 def test_the_attitude_is_the_missions_where_it_says_so_or_a_person_flies():
     """Open with `auto` on a route; else false, and refused where it was asked for by name."""
     tilting = {"vehicle": "paper-tilting", "method": "allocation-only"}
-    asked = {"control.levers.posture": True}
-    assert Scenario.preset("quick", **tilting).parts().control.levers.posture is None
+    asked = {"control.allocation.optimize_attitude": True}
+    assert Scenario.preset("quick", **tilting).parts().control.allocation.optimize_attitude is None
     for closed in ({"mission.aim": "tilt"}, {"mission.aim": "pitch"}, {"pilot": "human"}):
-        assert Scenario.preset("quick", **tilting, **closed).parts().control.levers.posture is False
-    with pytest.raises(InputError, match=r"control\.levers\.posture: true, but mission\.aim is pitch"):
+        assert Scenario.preset("quick", **tilting, **closed).parts().control.allocation.optimize_attitude is False
+    with pytest.raises(InputError, match=r"control\.allocation\.optimize_attitude: true, but mission\.aim is pitch"):
         _ = Scenario.preset("quick", **tilting, **asked, **{"mission.aim": "pitch"}).parts().control
-    assert Scenario.preset("quick", **tilting, **asked, pilot="human").parts().control.levers.posture is True
+    assert (
+        Scenario.preset("quick", **tilting, **asked, pilot="human").parts().control.allocation.optimize_attitude is True
+    )
 
 
 @pytest.mark.slow
@@ -192,7 +194,11 @@ def test_a_heavy_vehicle_that_leans_halves_the_wash_and_keeps_its_camera_in_plac
     """
     seen = {}
     for posture in (None, False):
-        fields = {"vehicle": "bluerov2-heavy", "method": "allocation-only", "control.levers.posture": posture}
+        fields = {
+            "vehicle": "bluerov2-heavy",
+            "method": "allocation-only",
+            "control.allocation.optimize_attitude": posture,
+        }
         parts = Scenario.preset("quick", world="payload", seed=2, **fields).parts()
         hover = gentle_route(parts.target.centre_W_m, parts.scenario.mission.standoff_m, -2.4)
         frame = fly(parts.replace(route=hover), checked=False, duration_s=18.0, water_every_s=0.25).steps

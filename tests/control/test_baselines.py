@@ -16,8 +16,8 @@ from wakewise.wake import InfluenceModel, disturbance, wake_model
 VEHICLE = load_vehicle("paper")
 CENTRE = np.array([0.0, 0.0, 1.4])
 WAKE = wake_model("paper-calibrated")
-OFF = {"spare": False, "meet": False, "drift": False}
-SETTINGS = ControlSettings(plan=PlanSettings(iterations=3), levers=OFF)
+OFF = {"null_space": False, "merging_jets": False, "advection": False}
+SETTINGS = ControlSettings(plan=PlanSettings(iterations=3), allocation=OFF)
 PLANNING = ("pseudo-inverse", "mpc", "mpc-smooth", "linear", "wake-aware")
 
 
@@ -102,5 +102,5 @@ def test_smooth_changes_its_commands_less():
 def test_the_linear_ablation_believes_in_its_own_model():
     """`linear` does not change with the wake model of the settings."""
     one = flown("linear", steps=6)[-1].thrusts_N
-    other = ControlSettings(plan=SETTINGS.plan, levers=OFF, wake={"model": "jet"})
+    other = ControlSettings(plan=SETTINGS.plan, allocation=OFF, wake={"model": "jet"})
     np.testing.assert_allclose(flown("linear", other, steps=6)[-1].thrusts_N, one)

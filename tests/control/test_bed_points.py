@@ -1,10 +1,10 @@
-"""Levers: points that join the region."""
+"""Mechanisms: points that join the region."""
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from wakewise.control import ControlSettings, LeverSettings, make_controller
+from wakewise.control import AllocationSettings, ControlSettings, make_controller
 from wakewise.control.bed_points import BED_POINTS, BED_RADIUS_M, BED_WEIGHT, with_bed_points
 from wakewise.control.mpc_controller import plan_superposition
 from wakewise.core.geometry import Pose
@@ -24,13 +24,13 @@ def region() -> Region:
 def test_levers_that_are_off_leave_the_region_alone():
     """The very same object, so that nothing can differ by rounding."""
     given = region()
-    assert with_bed_points(given, LeverSettings()) is given
+    assert with_bed_points(given, AllocationSettings()) is given
 
 
 def test_bed_points_lie_in_a_thin_disk_round_the_foot():
     """Within the radius, 1 to 3 cm above the bed, evenly: half of them within r / sqrt(2); weights add up as set."""
-    given, levers = region(), LeverSettings(bed=True)
-    found = with_bed_points(given, levers, 1.5)
+    given, mechanisms = region(), AllocationSettings(include_bed=True)
+    found = with_bed_points(given, mechanisms, 1.5)
     extra = found.points_W_m[60:]
     foot = given.points_W_m[given.distance_m == 0.0, :2].mean(axis=0)
     reach = np.linalg.norm(extra[:, :2] - foot, axis=1)
@@ -43,9 +43,9 @@ def test_bed_points_lie_in_a_thin_disk_round_the_foot():
 
 
 def test_every_lever_together_still_flies():
-    """All levers on, with the floor's model: finite thrusts."""
-    levers = LeverSettings(bed=True, drift_m_s=(0.03, 0.02, 0.0))
-    settings = ControlSettings(levers=levers, wake={"model": "jet", "floor": True})
+    """All mechanisms on, with the floor's model: finite thrusts."""
+    mechanisms = AllocationSettings(include_bed=True, current_m_s=(0.03, 0.02, 0.0))
+    settings = ControlSettings(allocation=mechanisms, wake={"model": "jet", "floor": True})
     vehicle = load_vehicle("paper")
     controller = make_controller("wake-aware", vehicle, region(), wake_model(settings.wake, 1.5), settings)
     here = BodyState(X_WB=Pose(np.array([-0.5, 0.0, 1.1])))
@@ -54,12 +54,18 @@ def test_every_lever_together_still_flies():
 
 
 @pytest.mark.parametrize(
-    "field", [{"drift_m_s": (2.0, 0.0, 0.0)}, {"drift_m_s": (0.0, 0.0)}, {"spare": float("nan")}, {"bed": 7}]
+    "field",
+    [
+        {"current_m_s": (2.0, 0.0, 0.0)},
+        {"current_m_s": (0.0, 0.0)},
+        {"null_space": float("nan")},
+        {"include_bed": 7},
+    ],
 )
 def test_levers_out_of_range_are_refused(field):
     """Bad values do not become settings."""
     with pytest.raises(ValidationError):
-        LeverSettings(**field)
+        AllocationSettings(**field)
 
 
 def test_planner_and_allocator_weigh_alike():

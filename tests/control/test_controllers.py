@@ -40,7 +40,9 @@ def test_the_same_wrench_at_less_disturbance(wake):
     """At equal wrench, from rest, the gentle one disturbs no more than its effort weight pays for; often far less."""
     region, settings = (
         small_region(),
-        ControlSettings(levers={"spare": False, "meet": False, "drift": False, "doubt": False}),
+        ControlSettings(
+            allocation={"null_space": False, "merging_jets": False, "advection": False, "direction_uncertainty": False}
+        ),
     )
     dp, gentle = (make_controller(m, VEHICLE, region, wake_model(wake), settings) for m in INSTANT)
     rng = np.random.default_rng(1)

@@ -238,7 +238,11 @@ def test_the_cost_is_what_the_allocator_would_pay_there():
     """Level and loaded, it is the weighed D and effort of the thrusts that `allocation-only` finds for its own
     wrench.
     """
-    settings = ControlSettings(levers=dict.fromkeys(("meet", "drift", "doubt", "posture", "thrift"), False))
+    settings = ControlSettings(
+        allocation=dict.fromkeys(
+            ("merging_jets", "advection", "direction_uncertainty", "optimize_attitude", "power_limit"), False
+        )
+    )
     controller = make_controller("allocation-only", VEHICLE, region(), believed(), settings)
     goal = looking(VEHICLE, np.radians(40.0))
     R, context = goal.X_WB.R, controller.allocator.context

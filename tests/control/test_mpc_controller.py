@@ -14,8 +14,8 @@ from wakewise.robot.vehicles import compile_body, step_rk4
 from wakewise.vision.evaluation.flight import sign_flips
 
 PLACE = Pose(np.array([0.45, 0.0, 1.05]), quat_from_euler(0.0, 0.0, np.pi))
-OFF = {"spare": False, "meet": False, "drift": False}
-QUICK = ControlSettings(plan=PlanSettings(iterations=2), levers=OFF)
+OFF = {"null_space": False, "merging_jets": False, "advection": False}
+QUICK = ControlSettings(plan=PlanSettings(iterations=2), allocation=OFF)
 PLANNING = ("wake-aware", "mpc", "mpc-smooth", "linear", "pseudo-inverse")
 
 

@@ -9,7 +9,7 @@ from wakewise.allocation import PowerBoundedAllocator, Weights, min_wash_allocat
 from wakewise.control import ControlSettings, make_controller, vehicle_layout
 from wakewise.control.null_space_allocation import SEARCH_S, STAGGER_S, AllocationContext, Allocator
 from wakewise.control.pipeline import Demand, MotionStage, Pipeline
-from wakewise.control.settings import LeverSettings
+from wakewise.control.settings import AllocationSettings
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.robot.vehicles import load_vehicle
@@ -31,7 +31,9 @@ def context_of(view, previous=1e-3):
     """Thrusts seen through a view, in still water."""
     weights = Weights(disturbance=150.0, effort=1e-3, previous=previous)
     bounded = PowerBoundedAllocator(layout=LAYOUT)
-    return AllocationContext(view=view, levers=LeverSettings(drift=False), allocator=bounded, weights=weights)
+    return AllocationContext(
+        view=view, settings=AllocationSettings(advection=False), allocator=bounded, weights=weights
+    )
 
 
 class Asks(MotionStage):
@@ -119,7 +121,7 @@ def test_the_noise_of_a_wrench_does_not_blow_ahead(method):
     With the least changes between searches it was a tenth of a newton, and the tank's water remembers that.
     """
     controller = make_controller(
-        method, VEHICLE, AHEAD, RoundJet(), ControlSettings(levers=LeverSettings(thrift=False))
+        method, VEHICLE, AHEAD, RoundJet(), ControlSettings(allocation=AllocationSettings(power_limit=False))
     )
     rng, state, ahead = np.random.default_rng(3), controller.init(), []
     for _ in range(100):
@@ -132,9 +134,9 @@ def test_the_noise_of_a_wrench_does_not_blow_ahead(method):
 
 @pytest.mark.parametrize("method", ["allocation-only", "wake-aware"])
 def test_levers_reach_the_controllers(method):
-    """With the levers on, a hover that pushes astern does so from the rear; the name stays."""
-    settings = ControlSettings(levers=LeverSettings(drift_m_s=(0.03, 0.0, 0.0)))
-    off = ControlSettings(levers=LeverSettings(spare=False, meet=False, drift=False))
+    """With the mechanisms on, a hover that pushes astern does so from the rear; the name stays."""
+    settings = ControlSettings(allocation=AllocationSettings(current_m_s=(0.03, 0.0, 0.0)))
+    off = ControlSettings(allocation=AllocationSettings(null_space=False, merging_jets=False, advection=False))
     X_WB = Pose(np.zeros(3))
     estimate = BodyState(X_WB=X_WB, load_B=np.array([0.4, 0.0, 0.0, 0.0, 0.02, 0.0]))
     front = {}

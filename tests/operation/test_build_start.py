@@ -69,7 +69,7 @@ def test_an_empty_target_is_refused(capsys, tmp_path, monkeypatch):
 def test_the_planner_knows_the_tank_and_the_target():
     """Six faces of the tank, the target's sphere where the target stands, and the stated obstacles."""
     scenario = load_scenario(
-        "quick", None, {"control.obstacles": [[2.0, 0.0, 1.0, 0.1]], "control.levers.spare": False}
+        "quick", None, {"control.obstacles": [[2.0, 0.0, 1.0, 0.1]], "control.allocation.null_space": False}
     )
     parts = scenario.parts()
     table = parts.controller.motion.model.table

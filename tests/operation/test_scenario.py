@@ -186,8 +186,13 @@ def test_a_scenario_has_at_most_220_fields() -> None:
 
 
 def test_a_scenario_without_a_preset_is_gentle() -> None:
-    """The levers that the tank bore out are defaults, and no preset speaks of control."""
+    """The mechanisms that the tank bore out are defaults, and no preset speaks of control."""
     control = Scenario().control
-    assert control.levers.spare and control.levers.meet and control.levers.drift and control.wake.floor
-    assert control.levers.drift_m_s is None
+    assert (
+        control.allocation.null_space
+        and control.allocation.merging_jets
+        and control.allocation.advection
+        and control.wake.floor
+    )
+    assert control.allocation.current_m_s is None
     assert all(load_scenario(preset, None, {}).control == control for preset in PRESETS)

@@ -21,10 +21,13 @@ def test_defaults_leave_nothing_idle(method):
 
 def test_levers_that_need_another_are_named():
     """With spare off, what lies behind it is idle for a method that plans, and not for one that does not."""
-    off = {"control.levers.spare": False}
-    assert "control.levers.meet, drift, doubt, thrift: nothing without" in said("wake-aware", **off)
-    assert "control.levers.drift:" in said(
-        "wake-aware", **off, **{f"control.levers.{n}": False for n in ("meet", "doubt", "thrift")}
+    off = {"control.allocation.null_space": False}
+    words = "merging_jets, advection, direction_uncertainty, power_limit: nothing without"
+    assert f"control.allocation.{words}" in said("wake-aware", **off)
+    assert "control.allocation.advection:" in said(
+        "wake-aware",
+        **off,
+        **{f"control.allocation.{n}": False for n in ("merging_jets", "direction_uncertainty", "power_limit")},
     )
     assert said("allocation-only", **off) == ""
 
@@ -32,7 +35,7 @@ def test_levers_that_need_another_are_named():
 @pytest.mark.parametrize(
     ("method", "changes", "words"),
     [
-        ("dp", {"control.levers.bed": True}, "control.levers.bed: nothing for dp"),
+        ("dp", {"control.allocation.include_bed": True}, "control.allocation.include_bed: nothing for dp"),
         (
             "allocation-only",
             {"control.obstacles": [[2.0, 2.0, 1.0, 0.1]]},
@@ -50,20 +53,20 @@ def test_levers_that_need_another_are_named():
 def test_a_setting_without_a_use_is_said(method, changes, words):
     """With its field and why; where it has a use nothing is said."""
     assert words in said(method, **changes)
-    used = {"control.operator_seed": "manual", "control.levers.bed": "wake-aware"}
+    used = {"control.operator_seed": "manual", "control.allocation.include_bed": "wake-aware"}
     other = used.get(next(iter(changes)), "wake-aware")
     if "ideal" not in str(changes):
         assert said(other, **changes) == ""
 
 
 @pytest.mark.parametrize(
-    "levers",
-    [{"drift": False, "drift_m_s": (0.1, 0.0, 0.0)}, {"drift_m_s": (0.0, 0.0, 0.0)}],
+    "mechanisms",
+    [{"advection": False, "current_m_s": (0.1, 0.0, 0.0)}, {"current_m_s": (0.0, 0.0, 0.0)}],
 )
-def test_a_current_that_could_not_act_is_refused(levers):
-    """A stated current beside a lever that is off, or of no speed, contradicts itself."""
-    with pytest.raises(InputError, match="drift_m_s"):
-        ww.Scenario.preset("quick", **{f"control.levers.{name}": value for name, value in levers.items()})
+def test_a_current_that_could_not_act_is_refused(mechanisms):
+    """A stated current beside a mechanism that is off, or of no speed, contradicts itself."""
+    with pytest.raises(InputError, match="current_m_s"):
+        ww.Scenario.preset("quick", **{f"control.allocation.{name}": value for name, value in mechanisms.items()})
 
 
 def test_methods_of_the_lists_are_methods():

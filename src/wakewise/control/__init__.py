@@ -16,15 +16,15 @@ from wakewise.control.methods import MAKERS, METHODS, ControlTask, make_controll
 from wakewise.control.null_space_allocation import vehicle_layout
 from wakewise.control.pid import Pid, PidState, make_pid
 from wakewise.control.pipeline import Pipeline, PipelineState, with_failsafe, with_pwm
-from wakewise.control.settings import ControlSettings, LeverSettings
+from wakewise.control.settings import AllocationSettings, ControlSettings
 
 __all__ = [
     "MAKERS",
     "METHODS",
+    "AllocationSettings",
     "ControlSettings",
     "ControlTask",
     "Gains",
-    "LeverSettings",
     "Pid",
     "PidState",
     "Pipeline",

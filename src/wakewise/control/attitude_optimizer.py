@@ -378,10 +378,11 @@ def attitude_optimizer(
     InputError
         If it is asked for by name and the vehicle's camera is fixed.
     """
-    wanted, joint = settings.levers.posture, vehicle.tilt
+    wanted, joint = settings.allocation.optimize_attitude, vehicle.tilt
     if wanted and joint is None:
         raise InputError(
-            f"control.levers.posture: true, the camera of {vehicle.name} has no joint, so the body's attitude follows "
+            f"control.allocation.optimize_attitude: true, the camera of {vehicle.name} has no joint, so the "
+            "body's attitude follows "
             "from the camera's: leave it null, or take a vehicle with camera_tilt"
         )
     if joint is None or wanted is False:

@@ -120,7 +120,7 @@ def trim_advice(
     poses : tuple of Pose
         X_WB of the mission.
     region, wake, settings
-        As a controller has them; with the bed lever, points on the bed count.
+        As a controller has them; with the bed mechanism, points on the bed count.
     net_weight_N : float
         Weight less buoyancy that is known but not in the vehicle's numbers, positive: heavy.
     unknown_N : float
@@ -142,7 +142,7 @@ def trim_advice(
         raise InputError(f"trim: unknown_N {unknown_N:g}, must be finite and not negative")
     if not np.isfinite(net_weight_N):
         raise InputError(f"trim: net_weight_N {net_weight_N:g}, must be finite")
-    view = InfluenceModel.of(vehicle, with_bed_points(region, chosen.levers), wake, chosen.superposition)
+    view = InfluenceModel.of(vehicle, with_bed_points(region, chosen.allocation), wake, chosen.superposition)
     grams = [view.gram(X_WB) for X_WB in poses]
     weights = Weights(disturbance=chosen.w_disturbance / view.total_weight, effort=chosen.w_effort)
     believed = net_buoyancy_N(vehicle)

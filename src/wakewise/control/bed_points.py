@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.control.settings import LeverSettings
+from wakewise.control.settings import AllocationSettings
 from wakewise.core.arrays import Array, IntArray
 from wakewise.scene.targets import Region
 
@@ -17,13 +17,13 @@ GOLDEN_RAD = float(np.pi * (3.0 - np.sqrt(5.0)))
 """Angle of a sunflower's spiral, which spreads points evenly over a disk (H. Vogel, Math. Biosci. 44 (1979) 179)."""
 
 
-def with_bed_points(region: Region, levers: LeverSettings, bed_z_m: float | None = None) -> Region:
-    """The region and, if the lever is on, a disk of points just above the bed around the target's foot.
+def with_bed_points(region: Region, settings: AllocationSettings, bed_z_m: float | None = None) -> Region:
+    """The region and, if `include_bed` is on, a disk of points just above the bed around the target's foot.
 
     Parameters
     ----------
     region : Region
-    levers : LeverSettings
+    settings : AllocationSettings
     bed_z_m : float, optional
         Depth of the bed; the lowest point of the region where it is not known.
 
@@ -32,7 +32,7 @@ def with_bed_points(region: Region, levers: LeverSettings, bed_z_m: float | None
     Region
         The weights of the bed points add up to `BED_WEIGHT` times those of the region.
     """
-    if not levers.bed:
+    if not settings.include_bed:
         return region
     foot = region.points_W_m[_surface(region), :2].mean(axis=0)
     bed = float(region.points_W_m[:, 2].max()) if bed_z_m is None else bed_z_m

@@ -100,7 +100,7 @@ def tracking(
     if not gentle:
         allocator = least_thrust_allocator(own, vehicle, region, wake, settings)
         return Pipeline(name=name, layout=vehicle_layout(vehicle), motion=stage, allocator=allocator)
-    context = allocation_context(vehicle, with_bed_points(region, settings.levers, bed_of(wake)), wake, settings)
+    context = allocation_context(vehicle, with_bed_points(region, settings.allocation, bed_of(wake)), wake, settings)
     return Pipeline(
         name=name,
         layout=own,
@@ -124,9 +124,9 @@ def mpc(
 
     With `least` thrusts sent are the least ones of the same wrench.
     """
-    levers, solid = settings.levers, around or around_target(region)
-    seen = with_bed_points(region, levers, bed_of(wake))
-    if levers.spare:
+    effects, solid = settings.allocation, around or around_target(region)
+    seen = with_bed_points(region, effects, bed_of(wake))
+    if effects.null_space:
         # The motion spares the target alone: points beside it, and the bed, move only spare thrusts. A plan that is
         # told of them leaves its path for water that nobody photographs.
         planned = mpc_pipeline(vehicle, region, free_jet(wake), settings, name=name, surroundings=solid)

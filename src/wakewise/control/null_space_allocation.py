@@ -33,7 +33,7 @@ from wakewise.allocation import (
     disturbance_of,
     min_norm_allocation,
 )
-from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings, LeverSettings
+from wakewise.control.settings import PREVIOUS_SHARE, AllocationSettings, ControlSettings
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, WakeModel
 from wakewise.robot.thrusters import electrical_power_W
@@ -77,7 +77,7 @@ class AllocationContext:
     """The region as the jets reach it, the settings that add to it, and what thrusts are compared by."""
 
     view: InfluenceModel
-    levers: LeverSettings
+    settings: AllocationSettings
     allocator: PowerBoundedAllocator
     weights: Weights
 
@@ -97,7 +97,7 @@ class AllocationContext:
         doubt is a reason to choose, but no wash that would be worth power.
         """
         found = self.view.seen(estimate.X_WB, self.flow(estimate, thrusts_N))
-        astray = self.view.astray(estimate.X_WB) if self.levers.doubt else None
+        astray = self.view.astray(estimate.X_WB) if self.settings.direction_uncertainty else None
         if astray is None:
             return found
         return InfluenceMatrices(gram=(1.0 - DOUBT) * found.gram + np.diag(DOUBT * astray), sent=found.sent)
@@ -204,9 +204,9 @@ class AllocationContext:
 
     def _current(self, estimate: BodyState) -> tuple[Array | None, Array | None]:
         """The current, shape (3,), and its covariance, shape (3, 3); None each where it does not count or is sure."""
-        stated, found = self.levers.drift_m_s, estimate.current_covariance
+        stated, found = self.settings.current_m_s, estimate.current_covariance
         current = estimate.current_W_m_s if stated is None else np.array(stated, dtype=np.float64)
-        if current is None or not self.levers.drift or not current.any():
+        if current is None or not self.settings.advection or not current.any():
             return None, None
         return current, found if stated is None else None
 
@@ -302,9 +302,11 @@ def allocation_context(
     layout = vehicle_layout(vehicle)
     view = InfluenceModel.of(vehicle, region, wake, settings.superposition)
     return AllocationContext(
-        view=with_merging_jets(view, layout) if settings.levers.meet else view,
-        levers=settings.levers,
-        allocator=PowerBoundedAllocator(layout=layout, law=power_law(vehicle) if settings.levers.thrift else None),
+        view=with_merging_jets(view, layout) if settings.allocation.merging_jets else view,
+        settings=settings.allocation,
+        allocator=PowerBoundedAllocator(
+            layout=layout, law=power_law(vehicle) if settings.allocation.power_limit else None
+        ),
         weights=weights_of(settings, view.total_weight),
     )
 
@@ -324,7 +326,11 @@ def single_jet_allocator(vehicle: Vehicle, region: Region, wake: WakeModel, sett
     if settings.w_disturbance == 0.0:
         return least_thrust_allocator(vehicle_layout(vehicle), vehicle, region, wake, settings)
     still = settings.model_copy(
-        update={"levers": settings.levers.model_copy(update={"meet": False, "drift": False, "doubt": False})}
+        update={
+            "allocation": settings.allocation.model_copy(
+                update={"merging_jets": False, "advection": False, "direction_uncertainty": False}
+            )
+        }
     )
     context = allocation_context(vehicle, region, wake, still)
     return Allocator(layout=context.layout, context=context, search_s=0.0)

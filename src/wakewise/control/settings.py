@@ -24,41 +24,41 @@ PREVIOUS_SHARE = 5.0
 with the time constant dt w_p / w_effort; setting that to the lag at 50 Hz gives 5."""
 
 
-class LeverSettings(Settings):
-    """Switches of the levers; those that the tank bore out are on (docs/research-log/0014), all off is the paper's."""
+class AllocationSettings(Settings):
+    """What null-space allocation accounts for. Defaults are what reduces wash in the tank (design record 11)."""
 
-    bed: bool = Field(default=False, description="also keep the water still on the bed around the target")
-    spare: bool = Field(
-        default=True, description="share out the plan's wrench anew at every step by the exact allocator"
+    include_bed: bool = Field(default=False, description="also keep the water still on the bed around the target")
+    null_space: bool = Field(
+        default=True, description="allocate the plan's wrench anew at every step by the exact allocator"
     )
-    meet: bool = Field(
-        default=True, description="count what jets become that meet: they join and run on between them; needs spare"
+    merging_jets: bool = Field(
+        default=True, description="jets that meet merge and run on between them; needs null_space"
     )
-    drift: bool = Field(
-        default=True, description="follow the jets as the current bends, stops and brings them; needs spare"
+    advection: bool = Field(default=True, description="the current bends, stops and carries the jets; needs null_space")
+    direction_uncertainty: bool = Field(
+        default=True, description="some of the jets go elsewhere than predicted; needs null_space"
     )
-    doubt: bool = Field(
-        default=True, description="hold that some of the jets go elsewhere than they are reckoned to; needs spare"
-    )
-    thrift: bool = Field(
+    power_limit: bool = Field(
         default=True,
-        description="gentle shares only as far as they are worth their power, and bounded by what there is to save",
+        description="limit the power of null-space thrust by the wash that it removes and by a bound on the whole",
     )
-    posture: bool | None = Field(
+    optimize_attitude: bool | None = Field(
         default=None,
-        description="lean the body as its thrusters like it where the camera's joint keeps the view (mission.aim: "
-        "auto); null: where there is a joint",
+        description="choose the hull's attitude where the camera's joint keeps the view (mission.aim: auto); null: "
+        "where there is a joint",
     )
-    drift_m_s: Velocity | None = Field(
-        default=None, description="that current, north, east, down, if it is stated; null: as the estimator finds it"
+    current_m_s: Velocity | None = Field(
+        default=None, description="current, north, east, down, if it is stated; null: as the estimator finds it"
     )
 
     @model_validator(mode="after")
-    def _stated_current_can_act(self) -> LeverSettings:
-        if self.drift_m_s is not None and not self.drift:
-            raise ValueError("drift_m_s is stated but drift is off; leave it null, or turn drift on")
-        if self.drift_m_s is not None and not any(self.drift_m_s):
-            raise ValueError("drift_m_s is no current at all; null takes the estimator's, drift: false does without")
+    def _stated_current_can_act(self) -> AllocationSettings:
+        if self.current_m_s is not None and not self.advection:
+            raise ValueError("current_m_s is stated but advection is off; leave it null, or turn advection on")
+        if self.current_m_s is not None and not any(self.current_m_s):
+            raise ValueError(
+                "current_m_s is no current at all; null takes the estimator's, advection: false does without"
+            )
         return self
 
 
@@ -106,8 +106,8 @@ class ControlSettings(Settings):
         "null for its own lag",
     )
     plan: PlanSettings = Field(default=PlanSettings(), description="horizon and weights of the methods that plan")
-    levers: LeverSettings = Field(
-        default=LeverSettings(), description="what `wake-aware` and `allocation-only` use beyond the free jet"
+    allocation: AllocationSettings = Field(
+        default=AllocationSettings(), description="what null-space allocation accounts for beyond the free jet"
     )
     operator_seed: int | None = Field(
         default=None,
@@ -116,10 +116,10 @@ class ControlSettings(Settings):
         "trial's seed draws",
     )
 
-    def without_posture(self) -> ControlSettings:
+    def without_attitude_optimization(self) -> ControlSettings:
         """The same where the body's attitude is the mission's."""
-        levers = self.levers.model_copy(update={"posture": False})
-        return self.model_copy(update={"levers": levers})
+        allocation = self.allocation.model_copy(update={"optimize_attitude": False})
+        return self.model_copy(update={"allocation": allocation})
 
 
 def flown_by(settings: ControlSettings, seed: int) -> ControlSettings:

@@ -283,7 +283,7 @@ class Parts:
     def control(self) -> ControlSettings:
         """What the controllers are told: the scenario's settings and who flies, nothing of the water flown in."""
         told = flown_by(self.scenario.control, int(self.seeds.person().integers(2**32)))
-        return told if self._leans else told.without_posture()
+        return told if self._leans else told.without_attitude_optimization()
 
     @property
     def _leans(self) -> bool:
@@ -295,10 +295,11 @@ class Parts:
         InputError
             If that is asked for and the mission says what aims the camera.
         """
-        aim, wanted = self.scenario.mission.aim, self.scenario.control.levers.posture
+        aim, wanted = self.scenario.mission.aim, self.scenario.control.allocation.optimize_attitude
         if wanted and aim != "auto":
             raise InputError(
-                f"control.levers.posture: true, but mission.aim is {aim}, which says how the body stands: leave "
+                f"control.allocation.optimize_attitude: true, but mission.aim is {aim}, which says how the body "
+                "stands: leave "
                 "mission.aim at auto, or posture at null"
             )
         return aim == "auto" and (bool(wanted) or (self.scenario.pilot == "route" and "pilot" not in self.given))

@@ -4,8 +4,9 @@ The tank as a controller is told of it: its walls, stated obstacles, the target.
 
 Switches that are set and cannot act: what a scenario asks for that its method, vehicle or pilot has no use for.
 
-A setting that contradicts itself is refused where it is made (`control.levers`). One that merely has no effect here is
-said before the flight, so that nobody reads a difference into it that is none: the same settings are flown with many
+A setting that contradicts itself is refused where it is made (`control.allocation`).
+One that merely has no effect here
+is said before the flight, so that nobody reads a difference into it that is none: the same settings are flown with many
 methods, and most of them are somebody's.
 """
 
@@ -55,26 +56,27 @@ def surroundings_of(scenario: Scenario, target: Target | None = None) -> Surroun
 PLANNING = frozenset({"pseudo-inverse", "mpc", "mpc-smooth", "linear", "wake-aware"})
 """Our methods that plan."""
 MITIGATION_METHODS = frozenset({"pseudo-inverse", "linear", "allocation-only", "wake-aware"})
-"""Our methods that use levers; of these all but `allocation-only` need `spare` for all of them but the bed."""
-_AFTER_SPARE = ("meet", "drift", "doubt", "thrift")
+"""Our methods that allocate in the null space; all but `allocation-only` need `null_space` for all but the bed."""
+_NEED_NULL_SPACE = ("merging_jets", "advection", "direction_uncertainty", "power_limit")
 
 
 def ineffective_settings(scenario: Scenario, vehicle: Vehicle) -> tuple[str, ...]:
     """What is set and does nothing, a sentence each, with the field's name; nothing is known of a method from outside.
 
-    Levers are on by default, so a method without levers is only told of the one that is not.
+    Its fields are on by default, so a method without null-space allocation is only told of the one that is not.
     """
     control, method, found = scenario.control, scenario.method, []
     if method in METHODS:
-        levers = control.levers
-        if method in MITIGATION_METHODS & PLANNING and not levers.spare:
-            on = [name for name in _AFTER_SPARE if getattr(levers, name)]
+        allocation = control.allocation
+        if method in MITIGATION_METHODS & PLANNING and not allocation.null_space:
+            on = [name for name in _NEED_NULL_SPACE if getattr(allocation, name)]
             if on:
                 found.append(
-                    f"control.levers.{', '.join(on)}: nothing without control.levers.spare, which {method} shares by"
+                    f"control.allocation.{', '.join(on)}: nothing without control.allocation.null_space, which "
+                    f"{method} shares by"
                 )
-        if levers.bed and method not in MITIGATION_METHODS:
-            found.append(f"control.levers.bed: nothing for {method}, which has no levers")
+        if allocation.include_bed and method not in MITIGATION_METHODS:
+            found.append(f"control.allocation.include_bed: nothing for {method}, which has no null-space stage")
         if method not in PLANNING:
             if control.obstacles:
                 found.append(f"control.obstacles: not kept clear of by {method}, which does not plan")

@@ -110,7 +110,7 @@ def _for_mission(
     vehicle: str, scenario: Path | None, net_weight: float | None, known_to: float | None, json: bool
 ) -> None:
     """Trim by the wake model over a mission's poses."""
-    from wakewise.control import LeverSettings
+    from wakewise.control import AllocationSettings
     from wakewise.control.ballast_advice import trim_advice
     from wakewise.operation import load_scenario
     from wakewise.robot.vehicles.ballast import net_buoyancy_N
@@ -123,7 +123,7 @@ def _for_mission(
     times = route.exposures_s[:: max(1, len(route.exposures_s) // 24)]
     poses = tuple(route.body(float(t), parts.aim).X_WB for t in times)
     wake = wake_model(chosen.control.wake.model_copy(update={"floor": True}), chosen.tank.size_m[2])
-    settings = chosen.control.model_copy(update={"levers": LeverSettings(bed=True)})
+    settings = chosen.control.model_copy(update={"allocation": AllocationSettings(include_bed=True)})
     unknown_N = known_to
     if unknown_N is None:
         apart = chosen.tank.mismatch

@@ -1,11 +1,13 @@
-"""What each method does to the target's water where users have the trouble, and what each mechanism is worth there.
+"""The study of wash: what each method does to the target's water where users have the trouble; `wakewise bench gentle`.
 
-Scenarios are files (`scenarios/`), stratified over trim and the side of the current (`strata.py`); the library's
-worlds count as scenarios, too. Seed k of a scenario is one world for all methods, so flights are compared in pairs;
-the headline was chosen beforehand (`headline.py`, docs/research-log/0033). The paper's own world is circular and says
-so (`paper.py`). What no controller could pass by sharing thrusts out is worked out where that is wished (`bound.py`).
+Scenarios are files (`scenarios/`), stratified over trim and the side of the current (`scenario_files.py`); the library's
+worlds count as scenarios, too. Seed k of a scenario is one world for all methods, so flights are compared in pairs.
+The headline was chosen beforehand (`headline.py`, docs/research-log/0033). The paper's own world is circular and says so
+(`paper.py`). What no controller can pass by sharing thrusts is worked out where that is wanted (`energy_optimum.py`).
+Mechanisms of `wake-aware` are switched one by one: each is compared with the method without it, all others on (left
+out), and with the method without any (alone).
 
-Flights are kept (`flight_store`): a run that was stopped goes on, and a second one only flies what is new.
+A campaign makes and keeps the flights: a run that was stopped goes on, and a second one flies what is new.
 """
 
 from __future__ import annotations
@@ -16,105 +18,226 @@ from typing import Any
 
 import numpy as np
 
+from wakewise.control import MAKERS
+from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns import ProcessExecutor
-from wakewise.experiments.trials.timing import BenchOptions
-from wakewise_paper import flight_batches
-from wakewise_paper.flight_batches import FlightFailure, FlightStore, Key, store_folder
-from wakewise_paper.wash_reduction.energy_optimum import BoundTrial
-from wakewise_paper.wash_reduction.figures import (
-    SPEED,
+from wakewise.experiments.campaigns.definition import PlannedTrial
+from wakewise.experiments.campaigns.statistics import log_reduction_pct, mean_figures, pairs_of, reduction_pct
+from wakewise.experiments.campaigns.study import (
+    Key,
     Row,
-    bound_figures,
-    log_reduction_pct,
-    means,
-    pairs_of,
-    reduction_pct,
+    StudyResult,
+    missing,
+    run_study,
+    selected,
+    store_folder,
 )
-from wakewise_paper.wash_reduction.flight import FIGURES
+from wakewise.experiments.trials.timing import BenchOptions
+from wakewise.operation.worlds.library import load_world
+from wakewise_paper.wash_reduction.energy_optimum import bound_trial
+from wakewise_paper.wash_reduction.flight import FIGURES, TRIM, wash_trial
+from wakewise_paper.wash_reduction.headline import PLACE, RIVALS, SPEED, WRONG, headline, tag_of
+from wakewise_paper.wash_reduction.optimum_figures import bound_figures
 from wakewise_paper.wash_reduction.paper import FIGURES as PAPER_FIGURES
 from wakewise_paper.wash_reduction.paper import METHODS as PAPER_METHODS
+from wakewise_paper.wash_reduction.paper import PAPER, paper_trial
 from wakewise_paper.wash_reduction.paper import SEEDS as PAPER_SEEDS
-from wakewise_paper.wash_reduction.paper import PaperWashTrial
-from wakewise_paper.wash_reduction.plan import (
-    MECHANISMS,
-    METHODS,
-    NONE,
-    flight_s,
-    flown_methods,
-    only_name,
-    planned_trials,
-    selected_mechanisms,
-    without_name,
-)
-from wakewise_paper.wash_reduction.scenario_files import names_of, title_of, trim_of
-from wakewise_paper.wash_reduction.summary_table import PLACE, RIVALS, WRONG, headline, tag_of
+from wakewise_paper.wash_reduction.scenario_files import WORLD, names_of, title_of, trim_of
 
 MODEL_FIGURES = ("rmse_mm", "completeness_pct", "success_pct")
-PAPER = "paper"
+BOUND = "bound"
 
 _engine = ProcessExecutor
-_FLY, _FLY_PAPER = "wakewise_paper.wash_reduction.flight:fly_trial", "wakewise_paper.wash_reduction.paper:fly_paper"
-_BOUND = "wakewise_paper.wash_reduction.energy_optimum:fly_bound"
+
+Settings = dict[str, Any]
+
+MECHANISMS: dict[str, Settings] = {
+    "advection": {"allocation.advection": False},
+    "merging-jets": {"allocation.merging_jets": False},
+    "wall-jets": {"wake.floor": False},
+    "direction-uncertainty": {"allocation.direction_uncertainty": False},
+    "attitude": {"allocation.optimize_attitude": False},
+    "power-limit": {"allocation.power_limit": False},
+}
+"""Fields of `ControlSettings` that take a mechanism away, by its name. Sharing out (`allocation.null_space`) is no
+mechanism of its own:
+the others need it."""
+
+NONE = "wake-aware, no mechanisms"
+MECHANISM_SEEDS = 3
+"""Mechanisms fly the first seeds only, which have all trims and all sides once."""
+
+
+def selected_mechanisms(wished: tuple[str, ...] | None) -> tuple[str, ...]:
+    """Names of the mechanisms to switch; none if not given, `all` for all.
+
+    Raises
+    ------
+    InputError
+        If one is not known.
+    """
+    names = () if wished is None or wished == ("none",) else wished
+    for name in names:
+        if name not in (*MECHANISMS, "all"):
+            raise InputError(f"mechanisms: '{name}' is not known, allowed: none, all, {', '.join(MECHANISMS)}")
+    return tuple(MECHANISMS) if "all" in names else tuple(name for name in MECHANISMS if name in names)
+
+
+def without(*names: str) -> Settings:
+    """Fields that take these mechanisms away."""
+    merged: Settings = {}
+    for name in names:
+        merged |= MECHANISMS[name]
+    return merged
+
+
+def mechanism_settings(names: tuple[str, ...]) -> dict[str, Settings]:
+    """Settings of the flights that judge some mechanisms, by what the flight is called."""
+    if not names:
+        return {}
+    table = {NONE: without(*MECHANISMS)}
+    for name in names:
+        table[without_name(name)] = without(name)
+        table[only_name(name)] = without(*(other for other in MECHANISMS if other != name))
+    return table
+
+
+def without_name(name: str) -> str:
+    """What the flight without a mechanism is called."""
+    return f"wake-aware without {name}"
+
+
+def only_name(name: str) -> str:
+    """What the flight with a mechanism alone is called."""
+    return f"wake-aware, {name} alone"
+
+
+METHODS = (
+    "dp",
+    "manual",
+    "no-forward-jets",
+    "ardusub",
+    "pseudo-inverse",
+    "mpc",
+    "mpc-smooth",
+    "allocation-only",
+    "wake-aware",
+    "wake-aware+trim",
+    "dp+trim",
+    "no-forward-jets+trim",
+)
+"""The first is what the others are held against."""
+
+
+def flown_methods(wished: tuple[str, ...] | None) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Methods to fly, in the bench's order, and why others are not.
+
+    Raises
+    ------
+    InputError
+        If a name is none of the bench's.
+    """
+    selected("methods", wished, METHODS)
+    reasons: dict[str, str] = {}
+    for name in METHODS:
+        if wished is not None and name not in wished:
+            reasons[name] = "this method was left out"
+        elif name.removesuffix(TRIM) not in MAKERS:
+            reasons[name] = "there is no such method yet"
+    return tuple(name for name in METHODS if name not in reasons), reasons
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
-    """Fly what is wished and not known yet; scenarios' tables, the headline, the paper's world.
+    """Fly what is wanted and not known yet; scenarios' tables, the headline, the paper's world.
 
     Raises
     ------
     InputError
         If a scenario, method or mechanism is not known.
     """
+    began = time.monotonic()
     wished = options.scenarios
     scenarios = names_of(None if wished is None else tuple(name for name in wished if name != PAPER))
     with_paper = wished is None or PAPER in wished
     methods, reasons = flown_methods(options.methods)
     mechanisms = selected_mechanisms(options.mechanisms)
-    began = time.monotonic()
     trials = planned_trials(scenarios, methods, mechanisms, options.seeds)
-    folder = options.store or store_folder()
-    store = FlightStore(folder, options.fresh)
-    expected = sum(flight_s(trial) for trial in trials.values() if store.load(trial, _FLY) is None)
+    papers = paper_trials(methods, options.seeds) if with_paper else {}
+    bounds = bound_trials(scenarios, options.bound)
+    folder = options.store or store_folder("gentle")
+    expected = sum(flight_s(*key[:2]) for key in missing(trials, folder, options))
     words = f"{len(trials)} flights, some {expected / 60.0 / options.workers:.0f} min of {options.workers} free cores"
     options.progress(0, max(len(trials), 1), words)
-    rows, failures, kept = flight_batches.fly_all(trials, _FLY, store, options, _engine)
-    papers: dict[Key, Row] = {}
-    lost: list[FlightFailure] = []
-    known = 0
-    if with_paper:
-        papers, lost, known = flight_batches.fly_all(
-            paper_trials(methods, options.seeds), _FLY_PAPER, store, options, _engine
-        )
-    bounds: dict[Key, Row] = {}
-    unbound: list[FlightFailure] = []
-    if options.bound:
-        bounds, unbound, _ = flight_batches.fly_all(
-            bound_trials(scenarios, options.bound), _BOUND, store, options, _engine
-        )
-    failed = {(failure.name, (failure.flow, failure.seed)) for failure in failures}
-    trims = {(scenario, seed): trim_of(scenario, seed) for scenario, _, seed in trials}
+    made = run_study("gentle", trials | papers | bounds, folder, options, _engine)
+    flown, unbound = made.part(trials), made.part(bounds)
     return {
-        "scenarios": {name: scenario_figures(name, methods, mechanisms, rows, failures) for name in scenarios},
-        "headline": headline(by_method(rows), trims, failed),
-        "bound": bound_figures(bounds) if options.bound else None,
-        "flows": {PAPER: paper_figures(papers, methods)} if with_paper else {},
-        "flights": len(trials) + len(papers) + len(lost),
-        "flown": len(rows) + len(papers) - kept - known,
-        "failed": len(failures) + len(lost) + len(unbound),
-        "failures": [vars(failure) for failure in (*failures, *lost, *unbound)],
-        "flight_cpu_s": _cpu_s(rows),
+        "scenarios": {name: scenario_figures(name, methods, mechanisms, flown) for name in scenarios},
+        "headline": headline(
+            by_method(flown.rows),
+            {(scenario, seed): trim_of(scenario, seed) for scenario, _, seed in trials},
+            {(name, (scenario, seed)) for scenario, name, seed in flown.failures},
+        ),
+        "bound": bound_figures(unbound.rows) if options.bound else None,
+        "flows": {PAPER: paper_figures(made.part(papers).rows, methods)} if with_paper else {},
+        **made.part([*trials, *papers]).counts,
+        "failed": len(made.failures),
+        "failures": [vars(failure) for failure in made.failures.values()],
+        "flight_cpu_s": _cpu_s(flown.rows),
         "wall_s": time.monotonic() - began,
         "why": reasons | why(mechanisms, with_paper),
     }
 
 
-def bound_trials(scenarios: tuple[str, ...], seeds: int) -> dict[Key, BoundTrial]:
-    """Flights whose sharings are judged."""
+def planned_trials(
+    scenarios: tuple[str, ...], methods: tuple[str, ...], mechanisms: tuple[str, ...], seeds: int
+) -> dict[Key, PlannedTrial]:
+    """Flights to make, seed by seed, so that a run that is stopped has whole seeds; mechanisms last."""
+    trials: dict[Key, PlannedTrial] = {}
+    ours = "wake-aware" in methods
+    for seed in range(1, seeds + 1):
+        for scenario in scenarios:
+            for method in methods:
+                trials[scenario, method, seed] = wash_trial(scenario, method, seed)
+            if ours and has_current(scenario):
+                trials[scenario, WRONG, seed] = wash_trial(scenario, "wake-aware", seed, name=WRONG, wrong_current=True)
+    table = mechanism_settings(mechanisms) if ours else {}
+    for seed in range(1, min(seeds, MECHANISM_SEEDS) + 1):
+        for scenario in scenarios:
+            for name, control in table.items():
+                trials[scenario, name, seed] = wash_trial(scenario, "wake-aware", seed, name=name, control=control)
+    return trials
+
+
+def paper_trials(methods: tuple[str, ...], seeds: int) -> dict[Key, PlannedTrial]:
+    """Flights in the paper's own world."""
     return {
-        (scenario, "bound", seed): BoundTrial(scenario=scenario, seed=seed)
-        for seed in range(1, seeds + 1)
-        for scenario in scenarios
+        (PAPER, method, seed): paper_trial(method, seed)
+        for seed in range(1, min(seeds, PAPER_SEEDS) + 1)
+        for method in PAPER_METHODS
+        if method in methods
     }
+
+
+def bound_trials(scenarios: tuple[str, ...], seeds: int) -> dict[Key, PlannedTrial]:
+    """Flights whose ways to share thrusts are judged."""
+    return {
+        (scenario, BOUND, seed): bound_trial(scenario, seed) for seed in range(1, seeds + 1) for scenario in scenarios
+    }
+
+
+def has_current(scenario: str) -> bool:
+    """Whether there is a current that can be believed wrong."""
+    if not scenario.startswith(WORLD):
+        return True
+    world = load_world(scenario.removeprefix(WORLD))
+    field = "tank.current.velocity_m_s"
+    return field in world.randomize or any(world.values.get(field, ()))
+
+
+def flight_s(scenario: str, name: str) -> float:
+    """About how much CPU time a flight takes, in seconds: measured on two cores, for saying how long a run is."""
+    base = {"station": 34.0, "nadir": 5.0, "brake": 6.0}.get(scenario.split("/", maxsplit=1)[0], 8.0)
+    return base + (3.0 if name.endswith(TRIM) else 0.0)
 
 
 def by_method(rows: Mapping[Key, Row]) -> dict[str, dict[tuple[str, int], Row]]:
@@ -129,17 +252,16 @@ def scenario_figures(
     scenario: str,
     methods: tuple[str, ...],
     mechanisms: tuple[str, ...],
-    rows: Mapping[Key, Row],
-    failures: list[FlightFailure],
+    flown: StudyResult[Key],
 ) -> dict[str, Any]:
     """Table of one scenario: methods, what `wake-aware` is worth, mechanisms; flights that failed are with their
     method.
     """
     here: dict[str, dict[int, Row]] = {}
-    for (where, name, seed), row in rows.items():
+    for (where, name, seed), row in flown.rows.items():
         if where == scenario:
             here.setdefault(name, {})[seed] = row
-    lost = [failure for failure in failures if failure.flow == scenario]
+    lost = [failure for failure in flown.failures.values() if failure.flow == scenario]
     strata = {seed: trim_of(scenario, seed) for own in here.values() for seed in own}
     table: dict[str, Any] = {}
     dp = here.get(METHODS[0], {})
@@ -148,7 +270,7 @@ def scenario_figures(
         gone = [failure for failure in lost if failure.name == name]
         if not own and not gone:
             continue
-        told = means(own.values(), FIGURES)
+        told = mean_figures(own.values(), FIGURES, worst=("solve_ms_p99",))
         told |= dict.fromkeys(MODEL_FIGURES)
         told["failed"] = len(gone)
         told["failures"] = [f"seed {failure.seed}: {failure.reason}" for failure in gone]
@@ -195,22 +317,14 @@ def mechanism_figures(name: str, here: Mapping[str, Mapping[int, Row]], strata: 
     return answer
 
 
-def paper_trials(methods: tuple[str, ...], seeds: int) -> dict[Key, PaperWashTrial]:
-    """Flights in the paper's own world."""
-    return {
-        (PAPER, method, seed): PaperWashTrial(method=method, seed=seed)
-        for seed in range(1, min(seeds, PAPER_SEEDS) + 1)
-        for method in PAPER_METHODS
-        if method in methods
-    }
-
-
 def paper_figures(rows: Mapping[Key, Row], methods: tuple[str, ...]) -> dict[str, Any]:
     """Table of the paper's world, and reductions of `wake-aware`; circular, since its wake model is the water."""
     here = {name: {seed: row for (_, who, seed), row in rows.items() if who == name} for name in PAPER_METHODS}
     answer: dict[str, Any] = {
         "circular": True,
-        "methods": {name: means(here[name].values(), PAPER_FIGURES) for name in PAPER_METHODS if name in methods},
+        "methods": {
+            name: mean_figures(here[name].values(), PAPER_FIGURES) for name in PAPER_METHODS if name in methods
+        },
     }
     for rival in PAPER_METHODS[:-1]:
         for figure, short in ((SPEED, ""), ("disturbance", "_disturbance")):

@@ -26,9 +26,11 @@ One sharing for each stretch of a flight: the least wash that a bound on energy 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -47,13 +49,16 @@ from wakewise.control.null_space_allocation import (
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState, TruthProvider
+from wakewise.experiments.campaigns.definition import FLIGHT_SOURCES, PlannedTrial
+from wakewise.experiments.campaigns.study import study_trial
+from wakewise.experiments.campaigns.task import Task, WorkProgress
 from wakewise.operation import Parts, fly
 from wakewise.operation.loop import Step
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.missions import SETTLING
 from wakewise.simulation.tank.tank import TankWorld, tank_ambient, tank_points
 from wakewise.wake import bed_of
-from wakewise_paper.wash_reduction.flight import WashTrial, parts_of
+from wakewise_paper.wash_reduction.flight import SOURCES, parts_of
 from wakewise_paper.wash_reduction.prescribed_motion import PrescribedMotionTank, PrescribedPath
 
 HALF, BEYOND = 0.5, 1.4
@@ -180,16 +185,12 @@ Led = Callable[[IntArray], tuple[float, float]]
 """`picks -> mean speed in m/s, energy`."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class BoundTrial:
-    """One flight whose sharings are judged; hashable, so that it can be handed to a worker.
-
-    `duration_s` is as in `WashTrial`.
-    """
-
-    scenario: str
-    seed: int
-    duration_s: float | None = None
+def bound_trial(scenario: str, seed: int) -> PlannedTrial:
+    """One flight of `dp` whose ways to share thrusts are judged."""
+    name = f"{scenario}/bound/{seed}"
+    settings = {"scenario": scenario, "seed": seed}
+    task = Task(name=name, work=f"{__name__}:fly_bound", settings=settings, sources=(*FLIGHT_SOURCES, *SOURCES))
+    return study_trial(scenario, "bound", seed, task)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -212,8 +213,8 @@ class RecordedFlight:
     power_W: float
 
 
-def fly_bound(trial: BoundTrial) -> dict[str, float | None]:
-    """What sharings give in one flight.
+def fly_bound(settings: Mapping[str, Any], folder: Path, progress: WorkProgress) -> dict[str, float | None]:
+    """What sharings give in one flight: `scenario`, `seed`, and `duration_s` where only its first part is flown.
 
     Keys, speeds being means at the target in m/s, energies over that of the least thrusts: `dp_m_s` as flown;
     `least_m_s` the same led without the noise of its wrench; for each of `ENERGIES`
@@ -222,8 +223,9 @@ def fly_bound(trial: BoundTrial) -> dict[str, float | None]:
     its bound on power and without; `candidate_allocations`, how many there were; `dp_power_W`, `least_power_W`,
     `cpu_s`.
     """
+    del folder, progress
     began = time.process_time()
-    flown = fly_dp(trial)
+    flown = fly_dp(settings["scenario"], settings["seed"], settings.get("duration_s"))
     grid, named = candidates(flown)
     judge = AllocationJudge.of(flown, grid)
     found: dict[str, float | None] = {
@@ -242,7 +244,7 @@ def fly_bound(trial: BoundTrial) -> dict[str, float | None]:
     return found
 
 
-def fly_dp(trial: BoundTrial) -> RecordedFlight:
+def fly_dp(scenario: str, seed: int, duration_s: float | None = None) -> RecordedFlight:
     """Fly `dp` and keep what its water needs.
 
     Raises
@@ -250,19 +252,19 @@ def fly_dp(trial: BoundTrial) -> RecordedFlight:
     InputError
         If the scenario is not flown in the tank.
     """
-    parts = parts_of(WashTrial(scenario=trial.scenario, method="dp", seed=trial.seed))
+    parts = parts_of(scenario, "dp", seed)
     world = parts.world
     if not isinstance(world, TankWorld):
-        raise InputError(f"bound: {trial.scenario} is not flown in the tank")
+        raise InputError(f"bound: {scenario} is not flown in the tank")
     every, estimates = round(SEARCH_S * parts.scenario.control.rate_hz), []
     seen: list[int] = []
 
-    def heard(step: Step, witness: TruthProvider | None) -> None:  # noqa: ARG001
+    def heard(step: Step, _: TruthProvider | None) -> None:
         if len(seen) % every == 0:
             estimates.append(step.estimate)
         seen.append(1)
 
-    steps = fly(parts, checked=False, water_every_s=0.25, duration_s=trial.duration_s, watch=heard).steps
+    steps = fly(parts, checked=False, water_every_s=0.25, duration_s=duration_s, watch=heard).steps
     times = steps["time_s"].to_numpy()
     state = [steps.select(f"true_{name}" for name in names).to_numpy() for names in _STATE]
     way = PrescribedPath(times_s=times, p_WB_m=state[0], q_WB=state[1], nu_B=state[2])

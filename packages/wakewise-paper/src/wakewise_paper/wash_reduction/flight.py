@@ -1,26 +1,20 @@
-"""One flight of the gentle bench: a scenario or a world of the library, one vehicle, one method, one seed."""
+"""One flight of the study of wash: a scenario of its own or a world of the library, one vehicle, one method, one seed."""
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import polars as pl
 
-from wakewise.core.arrays import Array
-from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import TruthProvider
-from wakewise.operation import Parts, Scenario, fly
-from wakewise.operation.loop import Step
-from wakewise.robot.vehicles import Vehicle
-from wakewise.scene.missions import SETTLING, Route
+from wakewise.experiments.campaigns.definition import PlannedTrial
+from wakewise.experiments.campaigns.flights import flight_parts
+from wakewise.experiments.campaigns.study import flight_trial
+from wakewise.operation import Parts
+from wakewise.scene.missions import Route
 from wakewise.simulation.tank.tether import DRAG_COEFFICIENT
-from wakewise.vision.evaluation import attitude_rmse_deg, flight_figures
-from wakewise_paper.wash_reduction.ballasted_world import ballasted_world, blocks_of
-from wakewise_paper.wash_reduction.paper import WATER_EVERY_S
-from wakewise_paper.wash_reduction.routes import (
+from wakewise_paper import flights
+from wakewise_paper.routes import (
     BRAKE_AT_M,
     CLOSE_M,
     HOVER_DEG,
@@ -39,8 +33,8 @@ from wakewise_paper.wash_reduction.scenario_files import (
     load_scenario_file,
     sample_conditions,
 )
-from wakewise_paper.world_study.flight import WorldTrial, short_flight
 
+SOURCES = (*flights.SOURCES, "wakewise_paper:wash_reduction")
 TRIM = "+trim"
 """Ends the name of a method that is flown with the float or lead that its own hover asks for."""
 CABLE_M, WINCH_M = 0.01, 1.5
@@ -81,63 +75,68 @@ FIGURES = (
 """Of each flight, from the end of settling on; `float_N` is what +trim added, null for others."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class WashTrial:
-    """One flight to make; hashable and plain, so that it can be handed to a worker.
+def wash_trial(
+    scenario: str,
+    method: str,
+    seed: int,
+    *,
+    name: str = "",
+    control: Mapping[str, Any] | None = None,
+    wrong_current: bool = False,
+    duration_s: float | None = None,
+) -> PlannedTrial:
+    """One flight to make.
 
-    Parameters
-    ----------
-    scenario : str
-        Full name: `orbit/paper`, `world/mud`.
-    method : str
-        A method's name, or one with `TRIM` at its end.
-    seed : int
-        From 1.
-    control : tuple
-        Dotted fields of `ControlSettings` and their values.
-    wrong_current : bool
-        State a wrong current to the controller.
-    duration_s : float or None
-        Only the first part of the flight.
+    `scenario` is a full name such as orbit/paper or world/mud; `method` may end with `TRIM`; `name` is what the flight is
+    called if not by its method; `control` are dotted fields of `ControlSettings`; `wrong_current` states a wrong current
+    to the controller; `duration_s` flies the first part only.
     """
-
-    scenario: str
-    method: str
-    seed: int
-    control: tuple[tuple[str, Any], ...] = ()
-    wrong_current: bool = False
-    duration_s: float | None = None
-
-
-def parts_of(trial: WashTrial) -> Parts:
-    """Parts of the flight, but for what +trim adds."""
-    method = trial.method.removesuffix(TRIM)
-    if trial.scenario.startswith(WORLD):
-        world = WorldTrial(world=trial.scenario.removeprefix(WORLD), method=method, seed=trial.seed)
-        parts = short_flight(world)
+    own = method.removesuffix(TRIM)
+    setup: dict[str, dict[str, Any]] = {}
+    if scenario.startswith(WORLD):
+        fields: dict[str, Any] = {"world": scenario.removeprefix(WORLD), "method": own, "seed": seed}
+        setup[flights.HOVER_AND_ARC] = {}
     else:
-        name, vehicle = trial.scenario.split("/")
-        parts = scenario_parts(name, vehicle, method, trial.seed)
-    told = dict(trial.control)
-    if trial.wrong_current:
-        told |= wrong_current(parts.scenario.tank.current.velocity_m_s, parts.scenario.seed)
-    return parts.replace(**{f"control.{key}": value for key, value in told.items()}) if told else parts
+        file, vehicle = scenario.split("/")
+        fields = scenario_fields(file, seed) | {"vehicle": vehicle, "method": own}
+        setup[f"{__name__}:scenario_setup"] = {"name": file, "seed": seed}
+    if wrong_current:
+        setup[f"{__name__}:wrong_current"] = {}
+    if method.endswith(TRIM):
+        setup[flights.BALLASTED] = {}
+    return flight_trial(
+        scenario,
+        name or method,
+        seed,
+        fields | {f"control.{key}": value for key, value in (control or {}).items()},
+        setup=setup,
+        probes={flights.CAMERA_ERRORS: {}},
+        duration_s=duration_s,
+        sources=SOURCES,
+    )
 
 
-def scenario_parts(name: str, vehicle: str, method: str, seed: int) -> Parts:
-    """Parts of a flight of one of the bench's own scenarios."""
-    file, what = load_scenario_file(name), sample_conditions(name, seed)
+def parts_of(scenario: str, method: str, seed: int, **more: Any) -> Parts:
+    """Parts of a flight of `wash_trial`."""
+    return flight_parts(wash_trial(scenario, method, seed, **more).task.settings)[0]
+
+
+def scenario_fields(name: str, seed: int) -> dict[str, Any]:
+    """Fields of a scenario of the study that a seed has, by dotted name, with what the scenario's own seed draws."""
+    what = sample_conditions(name, seed)
     values, draws = fields_of(name)
-    told: dict[str, Any] = values | {
+    return values | {
         "world": "tank",
-        "vehicle": vehicle,
-        "method": method,
         "seed": what.seed,
         "tank.mismatch.trim_N": what.trim_N,
         "tank.current.velocity_m_s": what.current_W_m_s,
-        "randomize": {key: draw.model_dump(exclude_none=True) for key, draw in draws.items()},
+        "draws": {key: draw.model_dump(exclude_none=True) for key, draw in draws.items()},
     }
-    parts = Scenario.preset("quick", **told).parts()
+
+
+def scenario_setup(parts: Parts, name: str, seed: int) -> Parts:
+    """Camera, route and cable of a flight of a scenario of the study."""
+    file, what = load_scenario_file(name), sample_conditions(name, seed)
     if file.course == "nadir":
         parts = parts.replace(vehicle=looking_down(parts.vehicle))
     parts = parts.replace(route=route_of(file.course, parts, what))
@@ -181,55 +180,18 @@ def cable(parts: Parts, what: SampledConditions) -> dict[str, Any]:
     }
 
 
-def wrong_current(current_W_m_s: tuple[float, ...], seed: int) -> dict[str, Any]:
-    """Fields of control that state a current too fast or too slow, and turned."""
+def wrong_current(parts: Parts) -> Parts:
+    """State a current to the controller that is too fast or too slow, and turned; the seed draws both signs."""
+    stated = wrong_current_m_s(parts.scenario.tank.current.velocity_m_s, parts.scenario.seed)
+    return parts.replace(**{"control.allocation.current_m_s": stated})
+
+
+def wrong_current_m_s(current_W_m_s: tuple[float, ...], seed: int) -> tuple[float, ...]:
+    """A current that is believed in place of the true one, north, east and down."""
     faster, left = np.random.default_rng([seed, 31]).uniform(-1.0, 1.0, 2) < 0.0
     share = 1.0 + (WRONG_SHARE if faster else -WRONG_SHARE)
     turn = WRONG_RAD if left else -WRONG_RAD
     north, east, down = current_W_m_s
     c, s = np.cos(turn), np.sin(turn)
     stated = (share * (c * north - s * east), share * (s * north + c * east), down)
-    return {"allocation.current_m_s": tuple(round(float(v), 6) for v in stated)}
-
-
-def fly_trial(trial: WashTrial) -> dict[str, float | None]:
-    """Figures of one flight."""
-    began = time.process_time()
-    parts, float_N = parts_of(trial), None
-    if trial.method.endswith(TRIM):
-        blocks = blocks_of(parts)
-        float_N = float(sum(block.float_N for block in blocks))
-        parts = ballasted_world(parts, blocks)
-    solve_ms: list[float] = []
-
-    def heard(step: Step, witness: TruthProvider | None) -> None:  # noqa: ARG001
-        solve_ms.append(1e3 * step.solve_s)
-
-    # Courses clear the bed by their own check, orbits by the mission's.
-    flown = fly(parts, checked=False, water_every_s=WATER_EVERY_S, duration_s=trial.duration_s, watch=heard).steps
-    frame = flown.filter(pl.col("leg") != SETTLING)
-    judged = frame if frame.height else flown
-    figures: dict[str, Any] = flight_figures(judged) | camera_errors(judged, parts.vehicle)
-    figures["float_N"] = float_N
-    figures["solve_ms_p99"] = float(np.percentile(solve_ms[-judged.height :], 99))
-    figures["cpu_s"] = time.process_time() - began
-    return {key: figures.get(key) for key in FIGURES}
-
-
-def camera_errors(frame: pl.DataFrame, vehicle: Vehicle) -> dict[str, float]:
-    """How far the true camera is from the wished one: place in mm and angle in degrees, root mean square over steps."""
-    poses = {who: _camera_poses(frame, vehicle, who) for who in ("true", "goal")}
-    apart = poses["true"][0] - poses["goal"][0]
-    return {
-        "camera_rmse_mm": 1e3 * float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))),
-        "camera_attitude_rmse_deg": attitude_rmse_deg(poses["true"][1], poses["goal"][1]),
-    }
-
-
-def _camera_poses(frame: pl.DataFrame, vehicle: Vehicle, who: str) -> tuple[Array, Array]:
-    """Places, shape (n, 3), and attitudes, shape (n, 4), of the camera in W."""
-    places = frame.select(f"{who}_x_m", f"{who}_y_m", f"{who}_z_m").to_numpy()
-    turns = frame.select(f"{who}_qw", f"{who}_qx", f"{who}_qy", f"{who}_qz").to_numpy()
-    tilts = np.radians(frame[f"{who}_tilt_deg"].to_numpy())
-    cameras = [Pose(p, q) @ vehicle.X_BC_at(float(tilt)) for p, q, tilt in zip(places, turns, tilts, strict=True)]
-    return np.array([X.p_m for X in cameras]), np.array([X.q for X in cameras])
+    return tuple(round(float(v), 6) for v in stated)

@@ -2,8 +2,8 @@
 
 A short flight (hover on one orbit, part of a lower one, from a side that the seed draws) gives water, silt, sway,
 position and energy; a whole quick scan gives the model. Seed k is one world for all methods, so that flights are
-compared in pairs; intervals are 95 % of a bootstrap over seeds. Flights and scans are kept: a run that was stopped goes
-on, and a second one only flies what is new.
+compared in pairs; intervals are 95 % of a bootstrap over seeds. A campaign makes and
+keeps flights and scans: a run that was stopped goes on, and a second one flies what is new.
 
 Emergent in these figures are: how jets decay, merge, meet walls and drift, within the laws that the tank is given
 (`wakewise.simulation.tank.validation_limits` says how well each is met); what the bed lets go; how the target bends;
@@ -14,17 +14,26 @@ world show NAME`).
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
-from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns import ProcessExecutor
+from wakewise.experiments.campaigns.definition import PlannedTrial
+from wakewise.experiments.campaigns.statistics import mean_figures, reduction_pct
+from wakewise.experiments.campaigns.store import open_store
+from wakewise.experiments.campaigns.study import (
+    FlightFailure,
+    Key,
+    Row,
+    numbers,
+    run_study,
+    selected,
+    store_folder,
+)
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import load_scenario
 from wakewise.operation.worlds.library import load_world, world_names
-from wakewise_paper import flight_batches
-from wakewise_paper.flight_batches import PHOTOGRAPHS, FlightFailure, FlightStore, Key, Row, store_folder
-from wakewise_paper.world_study.figures import method_figures, ratios
-from wakewise_paper.world_study.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial
+from wakewise_paper.world_study.flight import FLIGHT, FLIGHT_FIGURES, MODEL_FIGURES, SCAN, scan, short_flight
 from wakewise_paper.world_study.lattice_comparison import JUDGED, judge_table, judge_trials
 
 METHODS = ("dp", "manual", "ardusub", "mpc", "mpc-smooth", "no-forward-jets", "allocation-only", "wake-aware")
@@ -36,13 +45,29 @@ EMERGENT = (
 )
 TYPED_IN = "constants of the laws and numbers of the worlds, each with its source (wakewise world show NAME)"
 
+RATIOS = (
+    ("target_speed_mean_m_s", "target_speed"),
+    ("exposure_speed_mean_m_s", "exposure_speed"),
+    ("bed_shear_p95_Pa", "bed_shear"),
+    ("silt_lifted_g", "silt_lifted"),
+    ("silt_suspended_max_g", "silt_suspended"),
+    ("ray_optical_depth", "ray_optical_depth"),
+    ("sway_rms_mm", "sway"),
+    ("sway_wash_mm", "sway_wash"),
+    ("position_rmse_mm", "position"),
+    ("energy_kJ", "energy"),
+)
+"""Figures whose ratio to the first method is told, and the ratio's name."""
+
+
+TrialKey = tuple[str, str, str, int]
+"""Kind of trial or flow, world, method and seed."""
+
 _engine = ProcessExecutor
-_FLY, _SCAN = (f"wakewise_paper.world_study.flight:{name}_trial" for name in ("fly", "scan"))
-_JUDGE = "wakewise_paper.world_study.lattice_comparison:judged_trial"
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
-    """Fly what is wished and not known yet, and gather each world's table.
+    """Fly what is wanted and not known yet, and gather each world's table.
 
     Raises
     ------
@@ -50,53 +75,50 @@ def run(options: BenchOptions) -> dict[str, Any]:
         If a world or method is not known.
     """
     began = time.monotonic()
-    worlds = _known("worlds", options.worlds, world_names())
-    methods = _known("methods", options.methods, METHODS)
-    flights = planned(worlds, methods, options.seeds)
-    scans = planned(worlds, methods, options.models)
+    worlds = selected("worlds", options.worlds, world_names())
+    methods = selected("methods", options.methods, METHODS)
+    flights, scans = (
+        {(kind, world, method, seed): make(world, method, seed) for world, method, seed in planned(worlds, methods, n)}
+        for kind, make, n in ((FLIGHT, short_flight, options.seeds), (SCAN, scan, options.models))
+    )
+    judged = judge_trials(options.judge, tuple(name for name in JUDGED if name in worlds))
     folder = options.store or store_folder("worlds")
-    flown, lost, kept = flight_batches.fly_all(flights, _FLY, FlightStore(folder, options.fresh), options, _engine)
-    models, failed, had = flight_batches.fly_all(
-        scans, _SCAN, FlightStore(folder, options.fresh, PHOTOGRAPHS), options, _engine
-    )
-    judged, unjudged, seen = flight_batches.fly_all(
-        judge_trials(options.judge, tuple(name for name in JUDGED if name in worlds)),
-        _JUDGE,
-        FlightStore(folder, options.fresh),
-        options,
-        _engine,
-    )
-    known = FlightStore(folder, False, PHOTOGRAPHS)
-    for name in worlds:  # models of an earlier run count, too
-        for method in methods:
-            for seed in range(options.models + 1, options.seeds + 1):
-                row = known.load(WorldTrial(world=name, method=method, seed=seed), _SCAN)
-                if row is not None:
-                    models[name, method, seed] = row
+    trials: dict[TrialKey, PlannedTrial] = flights | scans | judged
+    made = run_study("worlds", trials, folder, options, _engine)
+    flown = {(key[1], key[2], key[3]): row for key, row in made.rows.items() if key in flights}
+    models = {(key[1], key[2], key[3]): row for key, row in made.rows.items() if key in scans}
+    lost = [failure for key, failure in made.failures.items() if key not in judged]
+    models |= earlier_models(worlds, methods, options)
     return {
         "default_world": load_scenario("quick", None, {}).world,
-        "worlds": {name: world_figures(name, methods, flown, models, lost + failed) for name in worlds},
-        "judge": judge_table(judged) if options.judge else None,
+        "worlds": {name: world_figures(name, methods, flown, models, lost) for name in worlds},
+        "judge": judge_table(made.part(judged).rows) if options.judge else None,
         "why": {} if options.judge else {"judge": "not flown; --judge sets for how many seeds"},
         "emergent": EMERGENT,
         "typed_in": TYPED_IN,
         "flights": len(flights),
         "models": len(models),
-        "failed": len(lost) + len(failed) + len(unjudged),
-        "failures": [vars(failure) for failure in (*lost, *failed, *unjudged)],
-        "known_already": kept + had + seen,
+        "failed": len(made.failures),
+        "failures": made.counts["failures"],
+        "known_already": len(made.known),
         "wall_s": time.monotonic() - began,
     }
 
 
-def planned(worlds: tuple[str, ...], methods: tuple[str, ...], seeds: int) -> dict[Key, WorldTrial]:
-    """Each method in each world on seeds 1 to `seeds`; seed by seed, so that a run that is stopped has whole worlds."""
-    return {
-        (world, method, seed): WorldTrial(world=world, method=method, seed=seed)
-        for seed in range(1, seeds + 1)
-        for world in worlds
-        for method in methods
-    }
+def planned(worlds: tuple[str, ...], methods: tuple[str, ...], seeds: int) -> list[Key]:
+    """World, method and seed, seed by seed, so that a run that is stopped has whole seeds of all worlds."""
+    return [(world, method, seed) for seed in range(1, seeds + 1) for world in worlds for method in methods]
+
+
+def earlier_models(worlds: tuple[str, ...], methods: tuple[str, ...], options: BenchOptions) -> dict[Key, Row]:
+    """Models of further seeds that an earlier run made."""
+    store = open_store(options.store or store_folder("worlds"))
+    found: dict[Key, Row] = {}
+    for world, method, seed in planned(worlds, methods, options.seeds):
+        figures = store.figures(scan(world, method, seed).task.key) if seed > options.models else None
+        if figures is not None:
+            found[world, method, seed] = numbers(figures)
+    return found
 
 
 def world_figures(
@@ -111,8 +133,8 @@ def world_figures(
         lost = [f for f in failures if (f.flow, f.name) == (name, method)]
         for failure in lost:
             scans.setdefault(failure.seed, {"success": 0.0})
-        told = method_figures(rows, FLIGHT_FIGURES)
-        told |= {key: value for key, value in method_figures(scans, MODEL_FIGURES).items() if key != "flights"}
+        told = mean_figures(rows.values(), FLIGHT_FIGURES)
+        told |= {key: value for key, value in mean_figures(scans.values(), MODEL_FIGURES).items() if key != "flights"}
         success = told.pop("success")
         told["success_pct"] = None if success is None else 100.0 * success
         told.pop("success_interval")
@@ -122,6 +144,25 @@ def world_figures(
         told["why"] = why(told)
         tables[method] = told
     return {"title": world.file.title, "why": world.file.why, "methods": tables}
+
+
+def ratios(base: Mapping[int, Row], other: Mapping[int, Row]) -> dict[str, Any]:
+    """How much smaller each figure's mean is than the base's, in percent, over the seeds that both flew.
+
+    With an interval of 95 % over pairs, and of the target's speed the worst and the best seed.
+    """
+    answer: dict[str, Any] = {}
+    for figure, name in RATIOS:
+        value, interval = reduction_pct(base, other, figure)
+        answer[f"{name}_less_pct"], answer[f"{name}_less_interval_pct"] = value, interval
+    each = [
+        100.0 * (1.0 - ours / theirs)
+        for seed in sorted(set(base) & set(other))
+        if (ours := other[seed].get(RATIOS[0][0])) is not None and (theirs := base[seed].get(RATIOS[0][0]))
+    ]
+    answer["target_speed_less_worst_pct"] = min(each) if each else None
+    answer["target_speed_less_best_pct"] = max(each) if each else None
+    return answer
 
 
 def why(figures: dict[str, Any]) -> dict[str, str]:
@@ -141,11 +182,3 @@ def why(figures: dict[str, Any]) -> dict[str, str]:
 
 def _of(rows: dict[Key, Row], world: str, method: str) -> dict[int, Row]:
     return {seed: row for (where, who, seed), row in rows.items() if (where, who) == (world, method)}
-
-
-def _known(what: str, wished: tuple[str, ...] | None, allowed: tuple[str, ...]) -> tuple[str, ...]:
-    """The wished names in the bench's order; all if None."""
-    for name in wished or ():
-        if name not in allowed:
-            raise InputError(f"{what}: '{name}' is not known, allowed: {', '.join(allowed)}")
-    return tuple(name for name in allowed if wished is None or name in wished)

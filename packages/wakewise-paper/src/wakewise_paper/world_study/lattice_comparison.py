@@ -13,17 +13,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 from scipy.spatial import ConvexHull
 
 from wakewise.core.arrays import Array
+from wakewise.core.interfaces import TruthProvider
+from wakewise.experiments.campaigns.definition import PlannedTrial
+from wakewise.experiments.campaigns.flights import FlightProbe
+from wakewise.experiments.campaigns.study import Row, flight_trial
+from wakewise.operation import Parts
 from wakewise.operation.loop import Step
 from wakewise.scene.targets import Mesh, Target
 from wakewise.simulation.tank.water_truth import surface_samples
-from wakewise_paper.flight_batches import Key, Row
-from wakewise_paper.world_study.flight import WorldTrial, flown_figures, short_flight
+from wakewise_paper import flights
+from wakewise_paper.world_study.flight import SOURCES
 
 JUDGED = ("payload", "close", "kelp")
 METHODS = ("dp", "no-forward-jets", "wake-aware")
@@ -36,18 +43,25 @@ CLEAR = "clear_speed_mean_m_s"
 _PLACES = {"": "target_speed_mean_m_s", "clear_": CLEAR}
 
 
-def judged_trial(trial: WorldTrial) -> dict[str, float | None]:
-    """Figures of one short flight, with the mean excess speed 8 cm off the target's hull from settling on."""
-    parts = short_flight(trial)
-    points, speeds = clear_points(parts.target), [(-np.inf, 0.0)]
+class ClearSpeed(FlightProbe):
+    """Mean excess speed of the water 8 cm off the target's hull, from settling on."""
 
-    def look(step: Step, witness: Any) -> None:
-        if step.time_s >= max(_SETTLED_S, speeds[-1][0] + _LOOK_S):
-            excess = witness.excess_velocity(points)
-            speeds.append((step.time_s, float(np.linalg.norm(excess, axis=1).mean())))
+    def __init__(self, parts: Parts, folder: Path) -> None:
+        super().__init__(parts, folder)
+        self._points = clear_points(parts.target)
+        self._speeds: list[tuple[float, float]] = [(-np.inf, 0.0)]
 
-    figures = flown_figures(parts, trial.duration_s, look)
-    return figures | {CLEAR: float(np.mean([speed for _, speed in speeds[1:]])) if speeds[1:] else None}
+    def step(self, step: Step, witness: TruthProvider | None) -> None:
+        """Look at the water twice a second."""
+        if step.time_s >= max(_SETTLED_S, self._speeds[-1][0] + _LOOK_S):
+            water: Any = witness  # tank and lattice tell more of their water than every world must
+            excess = water.excess_velocity(self._points)
+            self._speeds.append((step.time_s, float(np.linalg.norm(excess, axis=1).mean())))
+
+    def figures(self, steps: pl.DataFrame) -> Mapping[str, float | None]:
+        """`clear_speed_mean_m_s`; None of a flight that ended before."""
+        del steps
+        return {CLEAR: float(np.mean([speed for _, speed in self._speeds[1:]])) if self._speeds[1:] else None}
 
 
 def clear_points(target: Target) -> Array:
@@ -61,11 +75,23 @@ def clear_points(target: Target) -> Array:
     return np.asarray(off[off[:, 2] < target.bed_z_m - 0.5 * CLEAR_M])
 
 
-def judge_trials(seeds: int, worlds: tuple[str, ...] = JUDGED) -> dict[Key, WorldTrial]:
-    """Flights to make; the flow stands before the world in their keys."""
+JudgeKey = tuple[str, str, str, int]
+"""Flow, world, method and seed."""
+
+
+def judge_trials(seeds: int, worlds: tuple[str, ...] = JUDGED) -> dict[JudgeKey, PlannedTrial]:
+    """Flights to make; the target is held still in both waters."""
     return {
-        (f"{flow}: {world}", method, seed): WorldTrial(
-            world=world, method=method, seed=seed, flow=flow, duration_s=DURATION_S
+        (flow, world, method, seed): flight_trial(
+            f"{flow}: {world}",
+            method,
+            seed,
+            {"world": world, "method": method, "seed": seed, "flow": flow, "target.elasticity": "none"},
+            setup={flights.HOVER_AND_ARC: {}},
+            probes={f"{__name__}:ClearSpeed": {}},
+            duration_s=DURATION_S,
+            sources=SOURCES,
+            variation="judge",
         )
         for seed in range(1, seeds + 1)
         for world in worlds
@@ -74,17 +100,17 @@ def judge_trials(seeds: int, worlds: tuple[str, ...] = JUDGED) -> dict[Key, Worl
     }
 
 
-def judge_table(rows: Mapping[Key, Row]) -> dict[str, Any]:
+def judge_table(rows: Mapping[JudgeKey, Row]) -> dict[str, Any]:
     """By world and method: speeds on and 8 cm off the target in each flow, and how much less than `dp`'s.
 
     Means over the seeds that both flew.
     """
-    worlds = [name for name in JUDGED if any(key[0].endswith(f": {name}") for key in rows)]
+    worlds = [name for name in JUDGED if any(key[1] == name for key in rows)]
     answer: dict[str, Any] = {}
     for world in worlds:
         table: dict[str, Any] = {}
         for method in METHODS:
-            found = [{k[2]: r for k, r in rows.items() if k[:2] == (f"{flow}: {world}", method)} for flow in FLOWS]
+            found = [{k[3]: r for k, r in rows.items() if k[:3] == (flow, world, method)} for flow in FLOWS]
             both = sorted(set(found[0]) & set(found[1]))
             table[method] = {"seeds": len(both)}
             for place, figure in _PLACES.items():

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from wakewise_paper.wash_reduction.figures import SPEED, TROUBLE_M_S, Row, log_reduction_pct, pairs_of, ratio
+from wakewise.experiments.campaigns.statistics import as_reduction, log_reduction_pct, pairs_of, ratio
+from wakewise.experiments.campaigns.study import Row
 
-CALM_M_S = 0.005
-"""What `dp` leaves where there is no trouble, less than."""
+SPEED = "target_speed_mean_m_s"
+TROUBLE_M_S, CALM_M_S = 0.010, 0.005
+"""Wash of `dp` where there is trouble, more than; and where there is none, less than."""
 POSITION_SHARE, POSITION_MM = 1.05, 0.2
 """The camera may be off by so much of what `dp` leaves, and so much more."""
 SILT, SWAY, PLACE, ENERGY = "ray_optical_depth", "sway_rms_mm", "camera_rmse_mm", "energy_kJ"
@@ -75,7 +77,7 @@ def exposed_figures(
         found = log_reduction_pct(pairs_of(base, ours, SPEED, trims), len(lost & set(base)))
         answer[f"reduction_vs_{tag}_pct"], answer[f"reduction_vs_{tag}_interval_pct"] = found[:2]
         answer[f"worst_flight_vs_{tag}_pct"] = found[2]
-        answer[f"sums_reduction_vs_{tag}_pct"] = _less(ratio(pairs_of(base, ours, SPEED, trims)))[0]
+        answer[f"sums_reduction_vs_{tag}_pct"] = as_reduction(*ratio(pairs_of(base, ours, SPEED, trims)))[0]
     worst: dict[str, float] = {}
     for scenario in answer["scenarios"]:
         here = {k: v for k, v in dp.items() if k[0] == scenario}
@@ -88,7 +90,7 @@ def exposed_figures(
     answer |= place(dp, ours, len(lost))
     answer["energy_ratio"], answer["energy_ratio_interval"] = ratio(pairs_of(dp, ours, ENERGY, trims))
     for name, figure in (("silt_rays", SILT), ("sway", SWAY), ("sway_wash", SWAY_WASH)):
-        less = _less(ratio(pairs_of(dp, ours, figure, trims)))
+        less = as_reduction(*ratio(pairs_of(dp, ours, figure, trims)))
         answer[f"{name}_reduction_pct"], answer[f"{name}_reduction_interval_pct"] = less
         answer[f"{name}_worst_world_pct"] = _worst_ratio(dp, ours, figure, answer["scenarios"])
     if method == "wake-aware":
@@ -164,16 +166,6 @@ def _worst_ratio(dp: Mapping[Known, Row], ours: Mapping[Known, Row], figure: str
     ]
     known = [value for value in found if value is not None]
     return 100.0 * (1.0 - max(known)) if known else None
-
-
-def _less(
-    found: tuple[float | None, tuple[float, float] | None],
-) -> tuple[float | None, tuple[float, float] | None]:
-    """A ratio as a reduction in percent."""
-    value, ends = found
-    if value is None:
-        return None, None
-    return 100.0 * (1.0 - value), None if ends is None else (100.0 * (1.0 - ends[1]), 100.0 * (1.0 - ends[0]))
 
 
 def _why(answer: dict[str, Any], flights: int) -> dict[str, str]:
