@@ -19,7 +19,7 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cockpit.control_mailbox import ControlMailbox
-from wakewise.ui.cockpit.requests import PAGE
+from wakewise.ui.cockpit.server import PAGE
 from wakewise.ui.cockpit.server import CockpitServer
 from wakewise.ui.cockpit.view_model import CameraPicture, StatusMessage
 from wakewise.ui.web.files import StaticFiles
@@ -32,7 +32,7 @@ _RANGES = {"w_track": [0.5, 50.0], "gain": [0.1, 1.0], "mode": ["operator", "hol
 class Rehearsal:
     """A `Show` whose vehicle is a point: it moves as the sticks say."""
 
-    seat: ControlMailbox = field(default_factory=ControlMailbox)
+    mailbox: ControlMailbox = field(default_factory=ControlMailbox)
     edition: int = 0
     desk: dict[str, Any] = field(
         default_factory=lambda: {
@@ -71,7 +71,7 @@ class Rehearsal:
     def _fly(self) -> None:
         """The loop, at 50 Hz, as a flight's would read the seat."""
         while not self._over.wait(0.02):
-            controls = self.seat.read(self.time_s)
+            controls = self.mailbox.read(self.time_s)
             self.axes = np.zeros(5) if controls is None else controls.axes
             self.flown.append((time.monotonic(), self.axes))
             for what in () if controls is None else controls.pressed:
@@ -79,7 +79,7 @@ class Rehearsal:
                 if what in ("hold", "scan", "operator"):
                     self.desk["mode"] = what
                 self._notes.append(StatusMessage(text=what, time_s=self.time_s))
-            self.seat.flown()
+            self.mailbox.flown()
             self.heading += 0.5 * self.axes[3] * 0.02
             c, s = math.cos(self.heading), math.sin(self.heading)
             u, v, w = 0.3 * self.axes[:3]
@@ -149,7 +149,7 @@ class Rehearsal:
             "loop": {
                 "behind_ms": 0.4,
                 "solve_ms_p99": 3.1,
-                "stick_to_thrust_ms_p99": self.seat.stick_to_thrust_ms_p99,
+                "stick_to_thrust_ms_p99": self.mailbox.stick_to_thrust_ms_p99,
             },
             "fallback": None,
         }
@@ -158,7 +158,7 @@ class Rehearsal:
         told, self._notes = self._notes, []
         return told
 
-    def set_desk(self, changes: dict[str, Any]) -> None:
+    def change_settings(self, changes: dict[str, Any]) -> None:
         for name, value in changes.items():
             allowed = _RANGES.get(name)
             if name not in self.desk or (name in ("w_track", "gain") and not allowed[0] <= value <= allowed[1]):

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from rehearsal import Rehearsal
 
-from wakewise.ui.cockpit.requests import SERVICE, page_files
+from wakewise.ui.cockpit.server import SERVICE, page_files
 from wakewise.ui.cockpit.server import CockpitServer
 
 # Required and optional keys of each object, as Cockpit's "External Integrations" lists them.

@@ -10,7 +10,7 @@ import pytest
 from browser import Browser, Page, until
 from rehearsal import Rehearsal
 
-from wakewise.ui.cockpit.requests import page_files
+from wakewise.ui.cockpit.server import page_files
 from wakewise.ui.cockpit.server import CockpitServer
 
 
@@ -56,11 +56,11 @@ def test_a_key_moves_the_vehicle_and_a_window_left_stops_it(rehearsal: Rehearsal
     other = browser.open("about:blank")
     until(lambda: not rehearsal.flown[-1][1].any(), "to stop")
     stopped_s = time.monotonic()
-    until(lambda: not rehearsal.seat.holding.flying, "the helm to lapse")
+    until(lambda: not rehearsal.mailbox.holding.flying, "the helm to lapse")
     assert not any(axes.any() for at_s, axes in rehearsal.flown if at_s > stopped_s)
     other.close()
     page.front()
-    until(lambda: rehearsal.seat.holding.flying, "sticks again")
+    until(lambda: rehearsal.mailbox.holding.flying, "sticks again")
     page.up("KeyW")
     page.down("KeyA")
     flies(rehearsal, 1, -1.0)
@@ -71,8 +71,8 @@ def test_a_closed_tab_stops_and_frees_the_helm(rehearsal: Rehearsal, page: Page)
     page.down("KeyW")
     flies(rehearsal, 0, 1.0)
     page.close()
-    until(lambda: rehearsal.seat.holding.holder is None, "the helm to be free")
-    assert not rehearsal.seat.read(0.0)
+    until(lambda: rehearsal.mailbox.holding.holder is None, "the helm to be free")
+    assert not rehearsal.mailbox.read(0.0)
 
 
 def test_pictures_flow_and_captures_count(rehearsal: Rehearsal, page: Page) -> None:

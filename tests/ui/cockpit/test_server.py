@@ -41,7 +41,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def show(clock: Clock) -> Iterator[Rehearsal]:
-    rehearsal = Rehearsal(seat=ControlMailbox(clock))
+    rehearsal = Rehearsal(mailbox=ControlMailbox(clock))
     yield rehearsal
     rehearsal.close()
 
@@ -238,7 +238,7 @@ def test_a_page_that_closes_stops_the_vehicle_at_once(server: CockpitServer, sho
         async with asyncio.timeout(2.0):
             while server.clients:
                 await asyncio.sleep(0.002)
-        assert show.seat.read(0.0) is None
+        assert show.mailbox.read(0.0) is None
         async with page(server, "helm") as again:
             assert again.lease is not None
 

@@ -28,25 +28,25 @@ class Hands:
 
     def __init__(self, session: CockpitSession) -> None:
         self.session, self.seq, self.axes, self.said = session, 0, np.zeros(5), [""]
-        session.seat.ask("me")
+        session.mailbox.ask("me")
 
     @property
     def lease(self) -> str:
-        return self.session.seat.holding.lease or ""
+        return self.session.mailbox.holding.lease or ""
 
     def until(self, right: Callable[[], object], within_s: float = 60.0) -> None:
         end_s = time.monotonic() + within_s
         while not right():
             assert time.monotonic() < end_s, self.said
-            if self.session.seat.holding.holder != "me":
-                self.session.seat.ask("me")
+            if self.session.mailbox.holding.holder != "me":
+                self.session.mailbox.ask("me")
             self.seq += 1
-            self.session.seat.moved("me", self.lease, self.seq, 1e3 * time.monotonic(), self.axes)
+            self.session.mailbox.moved("me", self.lease, self.seq, 1e3 * time.monotonic(), self.axes)
             self.said += [note.text for note in self.session.notes()]
             time.sleep(0.04)
 
     def press(self, what: str) -> None:
-        assert self.session.seat.press("me", self.lease, what)
+        assert self.session.mailbox.press("me", self.lease, what)
 
     @property
     def state(self) -> dict[str, Any]:

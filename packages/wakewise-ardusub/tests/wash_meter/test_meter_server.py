@@ -18,7 +18,8 @@ from test_cockpit_extras import EXTRAS, SERVICE_KEYS, WIDGET, fits
 
 from wakewise.core.errors import InputError
 from wakewise.ui.web.origin_check import PER_ADDRESS, TOKEN_HEADER, RequestOrigin
-from wakewise_ardusub.wash_meter.server import MOST_KEPT, OFFER, PAGE, MeterServer
+from wakewise.ui.web.server import MAX_KEPT
+from wakewise_ardusub.wash_meter.server import OFFER, PAGE, MeterServer
 
 WISHED: list[str] = []
 ASK = urllib.request.build_opener(urllib.request.ProxyHandler({})).open
@@ -178,11 +179,11 @@ def test_a_connection_that_was_let_in_is_kept_whatever_others_do(server: MeterSe
         assert not asks(page).will_close
         assert page.sock is own
         kept = 0
-        for _ in range(MOST_KEPT + 5):
+        for _ in range(MAX_KEPT + 5):
             other = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5)
             stack.callback(other.close)
             kept += not asks(other).will_close
-        assert kept < MOST_KEPT
+        assert kept < MAX_KEPT
 
 
 def test_without_the_token_no_connection_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:

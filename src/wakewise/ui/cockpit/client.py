@@ -31,7 +31,7 @@ class Client:
     id: str
     name: str = "somebody"
     greeted: bool = False
-    amiss: int = 0
+    invalid: int = 0
     throttled: int = 0
     unseen: int | None = None
     pictured_s: float = 0.0
@@ -54,7 +54,7 @@ class Client:
         """Whether it can take a picture, or has had one so lately that its word for it may be under way."""
         return self.looks or (self.greeted and now_s - self.pictured_s < SEEN_WITHIN_S)
 
-    def tell(self, text: str) -> None:
+    def send(self, text: str) -> None:
         """Put a message that is to arrive into the outbox."""
         self._words.append(text)
         self._something.set()

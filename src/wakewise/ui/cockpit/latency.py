@@ -94,7 +94,7 @@ def measure(
         if page.returncode != 0:
             raise StageError(f"latency: the page that flies ended with exit status {page.returncode}")
         counted: dict[str, Any] = json.loads(told)
-        waits_ms = 1e3 * np.array(session.seat.waits_s)
+        waits_ms = 1e3 * np.array(session.mailbox.waits_s)
         live, lookout = session.live, session.lookout
         if live is None or lookout is None or not len(waits_ms):
             raise StageError("latency: no stick was flown")

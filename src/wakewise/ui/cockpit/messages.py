@@ -15,8 +15,6 @@ from typing import Any, Literal
 from wakewise.core.arrays import Array
 from wakewise.operation.teleop.input.controls import ACTIONS, CONTROL_AXES, apply_dead_zone
 
-MOST_BYTES = 65536
-"""A longer message ends the connection (websockets does that while it reads)."""
 _WORD = 64  # characters of a name, a token, an id
 _LARGEST = 2**53  # the largest whole number that JavaScript counts to
 _FIELDS = 16

@@ -81,7 +81,7 @@ class CockpitSession:
         scene: bool = False,
     ) -> None:
         self._parts = scenario if isinstance(scenario, Parts) else scenario.parts()
-        self.seat, self.desk = ControlMailbox(device=device), OperatorState(OperatorSettings(watch_target=False))
+        self.mailbox, self.desk = ControlMailbox(device=device), OperatorState(OperatorSettings(watch_target=False))
         self._device, self._scene_wanted = device, scene
         self._scene: ViserScene | None = None
         self._fallback: str | None = None
@@ -187,7 +187,7 @@ class CockpitSession:
             "loop": {
                 "behind_ms": number(1e3 * live.behind_s, 2),
                 "solve_ms_p99": number(lookout.solve_ms_p99, 2),
-                "stick_to_thrust_ms_p99": number(self.seat.stick_to_thrust_ms_p99, 1),
+                "stick_to_thrust_ms_p99": number(self.mailbox.stick_to_thrust_ms_p99, 1),
             },
         }
 
@@ -198,7 +198,7 @@ class CockpitSession:
             told.append(self._notes.popleft())
         return told
 
-    def set_desk(self, changes: dict[str, Any]) -> None:
+    def change_settings(self, changes: dict[str, Any]) -> None:
         """Change settings of the desk; raises InputError where a value is out of range."""
         self.desk.set(**changes)
 
@@ -259,7 +259,7 @@ class CockpitSession:
             self._gauges = WakeReadout.of(parts)
             self._described = static_description(parts, self._gauges)
         self._say_preparing("making pilot and controllers")
-        flown = assisted(parts, self.seat, self.desk)
+        flown = assisted(parts, self.mailbox, self.desk)
         pilot = cast("AssistedPilot", flown.pilot)
         self._gauges.disturbances(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))  # kernels are read now
         self._gauges.predicted_m_s(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))
@@ -267,7 +267,7 @@ class CockpitSession:
             parts.vehicle,
             self._gauges.true_points_W_m,
             1.0 / parts.control.rate_hz,
-            self.seat.flown,
+            self.mailbox.flown,
             lambda: pilot.velocity_W_m_s,
         )
         self._photos = 0
@@ -329,7 +329,7 @@ class CockpitSession:
             return
         self._say_preparing("the flight is over; hold, scan or operator begins another")
         while not self._over.wait(TENDED_S):
-            controls = self.seat.read(0.0)
+            controls = self.mailbox.read(0.0)
             asked = [what for what in (controls.pressed if controls is not None else ()) if what in MODES]
             if asked:
                 self.desk.press(asked[-1])

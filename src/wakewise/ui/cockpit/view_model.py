@@ -41,7 +41,7 @@ class ViewModel(Protocol):
     """What is shown, and what may be changed; called from the server's thread, and never for long."""
 
     @property
-    def seat(self) -> ControlMailbox:
+    def mailbox(self) -> ControlMailbox:
         """The helm, and where the flight reads its sticks."""
         ...
 
@@ -62,7 +62,7 @@ class ViewModel(Protocol):
         """What has happened since the last call."""
         ...
 
-    def set_desk(self, changes: dict[str, Any]) -> None:
+    def change_settings(self, changes: dict[str, Any]) -> None:
         """Change settings of the desk; raises InputError where a value is out of range."""
         ...
 

@@ -1,7 +1,6 @@
-"""Pages that a program of this package serves to a browser: who may ask for them, and what lies at which address.
+"""Web server of the pages, for the cockpit and the wash meter.
 
-`origin_check.py` says who may come in, `origin_check.py` how many may wait at the door, `files.py` what is answered,
-`origin_check.py` where others find a page, `blueos.py` what other ground stations are told of it. `page/` holds what
-every page has: colours, theme, drawing, numbers, icon. Standard library only, so that a page can be served from the
-small computer of a vehicle.
+`server.py`: HTTP server with access rules, JSON, POST requests and a WebSocket. `websocket.py`: the WebSocket.
+`origin_check.py`: allowed hosts and origins, the token, bounds on connections. `files.py`: static files.
+`blueos.py`: descriptions for BlueOS and BlueRobotics Cockpit. `page/`: style and scripts that all pages share.
 """
