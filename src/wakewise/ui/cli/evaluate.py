@@ -1,4 +1,4 @@
-"""`wakewise evaluate`: a cloud against a true mesh, another cloud, or depth maps of surveyed cameras."""
+"""`wakewise evaluate`: a cloud, mesh or splats against a reference; rendered views against photographs."""
 
 from __future__ import annotations
 
@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.core.errors import InputError
+from wakewise.core.errors import InputError, StageError
 from wakewise.ui.cli.console import format_value, print_json, print_table
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
     from wakewise.core.arrays import Array
 
-Cloud = Annotated[Path, typer.Argument(help="Reconstructed points or mesh (PLY), in metres.")]
+Cloud = Annotated[
+    Path | None,
+    typer.Argument(help="Points, mesh or Gaussian splats (PLY), in metres; none with --views.", show_default=False),
+]
 Reference = Annotated[
     Path | None,
     typer.Option("--reference", help="True surface in the same frame and metres: a mesh, or a cloud such as a laser "
@@ -53,12 +56,47 @@ Thresholds = Annotated[
     typer.Option("--thresholds", metavar="LIST", help="Distances at which shares are counted: mm, as 0.5,1,2, or "
                  "percent of the truth's extent, as 0.5%,1%; 0.25%,0.5%,1% if not given.", show_default=False),
 ]  # fmt: skip
+Views = Annotated[
+    Path | None,
+    typer.Option("--views", metavar="FOLDER", help="Rendered views, named like the photographs of --photos.",
+                 show_default=False),
+]  # fmt: skip
+Photos = Annotated[
+    Path | None,
+    typer.Option("--photos", metavar="FOLDER", help="Photographs that the views are compared with.",
+                 show_default=False),
+]  # fmt: skip
+Split = Annotated[
+    Path | None,
+    typer.Option("--split", metavar="JSON", help="export.json, whose held-out photographs must each have a view; all "
+                 "views that have a photograph if not given.", show_default=False),
+]  # fmt: skip
+Opacity = Annotated[
+    float | None,
+    typer.Option("--opacity", min=0.0, max=1.0, help="Splats: least opacity that counts as surface; 0.5.",
+                 show_default=False),
+]  # fmt: skip
+Frame = Annotated[
+    str, typer.Option("--frame", help="Axes of the model: reference, or nerfstudio (z up) with a reference in NED.")
+]
+Dataparser = Annotated[
+    Path | None,
+    typer.Option("--dataparser", metavar="JSON", help="dataparser_transforms.json of a nerfstudio run, whose turn, "
+                 "shift and scale are undone.", show_default=False),
+]  # fmt: skip
+MeshSamples = Annotated[
+    int | None,
+    typer.Option("--mesh-samples", min=100, help="Take so many points of a mesh's triangles, evenly by area, instead "
+                 "of its vertices.", show_default=False),
+]  # fmt: skip
 Figures = tuple[dict[str, Any], dict[str, tuple[str, str]]]
 """Values and what they are: unit and definition by key."""
+SPACING_M = 0.4e-3
+"""Of the points that stand for a Gaussian: half of the cell that a model is thinned to."""
 
 
 def evaluate(
-    cloud: Cloud,
+    cloud: Cloud = None,
     reference: Reference = None,
     depth_maps: Depths = None,
     cameras: Cameras = None,
@@ -67,21 +105,39 @@ def evaluate(
     thresholds: Thresholds = None,
     no_icp: NoIcp = False,
     colours: Colours = None,
+    views: Views = None,
+    photos: Photos = None,
+    split: Split = None,
+    opacity: Opacity = None,
+    frame: Frame = "reference",
+    dataparser: Dataparser = None,
+    mesh_samples: MeshSamples = None,
     json: Json = False,
 ) -> None:
     """Measure a model against the truth: accuracy, completeness, F-score, each figure defined beside it.
 
+    Models of other programs are scored alike: splats (3D Gaussian splatting's PLY), meshes and clouds of fields. With
+    --views, rendered views are compared with photographs: PSNR, SSIM, LPIPS.
     A model that is no model of the reference is a failure, never a figure.
     """
-    from wakewise.vision.reconstruction import read_cloud
-
+    if views is not None or photos is not None or split is not None:
+        if cloud is not None or views is None or photos is None:
+            raise InputError("evaluate: views need --views FOLDER and --photos FOLDER, and no model")
+        _print_views(views, photos, split, json)
+        return
+    if cloud is None:
+        raise InputError("evaluate: give a model (PLY), or --views FOLDER with --photos FOLDER")
+    if frame not in ("reference", "nerfstudio"):
+        raise InputError(f"--frame: '{frame}', allowed are reference, nerfstudio")
     if (reference is None) == (depth_maps is None):
         raise InputError("evaluate: give either --reference MESH or CLOUD, or --depth-maps NPZ with --cameras FOLDER")
     if not unit_m > 0.0:
         raise InputError(f"--unit-m {unit_m:g}: must be above 0")
     if depth_maps is not None and thresholds is not None:
         raise InputError("--thresholds: depth maps have their own, 5, 10, 20 and 50 mm")
-    points = read_cloud(cloud).points_m
+    points, about = _points(
+        cloud, reference, unit_m, opacity, frame == "nerfstudio" or dataparser is not None, dataparser, mesh_samples
+    )
     if reference is None:
         figures, definitions = _against_depths(points, depth_maps, cameras)
     else:
@@ -89,6 +145,10 @@ def evaluate(
             cloud, points, reference, cameras, bed_z, unit_m, thresholds, not no_icp, colours
         )
     _remark(figures)
+    if about:
+        from wakewise.vision.evaluation import SPLAT_DEFINITIONS
+
+        figures, definitions = figures | about, definitions | SPLAT_DEFINITIONS
     if json:
         why = {key: "camera positions were not given (--cameras)" for key, value in figures.items() if value is None}
         why |= {key: "ICP was not wished for" for key in why if key.startswith("icp_")}
@@ -113,6 +173,69 @@ def evaluate(
             f"within {share['threshold_mm']:.3g} mm: {share['accuracy_pct']:.1f} % of the model, "
             f"{share['completeness_pct']:.1f} % of the truth, F {share['f_score']:.1f}"
         )
+
+
+def _points(
+    cloud: Path,
+    reference: Path | None,
+    unit_m: float,
+    opacity: float | None,
+    nerfstudio: bool,
+    dataparser: Path | None,
+    mesh_samples: int | None,
+) -> tuple[Array, dict[str, Any]]:
+    """Points of a cloud, a mesh or splats in the frame of the reference; figures of the splats."""
+    import numpy as np
+
+    from wakewise.vision.evaluation import Crop, nerfstudio_frame, read_splats, sample_surface
+    from wakewise.vision.evaluation.trained_models import OPACITY
+    from wakewise.vision.reconstruction import read_cloud
+
+    similarity = nerfstudio_frame(dataparser) if nerfstudio else None
+    splats = read_splats(cloud)
+    if splats is None:
+        if opacity is not None:
+            raise InputError(f"--opacity: goes with splats only, {cloud} holds none")
+        if mesh_samples is None:
+            points = read_cloud(cloud).points_m
+        else:
+            from wakewise.scene.targets import read_mesh
+
+            points = sample_surface(read_mesh(cloud), Crop(), np.random.default_rng(0), mesh_samples).points_m
+        return points if similarity is None else similarity.apply(points), {}
+    if mesh_samples is not None:
+        raise InputError(f"--mesh-samples: goes with meshes only, {cloud} holds splats")
+    splats = splats if similarity is None else splats.moved(similarity)
+    corners = splats.centres_m if reference is None else unit_m * read_cloud(reference).points_m
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    reach = 0.1 * float(np.linalg.norm(high - low))  # what ICP may move it by, and what counts beside the truth
+    least = OPACITY if opacity is None else opacity
+    points, about = splats.surface(least, SPACING_M, low - reach, high + reach)
+    if not len(points):
+        raise StageError(f"{cloud}: none of its {about['splats']} splats about the reference has opacity {least:g}")
+    return points, about
+
+
+def _print_views(views: Path, photos: Path, split: Path | None, json: bool) -> None:
+    from wakewise.vision.evaluation import VIEW_DEFINITIONS, read_split, score_views
+
+    scores = score_views(views, photos, None if split is None else read_split(split))
+    figures = scores.figures()
+    if json:
+        units = {key: unit for key, (unit, _) in VIEW_DEFINITIONS.items()}
+        definitions = {key: text for key, (_, text) in VIEW_DEFINITIONS.items()}
+        print_json(figures | {"why": scores.why, "units": units, "definitions": definitions})
+        return
+    from rich.table import Table
+
+    table = Table(title=f"{views} against {photos}")
+    table.add_column("figure")
+    table.add_column("value", justify="right")
+    table.add_column("what it is")
+    for key, value in figures.items():
+        if key != "per_view":
+            table.add_row(key, format_value(value), scores.why.get(key, VIEW_DEFINITIONS[key][1]))
+    print_table(table)
 
 
 def _remark(figures: dict[str, Any]) -> None:
@@ -143,7 +266,6 @@ def _against_reference(
     colours: Path | None,
 ) -> Figures:
     """Against a mesh, or against a cloud where the file has no faces."""
-    from wakewise.core.errors import StageError
     from wakewise.core.optional_dependencies import need
 
     need("wakewise evaluate", "photos", only=("embreex", "small_gicp"))

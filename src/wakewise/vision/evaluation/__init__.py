@@ -1,10 +1,12 @@
-"""How good a flight and a model were: alignment, accuracy and completeness, flight figures.
+"""Scores of models, views and flights; pure functions whose results carry their unit in their name.
 
-Pure functions whose results carry their unit in their name. Start reading in `cloud_to_surface.py` (a cloud against the
-true surface) and `flight.py` (a flight's figures from its steps). `alignment.py` brings a model into the truth's frame
-(Umeyama, ICP), `cloud_to_surface.py` counts what lies within, `cloud_to_surface.py` measures area and volume,
-`depth_maps.py` and `cloud_to_cloud.py` judge against laser scans, `cloud_to_surface.py` counts a mesh's faults,
-`definitions.py` says what each figure is.
+- `alignment.py`: similarity of paired points (Umeyama, least median of squares), point-to-plane ICP.
+- `cloud_to_surface.py`: a cloud against a reference mesh; area, volume and faults of a mesh.
+- `cloud_to_cloud.py`: a cloud against a reference cloud. `depth_maps.py`: a cloud against depth maps.
+- `trained_models.py`: Gaussian splats as points, the frame of nerfstudio.
+- `rendered_views.py`: PSNR, SSIM and LPIPS of rendered views.
+- `flight.py`: figures of a flight from the table of its steps.
+- `definitions.py`: unit, definition and source of each figure.
 """
 
 from typing import TYPE_CHECKING
@@ -42,17 +44,27 @@ if TYPE_CHECKING:
         read_depth_views,
     )
     from wakewise.vision.evaluation.flight import SWAY_FIGURES, attitude_rmse_deg, flight_figures
+    from wakewise.vision.evaluation.rendered_views import VIEW_DEFINITIONS, ViewScores, read_split, score_views
+    from wakewise.vision.evaluation.trained_models import (
+        SPLAT_DEFINITIONS,
+        GaussianSplats,
+        nerfstudio_frame,
+        read_splats,
+    )
 
 __all__ = [
     "CLOUD_DEFINITIONS",
     "DEPTH_DEFINITIONS",
     "MESH_REFERENCE_DEFINITIONS",
+    "SPLAT_DEFINITIONS",
     "SURFACE_DEFINITIONS",
     "SWAY_FIGURES",
+    "VIEW_DEFINITIONS",
     "CloudComparison",
     "Crop",
     "DepthScore",
     "DepthView",
+    "GaussianSplats",
     "IcpRefinement",
     "MeshFaults",
     "Similarity",
@@ -60,6 +72,7 @@ __all__ = [
     "SurfaceSamples",
     "SurfaceScore",
     "ThresholdScore",
+    "ViewScores",
     "attitude_rmse_deg",
     "compare_clouds",
     "compare_depths",
@@ -70,11 +83,15 @@ __all__ = [
     "extent_m",
     "flight_figures",
     "mesh_faults",
+    "nerfstudio_frame",
     "read_depth_views",
+    "read_splats",
+    "read_split",
     "read_thresholds",
     "refine_icp",
     "robust_similarity",
     "sample_surface",
+    "score_views",
     "shares",
     "suspicious_scale",
     "umeyama",

@@ -8,11 +8,11 @@ from typing import Any
 import cv2
 import numpy as np
 import torch
-from skimage.metrics import structural_similarity
 
 from wakewise.core.arrays import Array
 from wakewise.core.files import write_bytes
 from wakewise.core.interfaces import Progress
+from wakewise.vision.evaluation.rendered_views import psnr_db, ssim
 from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
 from wakewise_nerf.field.posed import PosedPhoto
 from wakewise_nerf.field.rendering import origin_in, render
@@ -29,22 +29,6 @@ def split(photos: tuple[PosedPhoto, ...], every: int) -> tuple[tuple[PosedPhoto,
     """
     kept = tuple(photo for k, photo in enumerate(photos) if k % every)
     return kept, photos[::every]
-
-
-def psnr_db(image: Array, truth: Array) -> float:
-    """Peak signal-to-noise ratio of an image with values from 0 to 1."""
-    return float(-10.0 * np.log10(max(float(np.mean((np.asarray(image) - truth) ** 2)), 1e-12)))
-
-
-def ssim(image: Array, truth: Array) -> float:
-    """Structural similarity over Gaussian windows of 1.5 px, mean of the colours; 1 is the same image.
-
-    Z. Wang et al., Image quality assessment, IEEE TIP 13(4), 2004, doi 10.1109/TIP.2003.819861.
-    """
-    value = structural_similarity(
-        image, truth, channel_axis=2, data_range=1.0, gaussian_weights=True, sigma=1.5, use_sample_covariance=False
-    )
-    return float(value)
 
 
 def draw(training: TrainingState, origin: Any, directions: Any) -> tuple[Array, Array, Array]:
@@ -124,7 +108,7 @@ def judge(
         progress(done, len(photos), photo.name)
         truth = photo.colours.astype(np.float64) / 255.0
         image = np.clip(draw(training, origin_in(photo, region), photo.directions_W)[0], 0.0, 1.0)
-        scores.append((psnr_db(image, truth), _ssim_or_none(image, truth)))
+        scores.append((psnr_db(image, truth), ssim(image, truth)))
         views[photo.name] = {"psnr_db": scores[-1][0], "ssim": scores[-1][1]}
         pair = np.concatenate([photo.colours, np.rint(255.0 * image).astype(np.uint8)], axis=1)
         write_bytes(folder / f"{Path(photo.name).stem}.png", cv2.imencode(".png", pair[:, :, ::-1])[1].tobytes())
@@ -137,8 +121,3 @@ def judge(
         "ssim": float(np.mean(all_ssim)) if all_ssim else None,
         "views": views,
     }
-
-
-def _ssim_or_none(image: Array, truth: Array) -> float | None:
-    """SSIM, or None for an image smaller than its window of 11 px."""
-    return ssim(image, truth) if min(image.shape[:2]) >= 11 else None
