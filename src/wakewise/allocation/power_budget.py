@@ -84,7 +84,7 @@ class PowerLaw:
 
 
 @njit
-def _power(T, forward, reverse, least_forward, least_reverse):  # type: ignore[no-untyped-def]
+def _power(T: Array, forward: Array, reverse: Array, least_forward: float, least_reverse: float) -> float:
     """`PowerLaw.power_W` of thrusts, shape (n,)."""
     power = 0.0
     for i in range(T.size):
@@ -94,7 +94,7 @@ def _power(T, forward, reverse, least_forward, least_reverse):  # type: ignore[n
 
 
 @njit
-def _power_of(rows, forward, reverse, least_forward, least_reverse):  # type: ignore[no-untyped-def]
+def _power_of(rows: Array, forward: Array, reverse: Array, least_forward: float, least_reverse: float) -> Array:
     """`PowerLaw.power_W` of rows of thrusts, shape (r, n)."""
     power = np.empty(rows.shape[0])
     for r in range(rows.shape[0]):
@@ -103,9 +103,10 @@ def _power_of(rows, forward, reverse, least_forward, least_reverse):  # type: ig
 
 
 @njit
-def _best_by_power(  # type: ignore[no-untyped-def]
-    least, ways, steps, forward, reverse, least_forward, least_reverse, standing, most_W, calm, G, previous, weights
-):
+def _best_by_power(
+    least: Array, ways: Array, steps: int, forward: Array, reverse: Array, least_forward: float, least_reverse: float,
+    standing: float, most_W: float, calm: float, G: Array, previous: Array, weights: Array,
+) -> Array:  # fmt: skip
     """Thrusts of the least `power_adjusted_cost` on the grid of `steps` along each of `ways`, shape (k, n), within
     `most_W`.
 

@@ -1,17 +1,19 @@
-"""What the thrusters do to the water, as a controller sees it: wake models and the disturbance D of a target.
+"""Wake models and the disturbance D of a target: what the thrusters' jets do to the water, as a controller models it.
 
-D is here and nowhere else: the weighted mean square of the water's speed at the target's points. The simulated tank
-never uses this room: a planner that knew the truth would prove nothing.
+D is the weighted sum of squared water speeds at the points of a region. With actuator-disk jets it is the quadratic
+form D = s' G s of the square roots s of the thrusts; G is the Gram (influence) matrix. The simulated tank does not use
+this package.
 
-Start reading in `disturbance.py` (D, its Gram matrix, and D of jets that go astray) and `models.py` (models by name).
-Models: `jets.py` (the paper's), `jets.py` (round turbulent jets), `wall_jet.py` (their wall jets; `models.py` tells
-a bed of a model), `advected_jets.py` and `advected_jets.py` (both in a current), `calibration.py` (what can be
-fitted), `learned.py` with `learned.py` (a trained rival that remembers). Sums: `gram.py` and `wall_jet.py` with
-`kernels.py` (compiled), `disturbance.py` with `gram.py` (derivatives of D), `finite_difference.py`
-(the same for models that bring none), `disturbance.py` (what is refused), `plan_disturbance.py` and
-`plan_disturbance.py` (D and derivatives over a planner's stage), `influence.py` (D from a vehicle's pose).
-`point_files.py` reads measured velocities, `calibration.py`, `samples.py`, `scores.py` and `fit_file.py` fit a model to
-them, `calibration.py` holds them against the law that they must obey.
+- `disturbance.py`: D, its Gram matrix, its derivatives; D of jets of uncertain direction.
+- `gram.py`: compiled Gram matrix and Gauss-Newton sums; `plan_disturbance.py`: the same, faster, for one MPC stage;
+  `finite_difference.py`: the same by differences, for models without derivatives.
+- `influence.py`: Gram matrix of a vehicle at a pose; `merging_jets.py`: with jets that cross and merge.
+- `models.py`: models by name and their settings. `jets.py`: the paper's cone (cos^4 attenuation), cones with free
+  parameters, turbulent round jets; `kernels.py`: their compiled speeds.
+- `wall_jet.py`: jets that strike the bed; `advected_jets.py`: jets and wall jets in a current.
+- `learned.py`: a neural network as a wake model.
+- `samples.py`: measured velocities and scores of a model; `point_files.py`: files of velocities at points;
+  `calibration.py`: least-squares fit of a model and its file.
 """
 
 from __future__ import annotations

@@ -1,49 +1,40 @@
-"""Jets in water that moves: the current bends them, stops them, brings them back, and spreads them where it is unsure.
+"""Actuator-disk jets in a current: bent and stopped by it, spread where it is uncertain; their wall jets on the bed.
 
-What a thruster sends out goes on along its own direction e through the water, and the water takes it along:
+A jet keeps its direction e relative to the water, and the current c advects it:
 
     dX/dt = chi U e + c,    ds/dt = chi U
 
-with X the place of a cross-section that left t ago, s its way through the water, c the current, U the greatest speed in
-excess of the current, and chi U the mean speed with which momentum travels: momentum flux over mass flux of the
-profile, 1 at the disk and 1/2 for a Gaussian. A jet that blows steadily fills the curve X(t), the plume. In still water
-s is the distance from the disk and U the jet's own centreline speed U_0(s), which is what fixes everything else.
+X is the position of a cross-section of age t, s its distance through the water, U the greatest speed in excess of the
+current, chi U the mean speed of the momentum: momentum flux over mass flux of the profile, 1 at the disk and 1/2 for a
+Gaussian. A steady jet fills the curve X(t), the plume. In still water U is the jet's centreline speed U_0(s).
 
-- *Momentum.* What crosses a section in excess of the current is the jet's thrust at every t, in the direction e:
-  U |chi U e + c| q^2 = chi U_0(s)^2, q the width over that of the same jet in still water (the integral method: J. H.
-  W. Lee and V. H. Chu, Turbulent Jets and Plumes, Kluwer 2003).
-- *Width.* A jet along its own path widens by the same share of s in moving water as in still (Chu, Lee and Chu, J.
-  Hydraul. Eng. 125 (1999) 1060); what is bent over widens twice as fast, as a line puff does (0.34 against 0.17 for
-  profiles made square, Lee and Chu 2003). Between the two by the angle of the path against e: cos + 2 sin.
-- *Against the current* the front stops and is taken back past the thruster, as the law of momentum has it. There is one
-  root at every section if the current's opposing part counts by at most sqrt(8) / 3 in the speed of the section, and it
-  counts so; fronts then stop at 2.2 to 2.3 D U_j / |c|, where 2.4 to 2.8 are published (Koenig and Fiedler, Exp. Fluids
-  10 (1991) 212; Yoda and Fiedler, Exp. Fluids 21 (1996) 427).
-- *Across the current* the path is within 30 % of z / rD = 2.05 (x / rD)^.28, r = U_j / |c| (B. D. Pratte and W. D.
-  Baines, J. Hydraul. Div. ASCE 93 (1967) 53), for x from rD to 5 rD and r from 5 on.
-- *Unsure.* A current known to sigma_c puts the section sigma_c t elsewhere. What counts is the mean square of the
-  speed, and that of a Gaussian whose place is normal is a wider and lower one: width^2 grows by (2 sigma_c t)^2, the
-  root mean square of the greatest speed falls as one over the width.
+- *Momentum* in excess of the current through a section equals the thrust: U |chi U e + c| q^2 = chi U_0(s)^2, q the
+  width over that of the same jet in still water (integral method: J. H. W. Lee and V. H. Chu, Turbulent Jets and
+  Plumes, Kluwer 2003).
+- *Width.* Along its own path a jet grows by the same share of s as in still water (Chu, Lee and Chu, J. Hydraul. Eng.
+  125 (1999) 1060), bent over twice as fast, like a line puff (0.34 against 0.17 for top-hat profiles, Lee and Chu
+  2003). Between the two by the angle of the path against e: cos + 2 sin.
+- *Opposing current.* A section has one solution if the opposing component counts by at most sqrt(8) / 3, and it counts
+  by that. Fronts then stop at 2.2 to 2.3 D U_j / |c|; 2.4 to 2.8 are published (Koenig and Fiedler, Exp. Fluids 10
+  (1991) 212; Yoda and Fiedler, Exp. Fluids 21 (1996) 427).
+- *Cross-current.* The path is within 30 % of z / rD = 2.05 (x / rD)^0.28, r = U_j / |c| (B. D. Pratte and W. D. Baines,
+  J. Hydraul. Div. ASCE 93 (1967) 53), for x from rD to 5 rD and r from 5 on.
+- *Uncertain current.* A standard deviation sigma_c displaces a section by sigma_c t. The mean square speed of a
+  Gaussian at a normally distributed place is a wider and lower Gaussian: width^2 grows by (2 sigma_c t)^2, the root
+  mean square of the greatest speed falls as one over the width.
 
-Speeds are per square root of newton at a thrust that is guessed, so that D stays the quadratic form that the exact
-allocators minimise. A point that several parts of a plume pass has the fastest. Left out: walls but for the bed (see
-`floor_carried`), the pair of vortices of a bent jet, and a current that changes on the way.
+Speeds are per square root of newton at a nominal thrust, so that D stays a quadratic form. Where several parts of a
+plume pass a point, the fastest counts. Not modelled: the vortex pair of a bent jet, a current that varies on the way,
+walls other than the bed.
 
-Wall jets in water that moves: where the bent jet strikes, and how far its spreading water gets against a current.
+*Wall jets* (see `wall_jet`) start where the plume meets the bed. Water at d from the strike point left it tau ago and
+travelled |d - c tau| along its ray:
 
-The wall jet is that of `floor`, from where the plume of `carried` meets the bed. Its water leaves the strike point on
-rays and the current takes each ray along: what is at d from the strike point left it tau ago in the direction of
-d - c tau, and was |d - c tau| on its way when it had gone as far as its own speed takes it,
+    |d - c tau|^2 = 2 chi a tau,   u_max r = a sqrt(T),   chi = 1 / sqrt(2) for the half Gaussian over the bed.
 
-    |d - c tau|^2 = 2 chi a tau,   u_max r = a sqrt(T),   chi = 1 / sqrt(2) for the half Gaussian over the bed,
-
-a quadratic in tau whose first root is the water that is outward bound. It has none beyond a parabola with its focus at
-the strike point: there the front stops. Straight upstream this is where chi u_max = 2 |c|. (The free jet's front, for
-which there are measurements, gets half as far again as this reckoning has it, `carried`; for wall jets none were found,
-and the shorter law is kept. What is unsure of the current makes the edge soft.) Along the ray the speed in excess of
-the current follows from the momentum that crosses a section, as for the free jet.
-
-In still water it is the wall jet of `floor` to the last digits that the speed's search leaves, 1e-11.
+The first root of this quadratic is the outward-bound water; there is none beyond a parabola with its focus at the
+strike point, where the front stops (straight upstream: chi u_max = 2 |c|). No measurements of this front were found.
+The speed in excess of the current follows from the momentum through a section, as for the free jet.
 """
 
 from __future__ import annotations
@@ -53,9 +44,9 @@ from typing import cast
 
 import numpy as np
 
-from wakewise.core.arrays import Array, freeze
+from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.jit.njit import njit
-from wakewise.wake.kernels import ROUND_JET, as_tuple, own_constants, section_of, speed_and_slope
+from wakewise.wake.kernels import ROUND_JET, Numbers, as_tuple, own_constants, section_of, speed_and_slope
 from wakewise.wake.wall_jet import HALF_THICKNESS, LEAST_SINE, ROUND_DECAY, WALL_SPEED
 
 FOLLOWED_S = 40.0
@@ -106,7 +97,7 @@ def guessed_thrusts(thrusts: Array) -> Array:
 
 
 @njit
-def excess_speed(strength, chi, along, current2, near):  # type: ignore[no-untyped-def]
+def excess_speed(strength: float, chi: float, along: float, current2: float, near: float) -> float:
     """U of U |chi U e + c| = strength, `along` = c . e with what opposes already lessened, `current2` = c . c.
 
     The search begins at `near`.
@@ -133,7 +124,10 @@ def excess_speed(strength, chi, along, current2, near):  # type: ignore[no-untyp
 
 
 @njit
-def _rates(kind, numbers, own, s, grown, root, e, current, along, current2, near, v):  # type: ignore[no-untyped-def]
+def _rates(
+    kind: int, numbers: Numbers, own: Array, s: float, grown: float, root: float, e: Array, current: Array,
+    along: float, current2: float, near: float, v: Array,
+) -> tuple[float, float, float, float, float]:  # fmt: skip
     """(ds/dt, d grown/dt, U, U_0, width in still water) at one section, and dX/dt into `v`; `grown` / s widens it."""
     unit, chi, width = section_of(kind, numbers, own, s)
     still = unit * root
@@ -150,7 +144,10 @@ def _rates(kind, numbers, own, s, grown, root, e, current, along, current2, near
 
 
 @njit(apart=True)
-def trace_plume(kind, parameters, own, origin, e, thrust, current, unsure, curve):  # type: ignore[no-untyped-def]
+def trace_plume(
+    kind: int, parameters: Array, own: Array, origin: Array, e: Array, thrust: float, current: Array, unsure: float,
+    curve: Array,
+) -> None:  # fmt: skip
     """Sections of one plume into `curve`, (SECTIONS + 1, 7): X, t, s, speed over still water's at s, and width so.
 
     - `kind`, `parameters`, `own`: the jet's law and its disk's constants (`kernels.own_constants`), shape (6,).
@@ -191,7 +188,10 @@ def trace_plume(kind, parameters, own, origin, e, thrust, current, unsure, curve
 
 
 @njit
-def fill_plume(points, ball, kind, parameters, own, curve, end, room, hits, speed):  # type: ignore[no-untyped-def]
+def fill_plume(
+    points: Array, ball: Array, kind: int, parameters: Array, own: Array, curve: Array, end: Array, room: Array,
+    hits: IntArray, speed: Array,
+) -> None:  # fmt: skip
     """Raise `speed`, shape (n,), to the plume's speed per square root of newton at points, shape (3, n), in a ball.
 
     `end`, shape (2,): how far along itself the jet is whole, and what share of it goes on from there. `room`, shape
@@ -253,7 +253,10 @@ def fill_plume(points, ball, kind, parameters, own, curve, end, room, hits, spee
 
 
 @njit
-def plume_speeds(points, origins, directions, areas, kind, parameters, thrusts, current, unsure, ends):  # type: ignore[no-untyped-def]
+def plume_speeds(
+    points: Array, origins: Array, directions: Array, areas: Array, kind: int, parameters: Array, thrusts: Array,
+    current: Array, unsure: float, ends: Array,
+) -> tuple[Array, Array]:  # fmt: skip
     """Speed per square root of newton of m jets at n points, shape (m, n), and their curves, (m, SECTIONS + 1, 7).
 
     Jets leave along `directions`, shape (m, 3), and move the water in excess of the current along them, too. `ends`,
@@ -315,7 +318,7 @@ TURNS = 3
 
 
 @njit
-def bed_intersection(curve, bed_z):  # type: ignore[no-untyped-def]
+def bed_intersection(curve: Array, bed_z: float) -> tuple[bool, float, float, float, float]:
     """(lands, x, y, s, t) of where a plume, shape (SECTIONS + 1, 7), first meets the bed."""
     for k in range(SECTIONS):
         above, below = bed_z - curve[k, 2], bed_z - curve[k + 1, 2]
@@ -329,7 +332,10 @@ def bed_intersection(curve, bed_z):  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True)
-def add_carried_walls(points, curves, directions, areas, floor, thrusts, current, unsure, ends, velocity):  # type: ignore[no-untyped-def]
+def add_carried_walls(
+    points: Array, curves: Array, directions: Array, areas: Array, floor: Array, thrusts: Array, current: Array,
+    unsure: float, ends: Array, velocity: Array,
+) -> None:  # fmt: skip
     """Add wall jets' velocity per square root of newton to `velocity`, shape (m, n, 3); `floor` as of `FloorJet`.
 
     `ends`, shape (m, 2), as for `carried.fill_plume`: of what joins others on its way only a share strikes as itself.

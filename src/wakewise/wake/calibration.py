@@ -1,14 +1,10 @@
-"""Least-squares calibration of a wake model: parameters with uncertainty, fitted on one part of the data only.
+"""Least-squares calibration of a wake model: parameters with uncertainty, cross-validated, and the file of a fit.
 
-What is minimised is the sum of squared errors of the axial speed over the square root of thrust, so that strong and
-weak thrusts count alike. Scores are those of the other part.
+Minimised is the sum of squared errors of the axial speed over the square root of thrust, so that strong and weak
+thrusts count alike. Scores are those of held-out rows.
 
-Which numbers of which wake model can be fitted: where a search starts, what is allowed, what each number shapes.
-
-The law that a free jet obeys: the momentum flux through any plane across it is the thrust that made it.
-
-Whatever a fit scores, measured speeds and thrusts must keep to it. A thrust in kilograms-force for newtons, or speeds
-in feet a second, are off by a factor of four and more, and no residual shows it.
+Momentum check: the momentum flux through any plane across a free jet equals its thrust. Wrong units (kilograms-force
+for newtons, feet for metres) change the ratio by a factor of four and more, and no residual shows it.
 """
 
 from __future__ import annotations

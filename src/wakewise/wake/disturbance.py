@@ -1,46 +1,34 @@
-"""The disturbance D of a target: the weighted sum of squared water speeds at the points of its region.
+"""Disturbance D of a target: weighted sum of squared water speeds at the points of a region; Gram matrix, derivatives.
 
-Coherent, as in the paper: velocities of jets that meet add up, D = sum_j w_j |sum_i v_i(p_j)|^2. With v_i proportional
-to sqrt(|T_i|) that is D = s' G s, s = (sqrt(T+), sqrt(T-)): the matrix G depends on where the thrusters are and not on
-how hard they push.
+Coherent (as in the paper): velocities of jets add up, D = sum_j w_j |sum_i v_i(p_j)|^2. With v_i proportional to
+sqrt(|T_i|) this is D = s' G s, s = (sqrt(T+), sqrt(T-)). The Gram matrix G depends on the thrusters' poses only.
 
 Incoherent: squares add up, D = sum_j w_j sum_i |v_i(p_j)|^2, which keeps only the diagonal of G. It is linear in the
-split thrusts (T+, T-) >= 0, hence convex, and no optimiser can make jets cancel that in water would only spread
-sideways.
+split thrusts (T+, T-) >= 0, hence convex, and excludes cancellation of jets.
 
-Astray: nobody knows where the jets go, only about where they were sent. A jet lives for seconds, in water that has
-gusts, a bed, a hull and other jets in it, so what it does to the target is known less surely than its law: of single
-pushes sent beside a target the belief has the order right to .73 (docs/research-log/0048). Here its direction is
-scattered about the way it was sent as by von Mises and Fisher, f(theta) = kappa exp(kappa cos theta) / (4 pi sinh
-kappa), and the speed that is met at a distance r off the disk is that of its section there, U(r) exp(-(r theta')^2 /
-w(r)^2) with w the width. Of a jet narrower than the scatter the mean square of the speed at an angle theta is then
+Uncertain direction (`scattered_jet_gram`): each jet's direction is dispersed about the nominal one by a von
+Mises-Fisher distribution f(theta) = kappa exp(kappa cos theta) / (4 pi sinh kappa). At the distance r from the disk its
+profile is U(r) exp(-(r theta)^2 / w(r)^2), w the width. For a jet narrower than the dispersion the mean square speed at
+an angle theta is
 
     U(r)^2 (pi / 2) (w(r) / r)^2 f(theta).
 
-Momentum stays what it is, whichever way it goes. Jets go astray each by itself, so squares add up here, too, and the
-least shares send nothing ahead that can be sent elsewhere, without a word of where a vehicle has its bow.
+Squares of different jets add up. For single thrusts beside a target the nominal model has the order of disturbances
+right with probability 0.73 (docs/research-log/0048), hence this second hypothesis.
 
-What is wrong with the places of points and jets; NaN is looked for only once a sum is NaN.
+Derivatives are by position p_WB in world axes (m), rotation vector theta on the body's side, R_WB exp([theta]) (rad),
+and thrusts (N).
 
-Derivatives of the disturbance by thrust, position and attitude of the vehicle; Gauss-Newton blocks for a planner.
-
-Variables. Position p_WB in world axes (m). Attitude as a rotation vector theta on the body's side, R_WB exp([theta]),
-so in body axes (rad). Thrusts (N).
-
-Roots at zero. D goes with s = sqrt(T), whose slope at T = 0 is infinite. With `smooth_N` = e > 0 the roots are
+Roots at zero. s = sqrt(T) has infinite slope at T = 0. With `smooth_N` = e > 0 the roots are
 
     s(T+) = a(T) / (T^2 + e^2)^(1/4),   a(T) = (T + sqrt(T^2 + e^2/4)) / 2,   s(T-) = the same of -T
 
-which is smooth, within 1 % of sqrt(T) for T > 4.4 e, and at T = 0 leaves a speed as of e / 16 newtons in either
-direction (0.03 N for e = 0.5 N). With e = 0 the roots are exact. Then a thrust of exactly zero has slope 0 in the
-result: with jets of other thrusters in the same place D has a cusp there, with none it has a kink, and 0 stands for
-"stay".
+which are smooth, within 1 % of sqrt(T) for T > 4.4 e, and at T = 0 leave the speed of e / 16 newtons in both directions
+(0.03 N for e = 0.5 N). With e = 0 the roots are exact and a thrust of zero has slope 0.
 
-The edge. A sharp cone makes D jump when a point crosses the edge. Between crossings the derivatives here are exact; but
-a region is made of finitely many points, and the derivative of their sum knows nothing of the crossings to come, which
-for the region that they stand for add a flux through the moving edge (12-15 % of the gradient in the median, more on
-bad days). A smooth edge has that flux as the slope of the edge itself, and its derivatives contain it: give cones
-an edge of about 3 deg in anything that follows gradients. The jets' Gaussian tails need nothing.
+Edge of a cone. A sharp edge makes D jump when a point crosses it; the flux through the moving edge (12-15 % of the
+gradient in the median) is missing from the derivatives. A smooth edge contains it: give cones an edge of about 3 deg
+where gradients are used.
 """
 
 from __future__ import annotations
@@ -59,9 +47,9 @@ from wakewise.core.interfaces import WakeModel
 from wakewise.core.jit.njit import njit
 from wakewise.wake.advected_jets import CrossFlow, add_carried_walls, plumes
 from wakewise.wake.finite_difference import FiniteDifferenceWake
-from wakewise.wake.gram import FAST, dot, gram_slope_sum, gram_sum, stage_sum
+from wakewise.wake.gram import dot, gram_slope_sum, gram_sum, stage_sum
 from wakewise.wake.jets import AxialJet
-from wakewise.wake.kernels import as_tuple, own_constants, section_of
+from wakewise.wake.kernels import FAST, as_tuple, own_constants, section_of
 from wakewise.wake.learned import free_jet
 from wakewise.wake.wall_jet import ImpingingJet, floor_gram_sum, floor_stage_sum
 
@@ -378,7 +366,7 @@ def velocity(
 
 
 @njit(fastmath=FAST)
-def velocity_gram(velocity, weights):  # type: ignore[no-untyped-def]
+def velocity_gram(velocity: Array, weights: Array) -> Array:
     """G, shape (k, k), of velocities per square root of newton, shape (k, n, 3), at points of weights, shape (n,)."""
     k, n = velocity.shape[0], velocity.shape[1]
     G, rows, here = np.zeros((k, k)), np.empty((k, 3 * n)), np.empty(k, np.bool_)
@@ -400,7 +388,7 @@ def velocity_gram(velocity, weights):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _along(speeds, directions):  # type: ignore[no-untyped-def]
+def _along(speeds: Array, directions: Array) -> Array:
     """Velocities, shape (m, n, 3), of speeds, shape (m, n), along directions, shape (m, 3)."""
     m, n = speeds.shape
     velocity = np.empty((m, n, 3))
@@ -442,7 +430,9 @@ def carried_velocity(
 
 
 @njit
-def scattered_jet_gram(points, weights, origins, axes, areas, kind, parameters):  # type: ignore[no-untyped-def]
+def scattered_jet_gram(
+    points: Array, weights: Array, origins: Array, axes: Array, areas: Array, kind: int, parameters: Array
+) -> Array:
     """Mean of D per newton of each jet if it goes astray, shape (2 m,), in (m/s)^2/N.
 
     - `points`, `weights`, shape (n, 3) and (n,): of a region, in the world.

@@ -1,9 +1,8 @@
-"""D and its derivatives for wake models that bring none: central differences of the velocities that they give.
+"""Disturbance D and its derivatives by central differences, for wake models that have only `unit_velocity`.
 
-Our own models have compiled sums (`wakewise.wake.gram`, `wakewise.wake.plan_disturbance`). A model from outside need
-only offer `unit_velocity`; what an optimiser asks beyond that is made here, slower, from the same residuals: r =
-root(w) v at every point, D = r'r, gradient 2 J'r, Gauss-Newton matrix 2 J'J. By thrusts J is exact, since v is linear
-in the roots; by pose it is a central difference.
+Residuals r = sqrt(w) v at every point, D = r'r, gradient 2 J'r, Gauss-Newton matrix 2 J'J. By thrusts J is exact, since
+v is linear in the roots; by pose it is a central difference. The models of this package have compiled sums instead
+(`wakewise.wake.gram`, `wakewise.wake.plan_disturbance`).
 """
 
 from __future__ import annotations

@@ -1,37 +1,33 @@
-"""Compiled sums over a region's points: the Gram matrix of D, and its derivatives by the vehicle's pose.
+"""Compiled Gram matrix G of the disturbance D = s' G s, and the Gauss-Newton blocks of D over pose and thrusts.
 
-Points are taken in blocks of `BLOCK`, so that everything about a block stays in the processor's first caches and time
-grows linearly with the number of points. Within a block every jet that reaches a point gets a row of speeds (and of
-slopes), zero where it misses; the sums are then products of contiguous rows, which compile to vector instructions.
-Reordered addition (`FAST`) changes only the last bits, and always in the same way on one processor.
+Row i of G is thruster i with T > 0, whose jet goes along -axis; row m + i is the same thruster with T < 0.
 
-Rows: row i of G is thruster i with T > 0, whose jet goes along -axis; row m + i the same with T < 0.
+Variables of the derivatives, in this order: position of the body in W, shape (3,); rotation vector on the body's side
+(R_WB exp([theta])), shape (3,); m thrusts. With residuals r = sqrt(w) v (coherent: three components of the summed
+velocity at every point; incoherent: the speed of every jet at every point), D = r'r, its gradient is 2 J'r and the
+Gauss-Newton matrix 2 J'J. `plan_disturbance` computes the same faster for a planner.
 
-Compiled: D at given thrusts and pose, with its gradient and its Gauss-Newton matrix, for `gradients`.
-
-A planner asks `plan_disturbance`, which is held against this in the tests.
-
-Variables, in this order: position of the body in W, shape (3,), its rotation vector on the body's side
-(R_WB exp([theta])), shape (3,), and the m thrusts. With residuals r = sqrt(w) v (coherent: three components of the
-summed velocity at every point; incoherent: the speed of every jet at every point), D = r'r, its gradient is 2 J'r and
-the Gauss-Newton matrix 2 J'J.
+Points are processed in blocks of `BLOCK`, so that a block stays in the first-level cache. Every jet that reaches a
+point of a block has a row of speeds (and of slopes), zero where it misses; the sums are products of contiguous rows,
+which compile to vector instructions. Reordered addition (`FAST`) changes the last bits only, and reproducibly on one
+processor.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import njit
-from wakewise.wake.kernels import as_tuple, own_constants, speed_and_slope
+from wakewise.wake.kernels import FAST, Numbers, as_tuple, own_constants, speed_and_slope
 
 BLOCK = 256
-FAST = {"reassoc", "contract", "nsz", "arcp"}
 PERPENDICULAR = 1e-14
 """Cosine under which two jets count as perpendicular: rounding of unit vectors leaves up to some 1e-16."""
 
 
 @njit(apart=True, fastmath=FAST)
-def load_block(points, weights, start, count, block):  # type: ignore[no-untyped-def]
+def load_block(points: Array, weights: Array, start: int, count: int, block: Array) -> float:
     """Points x, y, z and roots of weights into rows 0 to 3 of `block`; returns NaN if any of them is not finite."""
     check = 0.0
     for j in range(count):
@@ -45,7 +41,7 @@ def load_block(points, weights, start, count, block):  # type: ignore[no-untyped
 
 
 @njit(apart=True)
-def check_jets(p, q, origins, axes, areas):  # type: ignore[no-untyped-def]
+def check_jets(p: Array, q: Array, origins: Array, axes: Array, areas: Array) -> float:
     """0 for a sound pose and sound thrusters; NaN if anything is not finite or an area is not more than 0."""
     check = 0.0
     for r in range(p.shape[0]):
@@ -60,7 +56,7 @@ def check_jets(p, q, origins, axes, areas):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=FAST)
-def dot(a, b, count):  # type: ignore[no-untyped-def]
+def dot(a: Array, b: Array, count: int) -> float:
     """Sum of products of the first `count` elements."""
     total = 0.0
     for j in range(count):
@@ -69,7 +65,10 @@ def dot(a, b, count):  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True)
-def fill_rows(block, count, origins, axes, own, kind, numbers, slopes, scratch, hits, rows, column):  # type: ignore[no-untyped-def]
+def fill_rows(
+    block: Array, count: int, origins: Array, axes: Array, own: Array, kind: int, numbers: Numbers, slopes: bool,
+    scratch: Array, hits: IntArray, rows: Array, column: IntArray,
+) -> int:  # fmt: skip
     """Rows of sqrt(w) times f, and if `slopes` alpha and beta, of the jets that reach one of the block's points.
 
     `rows[0]`, `rows[1]`, `rows[2]`, each of shape (2 m, BLOCK), take f, alpha and beta. Returns how many rows were
@@ -121,7 +120,7 @@ def fill_rows(block, count, origins, axes, own, kind, numbers, slopes, scratch, 
 
 
 @njit
-def cosines(axes):  # type: ignore[no-untyped-def]
+def cosines(axes: Array) -> Array:
     """d_i . d_k of the 2 m jets' directions, shape (2 m, 2 m); zero for what is perpendicular but for rounding."""
     m = axes.shape[0]
     table = np.zeros((2 * m, 2 * m))
@@ -139,7 +138,9 @@ def cosines(axes):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=FAST)
-def gram_sum(points, weights, origins, axes, areas, kind, parameters):  # type: ignore[no-untyped-def]
+def gram_sum(
+    points: Array, weights: Array, origins: Array, axes: Array, areas: Array, kind: int, parameters: Array
+) -> tuple[Array, float]:
     """G, shape (2 m, 2 m), and a number that is NaN if a point or weight is not finite or a weight is negative."""
     n, m = points.shape[0], origins.shape[0]
     own, numbers = own_constants(kind, parameters, areas), as_tuple(parameters)
@@ -164,7 +165,7 @@ def gram_sum(points, weights, origins, axes, areas, kind, parameters):  # type: 
 
 
 @njit(apart=True)
-def place(p, q, positions_B, axes_B):  # type: ignore[no-untyped-def]
+def place(p: Array, q: Array, positions_B: Array, axes_B: Array) -> tuple[Array, Array, Array]:
     """(R_WB, origins in W, axes in W) of thrusters on a body at p with unit quaternion q = (w, x, y, z)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     R = np.empty((3, 3))
@@ -183,7 +184,10 @@ def place(p, q, positions_B, axes_B):  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True, fastmath=FAST)
-def pose_slopes(block, count, p, origin, axis, sign, alpha, beta, slope):  # type: ignore[no-untyped-def]
+def pose_slopes(
+    block: Array, count: int, p: Array, origin: Array, axis: Array, sign: float, alpha: Array, beta: Array,
+    slope: Array,
+) -> None:  # fmt: skip
     """Rows 0 to 5 of `slope`: derivatives of one jet's sqrt(w) f by the vehicle's position and by a turn, both in W.
 
     A shift of the vehicle moves the point the other way, and a turn theta about the body's origin moves it by
@@ -207,7 +211,10 @@ def pose_slopes(block, count, p, origin, axis, sign, alpha, beta, slope):  # typ
 
 
 @njit(fastmath=FAST)
-def gram_slope_sum(points, weights, p, q, positions_B, axes_B, areas, kind, parameters):  # type: ignore[no-untyped-def]
+def gram_slope_sum(
+    points: Array, weights: Array, p: Array, q: Array, positions_B: Array, axes_B: Array, areas: Array, kind: int,
+    parameters: Array,
+) -> tuple[Array, Array, float]:  # fmt: skip
     """G, shape (2 m, 2 m), its derivatives by position in W and rotation vector in B, (6, 2 m, 2 m), and the check."""
     n, m = points.shape[0], positions_B.shape[0]
     R, origins, axes = place(p, q, positions_B, axes_B)
@@ -263,7 +270,7 @@ def gram_slope_sum(points, weights, p, q, positions_B, axes_B, areas, kind, para
 
 
 @njit
-def smooth_root(thrust, smooth):  # type: ignore[no-untyped-def]
+def smooth_root(thrust: float, smooth: float) -> tuple[float, float]:
     """Root of the part of a thrust above zero, and its derivative: see `wakewise.wake.disturbance`."""
     if smooth == 0.0:
         if thrust <= 0.0:
@@ -281,7 +288,7 @@ def smooth_root(thrust, smooth):  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True)
-def thrust_roots(thrusts, smooth):  # type: ignore[no-untyped-def]
+def thrust_roots(thrusts: Array, smooth: float) -> tuple[Array, Array]:
     """Roots s of the 2 m split thrusts, and the derivative of each by its own signed thrust."""
     m = thrusts.shape[0]
     root, slope = np.empty(2 * m), np.empty(2 * m)
@@ -293,9 +300,10 @@ def thrust_roots(thrusts, smooth):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=FAST)
-def stage_sum(  # type: ignore[no-untyped-def]
-    points, weights, p, q, positions_B, axes_B, areas, kind, parameters, thrusts, smooth, coherent, hessian
-):
+def stage_sum(
+    points: Array, weights: Array, p: Array, q: Array, positions_B: Array, axes_B: Array, areas: Array, kind: int,
+    parameters: Array, thrusts: Array, smooth: float, coherent: bool, hessian: bool,
+) -> tuple[float, Array, Array, float]:  # fmt: skip
     """D, gradient (6 + m,), Gauss-Newton matrix (6 + m, 6 + m) (zeros unless `hessian`), and the check."""
     n, m = points.shape[0], positions_B.shape[0]
     R, origins, axes = place(p, q, positions_B, axes_B)
@@ -370,7 +378,7 @@ def stage_sum(  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True)
-def turn_gradient(R, gradient):  # type: ignore[no-untyped-def]
+def turn_gradient(R: Array, gradient: Array) -> None:
     """Take elements 3 to 5 from W to B axes."""
     a, b, c = gradient[3], gradient[4], gradient[5]
     for r in range(3):
@@ -378,7 +386,7 @@ def turn_gradient(R, gradient):  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True)
-def turn_hessian(R, H):  # type: ignore[no-untyped-def]
+def turn_hessian(R: Array, H: Array) -> None:
     """Fill the upper triangle of H from the lower, and take rows and columns 3 to 5 from W to B axes."""
     size = H.shape[0]
     for r in range(size):

@@ -1,4 +1,4 @@
-"""What a controller believes its jets would do to the target from where it believes to be."""
+"""Influence matrix of a vehicle: the Gram matrix G of D = s' G s at a pose, from thruster geometry and wake model."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from wakewise.core.checks import one_of
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import WakeModel
-from wakewise.core.jit.njit import njit
 from wakewise.wake.advected_jets import CrossFlow
 from wakewise.wake.disturbance import SUPERPOSITIONS, Superposition, gram, scattered_jet_gram
+from wakewise.wake.gram import place
 from wakewise.wake.jets import AxialJet, JetLaw
 from wakewise.wake.learned import free_jet
 
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 
 class InfluenceMatrices(NamedTuple):
-    """Matrices of D, shape (2 n, 2 n) each: `gram`, by which shares are chosen, and `sent`, of what thrusts do as sent.
+    """Matrices of D, shape (2 n, 2 n) each: `gram` for the choice of thrusts, `sent` for D of the thrusts themselves.
 
-    They are one unless `gram` also charges thrusts for what may be: others that join them, jets that go astray
+    They differ only if `gram` has extra costs: jets that may merge, jets of uncertain direction
     (`wakewise.control.null_space_allocation`).
     """
 
@@ -37,7 +37,7 @@ class InfluenceMatrices(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class InfluenceModel:
-    """Places and axes of the thrusters on the body, the region's points in the world, and a wake model between them."""
+    """Thruster positions and axes on the body, weighted points of the region in the world, and a wake model."""
 
     wake: WakeModel
     points_W_m: Array
@@ -58,7 +58,7 @@ class InfluenceModel:
     def of(
         cls, vehicle: Vehicle, region: Region, wake: WakeModel, superposition: Superposition = "coherent"
     ) -> InfluenceModel:
-        """View of a region from a vehicle."""
+        """Influence of a vehicle on a region."""
         return cls(
             wake=wake,
             points_W_m=region.points_W_m,
@@ -75,22 +75,23 @@ class InfluenceModel:
         return float(np.sum(self.weights))
 
     def gram(self, X_WB: Pose, flow: CrossFlow | None = None) -> Array:
-        """Matrix G of D = s' G s, shape (2 n, 2 n), with the jets where a pose puts them and a flow carries them."""
+        """Matrix G of D = s' G s, shape (2 n, 2 n), at a pose; `flow` advects the jets."""
         origins_W, axes_W = self.places(X_WB)
         place = (self.points_W_m, self.weights, origins_W, axes_W, self.areas_m2)
         return gram(self.wake, *place, superposition=self.superposition, flow=flow)
 
     def places(self, X_WB: Pose) -> tuple[Array, Array]:
         """Thruster origins and force axes in the world, shape (m, 3) each, of the body at a pose."""
-        return cast("tuple[Array, Array]", _placed(X_WB.p_m, X_WB.q, self.positions_B_m, self.axes_B))
+        _, origins_W, axes_W = place(X_WB.p_m, X_WB.q, self.positions_B_m, self.axes_B)
+        return origins_W, axes_W
 
     def seen(self, X_WB: Pose, flow: CrossFlow | None = None) -> InfluenceMatrices:
-        """Matrices of D: what to choose shares by, and what thrusts do as sent."""
+        """Matrices of D for the choice of thrusts and for its value."""
         G = self.gram(X_WB, flow)
         return InfluenceMatrices(gram=G, sent=G)
 
     def astray(self, X_WB: Pose) -> Array | None:
-        """Mean of D per newton of each jet if it goes astray, shape (2 n,) (see `disturbance`); None without a law."""
+        """Mean of D per newton of each jet of uncertain direction, shape (2 n,) (`scattered_jet_gram`), or None."""
         if self._law is None:
             return None
         return cast(
@@ -101,25 +102,3 @@ class InfluenceModel:
     def _law(self) -> JetLaw | None:
         jet = free_jet(self.wake)
         return jet.law if isinstance(jet, AxialJet) else None
-
-
-@njit
-def _placed(p: Array, q: Array, positions_B: Array, axes_B: Array) -> tuple[Array, Array]:
-    """Thruster origins and axes in the world, shape (m, 3) each, of a body at p with unit quaternion q."""
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    R = np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    )
-    origins, axes = np.empty(positions_B.shape), np.empty(axes_B.shape)
-    for i in range(len(positions_B)):
-        for row in range(3):
-            origins[i, row] = p[row]
-            axes[i, row] = 0.0
-            for column in range(3):
-                origins[i, row] += R[row, column] * positions_B[i, column]
-                axes[i, row] += R[row, column] * axes_B[i, column]
-    return origins, axes

@@ -1,20 +1,18 @@
-"""Turbulent round jets: one that conserves momentum, and one whose four numbers are free to be fitted.
+"""Wake models of an actuator-disk jet: the paper's cone with cos^4 attenuation, free cones, turbulent round jets.
 
-Both give the speed along the jet's own direction. Speed grows with the square root of thrust, so a model is a speed per
-square root of newton. The jet leaves opposite to the force on the vehicle: T > 0 along -axis, T < 0 along +axis.
-
-The paper's proxy as printed, and the family of cones with free gain and powers that it belongs to.
+The velocity is along the jet's axis and grows with the square root of thrust, so a model is a speed per square root of
+newton. The jet leaves opposite to the force on the vehicle: T > 0 along -axis, T < 0 along +axis. Cones:
 
     v = G sqrt(|T| / (2 pi rho A)) (r_ref / sqrt(r^2 + r_s^2))^p cos^m(theta) s(theta)
 
-r is the distance from the disk's centre, theta the angle off the jet's direction, s the cone: 1 inside its half angle,
-0 outside, with an edge that is sharp or smooth.
+r is the distance from the disk's centre, theta the angle off the jet's axis, s the edge of the cone: 1 inside its half
+angle, 0 outside, sharp or smooth in between.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, NamedTuple
 
@@ -93,12 +91,10 @@ def check_ranges(record: object, what: str, **ranges: tuple[float, float]) -> No
 
     Raises InputError: naming the model, the field, the value and what is allowed.
     """
-    for field in fields(record):  # type: ignore[arg-type]
-        if field.name in ranges:
-            low, high = ranges[field.name]
-            value = getattr(record, field.name)
-            if not low <= value <= high:
-                raise InputError(f"{what}: {field.name} {value:g}, allowed {low:g} to {high:g}")
+    for name, (low, high) in ranges.items():
+        value = getattr(record, name)
+        if not low <= value <= high:
+            raise InputError(f"{what}: {name} {value:g}, allowed {low:g} to {high:g}")
 
 
 @dataclass(frozen=True, kw_only=True)

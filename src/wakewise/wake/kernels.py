@@ -1,29 +1,31 @@
-"""Compiled speeds of single jets: few kernels, of which every wake model is a set of parameters.
+"""Compiled speeds of a single actuator-disk jet: cone with cos^m attenuation, and turbulent round jet.
 
-A jet is axisymmetric. At a point with offset e from the disk's centre, x = e . d along the jet's unit direction d and
-r2 = e . e, its speed per square root of newton is f(x, r2), zero unless x > 0. The gradient is alpha d + beta e, so
-that the pair (alpha, beta) is all that any derivative with respect to position or attitude needs.
+At a point with offset e from the disk's centre, x = e . d along the jet's unit direction d and r2 = e . e, the speed
+per square root of newton is f(x, r2), zero unless x > 0. Its gradient is alpha d + beta e; every derivative by position
+or attitude follows from the pair (alpha, beta).
 
-Parameters travel as `(kind, parameters)`, see `cone_parameters` and `jet_parameters`; `own_constants` adds what depends
-on each thruster's disk. Units SI throughout.
+A law is `(kind, parameters)`, see `cone_parameters` and `jet_parameters`; `own_constants` adds the constants of each
+thruster's disk. SI units.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from wakewise.core.arrays import Array
+from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import njit
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}
+Numbers = tuple[float, float, float, float, float, float, float]
+"""Constants of a law as values, see `cone_parameters` and `jet_parameters`."""
 PRINTED_CONE, POWER_CONE, ROUND_JET = 0, 1, 2
-"""Kinds of kernel: the paper's cone without powers to take, the cone with any powers, and the turbulent round jet."""
+"""Kinds of kernel: the paper's cone (fixed powers), the cone with any powers, and the turbulent round jet."""
 
 TAIL_WIDTHS = 4.3
-"""A Gaussian profile is cut where less than 1e-8 of its middle is left, exp(-4.3^2): beyond is called nothing."""
+"""Widths at which a Gaussian profile is cut off: exp(-4.3^2) < 1e-8 of its centre value."""
 
 _NOTHING = 1e-300
-"""Added to a distance that may be zero where what it divides is zero, too."""
+"""Added to a divisor that is zero only where the dividend is zero, too."""
 
 
 def cone_parameters(
@@ -85,11 +87,11 @@ def jet_parameters(
 
 
 @njit(apart=True)
-def own_constants(kind, parameters, areas):  # type: ignore[no-untyped-def]
-    """What each disk adds, shape (m, 6): three constants of the kernel and three of its reach.
+def own_constants(kind: int, parameters: Array, areas: Array) -> Array:
+    """Constants of each disk, shape (m, 6): three of the law and three of its reach.
 
     Cones: speed at 1 m, two unused. Jets: x0, b0, L^6 in m, m, m^6. A jet reaches only points with
-    r2 <= reach0 + reach1 x + reach2 x^2, a test without roots that comes before everything else.
+    r2 <= reach0 + reach1 x + reach2 x^2; this test needs no square root.
     """
     own = np.zeros((areas.shape[0], 6))
     for i in range(areas.shape[0]):
@@ -109,7 +111,9 @@ def own_constants(kind, parameters, areas):  # type: ignore[no-untyped-def]
 
 
 @njit
-def speed_and_slope(kind, numbers, c0, c1, c2, x, r2):  # type: ignore[no-untyped-def]
+def speed_and_slope(
+    kind: int, numbers: Numbers, c0: float, c1: float, c2: float, x: float, r2: float
+) -> tuple[float, float, float]:
     """(f, alpha, beta) at a point within reach, x > 0 along the jet and squared distance r2 from the disk's centre."""
     if kind == ROUND_JET:
         return _jet(numbers, c0, c1, c2, x, r2)
@@ -123,7 +127,7 @@ def speed_and_slope(kind, numbers, c0, c1, c2, x, r2):  # type: ignore[no-untype
 
 
 @njit
-def _cone(numbers, c0, x, r2):  # type: ignore[no-untyped-def]
+def _cone(numbers: Numbers, c0: float, x: float, r2: float) -> tuple[float, float, float]:
     p, m, low, high = numbers[1], numbers[2], numbers[4], numbers[5]
     inverse = 1.0 / r2
     soft = r2 + numbers[3]
@@ -142,7 +146,7 @@ def _cone(numbers, c0, x, r2):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _jet(numbers, x0, b0, limit6, x, r2):  # type: ignore[no-untyped-def]
+def _jet(numbers: Numbers, x0: float, b0: float, limit6: float, x: float, r2: float) -> tuple[float, float, float]:
     slope = numbers[4]
     b = b0 + slope * x
     across2 = max(r2 - x * x, 0.0)
@@ -177,16 +181,18 @@ def _jet(numbers, x0, b0, limit6, x, r2):  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True, fastmath=FAST)
-def fill_cored_jet(q, roots, t, axis, own, numbers, slopes, near, pose):  # type: ignore[no-untyped-def]
+def fill_cored_jet(
+    q: Array, roots: Array, t: Array, axis: Array, own: Array, numbers: Array, slopes: bool, near: IntArray,
+    pose: Array,
+) -> None:  # fmt: skip
     """A round jet with a core at many points: signed speed by the force axis (negative astern of T > 0) into
     pose[0, 0], (P,); with `slopes` the gradient of |f| into pose[1], (3, P).
 
-    The law of `_jet`, its twin in the tests, where a point waits for cube root, roots and exponential in turn. Here
-    each step is a loop of its own over the points within reach, so that all but the cube root and the exponential run
-    on several points at a time: close to a target a plan asks for a hundred thousand of them.
+    The law is that of `_jet`. Each step is a loop of its own over the points within reach, so that all but the cube
+    root and the exponential compile to vector instructions: close to a target a plan evaluates 1e5 points.
 
-    q : (3, P) points, t : (3,) the disk and axis : (3,) its force; own : (6,), numbers : (7,), see `own_constants`;
-    near : (P,) and the rest of pose, (6, 3, P), are room to work in.
+    `q` (3, P): points; `t` (3,): centre of the disk; `axis` (3,): its force axis; `own` (6,), `numbers` (7,): see
+    `own_constants`. `near` (P,) and the rest of `pose`, (6, 3, P), are work arrays.
     """
     count = q.shape[1]
     f_row, g = pose[0, 0], pose[1]
@@ -204,7 +210,7 @@ def fill_cored_jet(q, roots, t, axis, own, numbers, slopes, near, pose):  # type
                 row[j] = 0.0
     found, reach0, reach1, reach2 = 0, own[3], own[4], own[5]
     for j in range(count):
-        # Without a branch: which points are within reach has no pattern that a processor could guess.
+        # Without a branch, because branch prediction fails here.
         x = abs(along[j])
         near[found] = j
         found += (x > 0.0) & (r2[j] <= reach0 + reach1 * x + reach2 * x * x)
@@ -225,7 +231,7 @@ def fill_cored_jet(q, roots, t, axis, own, numbers, slopes, near, pose):  # type
 
 
 @njit(fastmath=FAST)
-def _cored_law(numbers, own, near, found, slopes, pose):  # type: ignore[no-untyped-def]
+def _cored_law(numbers: Array, own: Array, near: IntArray, found: int, slopes: bool, pose: Array) -> None:
     """(f, alpha, beta) of `speed_and_slope` at the first `found` points of `near` into pose[3, 0], [4, 0], [4, 1]."""
     x0, b0, limit6, spread = own[0], own[1], own[2], numbers[4]
     decay, momentum, flat = numbers[0], numbers[1] / (numbers[0] * numbers[0]), np.sqrt(np.pi / 8.0)
@@ -265,14 +271,14 @@ def _cored_law(numbers, own, near, found, slopes, pose):  # type: ignore[no-unty
 
 
 @njit
-def section_of(kind, numbers, own, s):  # type: ignore[no-untyped-def]
+def section_of(kind: int, numbers: Numbers, own: Array, s: float) -> tuple[float, float, float]:
     """(U_0 per square root of newton, chi, width) of the jet in still water at a distance s from the disk."""
     if kind != ROUND_JET:
         speed, _, _ = speed_and_slope(kind, numbers, own[0], own[1], own[2], s, s * s)
         # cos^m of the angle is a Gaussian of the radius with this width.
         power = 4.0 if kind == PRINTED_CONE else max(numbers[2], 2.0)
         return speed, 0.5, s * np.sqrt(2.0 / power)
-    # The middle of the jet's own kernel, which is asked here for nothing else: one root serves speed and core.
+    # The centreline of `_jet`; one root serves speed and core.
     b, x = own[1] + numbers[4] * s, s + own[0]
     if numbers[5] == 0.0:
         return numbers[0] / x, 0.5, b
@@ -285,13 +291,15 @@ def section_of(kind, numbers, own, s):  # type: ignore[no-untyped-def]
 
 
 @njit
-def as_tuple(p):  # type: ignore[no-untyped-def]
-    """The kernel's numbers as values rather than an array, which lets the compiler keep them at hand."""
+def as_tuple(p: Array) -> Numbers:
+    """Constants as values, which the compiler can keep in registers."""
     return (p[0], p[1], p[2], p[3], p[4], p[5], p[6])
 
 
 @njit
-def fill_split_speed(points, origins, axes, areas, kind, parameters, speed):  # type: ignore[no-untyped-def]
+def fill_split_speed(
+    points: Array, origins: Array, axes: Array, areas: Array, kind: int, parameters: Array, speed: Array
+) -> None:
     """Speeds at points, shape (n, 3), for either sign of m thrusts, into `speed`, zeros of shape (n, 2 m).
 
     A point lies downstream of one of a thruster's two possible jets and upstream of the other, so one pass fills both
@@ -310,7 +318,7 @@ def fill_split_speed(points, origins, axes, areas, kind, parameters, speed):  # 
 
 
 @njit
-def fill_speed(along, across, areas, kind, parameters, speed):  # type: ignore[no-untyped-def]
+def fill_speed(along: Array, across: Array, areas: Array, kind: int, parameters: Array, speed: Array) -> None:
     """Speed per square root of newton at `along` and `across` the axis of single jets, all arrays of shape (n,)."""
     own, numbers = own_constants(kind, parameters, areas), as_tuple(parameters)
     for j in range(along.shape[0]):

@@ -1,25 +1,20 @@
-"""`learned`: a wake model that was trained on the tank's parcels and the lattice, as a rival of the laws of jets.
+"""Wake model `learned`: a small neural network of a jet with the thruster's thrust history.
 
-It knows of the tank what its training draws say (see `wakewise_paper.learned_wake`), so in the tank it is *circular
-to that degree*; none of our own models is. It gives the radial part and the slow inflow towards a jet's sides, which
-they leave out. As a `WakeModel` a thruster has always pushed as it does now; `LearnedWake.velocity` takes a history.
+Trained on simulated jets of the tank and the lattice Boltzmann solver (`wakewise_paper.learned_wake`), so its scores in
+the tank are circular to that degree. It has the radial velocity and the inflow towards a jet's sides, which the other
+models leave out. As a `WakeModel` the thrust is steady; `LearnedWake.velocity` takes a history. Size and inputs follow
+L. Vendruscolo, E. Sebastian, A. Prorok and A. Shankar, Wake Up to the Past, arXiv 2603.22472 (2026), of which only the
+abstract was available: history of states, transport delay, about 18,000 weights.
 
-A small neural network for a jet that remembers how its thruster pushed: features, forward pass, its numbers.
-
-Rival of the jets of this room, after L. Vendruscolo, E. Sebastian, A. Prorok and A. Shankar, Wake Up to the Past, arXiv
-2603.22472 (2026): predictors of wakes need the history of the states and the transport delay, and some 18,000 weights
-are enough. What is known of theirs is the abstract; the layers here are our own choice of that size.
-
-One jet, points in cylindrical coordinates of its frame: x along the jet from the disk's middle, r off its axis, D the
-disk's diameter, R = sqrt(x^2 + r^2). With M(t) = T(t) / rho, the flux of momentum, and M* the greatest of it that is
-remembered, dimensions leave nothing else than
+Points are in cylindrical coordinates of the jet: x along it from the disk's centre, r off its axis, D the disk's
+diameter, R = sqrt(x^2 + r^2). With M(t) = T(t) / rho and M* its maximum over the history, dimensional analysis gives
 
     velocity = sqrt(M*) / (R + D) f(x / D, r / D, M(t - delays) / M*)
     delays in units of t* = (R^2 / 6.6 + R D) / sqrt(M*)
 
-t* is about the time that a starting jet's front takes to R: it is at 2.57 M^(1/4) t^(1/2). So transport delay is in the
-coordinates, four times the thrust in half the time gives twice the speed exactly, and a steady jet goes with sqrt(T).
-f is a perceptron with two hidden layers of tanh; the part across is nil on the axis by construction.
+t* is about the time in which a starting jet's front reaches R (2.57 M^(1/4) t^(1/2)). Four times the thrust in half the
+time therefore gives exactly twice the speed, and a steady jet goes with sqrt(T). f is a perceptron with two hidden
+tanh layers; its radial component is zero on the axis by construction.
 """
 
 from __future__ import annotations
@@ -28,6 +23,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -325,10 +321,10 @@ def steady_table(network: Network) -> Array:
 
 def save_network(path: Path, network: Network, words: str) -> None:
     """Write a network in float32 with what it was trained on, whole or not at all."""
-    arrays = {f"w{k}": w.astype(np.float32) for k, w in enumerate(network.weights)}
+    arrays: dict[str, Any] = {f"w{k}": w.astype(np.float32) for k, w in enumerate(network.weights)}
     arrays |= {f"b{k}": b.astype(np.float32) for k, b in enumerate(network.biases)}
     with whole_file(path) as temporary:
-        np.savez_compressed(temporary, words=np.array(words), **arrays)  # type: ignore[arg-type]
+        np.savez_compressed(temporary, words=np.array(words), **arrays)
 
 
 def load_network(path: Path = SHIPPED) -> Network:

@@ -1,20 +1,16 @@
-"""Jets that meet: what two become, as terms of D beside those of single jets.
+"""Merging jets: two jets that cross join into one, as off-diagonal terms of the Gram matrix G.
 
-Two jets that cross at less than 120 deg join and run on along the sum of their momenta (conservation of momentum; the
-angle is that above which they rather turn aside, as jets that blow at each other do). The two forward jets of a
-vectored layout cross a decimetre ahead of the bow, and what they become goes where the camera looks, although neither
-jet alone comes near the target. In the tank this was most of the water's motion at a target downstream of a hover.
+Two jets that cross at less than 120 deg merge and continue along the sum of their momenta (conservation of momentum;
+beyond 120 deg they turn aside, like opposed jets). The two forward jets of a vectored layout cross a decimetre ahead of
+the bow.
 
-In a flow, a pair of which one does no more than correct is charged as if the other pushed as a thruster at rest is
-guessed to: half of what they would become each. D is of an instant, and shares that alternate between two jets that
-miss are the least that it can find; the water has both of them. That is a charge, not what is in the water: thrusts
-that leave one of the two at rest leave nothing of it, so the bound on power (`allocation.power_budget`) asks what they
-do as sent.
+Term of D. Jets a and b with T_a = T_b = 1 N merge into one of |e_a + e_b| N of momentum along e_a + e_b. The geometric
+mean sqrt(T_a T_b) = s_a s_b vanishes when either thrust does, so the merged jet is an entry of G off the diagonal and D
+stays a quadratic form of s. With unequal thrusts this overestimates.
 
-As a term of D. Of jets a and b with T_a = T_b = 1 N the joined jet carries |e_a + e_b| N of momentum along
-e_a + e_b. With unequal thrusts it turns towards the stronger, and without one of them there is none; the geometric mean
-sqrt(T_a T_b) = s_a s_b vanishes in the same way and keeps D a quadratic form of s, so the exact allocators of this room
-take it as it is: it is an entry of G off the diagonal. It errs on the safe side where thrusts are unequal.
+In a current (`flow`), a pair of which one thrust is only a correction is charged as if both were in use: half of the
+merged jet's D on each diagonal entry. Otherwise thrusts that alternate between two such jets would look harmless,
+while both jets are in the water. This charge is in `InfluenceMatrices.gram` only; `sent` has what the thrusts do.
 """
 
 from __future__ import annotations
@@ -151,7 +147,7 @@ def _slots_of(pairs: tuple[tuple[int, int], ...], n: int) -> tuple[IntArray, Int
 
 
 @njit
-def _meet(origins, axes, first, second, sizes):  # type: ignore[no-untyped-def]
+def _meet(origins: Array, axes: Array, first: IntArray, second: IntArray, sizes: Array) -> JoinedJets:
     """`JoinedJets` of those of the pairs of slots, `first` with `second`, that meet; `sizes` as for `joined_jets`."""
     n, many, count = origins.shape[0], first.size, 0
     a, b = np.empty(many, np.int64), np.empty(many, np.int64)
@@ -204,7 +200,9 @@ def _meet(origins, axes, first, second, sizes):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _send(origins, axes, areas, guessed, pushing, weak_N, met):  # type: ignore[no-untyped-def]
+def _send(
+    origins: Array, axes: Array, areas: Array, guessed: Array, pushing: Array, weak_N: float, met: JoinedJets
+) -> _Sent:
     """Jets to follow, `_Sent`, of slots that push with `pushing` and are guessed to with `guessed`, shape (2 n,)."""
     n, pairs = origins.shape[0], met.first.size
     joined, apart, joins, rests = np.empty(pairs, np.int64), np.empty(pairs, np.int64), 0, 0
@@ -246,7 +244,7 @@ def _send(origins, axes, areas, guessed, pushing, weak_N, met):  # type: ignore[
 
 
 @njit
-def _join(velocity, met, joined, pushing):  # type: ignore[no-untyped-def]
+def _join(velocity: Array, met: JoinedJets, joined: IntArray, pushing: Array) -> None:
     """Add what pairs become, rows of `velocity`, (m, n, 3), after all slots, to the rows of their two, by thrust."""
     for c in range(joined.size):
         k, one = joined[c], velocity[pushing.size + c]
@@ -260,7 +258,7 @@ def _join(velocity, met, joined, pushing):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _charged(G, velocity, weights, met, apart):  # type: ignore[no-untyped-def]
+def _charged(G: Array, velocity: Array, weights: Array, met: JoinedJets, apart: IntArray) -> tuple[Array, Array]:
     """G with a charge on each of a pair that rests, and G with what the pair becomes, of velocities (m, n, 3).
 
     D of what a pair becomes is per newton of its geometric mean.

@@ -1,19 +1,19 @@
-"""The wake models by name, and what a user may set of them in a scenario file.
+"""Wake models by name, with their settings and default parameters.
 
-Defaults. `paper` is printed in the paper and takes no numbers. The others start from the numbers below until they are
-fitted to a flow (`wakewise wake fit`), which any scenario file can carry instead:
-
+- `paper`: as printed in the paper; no parameters.
 - `paper-calibrated`: the gain 0.036 = (0.19 m)^2 / (1 m)^2. Gain-only fits of the paper's cone to swirling and
-  swirl-free jets asked for effective reference distances of 0.16 to 0.22 m; 0.19 m is the middle.
+  swirl-free jets gave reference distances of 0.16 to 0.22 m.
 - `fitted`: gain 0.6, decay power 0.85, cosine power 47, from fits to propeller jets with swirl, 1.7 to 8.3 disk
   diameters away. Swirl-free jets are narrower: cosine power 75 to 150.
-- `linear`: a simplified proxy for ablations: speed falls as 1/r and does not depend on the angle within the cone. Its
-  gain 0.5 makes it equal `fitted` on the axis at 0.3 m.
-- `jet`: the momentum-conserving round jet, numbers from the literature (`RoundJet`).
+- `linear`: for ablations. Speed falls as 1/r and is constant across the cone; gain 0.5 makes it equal `fitted` on the
+  axis at 0.3 m.
+- `jet`: the momentum-conserving round jet with published constants (`RoundJet`).
 - `jet-fitted`: a Gaussian of a propeller's width (`RoundJet.of_propeller`) from the disk on, with the exit speed
-  sqrt(T / (rho A)) at its middle and momentum T / rho: x0 = K sqrt(A) = 3.33 D and b0 = R sqrt(2) = 0.707 D.
-- `learned`: a rival, a small network trained on the tank's water and the lattice (`wakewise.wake.learned`); it takes no
-  numbers, and its derivatives are differences.
+  sqrt(T / (rho A)) on its axis and momentum T / rho: x0 = K sqrt(A) = 3.33 D and b0 = R sqrt(2) = 0.707 D.
+- `learned`: a neural network trained on simulated jets (`wakewise.wake.learned`); no parameters, derivatives by
+  differences.
+
+Fitted values (`wakewise wake fit`) can be set in any scenario file.
 """
 
 from __future__ import annotations

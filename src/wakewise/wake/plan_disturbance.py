@@ -1,11 +1,11 @@
-"""Compiled: D of one stage with its gradient and its Gauss-Newton matrix, in the vehicle's own axes.
+"""Compiled disturbance D of one MPC stage with its gradient and Gauss-Newton matrix, in body axes.
 
-The same figures as `wakewise.wake.disturbance.gauss_newton`, which is this module's twin in the tests, made
-for a planner that asks twenty times per plan: points as rows of coordinates, the paper's cone without branches, jets
-that miss the region left out before anything is computed, and no sum that is known to be zero. |v|^2 does not depend on
-the axes it is expressed in, so everything is done in B; only the slopes by position are turned to W at the end.
+Same values as `wakewise.wake.disturbance.gauss_newton`, faster: points are stored as rows of coordinates, the paper's
+cone has no branches, and jets that miss the region are skipped. |v|^2 does not depend on the axes, so the sums are done
+in B; only the slopes by position are turned to W at the end.
 
-The wake model and the region as a table for the planner's kernels, with an edge that gradients can follow.
+`PackedWakeModel` holds the wake model and the region for these kernels. `with_smooth_edge` gives a sharp cone an edge
+that has a gradient.
 """
 
 from __future__ import annotations
@@ -15,16 +15,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wakewise.core.arrays import Array, frozen
+from wakewise.core.arrays import Array, IntArray, frozen
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import WakeModel
 from wakewise.core.jit.njit import assign, njit
-from wakewise.wake.gram import smooth_root
+from wakewise.wake.gram import dot, smooth_root
 from wakewise.wake.jets import AxialJet, PaperJet, PowerJet
 from wakewise.wake.kernels import (
     FAST,
     PRINTED_CONE,
     ROUND_JET,
+    Numbers,
     as_tuple,
     fill_cored_jet,
     own_constants,
@@ -33,31 +34,26 @@ from wakewise.wake.kernels import (
 from wakewise.wake.wall_jet import ImpingingJet, floor_stage_sum
 
 PLAIN_CONE = 10
-"""Kind of the cone with the paper's powers, of any gain and edge: it needs neither logarithm nor branch."""
+"""Kind of the cone with the paper's powers and any gain and edge: no logarithm, no branch."""
 
 
 class PackedWakeModel(NamedTuple):
-    """A wake model over a region as the kernels take it.
+    """Wake model over a region of P points for n thrusters, as the kernels take it."""
 
-    points : (3, P) in W; weights : (P,), their sum is 1; roots : (P,), roots of the weights; middle, radius : sphere
-    round the points; positions, axes : (n, 3) in B; areas : (n,); own : (n, 6), numbers : (7,), see
-    `wakewise.wake.kernels`; floor : (2,), used if `walls`.
-    """
-
-    points: Array
-    rows: Array
-    weights: Array
-    roots: Array
-    middle: Array
-    radius: float
-    positions: Array
-    axes: Array
-    areas: Array
-    own: Array
+    points: Array  # (3, P), in W
+    rows: Array  # (P, 3), in W
+    weights: Array  # (P,), their sum is 1
+    roots: Array  # (P,), square roots of the weights
+    middle: Array  # (3,), centre of a sphere round the points, in W
+    radius: float  # of that sphere
+    positions: Array  # (n, 3), in B
+    axes: Array  # (n, 3), in B
+    areas: Array  # (n,)
+    own: Array  # (n, 6), see `wakewise.wake.kernels`
     kind: int
-    numbers: Array
+    numbers: Array  # (7,), see `wakewise.wake.kernels`
     walls: bool
-    floor: Array
+    floor: Array  # (2,), used if `walls`
     coherent: bool
     smooth_N: float
 
@@ -90,9 +86,8 @@ def wake_table(
         raise InputError("region: needs points with weights that are not negative, and at least one more than 0")
     share = np.array(weights, dtype=np.float64) / total
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    areas = frozen(
-        areas_m2, (None,), "areas"
-    )  # read-only as a vehicle's are, so that kernels are compiled for one kind
+    # Read-only like a vehicle's, so that kernels are compiled for one kind of array.
+    areas = frozen(areas_m2, (None,), "areas")
     return PackedWakeModel(
         points=np.ascontiguousarray(points.T),
         rows=points,
@@ -114,12 +109,12 @@ def wake_table(
 
 
 def is_compiled(wake: WakeModel) -> bool:
-    """Whether the kernels know a model; they do those of this room, with or without a floor."""
+    """Whether the kernels implement a model: those of this package, with or without a bed."""
     return isinstance(wake.jet if isinstance(wake, ImpingingJet) else wake, AxialJet)
 
 
 def with_smooth_edge(wake: WakeModel, edge_width_rad: float) -> WakeModel:
-    """The same model with an edge of that width if it is a cone with a sharp edge, which no gradient can follow."""
+    """The same model; a cone with a sharp edge, which has no gradient, gets an edge of that width."""
     if isinstance(wake, ImpingingJet):
         jet = with_smooth_edge(wake.jet, edge_width_rad)
         return replace(wake, jet=jet) if isinstance(jet, AxialJet) else wake
@@ -131,7 +126,7 @@ def with_smooth_edge(wake: WakeModel, edge_width_rad: float) -> WakeModel:
 
 
 class WakeScratch(NamedTuple):
-    """Room to work in, sized for P points and n thrusters."""
+    """Work arrays for P points and n thrusters."""
 
     q: Array
     sums: Array
@@ -143,7 +138,7 @@ class WakeScratch(NamedTuple):
 
 
 def wake_scratch(points: int, thrusters: int) -> WakeScratch:
-    """Room for a region of so many points and so many thrusters."""
+    """Work arrays for a region of so many points and so many thrusters."""
     return WakeScratch(
         q=np.empty((3, points)),
         sums=np.empty((3, points)),
@@ -155,16 +150,11 @@ def wake_scratch(points: int, thrusters: int) -> WakeScratch:
     )
 
 
-@njit(fastmath=FAST)
-def _dot(a, b, count):  # type: ignore[no-untyped-def]
-    total = 0.0
-    for j in range(count):
-        total += a[j] * b[j]
-    return total
-
-
 @njit(inline="always")
-def may_reach(own, tx, ty, tz, ax, ay, az, mx, my, mz, radius):  # type: ignore[no-untyped-def]
+def may_reach(
+    own: Array, tx: float, ty: float, tz: float, ax: float, ay: float, az: float, mx: float, my: float, mz: float,
+    radius: float,
+) -> bool:  # fmt: skip
     """False if neither jet of a thruster at t can reach any point of a sphere round m, all in B."""
     ex, ey, ez = mx - tx, my - ty, mz - tz
     along = abs(ex * ax + ey * ay + ez * az)
@@ -175,7 +165,10 @@ def may_reach(own, tx, ty, tz, ax, ay, az, mx, my, mz, radius):  # type: ignore[
 
 
 @njit(inline="always", fastmath=FAST)
-def _plain_cone(q, roots, count, tx, ty, tz, ax, ay, az, c0, low, high, f_row, g):  # type: ignore[no-untyped-def]
+def _plain_cone(
+    q: Array, roots: Array, count: int, tx: float, ty: float, tz: float, ax: float, ay: float, az: float, c0: float,
+    low: float, high: float, f_row: Array, g: Array,
+) -> None:  # fmt: skip
     """Signed speed by the force axis (negative astern of T > 0) into `f_row`, the gradient of |f| into `g`, (3, P)."""
     narrow = 1.0 / (high - low) if high > low else 1e12
     for j in range(count):
@@ -203,7 +196,10 @@ def _plain_cone(q, roots, count, tx, ty, tz, ax, ay, az, c0, low, high, f_row, g
 
 
 @njit(inline="always", fastmath=FAST)
-def _any_jet(q, roots, count, tx, ty, tz, ax, ay, az, own, kind, numbers, f_row, g):  # type: ignore[no-untyped-def]
+def _any_jet(
+    q: Array, roots: Array, count: int, tx: float, ty: float, tz: float, ax: float, ay: float, az: float, own: Array,
+    kind: int, numbers: Numbers, f_row: Array, g: Array,
+) -> None:  # fmt: skip
     """As `_plain_cone`, for every kind of jet."""
     for j in range(count):
         ex, ey, ez = q[0, j] - tx, q[1, j] - ty, q[2, j] - tz
@@ -226,7 +222,10 @@ def _any_jet(q, roots, count, tx, ty, tz, ax, ay, az, own, kind, numbers, f_row,
 
 
 @njit(apart=True, fastmath=FAST)
-def stage_disturbance(table, scratch, p, quat, R, thrusts, slopes, gradient, H):  # type: ignore[no-untyped-def]
+def stage_disturbance(
+    table: PackedWakeModel, scratch: WakeScratch, p: Array, quat: Array, R: Array, thrusts: Array, slopes: bool,
+    gradient: Array, H: Array,
+) -> float:  # fmt: skip
     """D; with `slopes` also its gradient, (6 + n,), and 2 J'J, (6 + n, 6 + n), both overwritten.
 
     Rows: position in W, rotation vector in B, thrusts.
@@ -258,7 +257,10 @@ def stage_disturbance(table, scratch, p, quat, R, thrusts, slopes, gradient, H):
 
 
 @njit(apart=True, fastmath=FAST)
-def _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H):  # type: ignore[no-untyped-def]
+def _free_jets(
+    table: PackedWakeModel, scratch: WakeScratch, p: Array, R: Array, thrusts: Array, slopes: bool, gradient: Array,
+    H: Array,
+) -> float:  # fmt: skip
     q, sums, S, jets, pose, active, near = scratch
     count, n = q.shape[1], thrusts.shape[0]
     if slopes:
@@ -339,7 +341,7 @@ def _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H):  # type: ign
                         S[3 * x + 2, j] += s * g[2, j]
     if table.coherent:
         for x in range(3):
-            D += _dot(sums[x], sums[x], count)
+            D += dot(sums[x], sums[x], count)
         if slopes:
             _products(table.axes, active, active_count, count, q, sums, S, jets, pose, gradient, H)
     if slopes:
@@ -348,7 +350,7 @@ def _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H):  # type: ign
 
 
 @njit(inline="always", fastmath=FAST)
-def _pose_rows(count, q, gx, gy, gz, out, x):  # type: ignore[no-untyped-def]
+def _pose_rows(count: int, q: Array, gx: Array, gy: Array, gz: Array, out: Array, x: int) -> None:
     """Rows by position (in B) and rotation vector of a quantity with gradient (gx, gy, gz) by the point in B."""
     for j in range(count):
         a, b, c = gx[j], gy[j], gz[j]
@@ -363,7 +365,10 @@ def _pose_rows(count, q, gx, gy, gz, out, x):  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True, fastmath=FAST)
-def _products(axes, active, active_count, count, q, sums, S, jets, pose, gradient, H):  # type: ignore[no-untyped-def]
+def _products(
+    axes: Array, active: IntArray, active_count: int, count: int, q: Array, sums: Array, S: Array, jets: Array,
+    pose: Array, gradient: Array, H: Array,
+) -> None:  # fmt: skip
     for x in range(3):
         used = False
         for index in range(active_count):
@@ -408,11 +413,11 @@ def _products(axes, active, active_count, count, q, sums, S, jets, pose, gradien
             k = active[other]
             cosine = axes[i, 0] * axes[k, 0] + axes[i, 1] * axes[k, 1] + axes[i, 2] * axes[k, 2]
             if abs(cosine) > 1e-14:
-                H[6 + i, 6 + k] = 2.0 * cosine * _dot(jets[i], jets[k], count)
+                H[6 + i, 6 + k] = 2.0 * cosine * dot(jets[i], jets[k], count)
 
 
 @njit
-def _add_six(row, s0, s1, s2, s3, s4, s5, factor):  # type: ignore[no-untyped-def]
+def _add_six(row: Array, s0: float, s1: float, s2: float, s3: float, s4: float, s5: float, factor: float) -> None:
     row[0] += factor * s0
     row[1] += factor * s1
     row[2] += factor * s2
@@ -422,9 +427,10 @@ def _add_six(row, s0, s1, s2, s3, s4, s5, factor):  # type: ignore[no-untyped-de
 
 
 @njit(apart=True, fastmath=FAST)
-def _alone(  # type: ignore[no-untyped-def]
-    i, count, q, f_row, g, ahead, ahead_slope, astern, astern_slope, slopes, gradient, H
-):
+def _alone(
+    i: int, count: int, q: Array, f_row: Array, g: Array, ahead: float, ahead_slope: float, astern: float,
+    astern_slope: float, slopes: bool, gradient: Array, H: Array,
+) -> float:  # fmt: skip
     """One jet of the incoherent sum: its squared speed alone, with slopes; returns its share of D."""
     D, by_thrust, second = 0.0, 0.0, 0.0
     for j in range(count):
@@ -460,7 +466,7 @@ def _alone(  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True)
-def _to_world(R, gradient, H):  # type: ignore[no-untyped-def]
+def _to_world(R: Array, gradient: Array, H: Array) -> None:
     """Fill the upper triangle from the lower and take rows and columns 0 to 2 from B to W."""
     size = H.shape[0]
     for r in range(size):

@@ -1,7 +1,7 @@
-"""Velocities at points as people and programs of PIV write them: CSV of our own columns, PIVlab's text, Tecplot, DaVis.
+"""Readers of velocities at points: CSV with this package's columns, PIVlab text, Tecplot, DaVis.
 
-A column's unit is in its name ("x_m", "x [mm]", "U m/s") and is turned into SI, which is said. What a row does not hold
-(NaN, nothing, a mask) leaves the row out, and is counted; a column that is of no use is named.
+A column's unit is in its name ("x_m", "x [mm]", "U m/s") and is converted to SI with a note. Rows without a velocity
+(NaN, empty, masked) are left out and counted. Columns that are not used are named.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Measured speeds of one thruster's jet: points, thrusts and axial speeds, and the regions they are judged in.
+"""Measured speeds of one thruster's jet, the regions of a jet, and R2 scores of wake models.
 
-Jet frame J: origin at the middle of the disk, x along the jet (downstream), so that theta is the angle off the jet's
-direction and the distance is from the disk's middle, as in the paper.
+Jet frame J: origin at the centre of the disk, x along the jet (downstream). Angles are off the jet's axis and distances
+from the disk's centre, as in the paper.
 """
 
 from __future__ import annotations

@@ -1,25 +1,20 @@
-"""What a jet does after it strikes the bed: a wall jet that spreads along it from where the jet's axis meets it.
+"""Wall jets: a round jet that strikes the bed spreads along it from the point where its axis meets the bed.
 
-A round jet that strikes a floor squarely runs outwards on it with u_max = 1.16 sqrt(M) / r and half thickness 0.09 r,
-M = T / rho, r from the strike point (N. Rajaratnam, Turbulent Jets, Elsevier 1976: 1.03 U0 D / r). Like the free jet it
-goes with sqrt(T), so it enters the same quadratic form of D; but its direction differs from point to point.
+At normal incidence u_max = 1.16 sqrt(M) / r and the half thickness is 0.09 r, M = T / rho, r from the strike point (N.
+Rajaratnam, Turbulent Jets, Elsevier 1976: 1.03 U0 D / r). The speed goes with sqrt(T) like the free jet's, so D stays a
+quadratic form; the direction differs from point to point. Three closures:
 
-Three things the law leaves open are closed as follows.
-
-- *A slanting jet* sends most of its water forward. The flux of momentum per angle phi from the forward direction is
+- *Oblique incidence.* The flux of momentum per angle phi from the forward direction is
   M / (2 pi) sin^3(psi) / (1 - cos(psi) cos(phi))^2, psi the angle between jet and bed: the inviscid sheet of D. Hasson
-  and R. E. Peck, AIChE J. 10 (1964) 752. Its integral is M and its component along the bed M cos(psi), so momentum
-  along the bed is kept. Speed goes with its root. Jets within 3 deg of level are taken as never landing.
-- *Near the strike point* the water turns and 1 / r cannot go on. With r / (r^2 + r0^2) for 1 / r, the speed is greatest
-  at r0 and vanishes at the strike point; r0 = 1.16 / (2 K) (H^6 + L^6)^(1/6) makes that greatest speed the centreline
-  speed with which a round jet arrives from the distance H (`RoundJet`: K = 6.9, L = K sqrt(A)).
-- *Across the layer* the speed falls as a Gaussian of the height, 1/2 at the half thickness; the thin layer under the
-  maximum, where friction slows the water, is left out.
+  and R. E. Peck, AIChE J. 10 (1964) 752. Its integral is M and its component along the bed M cos(psi). Speed goes with
+  its root. Jets within 3 deg of level do not strike.
+- *Near the strike point* r / (r^2 + r0^2) replaces 1 / r: the speed is greatest at r0 and zero at the strike point.
+  r0 = 1.16 / (2 K) (H^6 + L^6)^(1/6) makes the greatest speed the centreline speed of a round jet at the distance H
+  (`RoundJet`: K = 6.9, L = K sqrt(A)).
+- *Across the layer* the speed is a Gaussian of the height, 1/2 at the half thickness. The viscous layer is left out.
 
-The free jet is not stopped at the bed: within the last decimetre both terms are there. Not included: what a target in
-the way does to a wall jet, its meeting other wall jets, friction over long ways, and time.
-
-Compiled sums over a region's points with wall jets: `sums` and `stage` again, for velocities of any direction.
+The free jet is not stopped at the bed: within the last decimetre both terms are present. Not modelled: a target in the
+way of a wall jet, colliding wall jets, friction, time.
 """
 
 from __future__ import annotations
@@ -28,13 +23,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.core.arrays import Array
+from wakewise.core.arrays import Array, IntArray
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.core.jit.njit import assign, njit
 from wakewise.wake.gram import (
     BLOCK,
-    FAST,
     check_jets,
     dot,
     fill_rows,
@@ -46,7 +40,7 @@ from wakewise.wake.gram import (
     turn_hessian,
 )
 from wakewise.wake.jets import AxialJet, RoundJet
-from wakewise.wake.kernels import as_tuple, own_constants
+from wakewise.wake.kernels import FAST, Numbers, as_tuple, own_constants
 
 WALL_SPEED = 1.16
 """u_max r / sqrt(M) of a wall jet (Rajaratnam 1976)."""
@@ -92,7 +86,9 @@ class ImpingingJet:
 
 
 @njit
-def _strike(origin, dx, dy, dz, area, bed_z):  # type: ignore[no-untyped-def]
+def _strike(
+    origin: Array, dx: float, dy: float, dz: float, area: float, bed_z: float
+) -> tuple[bool, float, float, float, float, float]:
     """(lands, H, strike x, strike y, r0, d r0 / d H) of one jet: how far it goes, and where it meets the bed."""
     if dz < LEAST_SINE or origin[2] >= bed_z:
         return False, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -104,7 +100,7 @@ def _strike(origin, dx, dy, dz, area, bed_z):  # type: ignore[no-untyped-def]
 
 
 @njit
-def wall_velocity(points, origins, directions, areas, floor):  # type: ignore[no-untyped-def]
+def wall_velocity(points: Array, origins: Array, directions: Array, areas: Array, floor: Array) -> Array:
     """Velocity of the wall jets per square root of newton, shape (m, n, 3), of jets along `directions`, (m, 3)."""
     n, m = points.shape[0], origins.shape[0]
     velocity = np.zeros((m, n, 3))
@@ -126,7 +122,10 @@ def wall_velocity(points, origins, directions, areas, floor):  # type: ignore[no
 
 
 @njit(apart=True)
-def add_wall(block, count, p, origin, dx, dy, dz, area, floor, V, dV):  # type: ignore[no-untyped-def]
+def add_wall(
+    block: Array, count: int, p: Array, origin: Array, dx: float, dy: float, dz: float, area: float, floor: Array,
+    V: Array, dV: Array,
+) -> None:  # fmt: skip
     """Add sqrt(w) u of the wall jet of a jet along (dx, dy, dz) to `V`, (3, BLOCK).
 
     Its slopes by the body's shift and turn, both in W, go to `dV`, (6, 3, BLOCK).
@@ -172,9 +171,11 @@ def add_wall(block, count, p, origin, dx, dy, dz, area, floor, V, dV):  # type: 
 
 
 @njit(apart=True, fastmath=FAST)
-def fill_velocities(  # type: ignore[no-untyped-def]
-    block, count, p, origins, axes, areas, own, kind, numbers, floor, scratch, hits, rows, column, slope, V, dV
-):
+def fill_velocities(
+    block: Array, count: int, p: Array, origins: Array, axes: Array, areas: Array, own: Array, kind: int,
+    numbers: Numbers, floor: Array, scratch: Array, hits: IntArray, rows: Array, column: IntArray, slope: Array,
+    V: Array, dV: Array,
+) -> None:  # fmt: skip
     """Velocities of all 2 m jets, free and wall, into `V`, (2 m, 3, BLOCK), slopes into `dV`, (2 m, 6, 3, BLOCK)."""
     m = origins.shape[0]
     for k in range(2 * m):
@@ -223,7 +224,10 @@ def fill_velocities(  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=FAST)
-def floor_gram_sum(points, weights, p, q, positions_B, axes_B, areas, kind, parameters, floor, slopes):  # type: ignore[no-untyped-def]
+def floor_gram_sum(
+    points: Array, weights: Array, p: Array, q: Array, positions_B: Array, axes_B: Array, areas: Array, kind: int,
+    parameters: Array, floor: Array, slopes: bool,
+) -> tuple[Array, Array, float]:  # fmt: skip
     """G, (2 m, 2 m), dG by position in W and rotation vector in B, (6, 2 m, 2 m) (zeros unless `slopes`), the check."""
     n, m = points.shape[0], positions_B.shape[0]
     R, origins, axes = place(p, q, positions_B, axes_B)
@@ -259,9 +263,10 @@ def floor_gram_sum(points, weights, p, q, positions_B, axes_B, areas, kind, para
 
 
 @njit(apart=True, fastmath=FAST)
-def floor_stage_sum(  # type: ignore[no-untyped-def]
-    points, weights, p, q, positions_B, axes_B, areas, kind, parameters, floor, thrusts, smooth, coherent, hessian
-):
+def floor_stage_sum(
+    points: Array, weights: Array, p: Array, q: Array, positions_B: Array, axes_B: Array, areas: Array, kind: int,
+    parameters: Array, floor: Array, thrusts: Array, smooth: float, coherent: bool, hessian: bool,
+) -> tuple[float, Array, Array, float]:  # fmt: skip
     """D, gradient (6 + m,), Gauss-Newton matrix (6 + m, 6 + m) (zeros unless `hessian`), and the check."""
     n, m = points.shape[0], positions_B.shape[0]
     R, origins, axes = place(p, q, positions_B, axes_B)
@@ -306,7 +311,7 @@ def floor_stage_sum(  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True, fastmath=FAST)
-def _add_products(J, m, count, gradient, H, hessian):  # type: ignore[no-untyped-def]
+def _add_products(J: Array, m: int, count: int, gradient: Array, H: Array, hessian: bool) -> float:
     """Add 2 J'r to the gradient and 2 J'J to the lower triangle of H, r being the last row of J; returns r'r."""
     square = 0.0
     for x in range(3):

@@ -55,7 +55,7 @@ def zero_surface(grid: DistanceGrid) -> Mesh:
 
 
 @njit(inline="always")
-def _lattice(i, j, k, seed):  # type: ignore[no-untyped-def]
+def _lattice(i: int, j: int, k: int, seed: int) -> float:
     """Reproducible number in [0, 1) of a lattice corner: integer mixing after T. Wang's 32-bit hash."""
     h = (i * 73856093 ^ j * 19349663 ^ k * 83492791 ^ seed * 2654435761) & 0xFFFFFFFF
     h = (h ^ 61) ^ (h >> 16)
@@ -67,7 +67,7 @@ def _lattice(i, j, k, seed):  # type: ignore[no-untyped-def]
 
 
 @njit
-def noise(x, y, z, seed):  # type: ignore[no-untyped-def]
+def noise(x: float, y: float, z: float, seed: int) -> float:
     """Smooth value noise in [-1, 1] with features of size one: cubic fade between random lattice corners."""
     i, j, k = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
     fx, fy, fz = x - i, y - j, z - k
@@ -82,14 +82,17 @@ def noise(x, y, z, seed):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def smooth_min(a, b, k):  # type: ignore[no-untyped-def]
+def smooth_min(a: float, b: float, k: float) -> float:
     """Lower of a and b with the corner rounded over the length k (quadratic polynomial)."""
     h = max(k - abs(a - b), 0.0) / k
     return min(a, b) - 0.25 * k * h * h
 
 
 @njit(parallel=True)
-def add_cones(values, origin, spacing, start, end, start_radius, end_radius, blend):  # type: ignore[no-untyped-def]
+def add_cones(
+    values: Array, origin: Array, spacing: float, start: Array, end: Array, start_radius: Array, end_radius: Array,
+    blend: float,
+) -> None:  # fmt: skip
     """Unite round cones, from `start` to `end` (n, 3), with what is there; joints are filleted over `blend` metres."""
     for ix in prange(values.shape[0]):
         x = origin[0] + ix * spacing
@@ -114,7 +117,7 @@ def add_cones(values, origin, spacing, start, end, start_radius, end_radius, ble
 
 
 @njit(parallel=True)
-def roughen(values, origin, spacing, amplitude, feature, seed):  # type: ignore[no-untyped-def]
+def roughen(values: Array, origin: Array, spacing: float, amplitude: float, feature: float, seed: int) -> None:
     """Shift the surface by noise of the given amplitude and feature size (metres), and half of it at half the size."""
     for ix in prange(values.shape[0]):
         x = (origin[0] + ix * spacing) / feature
@@ -128,7 +131,10 @@ def roughen(values, origin, spacing, amplitude, feature, seed):  # type: ignore[
 
 
 @njit(parallel=True)
-def add_dome(values, origin, spacing, radii, relief, chart_spacing, lump, seed):  # type: ignore[no-untyped-def]
+def add_dome(
+    values: Array, origin: Array, spacing: float, radii: Array, relief: Array, chart_spacing: float, lump: float,
+    seed: int,
+) -> None:  # fmt: skip
     """Unite an ellipsoid about the origin, of half axes `radii` (3,), whose skin carries a relief.
 
     `relief` (n, n), in metres outward, is a chart with the pole in its middle, where a point lies as far from there,
@@ -164,14 +170,16 @@ def add_dome(values, origin, spacing, radii, relief, chart_spacing, lump, seed):
 
 
 @njit
-def _sheet(u, v, length, flare, cup, wave, phase):  # type: ignore[no-untyped-def]
+def _sheet(u: float, v: float, length: float, flare: float, cup: float, wave: float, phase: float) -> float:
     """Height of a plate's middle sheet over its base plane: it flares outward, cups, and waves more towards the rim."""
     ruffle = wave * (u / length) ** 2 * np.sin(5.0 * np.arctan2(v, 0.35 * length + u) + phase)
     return -flare * u * u / length + cup * v * v / length + ruffle
 
 
 @njit(parallel=True)
-def add_plates(values, origin, spacing, base, along, across, shape, blend):  # type: ignore[no-untyped-def]
+def add_plates(
+    values: Array, origin: Array, spacing: float, base: Array, along: Array, across: Array, shape: Array, blend: float
+) -> None:
     """Unite fan-shaped plates that grow from `base` (n, 3) along `along` (n, 3) with `across` (n, 3) as their width.
 
     `shape` (n, 8) has a row (length, half width, thickness at the root, thickness at the rim, flare, cup, wave, phase)

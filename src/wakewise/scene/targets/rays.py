@@ -83,7 +83,7 @@ def _joined(level: Array, join: np.ufunc) -> Array:
 
 
 @njit(inline="always")
-def _entry(low, high, start, inverse, best):  # type: ignore[no-untyped-def]
+def _entry(low: Array, high: Array, start: Array, inverse: Array, best: float) -> float:
     """Where a ray enters a box, infinity if it does not before `best`."""
     near, far = 0.0, best
     for k in range(3):
@@ -93,7 +93,10 @@ def _entry(low, high, start, inverse, best):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True)
-def _cast(low, high, corners, faces, starts, ways, face, distance):  # type: ignore[no-untyped-def]
+def _cast(
+    low: Array, high: Array, corners: Array, faces: IntArray, starts: Array, ways: Array, face: IntArray,
+    distance: Array,
+) -> None:  # fmt: skip
     """Fill `face` and `distance`, both (n,), for rays from `starts` along `ways`, both (n, 3)."""
     first_leaf = low.shape[0] // 2
     for ray in prange(starts.shape[0]):
