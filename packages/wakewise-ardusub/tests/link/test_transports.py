@@ -87,7 +87,7 @@ def test_a_stream_over_tcp_carries_both_ways():
         carrier.close()
 
 
-def test_a_serial_line_carries_both_ways_without_any_library():
+def test_a_serial_line_carries_both_ways():
     """A pseudo-terminal as the cable: packets come in whole, bytes go out as they are; pulled out, it is silence."""
     master, slave = os.openpty()
     carrier = carrier_of(parse_connection(f"serial:{os.ttyname(slave)}:115200"))

@@ -1,21 +1,26 @@
 """Sensors read live: a serial line that is a pseudo-terminal, a socket, an imitated depth sensor; and the command."""
 
+import ctypes
 import json
 import os
 import socket
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from test_ms5837 import SHEET_30BA, Part, _with_sum
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.ui.cli.main import run
-from wakewise_ardusub.sensors import DepthSensor, InertialUnit, LinePoses, LinuxI2C, SerialPort, UdpSocket
+from wakewise_ardusub.sensors import DepthSensor, I2CBus, InertialUnit, LinePoses, SerialPort, UdpSocket
 from wakewise_ardusub.sensors.jy901 import composed
+from wakewise_ardusub.sensors.ms5837 import ADDRESS
 from wakewise_ardusub.sensors.sensor_polling import DepthSource, InertialSource, PoseSource, watch
 
+smbus2 = pytest.importorskip("smbus2.smbus2", reason="the extra `links` is not installed")
+pytest.importorskip("serial", reason="the extra `links` is not installed")
 Capsys = pytest.CaptureFixture[str]
 
 
@@ -122,7 +127,7 @@ def test_the_command_shows_poses_that_are_sent_to_it(capsys: Capsys) -> None:
     [
         ([], "--depth, --imu or --poses"),
         (["--depth", "/dev/i2c-none"], "no such device"),
-        (["--imu", "/dev/null"], "is no serial port"),
+        (["--imu", "/dev/null"], "is not a serial port"),
         (["--imu", "/dev/null", "--baud", "9601"], "9600"),
         (["--imu", "/dev/null", "--imu-axes", "up,up,up"], "right-handed"),
         (["--poses", "here"], "such as 127.0.0.1:14660"),
@@ -143,13 +148,36 @@ def test_bad_words_are_one_line(words: list[str], said: str, capsys: Capsys) -> 
     assert len(told.err.strip().splitlines()) == 1
 
 
+def test_the_bus_carries_bytes_both_ways(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """smbus2's messages reach the part, and its answers come back; a part that is silent is an OSError."""
+    part = Part(_with_sum(SHEET_30BA), 4958179, 6815414)
+
+    def ioctl(_: int, request: int, data: Any) -> None:
+        if request != smbus2.I2C_RDWR:
+            return
+        for message in data.msgs[: data.nmsgs]:
+            if message.addr != ADDRESS:
+                raise OSError(121, "Remote I/O error")
+            if message.flags & smbus2.I2C_M_RD:
+                ctypes.memmove(message.buf, part.read(message.addr, message.len), message.len)
+            else:
+                part.write(message.addr, ctypes.string_at(message.buf, message.len))
+
+    monkeypatch.setattr("smbus2.smbus2.ioctl", ioctl)
+    (tmp_path / "i2c-1").write_bytes(b"")
+    bus = I2CBus(tmp_path / "i2c-1")
+    twin = Part(_with_sum(SHEET_30BA), 4958179, 6815414)
+    assert DepthSensor(bus, sleep=part.sleep).read() == DepthSensor(twin, sleep=twin.sleep).read()
+    with pytest.raises(EnvironmentFailure, match="0x77: does not answer, Remote I/O error"):
+        DepthSensor(bus, address=0x77, sleep=part.sleep)
+    bus.close()
+
+
 def test_devices_that_cannot_be_had_are_refused(tmp_path: Path) -> None:
     """A file that is no bus, a port that is taken."""
     (tmp_path / "file").write_bytes(b"")
-    bus = LinuxI2C(tmp_path / "file")
-    with pytest.raises(EnvironmentFailure, match="does not answer"):
-        DepthSensor(bus, sleep=lambda _: None)
-    bus.close()
+    with pytest.raises(InputError, match="file: is not an I2C bus, such as /dev/i2c-1"):
+        I2CBus(tmp_path / "file")
     with UdpSocket("0") as port, pytest.raises(EnvironmentFailure, match="cannot listen"):
         UdpSocket(f"127.0.0.1:{port.port}")
     with pytest.raises(InputError, match="no such device"):

@@ -105,14 +105,14 @@ def _sources(
     zero: bool,
 ) -> list[PolledSensor]:
     from wakewise.core.errors import InputError
-    from wakewise_ardusub.sensors import DepthSensor, InertialUnit, LinePoses, LinuxI2C, SerialPort, UdpSocket, mounting
+    from wakewise_ardusub.sensors import DepthSensor, I2CBus, InertialUnit, LinePoses, SerialPort, UdpSocket, mounting
     from wakewise_ardusub.sensors.sensor_polling import DepthSource, InertialSource, PoseSource
 
     sources: list[PolledSensor] = []
     if zero and depth is None:
         raise InputError("--zero: goes with --depth")
     if depth is not None:
-        bus = stack.enter_context(closing(LinuxI2C(depth)))
+        bus = stack.enter_context(closing(I2CBus(depth)))
         sensor = DepthSensor(bus, depth_model, density=density)
         if zero:
             typer.echo(f"surface pressure {sensor.zero() / 100.0:.1f} mbar", err=True)

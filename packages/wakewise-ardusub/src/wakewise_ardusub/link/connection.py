@@ -203,38 +203,23 @@ def dialect() -> Any:
     return importlib.import_module("pymavlink.dialects.v20.ardupilotmega")
 
 
-def open_serial(endpoint: Endpoint) -> Any:
-    """The serial line of an endpoint: the kernel's own (`SerialPort`); pyserial's where there is no such, on Windows.
-
-    Raises
-    ------
-    InputError
-        If there is no such device, or pyserial is needed and not installed.
-    EnvironmentFailure
-        If it may not be opened.
-    """
-    if endpoint.path.startswith("/"):
-        return SerialPort(endpoint.path, endpoint.baud, writes=True)
-    try:
-        serial = importlib.import_module("serial")
-    except ImportError:
-        raise InputError(f"{endpoint.words}: ports of Windows need pyserial: pip install pyserial") from None
-    try:
-        return serial.Serial(endpoint.path, endpoint.baud, timeout=0, write_timeout=1.0)
-    except OSError as fault:
-        raise EnvironmentFailure(f"{endpoint.words}: {fault.strerror or fault}") from None
-
-
 def _over_serial(mavutil: Any, endpoint: Endpoint, who: dict[str, Any]) -> Any:
-    """What pymavlink makes of a file, over a serial line; pyserial, which its own needs, is not in any extra."""
-    port = open_serial(endpoint)
-    if not isinstance(port, SerialPort):
-        port.close()
-        return mavutil.mavlink_connection(endpoint.path, dialect="ardupilotmega", baud=endpoint.baud, **who)
+    """A port of pymavlink over a serial line; its own prints to standard output and hides a device that was removed."""
     mavutil.set_dialect("ardupilotmega")
-    made = mavutil.mavfile(port.fileno(), endpoint.path, **who)
-    made.recv, made.write, made.close = lambda _=None: port.read(), port.write, port.close
-    return made
+    port = SerialPort(endpoint.path, endpoint.baud)
+
+    class SerialFile(mavutil.mavfile):
+        def recv(self, n: int | None = None) -> bytes:
+            del n
+            return port.read()
+
+        def write(self, buf: bytes) -> None:
+            port.write(buf)
+
+        def close(self) -> None:
+            port.close()
+
+    return SerialFile(port.fileno(), endpoint.path, **who)
 
 
 def _opened(endpoint: Endpoint, system: int) -> Any:

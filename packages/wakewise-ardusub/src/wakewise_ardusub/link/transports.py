@@ -20,7 +20,7 @@ from threading import Condition
 from typing import Any, Protocol
 
 from wakewise.core.errors import EnvironmentFailure, InputError
-from wakewise_ardusub.link.connection import Endpoint, open_serial
+from wakewise_ardusub.link.connection import Endpoint
 from wakewise_ardusub.link.message_state import MavlinkMessage
 from wakewise_ardusub.link.protocol import COMPANION_COMPONENT
 from wakewise_ardusub.sensors.devices import SerialPort
@@ -233,10 +233,8 @@ def _tcp(endpoint: Endpoint) -> StreamTransport:
 
 
 def _serial(endpoint: Endpoint) -> StreamTransport:
-    made = open_serial(endpoint)
-    if isinstance(made, SerialPort):
-        return StreamTransport(made, lambda _: made.read(), made.write, made.close)
-    return StreamTransport(made, made.read, made.write, made.close)
+    port = SerialPort(endpoint.path, endpoint.baud)
+    return StreamTransport(port, lambda _: port.read(), port.write, port.close)
 
 
 def _address(endpoint: Endpoint) -> tuple[str, int]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.sensors.devices import LinuxI2C, SerialPort, UdpSocket
+    from wakewise_ardusub.sensors.devices import I2CBus, SerialPort, UdpSocket
     from wakewise_ardusub.sensors.jy901 import FrameReader, InertialUnit, mounting
     from wakewise_ardusub.sensors.line_poses import (
         LinePoses,
@@ -26,9 +26,9 @@ __all__ = [
     "I2C",
     "DepthSensor",
     "FrameReader",
+    "I2CBus",
     "InertialUnit",
     "LinePoses",
-    "LinuxI2C",
     "PoseForwarder",
     "PoseSample",
     "SerialPort",

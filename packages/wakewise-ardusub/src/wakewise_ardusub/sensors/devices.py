@@ -1,114 +1,110 @@
-"""The devices themselves: an I2C bus and a serial port of Linux, a socket. What goes wrong is said in one line."""
+"""Device access for sensors: I2C bus (smbus2), serial port (pyserial) and UDP socket, without blocking reads.
+
+Errors are one line that names the device.
+"""
 
 from __future__ import annotations
 
-import os
-import select
+import errno
 import socket
 from pathlib import Path
 from types import TracebackType
 
 from wakewise.core.errors import EnvironmentFailure, InputError
+from wakewise_ardusub.optional_dependencies import need
 
-_I2C_SLAVE = 0x0703
-"""ioctl of linux/i2c-dev.h: the device that reads and writes go to."""
 _CHUNK = 4096
-PATIENCE_S = 1.0
-"""How long a line may take no bytes."""
+WRITE_TIMEOUT_S = 1.0
 
 
-class LinuxI2C:
-    """/dev/i2c-N, through the kernel's own i2c-dev; needs no library."""
+class I2CBus:
+    """An I2C bus of Linux, such as /dev/i2c-1.
+
+    Raises
+    ------
+    InputError
+        If there is no such device, or it is no I2C bus.
+    EnvironmentFailure
+        If it may not be opened.
+    MissingExtra
+        If smbus2 is not installed.
+    """
 
     def __init__(self, path: Path | str) -> None:
-        self._path = Path(path)
-        self._fd = _open(self._path, os.O_RDWR, "an I2C bus, such as /dev/i2c-1 (`ls /dev/i2c-*`)")
-        self._address: int | None = None
+        need(f"the I2C bus {path}", "links", only=("smbus2",))
+        from smbus2 import SMBus, i2c_msg
+
+        self._message, self._bus = i2c_msg, SMBus()
+        try:
+            self._bus.open(str(path))
+        except OSError as fault:
+            self._bus.close()
+            raise _not_opened(path, fault, "an I2C bus, such as /dev/i2c-1 (`ls /dev/i2c-*`)") from None
 
     def write(self, address: int, data: bytes) -> None:
         """Send bytes to a device; OSError if it does not answer."""
-        self._choose(address)
-        os.write(self._fd, data)
+        self._bus.i2c_rdwr(self._message.write(address, data))
 
     def read(self, address: int, count: int) -> bytes:
-        """Take bytes from a device; OSError if it does not answer."""
-        self._choose(address)
-        return os.read(self._fd, count)
+        """Read bytes from a device; OSError if it does not answer."""
+        message = self._message.read(address, count)
+        self._bus.i2c_rdwr(message)
+        return bytes(message)
 
     def close(self) -> None:
-        """Give the bus back."""
-        os.close(self._fd)
-
-    def _choose(self, address: int) -> None:
-        from fcntl import ioctl
-
-        if address != self._address:
-            ioctl(self._fd, _I2C_SLAVE, address)
-            self._address = address
+        """Close the bus."""
+        self._bus.close()
 
 
 class SerialPort:
-    """A serial line, raw, read without waiting; needs no library.
+    """A serial port, raw, 8N1, such as /dev/ttyUSB0 or COM3.
 
-    Parameters
-    ----------
-    path : Path or str
-    baud : int
-    writes : bool
-        Whether it is written to as well.
+    Raises
+    ------
+    InputError
+        If there is no such device, it is no serial port, or the rate is none of pyserial's.
+    EnvironmentFailure
+        If it may not be opened.
+    MissingExtra
+        If pyserial is not installed.
     """
 
-    def __init__(self, path: Path | str, baud: int, *, writes: bool = False) -> None:
+    def __init__(self, path: Path | str, baud: int) -> None:
+        need(f"the serial port {path}", "links", only=("serial",))
+        import serial
+
+        if baud not in serial.Serial.BAUDRATES:
+            raise InputError(f"baud {baud}: no rate of serial ports, such as 9600 or 115200")
+        self._path = path
         try:
-            import termios
-            import tty
-        except ImportError:
-            raise EnvironmentFailure(f"{path}: serial ports are read on Linux and macOS only") from None
-        speed = getattr(termios, f"B{baud}", None)
-        if speed is None:
-            raise InputError(f"baud {baud}: not a rate that this computer's serial ports know, such as 9600 or 115200")
-        self._path = Path(path)
-        flags = (os.O_RDWR if writes else os.O_RDONLY) | os.O_NOCTTY | os.O_NONBLOCK
-        self._fd = _open(self._path, flags, "a serial port, such as /dev/ttyUSB0")
-        try:
-            tty.setraw(self._fd)
-            settings = termios.tcgetattr(self._fd)
-            settings[4] = settings[5] = speed
-            termios.tcsetattr(self._fd, termios.TCSANOW, settings)
-        except termios.error:
-            os.close(self._fd)
-            raise InputError(f"{path}: is no serial port, such as /dev/ttyUSB0") from None
+            self._port = serial.Serial(str(path), baud, timeout=0.0, write_timeout=WRITE_TIMEOUT_S)
+        except OSError as fault:
+            raise _not_opened(path, fault, "a serial port, such as /dev/ttyUSB0") from None
 
     def read(self) -> bytes:
-        """What has come since.
+        """The bytes that have arrived, none if there are none.
 
         Raises
         ------
         EnvironmentFailure
-            If the device went away.
+            If the device was removed.
         """
         try:
-            data = os.read(self._fd, _CHUNK)
-        except BlockingIOError:
-            return b""
+            return bytes(self._port.read(_CHUNK))
         except OSError as fault:
-            raise EnvironmentFailure(f"{self._path}: {fault.strerror}, the device went away") from None
-        return data
+            raise EnvironmentFailure(f"{self._path}: {fault}; the device was removed") from None
 
     def write(self, data: bytes) -> None:
-        """Hand bytes over; OSError if the line takes none for `PATIENCE_S`, or is gone."""
-        while data:
-            if not select.select([], [self._fd], [], PATIENCE_S)[1]:
-                raise TimeoutError(f"{self._path}: takes no bytes")
-            data = data[os.write(self._fd, data) :]
+        """Send bytes; OSError if the port accepts none for `WRITE_TIMEOUT_S`, or was removed."""
+        self._port.write(data)
 
     def fileno(self) -> int:
-        """What the operating system calls it, for `select`."""
-        return self._fd
+        """File descriptor, for `select`."""
+        return int(self._port.fileno())
 
     def close(self) -> None:
-        """Give the port back."""
-        os.close(self._fd)
+        """Close the port."""
+        self._port.close()
 
 
 class UdpSocket:
@@ -166,12 +162,12 @@ def read_place(words: str, option: str) -> tuple[str, int]:
     return host, int(port)
 
 
-def _open(path: Path, flags: int, what: str) -> int:
-    try:
-        return os.open(path, flags)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such device; give {what}") from None
-    except PermissionError:
-        raise EnvironmentFailure(f"{path}: no permission; is your user in the device's group (dialout, i2c)?") from None
-    except OSError as fault:
-        raise InputError(f"{path}: {fault.strerror}; give {what}") from None
+def _not_opened(path: Path | str, fault: OSError, right: str) -> InputError | EnvironmentFailure:
+    """The error for a device that could not be opened; `right` says what would be one."""
+    if fault.errno == errno.ENOENT:
+        return InputError(f"{path}: no such device; give {right}")
+    if fault.errno in (errno.EACCES, errno.EPERM):
+        return EnvironmentFailure(f"{path}: no permission; is your user in the device's group (dialout, i2c)?")
+    if fault.errno == errno.EBUSY:
+        return EnvironmentFailure(f"{path}: {fault.strerror}")
+    return InputError(f"{path}: is not {right}")

@@ -34,7 +34,7 @@ _PRODUCTS: dict[int, Model] = {0x15: "02BA", 0x1A: "30BA"}
 
 
 class I2C(Protocol):
-    """A bus: two calls that smbus2, periphery or a microcontroller's bridge are easily wrapped in."""
+    """An I2C bus, such as `wakewise_ardusub.sensors.devices.I2CBus`."""
 
     def write(self, address: int, data: bytes) -> None:
         """Send bytes to a device."""
