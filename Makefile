@@ -7,13 +7,14 @@ STAMP := $(VENV)/.installed
 # Every process of a scan or a test reads hundreds of modules: their bytecode is kept, whatever the shell says.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup scan test test-all check bench results docs lock clean
+.PHONY: help setup scan test test-all coverage check bench results docs lock clean
 
 help:
 	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs, cockpit, ros, gamepad and links (LGPL), dask, tools for tests"
 	@echo "make scan    fly, photograph, reconstruct and judge a coral; leaves runs/quick/report.html"
 	@echo "make test    ruff, mypy, the import contract and the tests but the slow ones"
 	@echo "make test-all  the same with the slow ones"
+	@echo "make coverage  coverage per package; kernels count, run without a compiler"
 	@echo "make check   the same without the tests"
 	@echo "make bench   speed and quality, side by side with a peer"
 	@echo "make results BUDGET=2h   the paper's tables beside ours, from as many trials as fit; writes docs/results"
@@ -33,6 +34,15 @@ $(STAMP): requirements.lock pyproject.toml $(wildcard packages/*/pyproject.toml)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation $(addprefix --editable ,$(PACKAGES))
 	@$(BIN)/python tools/check_libraries.py
 	@touch $@
+
+# Kernels run as the Python that they are written in for the second run, so that their lines count.
+INTERPRETED := tests/allocation tests/estimation
+coverage: setup
+	$(BIN)/coverage erase
+	OPENBLAS_NUM_THREADS=1 $(BIN)/coverage run --parallel-mode -m pytest -n 0 -m "not slow" --hypothesis-profile=ci $(COVERED); \
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run --parallel-mode -m pytest -n 0 -m "not slow" --hypothesis-profile=ci $(INTERPRETED); \
+	$(BIN)/coverage combine --quiet
+	$(BIN)/python tools/coverage_by_package.py
 
 scan: setup
 	$(BIN)/wakewise scan --preset quick --out runs/quick
