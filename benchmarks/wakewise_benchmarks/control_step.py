@@ -19,7 +19,7 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.robot.thrusters import thruster_lag
 from wakewise.robot.vehicles import compile_body
-from wakewise.robot.vehicles.semi_implicit import rk4_kernel
+from wakewise.robot.vehicles.kernels import rk4_kernel
 from wakewise.wake import wake_model
 from wakewise_benchmarks.registry import VEHICLE, bench_region, bench_target
 

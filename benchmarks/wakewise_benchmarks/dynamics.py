@@ -31,12 +31,8 @@ from wakewise.robot.vehicles import (
     step_semi_implicit_jacobians,
 )
 from wakewise.robot.vehicles.dynamics import pack
-from wakewise.robot.vehicles.semi_implicit import (
-    rk4_jacobian_kernel,
-    rk4_kernel,
-    semi_implicit_jacobian_kernel,
-    semi_implicit_kernel,
-)
+from wakewise.robot.vehicles.kernels import rk4_jacobian_kernel, rk4_kernel
+from wakewise.robot.vehicles.semi_implicit import semi_implicit_jacobian_kernel, semi_implicit_kernel
 
 DT_S = 0.005
 ORACLE = "oracle_fossen_bluerov2heavy_200.csv"

@@ -21,10 +21,10 @@ from scipy import sparse
 
 from wakewise.core.arrays import Array
 from wakewise.core.jit.njit import njit
-from wakewise.planning.condensing import add_commands, condense
 from wakewise.planning.kernels import RATE_N, horizon, rotation
 from wakewise.planning.planner import PlanModel, Planner
 from wakewise.planning.problem import RATE_PENALTY, Horizon, PlanProblem
+from wakewise.planning.qp import add_commands, condense
 from wakewise.wake.plan_disturbance import stage_disturbance
 
 if TYPE_CHECKING:

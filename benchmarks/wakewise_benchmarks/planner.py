@@ -29,13 +29,12 @@ from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import Goal
 from wakewise.experiments.trials.timing import BenchOptions
+from wakewise.planning.obstacles import Surroundings
 from wakewise.planning.planner import PlanModel, Planner, compile_plan
-from wakewise.planning.problem import PLAN_EVERY_S, Horizon, PlanProblem, PlanSettings, PlanTerms, shifted
-from wakewise.planning.reference import reference_of
-from wakewise.planning.surroundings import Surroundings
+from wakewise.planning.problem import PLAN_EVERY_S, Horizon, PlanProblem, PlanSettings, PlanTerms, reference_of, shifted
 from wakewise.robot.thrusters import thruster_lag
 from wakewise.robot.vehicles import compile_body
-from wakewise.robot.vehicles.semi_implicit import rk4_kernel
+from wakewise.robot.vehicles.kernels import rk4_kernel
 from wakewise.wake import WakeSettings, wake_model
 from wakewise_benchmarks.control_step import METHODS, flown_step
 from wakewise_benchmarks.paper_planner import PaperPlanner

@@ -26,8 +26,7 @@ from wakewise.control.null_space_allocation import STANDING_W
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler, quat_from_rotvec
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.planning import Surroundings
-from wakewise.planning.problem import CLEARANCE_M
-from wakewise.planning.reference import reference_of
+from wakewise.planning.problem import CLEARANCE_M, reference_of
 from wakewise.robot.vehicles import TiltJoint
 from wakewise.wake import InfluenceModel
 

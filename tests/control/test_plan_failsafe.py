@@ -14,7 +14,7 @@ from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.planning import PlanSettings
 from wakewise.planning.planner import Planner
-from wakewise.planning.reference import reference_of
+from wakewise.planning.problem import reference_of
 from wakewise.robot.thrusters import thruster_lag
 from wakewise.robot.vehicles import compile_body, perturbed, step_rk4
 

@@ -16,7 +16,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState
 from wakewise.planning import PlanSettings
-from wakewise.planning.reference import reference_of
+from wakewise.planning.problem import reference_of
 
 HERE = BodyState(X_WB=Pose(np.array([0.5, -0.2, 1.0]), quat_from_euler(0.1, -0.2, 2.0)))
 

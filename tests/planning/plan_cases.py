@@ -4,10 +4,9 @@ import numpy as np
 
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import Goal
+from wakewise.planning.obstacles import Surroundings
 from wakewise.planning.planner import compile_plan
-from wakewise.planning.problem import PlanProblem, PlanSettings, PlanTerms
-from wakewise.planning.reference import reference_of
-from wakewise.planning.surroundings import Surroundings
+from wakewise.planning.problem import PlanProblem, PlanSettings, PlanTerms, reference_of
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake import WakeSettings, wake_model

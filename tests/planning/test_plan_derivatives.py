@@ -5,11 +5,9 @@ import pytest
 from plan_cases import CONE, REGION, SHARES, VEHICLE, model, problem
 
 from wakewise.core.geometry import Pose, quat_from_euler, quat_from_rotvec, quat_multiply
-from wakewise.planning.barrier import barrier_value, plane_gap, sphere_gap
-from wakewise.planning.condensing import condense
-from wakewise.planning.kernels import rotation
+from wakewise.planning.kernels import barrier_value, plane_gap, rotation, sphere_gap
 from wakewise.planning.planner import Planner
-from wakewise.planning.qp import BoxQP
+from wakewise.planning.qp import BoxQP, condense
 from wakewise.robot.vehicles import step_rk4
 from wakewise.wake import gauss_newton, wake_model
 from wakewise.wake.plan_disturbance import stage_disturbance, wake_scratch, wake_table

@@ -12,10 +12,9 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.core.interfaces import Goal
 from wakewise.planning import check_start
+from wakewise.planning.obstacles import Surroundings
 from wakewise.planning.planner import Planner, compile_plan
-from wakewise.planning.problem import PlanSettings, shifted
-from wakewise.planning.reference import reference_of
-from wakewise.planning.surroundings import Surroundings
+from wakewise.planning.problem import PlanSettings, reference_of, shifted
 from wakewise.scene.targets import Region
 
 START = np.zeros((20, 8))

@@ -13,9 +13,9 @@ from wakewise.control.failsafe import PlanFailsafe
 from wakewise.core.errors import InputError
 from wakewise.planning import check_start
 from wakewise.planning import qp as qp_module
+from wakewise.planning.obstacles import Surroundings
 from wakewise.planning.planner import Planner
 from wakewise.planning.qp import BoxQP
-from wakewise.planning.surroundings import Surroundings
 
 SIZE = 24
 

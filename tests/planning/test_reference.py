@@ -12,7 +12,7 @@ from wakewise.core.geometry import (
     rotvec_from_quat,
 )
 from wakewise.core.interfaces import Goal
-from wakewise.planning.reference import RAMP_S, between, reference_of
+from wakewise.planning.problem import RAMP_S, between, reference_of
 
 GOAL = Goal(
     X_WB=Pose(np.array([1.0, 2.0, 3.0]), quat_from_euler(0.1, -0.2, 0.7)),

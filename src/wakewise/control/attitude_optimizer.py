@@ -37,9 +37,8 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_rotvec
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.planning import Surroundings
-from wakewise.planning.barrier import least_gap
-from wakewise.planning.problem import CLEARANCE_M
-from wakewise.planning.reference import reference_of
+from wakewise.planning.kernels import least_gap
+from wakewise.planning.problem import CLEARANCE_M, reference_of
 from wakewise.robot.vehicles import RigidBody, TiltJoint, Vehicle, compile_body, restoring_wrench
 from wakewise.robot.vehicles.dynamics import coriolis_wrench, damping_wrench
 

@@ -45,7 +45,7 @@ from wakewise.control.settings import ControlSettings
 from wakewise.core.interfaces import Controller, WakeModel
 from wakewise.core.plugins import find
 from wakewise.planning import Surroundings
-from wakewise.planning.surroundings import around_target
+from wakewise.planning.obstacles import around_target
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake import bed_of, free_jet, wake_model

@@ -34,10 +34,9 @@ from wakewise.control.settings import ControlSettings
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.core.interfaces import BodyState, Goal, WakeModel
+from wakewise.planning.obstacles import Surroundings, around_target
 from wakewise.planning.planner import PlanModel, Planner, compile_plan
-from wakewise.planning.problem import PLAN_EVERY_S, Horizon, PlanProblem, PlanTerms, state_of
-from wakewise.planning.reference import between, reference_of
-from wakewise.planning.surroundings import Surroundings, around_target
+from wakewise.planning.problem import PLAN_EVERY_S, Horizon, PlanProblem, PlanTerms, between, reference_of, state_of
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake import ImpingingJet

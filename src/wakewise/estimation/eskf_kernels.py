@@ -32,8 +32,17 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.jit.njit import assign, njit
-from wakewise.robot.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, Three, coriolis, damping, rate_kernel, rotate
-from wakewise.robot.vehicles.semi_implicit import rk4_jacobian_kernel
+from wakewise.robot.vehicles.kernels import (
+    INVERSE,
+    LINEAR,
+    QUADRATIC,
+    Three,
+    coriolis,
+    damping,
+    rate_kernel,
+    rk4_jacobian_kernel,
+    rotate,
+)
 
 DRAG = 27
 """Where the error's drag begins; inertia comes six places later."""

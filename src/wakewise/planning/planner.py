@@ -21,9 +21,9 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import WakeModel
 from wakewise.planning import kernels
-from wakewise.planning.condensing import add_commands, add_rate_gradient, condense, condensed_room, motion_gradient
+from wakewise.planning.finite_difference import add_numeric, numeric_wake
 from wakewise.planning.kernels import CLOSEST, RATE_N, W_DISTURBANCE, PlanCase, PlanTable, horizon, plan_work, set_reach
-from wakewise.planning.numeric import add_numeric, numeric_wake
+from wakewise.planning.obstacles import Surroundings
 from wakewise.planning.problem import (
     BARRIER_REACH_M,
     CLEARANCE_M,
@@ -36,8 +36,7 @@ from wakewise.planning.problem import (
     PlanSettings,
     PlanTerms,
 )
-from wakewise.planning.qp import BoxQP
-from wakewise.planning.surroundings import Surroundings
+from wakewise.planning.qp import BoxQP, add_commands, add_rate_gradient, condense, condensed_room, motion_gradient
 from wakewise.robot.vehicles import Vehicle, compile_body
 from wakewise.scene.targets import Region
 from wakewise.wake import PaperJet, gram

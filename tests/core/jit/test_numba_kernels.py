@@ -142,7 +142,7 @@ def test_a_kernel_apart_is_not_copied_into_its_caller() -> None:
 def test_imports_are_found_wherever_they_stand() -> None:
     """Modules, names from modules, rooms, and imports over several lines."""
     names = {file.relative_to(PACKAGE).as_posix() for file in imported(PACKAGE / "planning" / "kernels.py")}
-    assert {"arrays.py", "planning/barrier.py", "vehicles/runge_kutta.py", "wake/plan_disturbance.py"} <= names
+    assert {"core/arrays.py", "robot/vehicles/kernels.py", "wake/plan_disturbance.py"} <= names
 
 
 def test_a_kernel_is_not_compiled_anew_for_each_whole_number() -> None:

@@ -69,23 +69,19 @@ def test_what_cannot_be_compiled_is_told_and_holds_nothing_up(monkeypatch: pytes
 
 def test_a_killed_process_is_no_verdict_on_a_kernel(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     """The job is not noted as done: another try is made by the next process."""
-    one = KernelEntry(
-        name="wakewise.robot.vehicles.semi_implicit.normalise", types=("float64[1C]",), job="more", cost_s=1.0
-    )
+    one = KernelEntry(name="wakewise.robot.vehicles.kernels.normalise", types=("float64[1C]",), job="more", cost_s=1.0)
     monkeypatch.setattr(precompile, "listed", lambda: (one,))
     monkeypatch.setattr(precompile, "_made_from", lambda job: "0")
     monkeypatch.setattr(precompile, "_tried", set())
     monkeypatch.setattr(precompile, "_asked", lambda *_: "")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert compile_kernels(("more",)).amiss == ("wakewise.robot.vehicles.semi_implicit.normalise: its process ended",)
+    assert compile_kernels(("more",)).amiss == ("wakewise.robot.vehicles.kernels.normalise: its process ended",)
     assert not precompile.is_warm(("more",))
 
 
 def test_a_note_is_taken_when_a_job_is_done(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     """Then nothing is done the next time, in another process neither."""
-    one = KernelEntry(
-        name="wakewise.robot.vehicles.semi_implicit.normalise", types=("float64[1C]",), job="more", cost_s=1.0
-    )
+    one = KernelEntry(name="wakewise.robot.vehicles.kernels.normalise", types=("float64[1C]",), job="more", cost_s=1.0)
     monkeypatch.setattr(precompile, "listed", lambda: (one,))
     monkeypatch.setattr(precompile, "_made_from", lambda job: "0")
     monkeypatch.setattr(precompile, "_tried", set())

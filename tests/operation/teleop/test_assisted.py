@@ -14,7 +14,7 @@ from wakewise.operation.teleop.assisted import assisted_pilot
 from wakewise.operation.teleop.input import CENTRED, Controls
 from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
 from wakewise.operation.teleop.resumable_mission import PACE_S
-from wakewise.planning.barrier import least_gap
+from wakewise.planning.kernels import least_gap
 from wakewise.planning.problem import CLEARANCE_M
 from wakewise.scene.missions import RoutePilot
 

@@ -49,7 +49,7 @@ from wakewise.operation.teleop.motion import (
 )
 from wakewise.operation.teleop.operator_state import OperatorSettings
 from wakewise.planning import Surroundings
-from wakewise.planning.barrier import plane_gap, sphere_gap
+from wakewise.planning.kernels import plane_gap, sphere_gap
 from wakewise.planning.problem import CLEARANCE_M
 from wakewise.scene.missions import CameraAim
 from wakewise.scene.missions.orbit import R_FC

@@ -16,7 +16,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.jit.njit import assign, njit, prange
 from wakewise.robot.vehicles.dynamics import RigidBody
-from wakewise.robot.vehicles.semi_implicit import rk4_stages
+from wakewise.robot.vehicles.kernels import rk4_stages
 
 BLOCK = 64
 """Vehicles that one thread takes at a time, with one set of work arrays: small, so that few vehicles feed all cores."""

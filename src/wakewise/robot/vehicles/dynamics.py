@@ -25,7 +25,8 @@ from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import fossen, kernels
 from wakewise.robot.vehicles.fossen import rigid_body_mass
-from wakewise.robot.vehicles.semi_implicit import rk4_kernel, semi_implicit_kernel
+from wakewise.robot.vehicles.kernels import rk4_kernel
+from wakewise.robot.vehicles.semi_implicit import semi_implicit_kernel
 from wakewise.robot.vehicles.vehicle import Vehicle
 
 __all__ = [

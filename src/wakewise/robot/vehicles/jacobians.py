@@ -15,8 +15,8 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import matrix_from_quat, skew
 from wakewise.robot.vehicles.dynamics import RigidBody, pack
-from wakewise.robot.vehicles.kernels import INVERSE, rate_jacobian_kernel
-from wakewise.robot.vehicles.semi_implicit import rk4_jacobian_kernel, semi_implicit_jacobian_kernel
+from wakewise.robot.vehicles.kernels import INVERSE, rate_jacobian_kernel, rk4_jacobian_kernel
+from wakewise.robot.vehicles.semi_implicit import semi_implicit_jacobian_kernel
 
 
 class AccelerationJacobians(NamedTuple):

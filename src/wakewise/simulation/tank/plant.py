@@ -17,8 +17,7 @@ from wakewise.core.interfaces import BodyState
 from wakewise.core.jit.njit import njit
 from wakewise.robot.thrusters import saturate, thruster_lag
 from wakewise.robot.vehicles import Vehicle, compile_body
-from wakewise.robot.vehicles.kernels import rotate
-from wakewise.robot.vehicles.semi_implicit import rk4_kernel
+from wakewise.robot.vehicles.kernels import rk4_kernel, rotate
 from wakewise.simulation.tank.contact import CollisionGeometry, surely_clear
 from wakewise.simulation.tank.settings import PLANT_STEP_S, ThrusterFailure
 from wakewise.simulation.tank.tether import Tether

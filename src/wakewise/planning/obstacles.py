@@ -113,8 +113,7 @@ def check_start(
         An empty region or weights that are negative or NaN, points of the target inside the hull, a hull that touches
         something or is nearer to it than `clearance_m`, or a state that is not finite.
     """
-    from wakewise.planning.barrier import plane_gap, sphere_gap
-    from wakewise.planning.kernels import rotation
+    from wakewise.planning.kernels import plane_gap, rotation, sphere_gap
 
     x = np.array(state, dtype=np.float64)
     if x.shape != (13,) or not np.isfinite(x).all():
