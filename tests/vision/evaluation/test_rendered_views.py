@@ -13,7 +13,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.main import run
-from wakewise.vision.evaluation import VIEW_DEFINITIONS, read_split, score_views
+from wakewise.vision.evaluation import SPLAT_DEFINITIONS, VIEW_DEFINITIONS, read_split, score_views
 from wakewise.vision.evaluation.rendered_views import psnr_db, ssim
 
 
@@ -149,3 +149,10 @@ def test_the_command_prints_each_figure_with_its_definition(folders, capsys):
     assert all(found[key] is not None or key in found["why"] for key in VIEW_DEFINITIONS)
     assert run(["evaluate", "--views", str(views), "--photos", str(photos)]) == 0
     assert "psnr_min_db" in capsys.readouterr().out
+
+
+def test_every_key_is_in_the_docs():
+    """docs/photographs.md defines the keys of views and of splats, and those of export.json."""
+    page = (Path(__file__).parents[3] / "docs" / "photographs.md").read_text(encoding="utf-8")
+    for key in (*VIEW_DEFINITIONS, *SPLAT_DEFINITIONS, "water.attenuation_per_m", "split", "undistorted", "dense"):
+        assert f"`{key}`" in page, key
