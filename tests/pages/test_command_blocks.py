@@ -142,13 +142,13 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Never(r"wakewise cockpit .*--gamepad", "needs a gamepad; tests/operation/input flies with SDL's virtual one"),
     Start(r"wakewise cockpit", "http://127.0.0.1:", also=("--no-browser", "--port", "0")),
     Run(r"wakewise link log dive\.tlog", slow=True),
-    Start(r"wakewise link meter .*", "http://127.0.0.1:", also=("--port", "0")),
+    Start(r"wakewise link wash-meter .*", "http://127.0.0.1:", also=("--port", "0")),
     Never(
         r"wakewise link sensors .*", "needs a companion's buses; packages/wakewise-ardusub/tests/sensors imitates them"
     ),
-    Run(r"wakewise link script --out scripts.*"),
+    Run(r"wakewise link install-script --out scripts.*"),
     Elsewhere(
-        r"wakewise link script --upload .*",
+        r"wakewise link install-script --upload .*",
         "packages/wakewise-ardusub/tests/cli/test_link_wire_commands.py",
         "--upload",
     ),
@@ -162,8 +162,8 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     ),
     Start(r"wakewise link ardusub .*", "heartbeat"),
     Start(r"wakewise link sitl .*", "now start the firmware"),
-    Start(r"wakewise link share", "shares udpin"),
-    Start(r"wakewise link stand-in .*", "MANUAL"),
+    Start(r"wakewise link route", "shares udpin"),
+    Start(r"wakewise link sitl-autopilot .*", "MANUAL"),
     Never(
         r"(ardusub|WAKEWISE_ARDUSUB=\S+ pytest) .*",
         "needs the firmware's binary; tests marked sitl run it where there is one",

@@ -173,7 +173,9 @@ def read_vehicle_summary(path: Path) -> VehicleSummary:
         raise InputError(f"{path}: cannot be read as a craft file, {fault}") from None
     if not isinstance(told, dict) or told.get("format") != FORMAT:
         found = told.get("format") if isinstance(told, dict) else type(told).__name__
-        raise InputError(f"{path}: format {found!r}, a craft file has {FORMAT!r} (wakewise link meter --write FILE)")
+        raise InputError(
+            f"{path}: format {found!r}, a craft file has {FORMAT!r} (wakewise link wash-meter --write FILE)"
+        )
     try:
         return _craft(told)
     except KeyError as fault:

@@ -1,4 +1,6 @@
-"""`wakewise link meter` says in one line what it cannot use, writes craft files, and runs until it is told to stop."""
+"""`wakewise link wash-meter` says in one line what it cannot use, writes craft files, and runs until it is told to
+stop.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,7 @@ def test_what_cannot_be_used_is_said_in_one_line(
     """Exit code 2, and nothing is left behind."""
     monkeypatch.chdir(tmp_path)
     Path("file").touch()
-    assert run(["link", "meter", *arguments]) == 2
+    assert run(["link", "wash-meter", *arguments]) == 2
     told = capsys.readouterr().err
     assert said in told
     assert len(told.strip().splitlines()) == 1
@@ -53,7 +55,7 @@ def test_what_cannot_be_used_is_said_in_one_line(
 def test_a_craft_file_is_written_for_a_small_computer(capsys: Capture, tmp_path: Path) -> None:
     """Any vehicle and model of ours that it can judge."""
     path = tmp_path / "six.json"
-    assert run(["link", "meter", "--vehicle", "bluerov2", "--wake-model", "fitted", "--write", str(path)]) == 0
+    assert run(["link", "wash-meter", "--vehicle", "bluerov2", "--wake-model", "fitted", "--write", str(path)]) == 0
     assert "written to" in capsys.readouterr().err
     craft = read_vehicle_summary(path)
     assert (craft.name, craft.wake.name, craft.count) == ("bluerov2", "fitted", 6)
@@ -81,7 +83,7 @@ def test_a_meter_ends_with_its_figures(capsys: Capture, tmp_path: Path) -> None:
     diving.start()
     try:
         arguments = ["--connection", ends, "--port", "0", "--out", str(tmp_path), "--json"]
-        assert run(["link", "meter", *arguments]) == 0
+        assert run(["link", "wash-meter", *arguments]) == 0
     finally:
         over.set()
         diving.join()

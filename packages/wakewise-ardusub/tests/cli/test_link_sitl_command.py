@@ -1,4 +1,4 @@
-"""`wakewise link sitl` and `wakewise link stand-in`."""
+"""`wakewise link sitl` and `wakewise link sitl-autopilot`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_the_stand_in_speaks_mavlink_and_says_how_it_went(capsys: Capture) -> No
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
         station.bind(("127.0.0.1", 0))
         port = station.getsockname()[1]
-        arguments = ["link", "stand-in", "--out", f"127.0.0.1:{port}", "--seconds", "0.6", "--json"]
+        arguments = ["link", "sitl-autopilot", "--out", f"127.0.0.1:{port}", "--seconds", "0.6", "--json"]
         assert run(arguments) == 0
         station.settimeout(1.0)
         ears, names = mavlink.MAVLink(None), set()
@@ -52,7 +52,16 @@ def test_a_tank_behind_the_stand_in(capsys: Capture, tmp_path: Path) -> None:
         for each in free:
             each.bind(("127.0.0.1", 0))
         port, watch = (each.getsockname()[1] for each in free)
-    beside = ["link", "stand-in", "--physics", f"127.0.0.1:{port}", "--out", f"127.0.0.1:{watch}", "--seconds", "12"]
+    beside = [
+        "link",
+        "sitl-autopilot",
+        "--physics",
+        f"127.0.0.1:{port}",
+        "--out",
+        f"127.0.0.1:{watch}",
+        "--seconds",
+        "12",
+    ]
     other = threading.Thread(target=run, args=(beside,))
     other.start()
     asked = ["link", "sitl", "--port", str(port), "--world", "still-tank", "--seconds", "5", "--held", "0"]
@@ -78,13 +87,13 @@ def test_a_tank_behind_the_stand_in(capsys: Capture, tmp_path: Path) -> None:
         (["sitl", "--host", "300.1.1.1"], "300.1.1.1"),
         (["sitl", "--params", "text.params"], "line 1"),
         (["sitl", "--params", "six.params"], "drives motors 1, 2"),
-        (["stand-in", "--out", "nowhere"], "must be HOST:PORT"),
-        (["stand-in", "--out", "127.0.0.1:0"], "must be HOST:PORT"),
-        (["stand-in", "--physics", "9002"], "must be HOST:PORT"),
-        (["stand-in", "--loop", "10"], "10 loops a second"),
-        (["stand-in", "--params", "missing.params"], "missing.params"),
-        (["stand-in", "--script", "missing.lua"], "missing.lua"),
-        (["stand-in", "--script", "a.lua", "--no-script"], "one or the other"),
+        (["sitl-autopilot", "--out", "nowhere"], "must be HOST:PORT"),
+        (["sitl-autopilot", "--out", "127.0.0.1:0"], "must be HOST:PORT"),
+        (["sitl-autopilot", "--physics", "9002"], "must be HOST:PORT"),
+        (["sitl-autopilot", "--loop", "10"], "10 loops a second"),
+        (["sitl-autopilot", "--params", "missing.params"], "missing.params"),
+        (["sitl-autopilot", "--script", "missing.lua"], "missing.lua"),
+        (["sitl-autopilot", "--script", "a.lua", "--no-script"], "one or the other"),
     ],
 )
 def test_bad_input_is_one_line(
@@ -103,7 +112,7 @@ def test_bad_input_is_one_line(
 
 def test_a_pilot_of_its_own_arms_it_and_switches_the_script_on(capsys: Capture) -> None:
     """So that a companion can be tried with no ground station at all."""
-    assert run(["link", "stand-in", "--out", "127.0.0.1:9", "--pilot", "--seconds", "1.5", "--json"]) == 0
+    assert run(["link", "sitl-autopilot", "--out", "127.0.0.1:9", "--pilot", "--seconds", "1.5", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["armed"]
     assert said["texts"][-1] == "Wakewise: no thrusts arrive"

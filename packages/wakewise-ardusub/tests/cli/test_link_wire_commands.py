@@ -1,4 +1,6 @@
-"""`wakewise link script` and `wakewise link ardusub --check | --motor-test`: what people and machines are told."""
+"""`wakewise link install-script` and `wakewise link ardusub --check | --motor-test`: what people and machines are
+told.
+"""
 
 from __future__ import annotations
 
@@ -57,7 +59,7 @@ def test_the_script_goes_onto_an_autopilot_and_starts(
 ) -> None:
     """Uploaded over UDP, read back, SCR_ENABLE set and rebooted: then the script runs there."""
     autopilot, where = stand_in
-    assert run(["link", "script", "--upload", where, "--start", "--json"]) == 0
+    assert run(["link", "install-script", "--upload", where, "--start", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said == {"version": SCRIPT_VERSION, "uploaded": "/APM/scripts/wakewise.lua", "written": []}
     until = time.monotonic() + 10.0
@@ -69,13 +71,13 @@ def test_the_script_goes_onto_an_autopilot_and_starts(
 
 def test_the_script_by_hand(capsys: Capture, tmp_path: Path) -> None:
     """Into a folder with the parameters it asks for; without options the steps are said."""
-    assert run(["link", "script", "--out", str(tmp_path / "new")]) == 0
+    assert run(["link", "install-script", "--out", str(tmp_path / "new")]) == 0
     assert "lua_scripts" in capsys.readouterr().out
     assert (tmp_path / "new" / "wakewise.lua").read_text() == script_text()
     assert (tmp_path / "new" / "wakewise.params").read_text() == parameters_text()
-    assert run(["link", "script", "--params"]) == 0
+    assert run(["link", "install-script", "--params"]) == 0
     assert capsys.readouterr().out == parameters_text()
-    assert run(["link", "script"]) == 0
+    assert run(["link", "install-script"]) == 0
     assert "SCR_ENABLE" in capsys.readouterr().out
 
 
@@ -211,12 +213,12 @@ def test_buttons_are_checked_with_the_rest(capsys: Capture, tmp_path: Path) -> N
 
 def test_the_simulators_parameters_are_written_beside_the_script(capsys: Capture, tmp_path: Path) -> None:
     """What a vehicle is asked to be set to, its frame, and a quiet depth sensor; every line is read."""
-    assert run(["link", "script", "--out", str(tmp_path / "scripts"), "--sitl"]) == 0
+    assert run(["link", "install-script", "--out", str(tmp_path / "scripts"), "--sitl"]) == 0
     capsys.readouterr()
     found = read_parameter_file(tmp_path / "scripts" / "sitl.params")
     asked = read_parameter_file(tmp_path / "scripts" / "wakewise.params")
     assert found == {**asked, "FRAME_CONFIG": 2.0, "SIM_BARO_RND": 0.01, "SIM_BAR2_RND": 0.01}
-    assert run(["link", "script", "--sitl"]) == 2
+    assert run(["link", "install-script", "--sitl"]) == 2
     assert "--out DIR" in capsys.readouterr().err
 
 
@@ -230,11 +232,11 @@ def test_the_simulators_parameters_are_written_beside_the_script(capsys: Capture
         (["ardusub", "--params", "here.txt"], "line 1"),
         (["ardusub", "--params", "good.params", "--vehicle", "no-such"], "no-such"),
         (["ardusub", "--params", "good.params", "--motor-results", "here.txt"], "no JSON"),
-        (["script", "--out", "here.txt"], "a file is there"),
-        (["script", "--upload", "udpin:0.0.0.0"], "a port is missing"),
-        (["script", "--upload", "file:here.txt"], "a log is no vehicle"),
-        (["script", "--start"], "--upload"),
-        (["script", "--params", "--out", "new"], "goes with neither"),
+        (["install-script", "--out", "here.txt"], "a file is there"),
+        (["install-script", "--upload", "udpin:0.0.0.0"], "a port is missing"),
+        (["install-script", "--upload", "file:here.txt"], "a log is no vehicle"),
+        (["install-script", "--start"], "--upload"),
+        (["install-script", "--params", "--out", "new"], "goes with neither"),
         (["ardusub", "--motors", "1"], "goes with --motor-test"),
         (["ardusub", "--check", "--motor-test"], "one after the other"),
         (["ardusub", "--camera", "mavlnk"], "right is mavlink, digicam, or run:PROGRAM"),

@@ -103,7 +103,7 @@ def test_the_command_counts_what_went_by(capsys: pytest.CaptureFixture[str]) -> 
 
         speaking = threading.Thread(target=speak)
         speaking.start()
-        asked = ["link", "share", "--connection", f"udpin:127.0.0.1:{port}", "--out", to, "--seconds", "1", "--json"]
+        asked = ["link", "route", "--connection", f"udpin:127.0.0.1:{port}", "--out", to, "--seconds", "1", "--json"]
         assert run(asked) == 0
         over.set()
         speaking.join()
@@ -113,5 +113,5 @@ def test_the_command_counts_what_went_by(capsys: pytest.CaptureFixture[str]) -> 
     assert said["datagrams"][f"udpin:127.0.0.1:{port}"] > 0
     assert said["datagrams"][to] == 0
     assert "0.0.0.0" not in told.err
-    assert run(["link", "share", "--out", "tcp:127.0.0.1:1"]) == 2
+    assert run(["link", "route", "--out", "tcp:127.0.0.1:1"]) == 2
     assert "can be shared" in capsys.readouterr().err

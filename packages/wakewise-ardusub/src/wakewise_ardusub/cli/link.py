@@ -9,10 +9,9 @@ import typer
 
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, write_page
 from wakewise.ui.cli.options import Json
-from wakewise_ardusub.cli import link_ardusub, link_script, link_share, link_sitl
-from wakewise_ardusub.cli.link_points import Ahead, Points, WakeModelName, region_ahead, region_words
+from wakewise_ardusub.cli import link_ardusub, link_install_script, link_route, link_sitl
 from wakewise_ardusub.cli.link_sensors import sensors
-from wakewise_ardusub.cli.link_wash_meter import meter
+from wakewise_ardusub.cli.link_wash_meter import Ahead, Points, WakeModelName, region_ahead, region_words, wash_meter
 
 if TYPE_CHECKING:
     from wakewise.robot.vehicles import Vehicle
@@ -22,14 +21,14 @@ if TYPE_CHECKING:
     from wakewise_ardusub.logs.table import LogTable
 
 app = typer.Typer(help="Real vehicles and what they recorded.", rich_markup_mode=None)
-app.command("meter")(meter)
+app.command("wash-meter")(wash_meter)
 app.command("sensors")(sensors)
 
 app.command("ardusub")(link_ardusub.ardusub)
-app.command("script")(link_script.script)
-app.command("share")(link_share.share)
+app.command("install-script")(link_install_script.install_script)
+app.command("route")(link_route.route)
 app.command("sitl")(link_sitl.sitl)
-app.command("stand-in")(link_sitl.stand_in)
+app.command("sitl-autopilot")(link_sitl.sitl_autopilot)
 
 DEFAULT_VEHICLE = "bluerov2-heavy"
 

@@ -143,9 +143,9 @@ def ardusub(
 ) -> None:
     """Fly a real ArduSub vehicle beside its pilot: sticks ask for motion, thrusts are chosen to spare the target.
 
-    Needs the script on the autopilot (`wakewise link script`); --check says whether all is well before anything moves.
-    Type Enter, or press the button given as `engage`, to consent once all is well, and again to take the sticks back;
-    any loss gives them back by itself. Ctrl-C lets go of the vehicle and ends.
+    Needs the script on the autopilot (`wakewise link install-script`); --check says whether all is well before
+    anything moves. Type Enter, or press the button given as `engage`, to consent once all is well, and again to take
+    the sticks back; any loss gives them back by itself. Ctrl-C lets go of the vehicle and ends.
     """
     from wakewise.core.errors import InputError
     from wakewise_ardusub.optional_dependencies import need

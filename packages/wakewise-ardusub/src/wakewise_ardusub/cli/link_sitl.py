@@ -1,4 +1,6 @@
-"""`wakewise link sitl` and `wakewise link stand-in`: vehicles behind a firmware, and a stand-in for it."""
+"""`wakewise link sitl` and `wakewise link sitl-autopilot`: physics behind ArduSub's firmware, and a simulated
+autopilot.
+"""
 
 from __future__ import annotations
 
@@ -82,8 +84,10 @@ Behind_ = Annotated[
         show_default=False,
     ),
 ]
-StandInVehicle = Annotated[str, typer.Option("--vehicle", help="Library name or vehicle YAML file; 6 or 8 thrusters.")]
-StandInParams = Annotated[
+AutopilotVehicle = Annotated[
+    str, typer.Option("--vehicle", help="Library name or vehicle YAML file; 6 or 8 thrusters.")
+]
+AutopilotParams = Annotated[
     Path | None,
     typer.Option("--params", help="Parameters in place of its own, .params or .parm.", show_default=False),
 ]
@@ -117,8 +121,8 @@ def sitl(
 ) -> None:
     """Put a vehicle in its water behind ArduSub: ArduPilot's JSON physics link (`--model JSON`), until Ctrl-C.
 
-    Start the firmware, or `wakewise link stand-in --physics 127.0.0.1:9002`, beside it. The vehicle starts anew when
-    the firmware does: at the surface, and then let down to where the scenario starts it.
+    Start the firmware, or `wakewise link sitl-autopilot --physics 127.0.0.1:9002`, beside it. The vehicle starts anew
+    when the firmware does: at the surface, and then let down to where the scenario starts it.
     """
     from wakewise.operation import load_scenario
     from wakewise_ardusub.physics import PhysicsServer, PulseTable
@@ -164,11 +168,11 @@ def sitl(
             typer.echo(f"last refused    {physics.why_refused}")
 
 
-def stand_in(
-    vehicle: StandInVehicle = DEFAULT_VEHICLE,
+def sitl_autopilot(
+    vehicle: AutopilotVehicle = DEFAULT_VEHICLE,
     physics: Behind_ = None,
     out: Out = None,
-    params: StandInParams = None,
+    params: AutopilotParams = None,
     script: ScriptFile = None,
     no_script: NoScript = False,
     pilot: PilotAshore = False,
@@ -176,14 +180,14 @@ def stand_in(
     seconds: Seconds = None,
     json: Json = False,
 ) -> None:
-    """A stand-in for ArduSub in pure Python, until Ctrl-C: MAVLink, arming, modes, mixer, failsafes and the script.
+    """Simulate ArduSub in pure Python, until Ctrl-C: MAVLink, arming, modes, mixer, failsafes and the script.
 
-    It is for trying and for tests, and no copy of the firmware: docs/sitl.md says what it does and what it does not.
+    It is for trials and tests and no copy of the firmware: docs/sitl.md lists what it does and what it does not.
     """
     from wakewise.core.errors import InputError
     from wakewise_ardusub.optional_dependencies import need
 
-    need("wakewise link stand-in", "links", only=("pymavlink", "lupa"))
+    need("wakewise link sitl-autopilot", "links", only=("pymavlink", "lupa"))
     from wakewise.robot.importers import any_vehicle
     from wakewise_ardusub.sitl.own_parameters import own_parameters, read_params
     from wakewise_ardusub.sitl.scripted_ground_station import ScriptedGroundStation, route_messages
@@ -201,18 +205,18 @@ def stand_in(
     behind = _embedded(chosen, values) if physics is None else UdpPhysics(*_address("--physics", physics))
     outs = out or [_STATION, _COMPANION, _WATCH]
     links = [UdpEndpoint(*_address("--out", each), out=True) for each in outs]
-    typer.echo(f"stand-in for ArduSub, system {made.system}: MAVLink to {', '.join(outs)}", err=True)
+    typer.echo(f"simulated ArduSub, system {made.system}: MAVLink to {', '.join(outs)}", err=True)
     with ExitStack() as held:
         held.enter_context(suppress(KeyboardInterrupt))
         held.callback(behind.close)
         for link in links:
             held.callback(link.close)
         turn = ScriptedGroundStation(made, route_messages(made, links)).turn if pilot else None
-        run(made, behind, links, _until(seconds), turn=turn, said=lambda: status_line(_stand_in_line(made)))
+        run(made, behind, links, _until(seconds), turn=turn, said=lambda: status_line(_autopilot_line(made)))
     if json:
-        print_json(_stand_in_facts(made))
+        print_json(_autopilot_facts(made))
     else:
-        typer.echo(_stand_in_line(made))
+        typer.echo(_autopilot_line(made))
 
 
 def _scripts(file: Path | None) -> dict[str, str]:
@@ -288,7 +292,7 @@ def _physics_line(figures: PhysicsFigures, depths: DepthMonitor | None) -> str:
     )
 
 
-def _stand_in_line(made: SimulatedAutopilot) -> str:
+def _autopilot_line(made: SimulatedAutopilot) -> str:
     from wakewise_ardusub.sitl.modes import MODES
 
     pulses = " ".join(str(pulse) for pulse in made.pulses_us[:8])
@@ -298,7 +302,7 @@ def _stand_in_line(made: SimulatedAutopilot) -> str:
     return f"t {made.now_s:.1f} s, {state}, depth {depth_m:.2f} m; pulses {pulses}{said}"
 
 
-def _stand_in_facts(made: SimulatedAutopilot) -> dict[str, Any]:
+def _autopilot_facts(made: SimulatedAutopilot) -> dict[str, Any]:
     return {
         "time_s": made.now_s,
         "armed": made.armed,

@@ -1,4 +1,4 @@
-"""`wakewise link meter`: beside a vehicle that dives, what its thrusters do and what gentler ones would have spared."""
+"""`wakewise link wash-meter`: live wash of a vehicle's thrusters on its target, flown and with gentler allocations."""
 
 from __future__ import annotations
 
@@ -9,12 +9,33 @@ import typer
 
 from wakewise.ui.cli.console import print_json
 from wakewise.ui.cli.options import Json
-from wakewise_ardusub.cli.link_points import Ahead, Points, WakeModelName, region_ahead, region_words
 
 if TYPE_CHECKING:
+    from wakewise.robot.vehicles import Vehicle as AnyVehicle
+    from wakewise.scene.targets import Region
     from wakewise_ardusub.vehicle_summary import VehicleSummary
     from wakewise_ardusub.wash_meter.run import MeterLoop
 
+Ahead = Annotated[
+    float,
+    typer.Option(
+        "--ahead",
+        metavar="M",
+        help="From the bow to the middle of a ball of 0.5 m across, which stands for the target.",
+    ),
+]
+Points = Annotated[
+    Path | None,
+    typer.Option(
+        "--points",
+        help="CSV with x_m, y_m, z_m from the middle of the vehicle (forward, right, down) and weight: what to spare "
+        "instead.",
+        show_default=False,
+    ),
+]
+WakeModelName = Annotated[
+    str, typer.Option("--wake-model", help="paper, paper-calibrated, fitted, linear, jet or jet-fitted.")
+]
 Connection = Annotated[
     str | None,
     typer.Option(
@@ -81,7 +102,7 @@ Write = Annotated[
 ]
 
 
-def meter(
+def wash_meter(
     connection: Connection = None,
     vehicle: Vehicle = "bluerov2-heavy",
     ahead: Ahead = 0.4,
@@ -98,7 +119,7 @@ def meter(
     write: Write = None,
     json: Json = False,
 ) -> None:
-    """Show live, in a page, what a vehicle's thrusters do to its target, and what gentler thrusts would have spared.
+    """Show in a page, live, the wash of a vehicle's thrusters on its target, and what gentler thrusts would save.
 
     It listens and never commands the vehicle; without --publish and --ask it sends nothing at all (with udpout: a
     heartbeat). Ctrl-C ends it.
@@ -116,7 +137,7 @@ def meter(
     if write is not None:
         _write(write, craft)
         return
-    need("wakewise link meter", "links", only=("pymavlink",))
+    need("wakewise link wash-meter", "links", only=("pymavlink",))
     if connection is None:
         raise InputError("--connection: missing, udpin:HOST:PORT or udpout:HOST:PORT is needed")
     settings = MeterSettings(
@@ -140,6 +161,32 @@ def meter(
     state = _run(work)
     if json:
         print_json(state)
+
+
+def region_ahead(vehicle: AnyVehicle, ahead: float, points: Path | None) -> Region:
+    """Protected region in the vehicle's frame: a ball ahead of the bow, or the points of a file.
+
+    Raises
+    ------
+    InputError
+        If the ball is out of range, or the file holds no points outside the vehicle.
+    """
+    import numpy as np
+
+    from wakewise.core.geometry import Pose
+    from wakewise.scene.targets import Region
+    from wakewise.ui.cli.points import read_points
+    from wakewise_ardusub.logs.replay_allocation import bow_points
+
+    if points is None:
+        return bow_points(vehicle, ahead)
+    places, weights = read_points(points, vehicle, Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])))
+    return Region(points_W_m=places, weights=weights, distance_m=np.zeros(len(places)))
+
+
+def region_words(ahead: float, points: Path | None) -> str:
+    """The protected region in words."""
+    return f"of {points}" if points is not None else f"of a ball {ahead:g} m ahead of the bow"
 
 
 def _run(work: MeterLoop) -> dict[str, Any]:

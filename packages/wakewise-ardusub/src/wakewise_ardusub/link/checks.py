@@ -241,10 +241,10 @@ def _script(facts: CheckInputs) -> Iterator[CheckResult]:
     if facts.heard is None:
         yield _unknown("script", asked, facts)
     elif facts.heard.script is None:
-        do = "wakewise link script --upload ..., then reboot the autopilot"
+        do = "wakewise link install-script --upload ..., then reboot the autopilot"
         yield _row("script", asked, "not heard", False, do)
     else:
-        do = "wakewise link script --upload ... puts the right one there; then reboot the autopilot"
+        do = "wakewise link install-script --upload ... puts the right one there; then reboot the autopilot"
         yield _row("script", asked, f"version {facts.heard.script:g}", facts.heard.script == SCRIPT_VERSION, do)
     value = facts.parameters.get(MODES_PARAMETER)
     if value is not None:

@@ -1,17 +1,18 @@
-"""What MAVLink messages say, by name and fields, whether they come as packets or as BlueOS writes them.
+"""Readers of logs with MAVLink messages: telemetry logs of ground stations (.tlog) and BlueOS's recordings (.mcap).
 
-What BlueOS records (MCAP): MAVLink messages as JSON under mavlink/SYSTEM/COMPONENT/NAME.
+`record_message` stores a message by name and fields, whichever file it comes from.
 
-Topics and payloads as bluerobotics/mavlink-server and blueos-recorder write them: an object with `header` and
-`message`, the latter with `type` and fields; enumerations in words. Other topics (video, other sensors) are passed
-over. The file is walked record by record, so that a damaged chunk costs its own messages only; a chunk that cannot be
-unpacked and a message that is no JSON each count as one bad record.
+**Telemetry log.** A record is eight bytes of time and one MAVLink packet. A record counts as bad if the checksum of its
+packet is wrong and the next record follows where it should (pymavlink's BAD_DATA); a stretch of bytes without a record
+counts as one more. After damage the reader resynchronises at the next packet with a right checksum. pymavlink decodes
+the packets; the framing is our own and not that of `mavutil.mavlogfile`. Both give the same counts for whole logs and
+for a vehicle's log of 50,136 good and 1,967 bad packets. On 200 damaged copies of a log of 1,077 packets the counts
+agreed on 52, and mavlogfile lost up to 17 more packets.
 
-Telemetry logs of ground stations: each record is eight bytes of time and one MAVLink packet.
-
-A record counts as bad if the checksum of its packet is wrong and the next record follows where it should, which is what
-pymavlink counts as BAD_DATA; a stretch of bytes in which no record is found counts as one more. After damage the reader
-goes on at the next packet whose checksum is right.
+**MCAP.** MAVLink messages as JSON under mavlink/SYSTEM/COMPONENT/NAME, as bluerobotics/mavlink-server and
+blueos-recorder write them: an object with `header` and `message`, the latter with `type` and fields; enumerations in
+words. Other topics are skipped. The file is read record by record, so that a damaged chunk loses its own messages only.
+A chunk that cannot be decompressed and a message that is no JSON each count as one bad record.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 wakewise_ardusub.wash_meter.embedded`.
 
 BlueROV2's own computer is a 32-bit one, for which Numba, SciPy's wheels and the readers of vehicle files are not to be
-had. Here the vehicle comes from a craft file (`wakewise link meter --vehicle NAME --write FILE` makes one on a larger
-computer), options are read by the standard library, and the kernels run as the Python that they are written in.
+had. Here the vehicle comes from a craft file (`wakewise link wash-meter --vehicle NAME --write FILE` makes one on a
+larger computer), options are read by the standard library, and the kernels run as the Python that they are written in.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`wakewise link script`: the script that lets a companion drive each motor, onto the autopilot or into a folder."""
+"""`wakewise link install-script`: put the Lua script for motor control on an autopilot, or into a folder."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Sitl = Annotated[
 Print = Annotated[bool, typer.Option("--params", help="Print what the autopilot is to be set to, and why.")]
 
 
-def script(
+def install_script(
     out: Folder = None,
     upload: Upload = None,
     start: Start = False,
@@ -83,8 +83,8 @@ def script(
         typer.echo(f"next      {done if start else 'set SCR_ENABLE to 1 if it is not, and reboot the autopilot'}")
     else:
         if not written:
-            typer.echo("wakewise link script --upload udpin:0.0.0.0:14550 puts it on the autopilot; by hand:")
-            typer.echo("0. wakewise link script --out .")
+            typer.echo("wakewise link install-script --upload udpin:0.0.0.0:14550 puts it on the autopilot; by hand:")
+            typer.echo("0. wakewise link install-script --out .")
         for i, step in enumerate(BY_HAND, start=1):
             typer.echo(f"{i}. {step}")
     typer.echo(

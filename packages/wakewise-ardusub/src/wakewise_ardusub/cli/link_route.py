@@ -1,4 +1,4 @@
-"""`wakewise link share`: one autopilot's MAVLink for several programs."""
+"""`wakewise link route`: one autopilot's MAVLink for several programs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Seconds = Annotated[
 ]
 
 
-def share(connection: Connection = VEHICLE, out: Out = None, seconds: Seconds = None, json: Json = False) -> None:
+def route(connection: Connection = VEHICLE, out: Out = None, seconds: Seconds = None, json: Json = False) -> None:
     """Share an autopilot's MAVLink among several programs over UDP, until Ctrl-C: a router without settings.
 
     What comes from one goes to all others as it is. On a vehicle, BlueOS's MAVLink Endpoints do this.
