@@ -68,7 +68,7 @@ def test_it_is_ready_once_a_picture_was_drawn(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(live_camera, "PictureRenderer", Slow)
     monkeypatch.setattr(live_camera.os, "nice", lambda _: 0)
-    monkeypatch.setattr(live_camera, "_write", lambda _, message: done.append(message.decode()))
+    monkeypatch.setattr(live_camera, "write_message", lambda _, message: done.append(message.decode()))
     begin = pickle.dumps((None, None, 480))
     live_camera.serve(io.BytesIO(len(begin).to_bytes(8, "little") + begin), io.BytesIO())
     assert done == ["lit", "drawn", "ready"]

@@ -233,13 +233,13 @@ def serve(pipe: IO[bytes], answers: IO[bytes]) -> None:
     first = read_message(pipe)
     if first is None:
         return
-    easel = PictureRenderer(*pickle.loads(first))
-    easel.warm()
+    renderer = PictureRenderer(*pickle.loads(first))
+    renderer.warm()
     write_message(answers, b"ready")
     with suppress(OSError):
         os.nice(NICER)
     while (message := read_message(pipe)) is not None:
-        image = easel.draw(pickle.loads(message))
+        image = renderer.draw(pickle.loads(message))
         write_message(answers, cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes())
 
 

@@ -29,7 +29,7 @@ from wakewise.simulation.tank.water_truth import STILL_M_S, surface_points
 from wakewise.ui.cockpit.flight_snapshot import SAMPLED_S, WINDOW_S, FlightSnapshot, SnapshotRecorder
 from wakewise.wake import InfluenceModel, free_jet
 from wakewise.wake.advected_jets import CrossFlow
-from wakewise.wake.disturbance import carried_velocity
+from wakewise.wake.disturbance import advected_velocity
 from wakewise.wake.jets import AxialJet
 
 POINTS = 300
@@ -88,8 +88,10 @@ class WakeReadout:
         place = (self.points_W_m, X_WB.apply(view.positions_B_m[on]), jets_W, view.areas_m2[on])
         flow = self.watch.flow(estimate, thrusts_N)
         if flow is not None and isinstance(free_jet(view.wake), AxialJet):
-            own = CrossFlow(current_W_m_s=flow.current_W_m_s, unsure_m_s=flow.unsure_m_s, thrusts_N=thrusts_N[on])
-            unit = carried_velocity(view.wake, *place, size_N, own)
+            own = CrossFlow(
+                current_W_m_s=flow.current_W_m_s, current_std_m_s=flow.current_std_m_s, thrusts_N=thrusts_N[on]
+            )
+            unit = advected_velocity(view.wake, *place, size_N, own)
         else:
             unit = view.wake.unit_velocity(*place)
         velocity = np.einsum("i,inx->nx", np.sqrt(size_N), unit)

@@ -1,21 +1,18 @@
-"""What people look at rather than measure: the film, photographs without the water's colour, the model in its own.
-
-The contact sheet: every photograph, small enough for one page file, large enough to judge.
-"""
+"""Film, contact sheet, photographs with the water's colour removed, and the model in the photographs' colours."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 
 import cv2
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError, StageError
-from wakewise.ui.reports.page import collapsible_section, panel
+from wakewise.ui.reports.page import collapsible_section, panel, parts, template
 from wakewise.ui.reports.svg_style import data_uri
 from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Photograph, Trial, TrialMesh
@@ -40,18 +37,7 @@ def film_html(trial: Trial) -> str:
             continue
         inside = path.stat().st_size <= MOST_FILM_BYTES
         source = data_uri(path.read_bytes(), kind) if inside else name
-        beside = "" if inside else f" It lies beside this page as {name}."
-        said = "film of the scan"
-        if kind.startswith("video"):
-            shown = (
-                f'<video controls muted loop playsinline preload="metadata" src="{source}" aria-label="{said}"></video>'
-            )
-        else:
-            shown = f'<img alt="{said}" src="{source}">'
-        return (
-            f'<figure class="film">{shown}<figcaption>The flight as a film. The wash is the tank\'s own water, driven '
-            f"once more by the thrusts on record; tracers show it and change nothing.{beside}</figcaption></figure>"
-        )
+        return str(template("trial.html").film(source, kind.startswith("video"), not inside))
     return ""
 
 
@@ -122,14 +108,10 @@ def _water(folder: Path, shots: list[Photograph]) -> tuple[dict[str, NDArray[np.
 
 def _pair(shot: Photograph, before: NDArray[np.uint8], after: NDArray[np.uint8]) -> str:
     figures = []
-    for picture, words in ((before, "as taken"), (after, "water undone")):
-        said = f"{shot.name}, {shot.time_s:.1f} s, {words}"
-        figures.append(
-            f'<figure><button type="button" class="photo" data-facts="{escape(said, quote=True)}">'
-            f'<img alt="{escape(said, quote=True)}" src="{_embedded(picture)}"></button>'
-            f"<figcaption>{escape(said)}</figcaption></figure>"
-        )
-    return f'<div class="columns pair">{"".join(figures)}</div>'
+    for picture, kind in ((before, "as taken"), (after, "water undone")):
+        caption = f"{shot.name}, {shot.time_s:.1f} s, {kind}"
+        figures.append(parts().captioned(parts().photo(_embedded(picture), caption, caption), caption))
+    return str(parts().columns(figures, True))
 
 
 def _embedded(picture: NDArray[np.uint8]) -> str:
@@ -196,18 +178,18 @@ def contact_sheet(trial: Trial, leg_of: dict[int, str]) -> str:
     shots = trial.photographs
     width = embedded_width(len(shots))
     marked = extremes(shots)
-    groups: list[tuple[str, list[str]]] = []
+    groups: list[tuple[str, list[Markup]]] = []
     for i, shot in enumerate(shots):
         leg = leg_of.get(i, "")
         if not groups or groups[-1][0] != leg:
             groups.append((leg, []))
         groups[-1][1].append(_photo(shot, i, marked, width))
-    parts = []
+    sheets = []
     for leg, found in groups:
-        sheet = f'<div class="sheet">{"".join(found)}</div>'
+        sheet = parts().sheet(found)
         count = f"{len(found)} photograph{'s' if len(found) > 1 else ''}"
-        parts.append(collapsible_section(leg, sheet, count) if leg else sheet)
-    return "".join(parts)
+        sheets.append(collapsible_section(leg, sheet, count) if leg else str(sheet))
+    return "".join(sheets)
 
 
 def _turbidity(per_m: float) -> str:
@@ -215,23 +197,13 @@ def _turbidity(per_m: float) -> str:
     return "< 0.001" if 0.0 < per_m < 0.001 else number(per_m, 2)
 
 
-def _photo(shot: Photograph, index: int, marked: Extremes, width: int) -> str:
+def _photo(shot: Photograph, index: int, marked: Extremes, width: int) -> Markup:
     kind = "sharpest" if index == marked.sharpest else "worst" if index == marked.worst else ""
-    tag = {
-        "sharpest": '<span class="tag">sharpest</span>',
-        "worst": '<span class="tag worst">least sharp</span>',
-        "": "",
-    }
+    tag = "least sharp" if kind == "worst" else kind
+    time = f"{shot.time_s:.1f}"
     sharpness = "" if shot.sharpness is None else f"sharpness {number(shot.sharpness)}"
     turbidity = "" if shot.turbidity_per_m is None else f"turbidity {_turbidity(shot.turbidity_per_m)} /m"
-    facts = [f"<b>{shot.time_s:.1f} s</b>", sharpness, turbidity]
-    lines = "".join(f"<span>{fact}</span>" for fact in facts if fact)
-    said = " · ".join(f for f in (shot.name, f"{shot.time_s:.1f} s", sharpness, turbidity, kind) if f)
-    source = embed(shot, width)
-    if source is None:
-        return f'<div class="photo gone"><div class="empty">no image file</div><span class="facts">{lines}</span></div>'
-    return (
-        f'<button type="button" class="photo {kind}" data-facts="{escape(said, quote=True)}">'
-        f'<img alt="{escape(shot.name, quote=True)}" src="{source}">{tag[kind]}'
-        f'<span class="facts">{lines}</span></button>'
-    )
+    details = template("trial.html").photo_details(time, sharpness, turbidity)
+    facts = " · ".join(one for one in (shot.name, f"{time} s", sharpness, turbidity, kind) if one)
+    made: Markup = parts().photo(embed(shot, width), shot.name, facts, kind, tag, details)
+    return made

@@ -26,10 +26,12 @@ from wakewise.ui.reports.page import (
     missing,
     missing_text,
     panel,
+    parts,
     pictures,
     plot,
     scene_box,
     section,
+    template,
 )
 from wakewise.ui.reports.scene3d import CAMERA_RGB, HULL_RGB, PATH_RGB, PLANNED_RGB, scene_html
 from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, error_colours, rgb
@@ -160,21 +162,11 @@ def _scene(trial: Trial, errors: ModelErrors | None, poster: str) -> str:
     html = scene_html(trial, errors)
     if html is None:
         return missing("the 3D scene", missing_text(trial, "steps.parquet", "images.csv", "truth.ply"))
-    legend = "".join(
-        legend_entry("rgb({},{},{})".format(*colour), name)
-        for colour, name in (
-            (PATH_RGB, "path"),
-            (CAMERA_RGB, "photographs"),
-            (PLANNED_RGB, "planned viewpoints"),
-            (HULL_RGB, "vehicle"),
-        )
-    )
+    layers = {"path": PATH_RGB, "photographs": CAMERA_RGB, "planned viewpoints": PLANNED_RGB, "vehicle": HULL_RGB}
+    legend = "".join(legend_entry("rgb({},{},{})".format(*colour), name) for name, colour in layers.items())
     if errors is not None:
         legend = error_scale("model by error (mm)") + legend
-    hint = (
-        '<span class="hint">Drag to turn, scroll to come closer. The button at the lower right switches layers on and '
-        "off: the model by its error, photographs, path, and the vehicle, which flies when you press play.</span>"
-    )
+    hint = str(template("trial.html").scene_hint())
     return scene_box(html, hint + legend, poster)
 
 
@@ -217,17 +209,13 @@ def _made(trial: Trial) -> str:
         + (f"; {'; '.join(why)}" if why else "")
         + f". {_compared(trial)}{_blurred(coverage)}"
     )
-    legend = "".join(
-        legend_entry(colour, name)
-        for colour, name in (
-            (WELL_SEEN, "seen well"), (IN_PART, "by too few"), (NOT_COVERED, "not"), (NOT_COUNTED, "does not count"),
-        )
-    )  # fmt: skip
+    colours = ((WELL_SEEN, "seen well"), (IN_PART, "by too few"), (NOT_COVERED, "not"), (NOT_COUNTED, "does not count"))
+    legend = str(parts().chips([parts().chip(*entry) for entry in colours]))
     surface = TrialMesh(vertices_m=target.mesh.vertices_m, faces=target.mesh.faces)
-    colours, counts = _painted(coverage, surface.vertices_m)
+    painted, counts = _painted(coverage, surface.vertices_m)
     frame = ViewBounds.around(surface.vertices_m[counts] if counts.any() else surface.vertices_m)
-    drawn = draw_surface(surface, colours, SIDES, frame, PIXELS)
-    return panel("Coverage", text, f'<div class="chips">{legend}</div>', pictures(drawn, SIDES, "coverage"))
+    drawn = draw_surface(surface, painted, SIDES, frame, PIXELS)
+    return panel("Coverage", text, legend, pictures(drawn, SIDES, "coverage"))
 
 
 def _compared(trial: Trial) -> str:

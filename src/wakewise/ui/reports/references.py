@@ -1,7 +1,7 @@
-"""What a trial's water is held against: the water without it, thrusts shared out as `dp` does, the bed's own grains.
+"""References for the wash of a trial, and limits of its water model.
 
-What the water of a trial gets wrong, told on the page of every flight in it: law by law for the tank's water, in a
-sentence for the others.
+References: the motion of the water itself, a flight with `dp` in the same water, and the threshold of the bed's grains.
+Limits: each validation law of the tank, or one sentence for other worlds.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from wakewise.operation.worlds.lattice_world import CELL_M
 from wakewise.operation.worlds.makers import WORLDS, flow_name
 from wakewise.scene.missions import SETTLING
 from wakewise.simulation.tank.validation_limits import ABSENT, limits_table
-from wakewise.ui.reports.page import collapsible_section, missing, prose, section
+from wakewise.ui.reports.page import collapsible_section, missing, parts, prose, section, template
 from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Trial
 
@@ -36,11 +36,13 @@ SMALL = 0.25
 
 @dataclass(frozen=True)
 class ReferenceBar:
-    """One bar of a yardstick: what it is, its value in its neighbours' unit and as text; `own` is this trial's."""
+    """One bar of a yardstick: what it is, its value in the unit of its neighbours and as text; `own` is this
+    trial's.
+    """
 
     name: str
     value: float
-    said: str
+    text: str
     own: bool = False
 
 
@@ -65,14 +67,14 @@ def reference_comparisons(trial: Trial) -> list[ReferenceComparison]:
 
 def yardstick_html(trial: Trial) -> str:
     """The section of a page; empty if nothing can be held against anything."""
-    cards = "".join(_card(found) for found in reference_comparisons(trial))
+    cards = [_card(found) for found in reference_comparisons(trial)]
     if not cards:
         return ""
     lead = (
         "What the wash at the target is to be held against. Wash is the water's speed beyond that of the same flow "
         "without thrusters."
     )
-    return section("yardstick", "Is that calm?", lead, f'<div class="yardsticks">{cards}</div>')
+    return section("yardstick", "Is that calm?", lead, template("trial.html").yardsticks(cards))
 
 
 def against_water(trial: Trial) -> ReferenceComparison | None:
@@ -203,20 +205,16 @@ def _share(share: float) -> str:
     return f"{number(100.0 * share, 2)} %"
 
 
-def _card(found: ReferenceComparison) -> str:
+def _card(found: ReferenceComparison) -> dict[str, Any]:
+    """Values of the template; lengths of bars are relative to the longest."""
     top = max((bar.value for bar in found.bars), default=0.0) or 1.0
-    rows = "".join(
-        f'<dt>{escape(bar.name)}</dt><dd><i class="{"own" if bar.own else ""}" '
-        f'style="--share:{max(bar.value / top, 0.005):.3f}"></i><span>{escape(bar.said)}</span></dd>'
-        for bar in found.bars
-    )
-    state = {True: "good", False: "bad", None: ""}[found.good]
-    bars = f'<dl class="bars">{rows}</dl>' if rows else ""
-    return (
-        f'<div class="yardstick"><h3>{escape(found.question)}</h3>'
-        f'<p class="verdict {state}">{escape(found.verdict)}</p>'
-        f"{bars}<p>{UNIT.sub(NO_BREAK, escape(found.sentence))}</p></div>"
-    )
+    return {
+        "question": found.question,
+        "verdict": found.verdict,
+        "state": {True: "good", False: "bad", None: ""}[found.good],
+        "bars": [(bar.name, bar.text, bar.own, f"{max(bar.value / top, 0.005):.3f}") for bar in found.bars],
+        "sentence": UNIT.sub(NO_BREAK, found.sentence),
+    }
 
 
 _OTHERS = {
@@ -231,23 +229,16 @@ _OTHERS = {
 
 
 def limits_section(trials: Mapping[str, Trial]) -> str:
-    """The part of a page, anchor "limits", that says what the water of these trials gets wrong.
-
-    Parameters
-    ----------
-    trials : mapping
-        Name of each trial, said where the trials of a page were not all flown in the same water.
-    """
+    """Section "limits": what the water model of these trials gets wrong, by trial where their waters differ."""
     waters: dict[str, list[str]] = {}
     for name, trial in trials.items():
         waters.setdefault(_water_html(trial), []).append(name)
-    parts = [
-        (f'<p class="sheet-leg">{escape(", ".join(names))}</p>' if len(waters) > 1 else "") + html
-        for html, names in waters.items()
+    sections = [
+        (str(parts().row_title(", ".join(names))) if len(waters) > 1 else "") + html for html, names in waters.items()
     ]
     title = f"What {'the tank' if _tank_html() in waters else 'this water'} gets wrong"
     lead = "A simulated flight is flown in a model of water. What that gets wrong limits what its figures can claim."
-    return section("limits", title, lead, "".join(parts))
+    return section("limits", title, lead, "".join(sections))
 
 
 def _water_html(trial: Trial) -> str:
@@ -260,32 +251,35 @@ def _water_html(trial: Trial) -> str:
     flow = flow_name(trial.settings)
     if flow == "tank":
         return _tank_html()
-    return f"<p>{prose(_OTHERS[flow])}</p>" if flow in WORLDS else _from_outside(flow)
+    return _paragraph(prose(_OTHERS[flow])) if flow in WORLDS else _from_outside(flow)
 
 
-def _from_outside(said: str) -> str:
-    return f"<p>The world came from outside ({escape(said)}): what it gets wrong, its maker has to say.</p>"
+def _from_outside(name: str) -> str:
+    return _paragraph(f"The world came from outside ({name}): what it gets wrong, its maker has to say.")
+
+
+def _paragraph(text: str) -> str:
+    return str(template("trial.html").paragraph(text))
 
 
 def _tank_html() -> str:
-    """The tank's laws, missed ones first, and what it has not."""
+    """Validation laws of the tank, missed ones first, and effects that it lacks."""
     rows = limits_table()
     missed = sum(row["met"] == "no" for row in rows)
-    table = (
-        '<table class="limits"><thead><tr><th></th><th>law, source</th><th class="num">asked</th>'
-        '<th class="num">reached</th><th>what it means for a claim</th></tr></thead>'
-        f"<tbody>{''.join(map(_row, rows))}</tbody></table>"
-    )
-    absent = "".join(f"<li>{prose(line)}</li>" for line in ABSENT)
+    macros = template("trial.html")
+    cells = [
+        (
+            macros.law(row["met"] == "yes"),
+            macros.law_source(row),
+            row["asked"],
+            row["reached"],
+            prose(row["means"]),
+        )
+        for row in rows
+    ]
+    heads = ("", "law, source", "asked", "reached", "what it means for a claim")
+    table = parts().table("ttnnm", heads, cells, "limits", wide=False)
+    absent = parts().items([prose(line) for line in ABSENT])
     return collapsible_section(
         "Laws it is held against", table, f"{missed} of {len(rows)} missed, these first"
-    ) + collapsible_section("What it has not at all", f"<ul>{absent}</ul>", f"{len(ABSENT)} things")
-
-
-def _row(row: Mapping[str, str]) -> str:
-    said = '<span class="kept">kept</span>' if row["met"] == "yes" else '<strong class="missed">missed</strong>'
-    return (
-        f"<tr><td>{said}</td><td><b>{escape(row['name'])}</b><br>{prose(row['law'])} "
-        f'<span class="null">({escape(row["source"])})</span></td><td class="num">{escape(row["asked"])}</td>'
-        f'<td class="num">{escape(row["reached"])}</td><td class="text">{prose(row["means"])}</td></tr>'
-    )
+    ) + collapsible_section("What it has not at all", absent, f"{len(ABSENT)} things")

@@ -1,13 +1,11 @@
-"""The report of one trial: a single HTML page for people who fly and people who measure.
-
-What a flight proposes for the ballast of the next one, on its page.
-"""
+"""Report of one trial: a single HTML page with verdict, model, flight, photographs, water, limits and all figures."""
 
 from __future__ import annotations
 
 import shlex
-from html import escape
 from pathlib import Path
+
+from markupsafe import Markup
 
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
@@ -18,30 +16,32 @@ from wakewise.ui.reports.model import before_colours, before_mesh, coverage_html
 from wakewise.ui.reports.page import (
     PageParts,
     collapsible_section,
+    framed_page,
     missing,
     missing_text,
+    parts,
     plot,
     prose,
     section,
+    template,
     tile,
-    whole_page,
 )
 from wakewise.ui.reports.references import limits_section, yardstick_html
 from wakewise.ui.reports.scene3d import vehicle_of
-from wakewise.ui.reports.text import grouped, number, shown, unit, verdict
+from wakewise.ui.reports.text import NONE, capitalised, grouped, number, shown, unit, verdict
 from wakewise.ui.reports.trial import Trial, read_trial
 from wakewise.vision.evaluation.cloud_to_surface import SUCCESS_COMPLETENESS_PCT, SUCCESS_RMSE_MM
 
 
 def trim_html(trial: Trial) -> str:
-    """A sentence, or nothing where the hover says nothing or there is nothing to change."""
+    """Proposed change of the ballast; empty if the hover shows none."""
     if trial.settings is None or trial.steps is None:
         return ""
     try:
-        said = ballast_proposal(trial.settings.parts().vehicle, trial.steps)
+        proposal = ballast_proposal(trial.settings.parts().vehicle, trial.steps)
     except InputError:  # the vehicle was given in Python
         return ""
-    return "" if said is None else f"<p>Before the next flight: {escape(said)}.</p>"
+    return "" if proposal is None else str(template("trial.html").flown_trim(proposal))
 
 
 PARTS = (
@@ -57,26 +57,15 @@ PARTS = (
 
 
 def begin_report(trial: Path, draft: PageParts, missing: str) -> None:
-    """Make the parts of a report that can be made before its folder is whole.
+    """Make the parts of a report that can be made before its folder is complete, and keep them in `draft`.
 
-    Parameters
-    ----------
-    trial : Path
-    draft : PageParts
-        Takes them; give it to `write_report` then.
-    missing : {"mesh", "colours"}
-        What is still being made: the mesh and its colours, or the colours alone.
-
-    Raises
-    ------
-    InputError
-        As `write_report`.
+    `missing` says what is still being made: "mesh" (mesh and colours) or "colours". Raises as `write_report`.
     """
     read = read_trial(trial)
     _seen_photographs(read, draft)
     coverage_html(read, draft)
-    _flown(read, draft)
-    _water(read, draft)
+    draft.once("flown", lambda: _flown(read))
+    draft.once("water", lambda: _water(read))
     before_mesh(read, draft)
     if missing == "colours":
         before_colours(read, draft)
@@ -103,65 +92,64 @@ def report_page(trial: Trial, draft: PageParts | None = None) -> str:
     """HTML of the whole report; `draft` holds the parts that are made already."""
     draft = draft or PageParts()
     calm = yardstick_html(trial)
-    parts = [part for part in PARTS if calm or part[0] != "yardstick"]
-    links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in parts)
-    body = (
-        f'<header class="top">{_headline(trial)}</header><nav class="parts" aria-label="parts"><div>{links}</div></nav>'
-        f"<main>{calm}{model_section(trial, draft)}{_flown(trial, draft)}{_seen(trial, draft)}"
-        f"{_water(trial, draft)}{limits_section({trial.name: trial})}{_figures(trial)}{_again(trial)}</main>"
-        f"<footer>{_footer(trial)}</footer>"
+    sections = (
+        calm,
+        model_section(trial, draft),
+        draft.once("flown", lambda: _flown(trial)),
+        _seen(trial, draft),
+        draft.once("water", lambda: _water(trial)),
+        limits_section({trial.name: trial}),
+        _figures(trial),
+        _again(trial),
     )
-    return whole_page(f"{trial.name} · Wakewise", body)
+    links = [part for part in PARTS if calm or part[0] != "yardstick"]
+    return framed_page(f"{trial.name} · Wakewise", _header(trial), links, sections, _footer(trial))
 
 
-def _headline(trial: Trial) -> str:
-    said = verdict(trial, named=True)
-    state = {True: "good", False: "bad", None: ""}[said.good]
-    reasons = "".join(f'<p class="why">{prose(line)}</p>' for line in said.reasons)
+def _header(trial: Trial) -> str:
+    found = verdict(trial, named=True)
     facts = [("trial", trial.name), ("method", trial.method), ("seed", trial.seed)]
     facts += [(key, str(trial.scenario[key])) for key in ("vehicle",) if trial.scenario.get(key)]
-    eyebrow = "".join(f"<span>{name} <b>{escape(value)}</b></span>" for name, value in facts)
-    foreign = f'<p class="outside">{escape(_capital(trial.outside))}.</p>' if trial.outside else ""
-    return (
-        f'<p class="eyebrow">{eyebrow}</p><h1 class="{state}"><span class="mark"></span>{escape(said.headline)}</h1>'
-        f'{foreign}{reasons}<dl class="tiles">{_tiles(trial)}</dl>'
+    return str(
+        parts().header(
+            facts,
+            found.headline,
+            {True: "good", False: "bad", None: ""}[found.good],
+            [prose(line) for line in found.reasons],
+            [Markup(one) for one in _tiles(trial)],
+            outside=capitalised(trial.outside),
+        )
     )
 
 
-def _tiles(trial: Trial) -> str:
+def _tiles(trial: Trial) -> list[str]:
     metrics = trial.metrics
 
     def one(name: str, key: str, unit_name: str, note: str, scale: float = 1.0, ok: bool | None = None) -> str:
         value = metrics.number(key)
         if value is None:
-            return tile(name, "–", "", _short(metrics.why.get(key, "not recorded")))
+            return tile(name, NONE, "", _short(metrics.why.get(key, "not recorded")))
         state = "" if ok is None else "ok" if ok else "off"
         return tile(name, number(scale * value), unit_name, note, state)
 
     rmse, covered = metrics.number("rmse_mm"), metrics.number("completeness_pct")
     registered, images = metrics.number("registered_images"), metrics.number("images")
-    photos = tile("photographs placed", "–", "", _short(metrics.why.get("registered_images", "not recorded")))
+    photos = tile("photographs placed", NONE, "", _short(metrics.why.get("registered_images", "not recorded")))
     if registered is not None:
         of = "" if images is None else f"of {images:.0f}"
         photos = tile("photographs placed", f"{registered:.0f}", of, "registered in the model")
-    during = metrics.number("exposure_speed_mean_m_s")
-    return (
-        one(
-            "RMSE", "rmse_mm", "mm", f"limit {SUCCESS_RMSE_MM:g} mm",
-            ok=None if rmse is None else rmse < SUCCESS_RMSE_MM,
-        )
-        + one(
-            "surface within 3 mm", "completeness_pct", "%", f"limit {SUCCESS_COMPLETENESS_PCT:g} %",
-            ok=None if covered is None else covered > SUCCESS_COMPLETENESS_PCT,
-        )
-        + photos
-        + one(
-            "water at the target", "target_speed_mean_m_s", "mm/s",
-            "wash, mean" if during is None else f"wash, mean; {number(1e3 * during)} while exposing", scale=1e3,
-        )
-        + one("position error", "position_rmse_mm", "mm", "rms, from where it was wished to be")
-        + one("flight", "duration_s", "s", _energy(trial))
-    )  # fmt: skip
+    during, energy = metrics.number("exposure_speed_mean_m_s"), metrics.number("energy_kJ")
+    wash = "wash, mean" if during is None else f"wash, mean; {number(1e3 * during)} while exposing"
+    fine = None if rmse is None else rmse < SUCCESS_RMSE_MM
+    whole = None if covered is None else covered > SUCCESS_COMPLETENESS_PCT
+    return [
+        one("RMSE", "rmse_mm", "mm", f"limit {SUCCESS_RMSE_MM:g} mm", ok=fine),
+        one("surface within 3 mm", "completeness_pct", "%", f"limit {SUCCESS_COMPLETENESS_PCT:g} %", ok=whole),
+        photos,
+        one("water at the target", "target_speed_mean_m_s", "mm/s", wash, scale=1e3),
+        one("position error", "position_rmse_mm", "mm", "rms, from the reference"),
+        one("flight", "duration_s", "s", "duration" if energy is None else f"{number(energy)} kJ in the thrusters"),
+    ]
 
 
 def _short(why: str) -> str:
@@ -169,31 +157,14 @@ def _short(why: str) -> str:
     return "no model" if why.startswith("no model") else why
 
 
-def _capital(words: str) -> str:
-    return words[:1].upper() + words[1:]
-
-
-def _energy(trial: Trial) -> str:
-    energy = trial.metrics.number("energy_kJ")
-    return "duration" if energy is None else f"{number(energy)} kJ in the thrusters"
-
-
-def _flown(trial: Trial, draft: PageParts) -> str:
-    return draft.once("flown", lambda: _flown_section(trial))
-
-
-def _flown_section(trial: Trial) -> str:
+def _flown(trial: Trial) -> str:
     legs = [name for name, _, _ in figures.legs(trial)]
     orbits = len({name for name in legs if name.startswith("orbit")})
     duration = trial.metrics.number("duration_s")
     lead = "The path that the vehicle really took and the photographs where they were really taken."
     if orbits:
-        lead = (
-            (f"{orbits} orbits" if orbits > 1 else "One orbit")
-            + ("" if duration is None else f" in {number(duration)} s")
-            + ". "
-            + lead
-        )
+        within = "" if duration is None else f" in {number(duration)} s"
+        lead = f"{f'{orbits} orbits' if orbits > 1 else 'One orbit'}{within}. {lead}"
     return section(
         "flown",
         "What was flown",
@@ -226,11 +197,7 @@ def _seen(trial: Trial, draft: PageParts) -> str:
     if not trial.photographs:
         gap = missing("the photographs", missing_text(trial, "images.csv"))
         return section("seen", "What was seen", "No photographs are on record.", gap)
-    lead = (
-        f"{len(trial.photographs)} photographs in the order they were taken"
-        '<span class="on-screen">; a click enlarges</span>. Sharpness is that of the target as it '
-        "appears in the picture (variance of the Laplacian), so compare it between photographs of the same orbit."
-    )
+    lead = str(template("trial.html").seen_lead(len(trial.photographs)))
     return section(
         "seen",
         "What was seen",
@@ -239,11 +206,7 @@ def _seen(trial: Trial, draft: PageParts) -> str:
     )
 
 
-def _water(trial: Trial, draft: PageParts) -> str:
-    return draft.once("water", lambda: _water_section(trial))
-
-
-def _water_section(trial: Trial) -> str:
+def _water(trial: Trial) -> str:
     gap = missing_text(trial, "steps.parquet")
     exposures = len(figures.exposure_times(trial))
     vehicle = vehicle_of(trial)
@@ -278,33 +241,27 @@ def _figures(trial: Trial) -> str:
         gap = missing("the figures", missing_text(trial, "metrics.json"))
         return section("figures", "The figures", "No figures are on record.", gap)
     tables = []
-    told: set[str] = set()
+    given: set[str] = set()
     for group, keys in grouped(metrics).items():
-        rows = "".join(_row(trial, key, told) for key in keys)
-        table = (
-            '<table class="figures"><colgroup><col class="key"><col class="val"><col class="unit"><col></colgroup>'
-            '<thead><tr><th>key</th><th class="num">value</th><th>unit</th><th>definition</th></tr></thead>'
-            f"<tbody>{rows}</tbody></table>"
-        )
+        rows = [_row(trial, key, given) for key in keys]
+        heads, columns = ("key", "value", "unit", "definition"), ("key", "val", "unit", "")
+        table = parts().table("knum", heads, rows, "figures", columns, wide=False)
         tables.append(collapsible_section(group, table, f"{len(keys)} figures"))
     lead = "Everything in metrics.json. A figure that could not be computed says why."
     return section("figures", "The figures", lead, "".join(tables))
 
 
-def _row(trial: Trial, key: str, told: set[str]) -> str:
-    """One figure; `told` are the reasons that the rows above have given, which are not given again."""
+def _row(trial: Trial, key: str, given: set[str]) -> tuple[str, ...]:
+    """Cells of one figure; `given` are the reasons of the rows above, which are not repeated."""
     metrics = trial.metrics
-    value, text = metrics.values[key], prose(str(metrics.definitions.get(key, "")))
-    cell = '<span class="null">–</span>' if value is None else escape(shown(value))
+    value, reason = metrics.values[key], ""
     if value is None:
         why = str(metrics.why.get(key, "no reason was given"))
-        said = "not computed, for the reason above" if why in told else f"not computed: {why}"
-        told.add(why)
-        text = f'{text}{"<br>" if text else ""}<span class="why-null">{prose(said)}</span>'
-    return (
-        f'<tr><td class="key">{escape(key)}</td><td class="num">{cell}</td><td class="unit">'
-        f'{escape(unit(metrics, key))}</td><td class="text">{text}</td></tr>'
-    )
+        reason = "not computed, for the reason above" if why in given else f"not computed: {why}"
+        given.add(why)
+    macros = template("trial.html")
+    text = macros.definition(str(metrics.definitions.get(key, "")), reason)
+    return key, macros.dash() if value is None else shown(value), unit(metrics, key), text
 
 
 def _again(trial: Trial) -> str:
@@ -324,24 +281,14 @@ def _again(trial: Trial) -> str:
             "file has every other setting; the same seed and parts give the same flight."
         )
     facts = [("seed", trial.seed), ("method", trial.method), ("versions", ", ".join(known) or "not recorded")]
-    listed = "".join(f"<dt>{name}</dt><dd>{escape(value)}</dd>" for name, value in facts)
-    scenario = missing("the scenario", missing_text(trial, "scenario.yaml"))
-    if trial.scenario_text:
-        scenario = (
-            f"<details><summary>scenario.yaml, everything resolved</summary><pre>{escape(trial.scenario_text)}</pre>"
-            "</details>"
-        )
-    gaps = "".join(f"<li><code>{escape(name)}</code> {escape(why)}</li>" for name, why in trial.missing.items())
-    note = f"<h3>Parts that this report had to do without</h3><ul>{gaps}</ul>" if gaps else ""
-    return section(
-        "again",
-        "How to reproduce it",
-        how,
-        f'<pre class="command">{escape(command)}</pre><dl class="facts">{listed}</dl>{scenario}{note}',
-    )
+    content = str(template("trial.html").again(command, facts, trial.scenario_text))
+    if not trial.scenario_text:
+        content += missing("the scenario", missing_text(trial, "scenario.yaml"))
+    if trial.missing:
+        content += str(template("trial.html").gaps(trial.missing.items()))
+    return section("again", "How to reproduce it", how, content)
 
 
 def _footer(trial: Trial) -> str:
-    simulated = "tank" in trial.scenario
-    said = "Vehicle, water and photographs of this trial are simulated. " if simulated else ""
-    return f"{said}World axes are north, east, down; heights in pictures are above the bed. Made by Wakewise."
+    origin = "Vehicle, water and photographs of this trial are simulated. " if "tank" in trial.scenario else ""
+    return f"{origin}World axes are north, east, down; heights in pictures are above the bed. Made by Wakewise."

@@ -96,9 +96,14 @@ def _reasons(trial: Trial, rmse: float | None, covered: float | None) -> list[st
     return [" ".join(lines)] if lines else []
 
 
+def capitalised(text: str) -> str:
+    """Text with a capital first letter; the other letters stay."""
+    return text[:1].upper() + text[1:]
+
+
 def _sentence(text: str) -> str:
     text = text.strip()
-    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+    return capitalised(text) + ("" if text.endswith((".", "!", "?")) else ".")
 
 
 def number(value: float | None, digits: int = 3, scale: float = 1.0) -> str:
