@@ -44,10 +44,7 @@ _quiet_decoders = _Quiet()
 def decode_picture(data: bytes, name: str, flags: int = COLOUR) -> NDArray[Any] | None:
     """A picture of bytes as OpenCV has it, blue first, rows down; None for what is none.
 
-    Raises
-    ------
-    InputError
-        If it has more pixels than are allowed; `name` says which it is.
+    Raises InputError if it has more pixels than are allowed; `name` says which it is.
     """
     if not check_picture(data, name):
         return None
@@ -61,10 +58,7 @@ def decode_picture(data: bytes, name: str, flags: int = COLOUR) -> NDArray[Any] 
 def read_picture(path: Path, flags: int = COLOUR) -> NDArray[Any] | None:
     """A picture of a file, as `decode_picture`; None where there is no file that can be read, too.
 
-    Raises
-    ------
-    InputError
-        If it has more pixels than are allowed.
+    Raises InputError if it has more pixels than are allowed.
     """
     try:
         data = path.read_bytes()

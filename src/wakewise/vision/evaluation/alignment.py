@@ -36,14 +36,8 @@ def umeyama(points_B: Array, points_A: Array, with_scale: bool = True) -> Simila
     Source: S. Umeyama, Least-squares estimation of transformation parameters between two point patterns,
     IEEE TPAMI 13(4), 1991, doi 10.1109/34.88573, eqs. 38-42.
 
-    Parameters
-    ----------
-    points_B, points_A : ndarray, shape (n, 3), n >= 3, row i of one belongs to row i of the other.
-
-    Raises
-    ------
-    InputError
-        If the shapes differ, there are fewer than 3 pairs, or the points lie on one line (the turn about it is open).
+    `points_B`, `points_A` have shape (n, 3), n >= 3. Raises InputError if the shapes differ, there are fewer than 3
+    pairs, or the points lie on one line (the turn about it is open).
     """
     B, A = np.asarray(points_B, dtype=np.float64), np.asarray(points_A, dtype=np.float64)
     if B.shape != A.shape or B.ndim != 2 or B.shape[1] != 3 or len(B) < 3:
@@ -71,10 +65,7 @@ def robust_similarity(
     squares over the pairs whose error is below what 999 in 1000 normally distributed ones keep to, the spread being
     told by the median: no threshold in metres has to be known.
 
-    Returns
-    -------
-    similarity : Similarity
-    inliers : ndarray of bool, shape (n,)
+    Returns `similarity`; `inliers`, shape (n,).
     """
     n = len(points_B)
     fit = umeyama(points_B, points_A, with_scale)
@@ -156,23 +147,11 @@ def refine_icp(
     Y. Chen and G. Medioni, Object modelling by registration of multiple range images, Image and Vision Computing
     10(3), 1992, doi 10.1016/0262-8856(92)90066-C. Scale is left alone: a model of the wrong size must stay wrong.
 
-    Parameters
-    ----------
-    cloud_m : ndarray, shape (n, 3)
-    surface_m, normals : ndarray, shape (k, 3)
-        Samples of the true surface and their unit normals.
-    distances_m : tuple
-        Largest distance of a match in each round.
-    limit_m : float
-        Largest mean displacement that counts as a refinement.
-    least_matched_pct : float
-        Share of the cloud that must lie within the last distance in the end.
-
-    Raises
-    ------
-    StageError
-        If too few points match or the cloud would move farther than `limit_m`: the alignment before it was wrong, or
-        this is no model of that surface.
+    `cloud_m` has shape (n, 3). `surface_m`, `normals`, shape (k, 3): samples of the true surface and their unit
+    normals. `distances_m`: largest distance of a match in each round. `limit_m`: largest mean displacement that counts
+    as a refinement. `least_matched_pct`: share of the cloud that must lie within the last distance in the end. Raises
+    StageError if too few points match or the cloud would move farther than `limit_m`: the alignment before it was
+    wrong, or this is no model of that surface.
     """
     need("registration (ICP)", "photos", only=("small_gicp",))
     import small_gicp

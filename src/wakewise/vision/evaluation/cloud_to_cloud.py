@@ -101,20 +101,9 @@ def compare_clouds(
     Both are thinned to one mean point per cell of half the smallest threshold, or of the reference's spacing where that
     is wider, so that dense spots do not rule.
 
-    Parameters
-    ----------
-    cloud_W_m, reference_W_m : ndarray, shape (n, 3)
-    thresholds_mm : tuple of float
-    bed_z_m : float, optional
-        Height of the bed, world z down; what is near it does not count in either.
-
-    Raises
-    ------
-    InputError
-        If too little of the reference counts.
-    StageError
-        If too little of the model lies near it, its scale is suspicious, or ICP says that the two do not belong
-        together.
+    `cloud_W_m`, `reference_W_m` have shape (n, 3). `bed_z_m`: height of the bed, world z down; what is near it does not
+    count in either. Raises InputError if too little of the reference counts; StageError if too little of the model lies
+    near it, its scale is suspicious, or ICP says that the two do not belong together.
     """
     whole = extent_m(reference_W_m)
     suspicion = suspicious_extent(cloud_W_m, reference_W_m)

@@ -68,10 +68,7 @@ def shares(to_truth_mm: Array, to_model_mm: Array, thresholds_mm: tuple[float, .
 def read_thresholds(words: str | None, extent_mm: float) -> tuple[float, ...]:
     """Thresholds in mm from `0.5,1` (mm) or `0.5%,1%` (of the extent); by the object's size if none are given.
 
-    Raises
-    ------
-    InputError
-        If one is no number above 0.
+    Raises InputError if one is no number above 0.
     """
     parts = [f"{share}%" for share in RELATIVE_PCT] if words is None else [part.strip() for part in words.split(",")]
     out = []
@@ -183,10 +180,7 @@ class SurfaceSamples:
 def sample_surface(mesh: MeshArrays, crop: Crop, rng: np.random.Generator, samples: int = SAMPLES) -> SurfaceSamples:
     """Sample the truth evenly by area, then drop what does not count.
 
-    Raises
-    ------
-    InputError
-        If the mesh has no area or nothing of it counts.
+    Raises InputError if the mesh has no area or nothing of it counts.
     """
     corners = np.asarray(mesh.vertices_m, dtype=np.float64)[np.asarray(mesh.faces)]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -212,14 +206,9 @@ def count_views(
 ) -> IntArray:
     """How many cameras saw each sample: nothing of the mesh in between, and not at a grazing angle.
 
-    Parameters
-    ----------
-    centres_W_m : ndarray, shape (k, 3)
-        True camera centres; every camera is taken to look at the target.
-    min_cosine : float
-        Smallest cosine between the outward normal and the way to the camera (0.2 is 78 degrees).
-    enough : int, optional
-        Stop looking for more cameras where so many are found, which is most of the work.
+    `centres_W_m`, shape (k, 3): true camera centres; every camera is taken to look at the target. `min_cosine`:
+    smallest cosine between the outward normal and the way to the camera (0.2 is 78 degrees). `enough`: stop looking for
+    more cameras where so many are found, which is most of the work.
     """
     need("the share of a surface that cameras see", "photos", only=("embreex",))
     from embreex import rtcore_scene
@@ -294,34 +283,15 @@ def compare_surface(
 ) -> SurfaceComparison:
     """Score a cloud against a true mesh; `SurfaceScore` defines every figure.
 
-    Parameters
-    ----------
-    cloud_W_m : ndarray, shape (n, 3)
-        The model's points, already in the frame and scale of the truth (from camera positions).
-    crop : Crop
-        What counts; the default keeps the truth's box and 20 mm around it.
-    camera_centres_W_m : ndarray, shape (k, 3), optional
-        Where the photographs were taken from, for the figures over the visible surface.
-    icp : bool
-        Take out what is left of the misalignment with rigid ICP (no scale) before measuring.
-    voxel_m : float
-        The cloud is thinned to one mean point per cell of this size first.
-    rng : Generator, optional
-        Draws the samples of the truth; without one they are the same at every call.
-    samples : int
-        How many are drawn.
-    thresholds_mm : tuple of float
-        At which shares are wanted besides those of the score.
-    distance : MeshDistance, optional
-        That of this mesh, where it is there already.
-
-    Raises
-    ------
-    InputError
-        If the mesh is empty or nothing of it counts.
-    StageError
-        If too little of the cloud lies near the truth to say anything, its scale is suspicious, or ICP says that the
-        two do not belong together.
+    `cloud_W_m`, shape (n, 3): the model's points, already in the frame and scale of the truth (from camera positions).
+    `crop`: what counts; the default keeps the truth's box and 20 mm around it. `camera_centres_W_m`, shape (k, 3):
+    where the photographs were taken from, for the figures over the visible surface. `icp`: take out what is left of the
+    misalignment with rigid ICP (no scale) before measuring. `voxel_m`: the cloud is thinned to one mean point per cell
+    of this size first. `rng`: draws the samples of the truth; without one they are the same at every call. `samples`:
+    how many are drawn. `thresholds_mm`: at which shares are wanted besides those of the score. `distance`: that of this
+    mesh, where it is there already. Raises InputError if the mesh is empty or nothing of it counts; StageError if too
+    little of the cloud lies near the truth to say anything, its scale is suspicious, or ICP says that the two do not
+    belong together.
     """
     icp = boolean(icp, "icp")
     suspicion = suspicious_scale(cloud_W_m, mesh)
@@ -434,12 +404,7 @@ def area_and_volume(mesh: MeshArrays, crop: Crop) -> tuple[float, float]:
     divergence is 1 and the flux through the cut is zero, so a mesh that is open there needs no lid. A mesh that is
     closed is cut likewise. Faces are counter-clockwise seen from outside; without a bed z0 is the lowest corner.
 
-    Parameters
-    ----------
-    mesh : MeshArrays
-        In the world, z down.
-    crop : Crop
-        Its bed says what counts; its box does not cut.
+    `mesh`: in the world, z down. `crop`: its bed says what counts; its box does not cut.
     """
     corners = mesh.vertices_m[mesh.faces]
     if crop.bed_z_m is None:

@@ -71,17 +71,9 @@ DEPTH_DEFINITIONS: dict[str, tuple[str, str]] = {
 def read_depth_views(depths: Path, cameras: Path) -> list[DepthView]:
     """Depth maps of an .npz file and the cameras of a folder, in order of name.
 
-    Parameters
-    ----------
-    depths : Path
-        Holds `depth`, shape (n, h, w), m along the optical axis, 0 where unknown: the middle of each w/W by h/H block.
-    cameras : Path
-        Folder of n `.camera` files (C. Strecha et al., CVPR 2008, doi 10.1109/CVPR.2008.4587706).
-
-    Raises
-    ------
-    InputError
-        If a file is missing or does not hold this.
+    `depths`: holds `depth`, shape (n, h, w), m along the optical axis, 0 where unknown: the middle of each w/W by h/H
+    block. `cameras`: folder of n `.camera` files (C. Strecha et al., CVPR 2008, doi 10.1109/CVPR.2008.4587706). Raises
+    InputError if a file is missing or does not hold this.
     """
     if not depths.is_file():
         raise InputError(f"{depths}: does not exist; an .npz file with an array depth (n, h, w) is needed")
@@ -134,18 +126,8 @@ def true_points(view: DepthView) -> tuple[Array, Array]:
 def compare_depths(cloud_W_m: Array, views: list[DepthView], cap_m: float = 0.1) -> DepthScore:
     """Score a cloud in the cameras' frame against depth maps.
 
-    Parameters
-    ----------
-    cloud_W_m : ndarray, shape (n, 3)
-    cap_m : float
-        Points farther than this from any true point are not compared.
-
-    Raises
-    ------
-    InputError
-        If the depth maps hold no surface.
-    StageError
-        If nothing of the cloud is near it.
+    `cloud_W_m` has shape (n, 3). `cap_m`: points farther than this from any true point are not compared. Raises
+    InputError if the depth maps hold no surface; StageError if nothing of the cloud is near it.
     """
     parts = [true_points(view) for view in views]
     points, normals = (np.concatenate(column) for column in zip(*parts, strict=True))

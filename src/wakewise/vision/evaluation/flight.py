@@ -128,10 +128,7 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
     Of a target that yields: sway_rms_mm, sway_wash_mm, sway_mean_mm, sway_about_mean_mm (see `sway_figures`),
     sway_peak_mm and target_stress_peak_Pa, the largest at any time, and shifted_mm, how far it has slid in the end.
 
-    Raises
-    ------
-    InputError
-        If the table has no rows or no time.
+    Raises InputError if the table has no rows or no time.
     """
     if "time_s" not in steps.columns or steps.height == 0:
         raise InputError(

@@ -102,10 +102,7 @@ def lpips_distance() -> tuple[Distance | None, str | None]:
 def read_split(path: Path) -> tuple[str, ...]:
     """Names of the held-out photographs that an `export.json` lists.
 
-    Raises
-    ------
-    InputError
-        If the file is none of an export, or holds no photograph out.
+    Raises InputError if the file is none of an export, or holds no photograph out.
     """
     try:
         names = json.loads(path.read_text(encoding="utf-8"))["split"]["held_out"]
@@ -121,10 +118,8 @@ def score_views(renders: Path, photos: Path, names: Sequence[str] | None = None)
 
     `names` are the photographs that must have a view, such as the held-out ones; all that have one if not given.
 
-    Raises
-    ------
-    InputError
-        If a folder or a view is missing, a picture cannot be read, or a view has another size than its photograph.
+    Raises InputError if a folder or a view is missing, a picture cannot be read, or a view has another size than its
+    photograph.
     """
     views, pictures = _pictures(renders), _pictures(photos)
     wanted = sorted(views.keys() & pictures.keys()) if names is None else [Path(name).stem for name in names]

@@ -100,10 +100,7 @@ class GaussianSplats:
 def read_splats(path: Path) -> GaussianSplats | None:
     """Gaussian splats of a PLY file; None if it is another file, such as a cloud or a mesh.
 
-    Raises
-    ------
-    InputError
-        If it holds splats that are damaged.
+    Raises InputError if it holds splats that are damaged.
     """
     if path.suffix.lower() != ".ply" or not path.is_file() or broken_ply(path) is not None:
         return None
@@ -140,10 +137,7 @@ def nerfstudio_frame(dataparser: Path | None) -> Similarity:
     nerfstudio turns, moves and scales the world before training, x' = s (T x + t), and writes s and (T, t) into the
     run's dataparser_transforms.json. Without that file the model is taken to be in the axes of the export.
 
-    Raises
-    ------
-    InputError
-        If the file is none of nerfstudio's.
+    Raises InputError if the file is none of nerfstudio's.
     """
     if dataparser is None:
         return Similarity(scale=1.0, R_AB=_Z_UP, t_A_m=np.zeros(3))

@@ -92,12 +92,9 @@ def meet(
 ) -> tuple[float, int, int, float, float]:  # fmt: skip
     """Where a ray from (ox, oy, oz) along (dx, dy, dz) first comes down through the surface.
 
-    Returns
-    -------
-    (t, i, j, u, v)
-        Distance in lengths of the direction, infinite if the surface is not met before `most`; the cell, and the place
-        in it along x and y, 0 to 1 each. From below the surface, at its start or where it
-        comes in from the side, a ray meets nothing.
+    Returns (t, i, j, u, v): distance in lengths of the direction, infinite if the surface is not met before `most`; the
+    cell, and the place in it along x and y, 0 to 1 each. From below the surface, at its start or where it comes in from
+    the side, a ray meets nothing.
     """
     cells = lines.shape[0] - 1
     ix = 1.0 / dx if dx != 0.0 else np.inf

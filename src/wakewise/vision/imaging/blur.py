@@ -86,22 +86,10 @@ def motion_blur(
 ) -> Image:
     """Average the frames of an exposure, each warped from the one at its middle.
 
-    Parameters
-    ----------
-    image : ndarray, shape (h, w, 3)
-        Linear radiance from `pose_at(poses, 0.5)`.
-    depth_m : ndarray, shape (h, w)
-        Depth along the optical axis, infinite where nothing is seen.
-    camera : Camera
-    poses : sequence of Pose
-        X_WC evenly spaced over the exposure and the readout, the first and last at its ends.
-    shutter : Shutter
-        Which part of that time each row sees.
-
-    Returns
-    -------
-    ndarray, shape (h, w, 3)
-        `image` itself if nothing moves by more than 0.02 px.
+    `image`, shape (h, w, 3): linear radiance from `pose_at(poses, 0.5)`. `depth_m`, shape (h, w): depth along the
+    optical axis, infinite where nothing is seen. `poses`: X_WC evenly spaced over the exposure and the readout, the
+    first and last at its ends. `shutter`: which part of that time each row sees. Returns shape (h, w, 3):
+    `image` itself if nothing moves by more than 0.02 px.
     """
     # The 0.1 % nearest pixels may move a little farther per frame than STEP_PX.
     near = float(np.quantile(depth_m[::8, ::8], 0.001))

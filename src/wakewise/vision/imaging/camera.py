@@ -49,14 +49,9 @@ def lens_row(
 ) -> Array:
     """Numbers that the kernels read, shape (14,).
 
-    Parameters
-    ----------
-    focal_px : float
-        Of the lens, in air where there is a port.
-    centre_px : (cx, cy)
-    distortion : (k1, k2, p1, p2)
-    port : (air_m, glass_m, glass index, water index), optional
-        Gap of air between pupil and glass, thickness of the glass, refractive indices relative to air.
+    `focal_px`: of the lens, in air where there is a port. `centre_px` is (cx, cy). `distortion` is (k1, k2, p1, p2).
+    `port`, (air_m, glass_m, glass index, water index): gap of air between pupil and glass, thickness of the glass,
+    refractive indices relative to air.
     """
     kind = PORT if port is not None else DISTORTED if any(distortion) else IDEAL
     air, glass, n_glass, n_water = port if port is not None else (0.0, 0.0, 1.0, 1.0)
@@ -229,17 +224,8 @@ def _check_size(width: int, height: int, fov_rad: float) -> None:
 class PinholeCamera:
     """Square pixels, principal point in the middle of the image; pixel centres at +0.5 as COLMAP has them.
 
-    Parameters
-    ----------
-    width, height : int
-        Image size in pixels.
-    fov_rad : float
-        Horizontal field of view (in water), between 0 and pi.
-
-    Raises
-    ------
-    InputError
-        If a size is below 1 or the field of view is outside (0, pi).
+    `width`, `height`: image size in pixels. `fov_rad`: horizontal field of view (in water), between 0 and pi. Raises
+    InputError if a size is below 1 or the field of view is outside (0, pi).
     """
 
     width: int
@@ -285,15 +271,9 @@ class PinholeCamera:
 class FlatPort:
     """A pane at right angles to the optical axis, air behind it and water before it.
 
-    Parameters
-    ----------
-    air_m : float
-        From the lens's entrance pupil to the pane.
-    glass_m : float
-        Thickness of the pane.
-    glass_index, water_index : float
-        Refractive indices relative to air: 1.49 for acrylic, 1.333 for water (589 nm, 20 C; Hale & Querry 1973,
-        doi 10.1364/AO.12.000555).
+    `air_m`: from the lens's entrance pupil to the pane. `glass_m`: thickness of the pane. `glass_index`, `water_index`:
+    refractive indices relative to air: 1.49 for acrylic, 1.333 for water (589 nm, 20 C; Hale & Querry 1973, doi
+    10.1364/AO.12.000555).
     """
 
     air_m: float = 0.02
@@ -314,21 +294,11 @@ class FlatPort:
 class LensCamera:
     """A lens with OpenCV's distortion, in the water itself or in air behind a flat port.
 
-    Parameters
-    ----------
-    width, height : int
-        Image size in pixels; the principal point is in the middle.
-    fov_rad : float
-        Field of view in water between the middles of the left and the right edge, radial distortion included.
-    distortion : (k1, k2, p1, p2)
-        OpenCV's, of the lens in the medium that it stands in.
-    port : FlatPort, optional
-
-    Raises
-    ------
-    InputError
-        If a size or angle is out of range, the distortion folds the image over, or a flat port cannot show that much:
-        from air, no more than 2 asin(1 / 1.333) = 97 degrees of the water can be seen.
+    `width`, `height`: image size in pixels; the principal point is in the middle. `fov_rad`: field of view in water
+    between the middles of the left and the right edge, radial distortion included. `distortion`, (k1, k2, p1, p2):
+    OpenCV's, of the lens in the medium that it stands in. Raises InputError if a size or angle is out of range, the
+    distortion folds the image over, or a flat port cannot show that much: from air, no more than 2 asin(1 / 1.333) = 97
+    degrees of the water can be seen.
     """
 
     width: int

@@ -62,11 +62,8 @@ class LedPanels:
     ) -> NDArray[np.float64]:
         """Irradiance at points of surfaces with unit normals, relative to pi times the panels' radiance, shape (n,).
 
-        Parameters
-        ----------
-        points_W_m, normals : ndarray, shape (n, 3)
-        occluder : EmbreeScene, optional
-            What casts shadows, in a frame with the world's axes and the origin `origin_W_m`.
+        `points_W_m`, `normals` have shape (n, 3). `occluder`: what casts shadows, in a frame with the world's axes and
+        the origin `origin_W_m`.
         """
         n = len(points_W_m)
         total = np.zeros(n)
@@ -139,15 +136,8 @@ def bake_light(
     Each is 1 on a level open surface at the foot. What bed and target throw back is the same share of either. The bed
     has one side that is seen, column 0.
 
-    Parameters
-    ----------
-    parts : vertices (m) and faces of target, bed and stones, in the scene's frame
-    normals : their unit vertex normals
-    near_m : float
-        Bed vertices farther than this from the foot are taken as unshaded.
-    panels : LedPanels
-    foot_W_m : ndarray, shape (3,)
-        Origin of the scene's frame in the world.
+    `near_m`: bed vertices farther than this from the foot are taken as unshaded. `foot_W_m`, shape (3,): origin of the
+    scene's frame in the world.
     """
     occluder = EmbreeScene()
     for vertices, faces in (parts[0], parts[2]):

@@ -45,12 +45,8 @@ def lobe_rad(diameter_m: float) -> float:
 def mean_square_lever(ranges_m: Array, silt_tau: Image, length_m: Image) -> Image:
     """Mean of (1 - s)^2 over the grains on rays of lengths (h', w'), s their share of the way; 1/3 if they are even.
 
-    Parameters
-    ----------
-    ranges_m : ndarray, shape (k,)
-    silt_tau : ndarray, shape (h' + 1, w' + 1, k) or larger
-        Optical depth from the camera up to each range.
-    length_m : ndarray, shape (h', w')
+    `ranges_m` has shape (k,). `silt_tau`, shape (h' + 1, w' + 1, k): optical depth from the camera up to each range.
+    `length_m` has shape (h', w').
     """
     tau = silt_tau[: length_m.shape[0], : length_m.shape[1]].astype(np.float64)
     steps = np.diff(ranges_m)
@@ -73,21 +69,10 @@ def mean_square_lever(ranges_m: Array, silt_tau: Image, length_m: Image) -> Imag
 def forward_scattered(signal: Image, tau: Image, lever: Image, lobe_px: float) -> Image:
     """What diffraction adds to a signal that has come through grains.
 
-    Parameters
-    ----------
-    signal : ndarray, shape (h, w, 3)
-        What arrives straight, attenuated by exp(-tau).
-    tau : ndarray, shape (h, w)
-        The grains' optical depth of each pixel's ray.
-    lever : ndarray, shape (h', w')
-        See `mean_square_lever`; stretched over the image.
-    lobe_px : float
-        Standard deviation of one turn near the camera, in pixels.
-
-    Returns
-    -------
-    ndarray, shape (h, w, 3)
-        Its sum is that of signal times (exp(tau / 2) - 1): what leaves one pixel arrives at others.
+    `signal`, shape (h, w, 3): what arrives straight, attenuated by exp(-tau). `tau`, shape (h, w): the grains' optical
+    depth of each pixel's ray. `lever`, shape (h', w'): see `mean_square_lever`; stretched over the image. `lobe_px`:
+    standard deviation of one turn near the camera, in pixels. Returns shape (h, w, 3): its sum is that of
+    signal times (exp(tau / 2) - 1): what leaves one pixel arrives at others.
     """
     h, w = tau.shape
     # No pixel's light is spread wider than the thickest water before the lens would.

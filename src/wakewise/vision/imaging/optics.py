@@ -107,10 +107,7 @@ def water_types() -> list[str]:
 def water_optics(water_type: str) -> WaterOptics:
     """Optics of a Jerlov water type, oceanic I, IB, II, III or coastal 1C, 3C, 5C.
 
-    Raises
-    ------
-    InputError
-        If the type is unknown.
+    Raises InputError if the type is unknown.
     """
     if water_type not in _TABLE:
         raise InputError(f"water type {water_type!r}: unknown, allowed {', '.join(_TABLE)}")
@@ -226,11 +223,8 @@ def attenuate(
     Given the silt's `grains`, what they only diffract is blurred and not lost
     (`wakewise.vision.imaging.forward_scatter`), on the way from the scene as on the lamps' way to it.
 
-    Returns
-    -------
-    radiance : ndarray, shape (h, w, 3)
-    silt_per_m : ndarray, shape (h, w)
-        Mean attenuation by silt along each pixel's ray, up to the surface or to the reach of `haze`.
+    Returns `radiance`, shape (h, w, 3); `silt_per_m`, shape (h, w): mean attenuation by silt along each pixel's ray, up
+    to the surface or to the reach of `haze`.
     """
     out = np.empty_like(view.radiance)
     silt_per_m = np.empty_like(view.depth_m)

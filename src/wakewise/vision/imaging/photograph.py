@@ -155,32 +155,14 @@ def photograph(
 ) -> RenderedPhoto:
     """Take one photograph.
 
-    Parameters
-    ----------
-    scene : Scene or sequence of Scene
-        Several show a target that moves: how it stands at instants evenly spaced over the exposure, an odd number.
-    camera : Camera
-        `settings.camera()`, or another one.
-    poses : sequence of Pose
-        True X_WC at instants evenly spaced over `settings.window_s`, the exposure and the readout, the first and last
-        at its ends; one means no motion.
-    silt : ScalarGrid or None
-        Concentration in kg/m3.
-    settings : ImagingSettings
-    rng : Generator
-        Draws flakes and noise, nothing else.
-    grains : SiltOptics, optional
-        What the silt is made of; pale 20 um carbonate mud if not given.
-    before : sequence of Pose
-        True X_WC before, `METERED_EVERY_S` apart, oldest first, for automatic exposure; without them it goes by the
-        photograph's own view.
-    drifting : FlakeCloud, optional
-        Flakes that other photographs show too, where the water has brought them; all are drawn here if not given.
-
-    Raises
-    ------
-    InputError
-        If there is no pose, or the silt is negative somewhere.
+    `scene`: several show a target that moves: how it stands at instants evenly spaced over the exposure, an odd number.
+    `camera`: `settings.camera()`, or another one. `poses`: true X_WC at instants evenly spaced over
+    `settings.window_s`, the exposure and the readout, the first and last at its ends; one means no motion. `silt`:
+    concentration in kg/m3. `rng`: draws flakes and noise, nothing else. `grains`: what the silt is made of; pale 20 um
+    carbonate mud if not given. `before`: true X_WC before, `METERED_EVERY_S` apart, oldest first, for automatic
+    exposure; without them it goes by the photograph's own view. `drifting`: flakes that other photographs show too,
+    where the water has brought them; all are drawn here if not given. Raises InputError if there is no pose, or the
+    silt is negative somewhere.
     """
     scenes = [scene] if isinstance(scene, Scene) else list(scene)
     views = [render(each, camera, pose_at(poses, 0.5), settings.lights(), settings.samples) for each in scenes]

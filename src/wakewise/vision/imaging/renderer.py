@@ -281,19 +281,8 @@ class Render:
 def render(scene: Scene, camera: Camera, X_WC: Pose, lights: Lights, samples: int = 2) -> Render:
     """Render one view without any water between.
 
-    Parameters
-    ----------
-    scene : Scene
-    camera : Camera
-    X_WC : Pose
-    lights : Lights
-    samples : int
-        Rays across a pixel, squared in all, where one ray is not enough; 1 to 8.
-
-    Raises
-    ------
-    InputError
-        If `samples` is out of range.
+    `samples`: rays across a pixel, squared in all, where one ray is not enough; 1 to 8. Raises InputError if `samples`
+    is out of range.
     """
     if not 1 <= samples <= 8:
         raise InputError(f"render: samples {samples}, allowed 1 to 8")

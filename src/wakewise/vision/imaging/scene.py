@@ -195,17 +195,8 @@ class Scene:
     def posed(self, moved_m: Array, target_normals: Array) -> Scene:
         """The same scene with its target's vertices moved from rest; colours and light from above move along.
 
-        Parameters
-        ----------
-        moved_m : ndarray, shape (n, 3)
-            One row for each vertex of the target.
-        target_normals : ndarray, shape (n, 3)
-            Unit normals of the moved surface, outward.
-
-        Raises
-        ------
-        InputError
-            If there is not one row for each vertex.
+        `moved_m`, shape (n, 3): one row for each vertex of the target. `target_normals`, shape (n, 3): unit normals of
+        the moved surface, outward. Raises InputError if there is not one row for each vertex.
         """
         n = self.first_bed_vertex
         if moved_m.shape != (n, 3) or target_normals.shape != (n, 3):
@@ -260,22 +251,10 @@ class Scene:
     ) -> Scene:
         """Lay the bed, scatter the stones, light everything and make it ready for rays.
 
-        Parameters
-        ----------
-        target : Target
-        seed : int
-            Not negative; the same seed gives the same sand, stones and colours.
-        bed_half_m : float
-            Half width of the part of the bed with fine relief; flat coarse sand goes on to 12 m.
-        stones : int
-            Number of stones on the fine part, none nearer to the target's bounding circle than 3 cm.
-        panels : Panels, optional
-            Four over a tank of 6 x 5 m if not given.
-
-        Raises
-        ------
-        InputError
-            If a number is out of range.
+        `seed`: not negative; the same seed gives the same sand, stones and colours. `bed_half_m`: half width of the
+        part of the bed with fine relief; flat coarse sand goes on to 12 m. `stones`: number of stones on the fine part,
+        none nearer to the target's bounding circle than 3 cm. `panels`: four over a tank of 6 x 5 m if not given.
+        Raises InputError if a number is out of range.
         """
         if seed < 0:
             raise InputError(f"scene: seed {seed}, must not be negative")

@@ -120,10 +120,7 @@ class ImagingSettings(Settings):
     def camera(self) -> PinholeCamera | LensCamera:
         """Camera of these settings; an ideal one if it has neither distortion nor port.
 
-        Raises
-        ------
-        InputError
-            If the lens cannot show the field of view.
+        Raises InputError if the lens cannot show the field of view.
         """
         from wakewise.vision.imaging.camera import FlatPort, LensCamera, PinholeCamera
 

@@ -139,11 +139,9 @@ def bed_heights(xy_m: Any, clear_m: float, seed: int) -> Any:
 def bake_bed(size: int, levels: int, texel_m: float, seed: int) -> Any:
     """Bake the sand's albedo into nested maps centred on the target's foot.
 
-    Returns
-    -------
-    ndarray of uint16, shape (levels, size, size, 4)
-        Red, green, blue albedo times 65535, and nothing; first axis x. Texels of level k are `texel_m * 2**k` wide and
-        hold no finer detail. With four numbers a texel is read at once.
+    Returns uint16, shape (levels, size, size, 4): red, green, blue albedo times 65535, and nothing; first
+    axis x. Texels of level k are `texel_m * 2**k` wide and hold no finer detail. With four numbers a texel is read at
+    once.
     """
     maps = np.zeros((levels, size, size, 4), np.uint16)
     for row in prange(levels * size):

@@ -65,10 +65,7 @@ _MEDIAN_NOISE_PX = 0.1
 def displacements(pairs: Sequence[tuple[Picture, Picture]]) -> list[Displacements]:
     """Displacement fields of pairs of frames, all of one shape (rows, columns), each side at least 128 px.
 
-    Raises
-    ------
-    InputError
-        If there are no pairs, their shapes differ, or they are too small.
+    Raises InputError if there are no pairs, their shapes differ, or they are too small.
     """
     if not pairs:
         raise InputError("image pairs: none, needs at least one")
@@ -83,10 +80,7 @@ def displacements(pairs: Sequence[tuple[Picture, Picture]]) -> list[Displacement
 def correlate(first: Picture, second: Picture, windows_px: tuple[int, ...] = WINDOWS_PX) -> Displacements:
     """Displacements from frame `first` to frame `second`, both of shape (rows, columns).
 
-    Raises
-    ------
-    InputError
-        If the frames differ in shape or are smaller than the first window.
+    Raises InputError if the frames differ in shape or are smaller than the first window.
     """
     if first.shape != second.shape or min(first.shape) < windows_px[0]:
         raise InputError(

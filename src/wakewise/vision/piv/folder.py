@@ -35,10 +35,7 @@ class PivFolder(Settings):
 def read_pairs(folder: Path) -> dict[str, tuple[Picture, Picture]]:
     """Pairs of 8-bit pictures by name, sorted; the two of a pair end in A and B before the suffix.
 
-    Raises
-    ------
-    InputError
-        If there are none, a partner is missing, or a picture cannot be read.
+    Raises InputError if there are none, a partner is missing, or a picture cannot be read.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder, needs pictures *A and *B")
@@ -71,10 +68,7 @@ def _read(path: Path) -> Picture:
 def read_piv_settings(folder: Path) -> PivFolder:
     """Read and check piv.yaml.
 
-    Raises
-    ------
-    InputError
-        If it is missing or a field is wrong.
+    Raises InputError if it is missing or a field is wrong.
     """
     path = folder / "piv.yaml"
     wanted = ", ".join(PivFolder.model_fields)
@@ -92,10 +86,7 @@ def read_piv_settings(folder: Path) -> PivFolder:
 def samples_of_folder(folder: Path) -> JetSamples:
     """Velocity samples in the jet frame from all pairs of a folder; pairs of one thrust are averaged.
 
-    Raises
-    ------
-    InputError
-        For faults of the folder, of piv.yaml or of the pictures.
+    Raises InputError for faults of the folder, of piv.yaml or of the pictures.
     """
     settings, pairs = read_piv_settings(folder), read_pairs(folder)
     if isinstance(settings.thrust_N, dict):

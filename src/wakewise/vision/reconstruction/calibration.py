@@ -92,17 +92,8 @@ class CameraCalibration:
 def calibrate(folder: Path, board: CalibrationBoard, model: str = "radial") -> CameraCalibration:
     """Calibrate the camera that took a folder of photographs of one board.
 
-    Parameters
-    ----------
-    model : str
-        Lens model that the figures are of: pinhole, radial or rational.
-
-    Raises
-    ------
-    InputError
-        If the folder or the model is none, or photographs differ in size.
-    StageError
-        If the board is found in fewer than three photographs.
+    `model`: lens model that the figures are of: pinhole, radial or rational. Raises InputError if the folder or the
+    model is none, or photographs differ in size; StageError if the board is found in fewer than three photographs.
     """
     if model not in MODELS:
         raise InputError(f"lens model: '{model}', allowed are {', '.join(MODELS)}")
@@ -214,10 +205,7 @@ def board_detector(photos: list[NDArray[np.uint8]], board: CalibrationBoard) -> 
 
     Where none are found, the dictionary of which most markers are seen.
 
-    Raises
-    ------
-    StageError
-        If no marker of any is seen.
+    Raises StageError if no marker of any is seen.
     """
     some = photos[:: max(1, len(photos) // 3)][:3]
     best: tuple[tuple[int, int], str, Any] = ((-1, -1), "", None)

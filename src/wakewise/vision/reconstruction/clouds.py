@@ -59,10 +59,7 @@ def write_cloud(path: Path, cloud: OrientedPointCloud) -> None:
 def read_cloud(path: Path) -> OrientedPointCloud:
     """Read points from a PLY file or any other that holds points or a mesh; grey and without normals where none are.
 
-    Raises
-    ------
-    InputError
-        If the file is missing, is no point file, or holds no finite points.
+    Raises InputError if the file is missing, is no point file, or holds no finite points.
     """
     path = path_of(path, "cloud")
     if not path.is_file():
@@ -124,10 +121,7 @@ _NEVER_CLASSIFIED = 0
 def write_las(path: Path, cloud: OrientedPointCloud, day: date | None = None) -> None:
     """Write points, whole or not at all; steps are a ten-thousandth of the spread, rounded to a power of ten or finer.
 
-    Parameters
-    ----------
-    day : date, optional
-        Day of creation; today if not given.
+    `day`: day of creation; today if not given.
     """
     points = cloud.points_m
     low, high = points.min(axis=0), points.max(axis=0)

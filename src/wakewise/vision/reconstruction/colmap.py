@@ -61,24 +61,10 @@ keep_sigterm()
 def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: None, *, disk: Path | None = None) -> T:
     """Run a COLMAP call in a thread, calling `watch` now and then; an interrupt cancels it and waits for its end.
 
-    Parameters
-    ----------
-    work : callable
-        Takes `cancellation_token`.
-    what : str
-        Name of the stage, for messages.
-    disk : Path, optional
-        Folder that the call writes to. COLMAP ends the whole process when its database finds no room, so the call is
-        cancelled when another program leaves less than `RESERVE_MB` there.
-
-    Raises
-    ------
-    StageError
-        If COLMAP fails, with its reason in one line.
-    EnvironmentFailure
-        If the disk fills.
-    OSError
-        If a file cannot be read or written.
+    `work`: takes `cancellation_token`. `what`: name of the stage, for messages. `disk`: folder that the call writes to.
+    COLMAP ends the whole process when its database finds no room, so the call is cancelled when another program leaves
+    less than `RESERVE_MB` there. Raises StageError if COLMAP fails, with its reason in one line; EnvironmentFailure if
+    the disk fills; OSError if a file cannot be read or written.
     """
     token = pycolmap.CancellationToken()
     result: list[T] = []
@@ -121,19 +107,8 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
 def call_apart(what: str, function: str, *arguments: Any, watch: Callable[[], None] = lambda: None) -> None:
     """Run a function of pycolmap that cannot be cancelled in a process of its own, which an interrupt ends at once.
 
-    Parameters
-    ----------
-    what : str
-        Name of the stage, for messages.
-    function : str
-        Its name; it takes and leaves files.
-    arguments
-        Paths, and options of pycolmap's own.
-
-    Raises
-    ------
-    StageError
-        If it fails, with its reason in one line.
+    `what`: name of the stage, for messages. `function`: its name; it takes and leaves files. `arguments`: paths, and
+    options of pycolmap's own. Raises StageError if it fails, with its reason in one line.
     """
     order: bytes | None = pickle.dumps((function, arguments))
     # Its own session: a terminal's Ctrl-C goes to whoever waits for it, and that ends it.

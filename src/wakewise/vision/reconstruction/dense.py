@@ -55,10 +55,7 @@ class DepthStore:
     def add(self, depth_map: DepthMap) -> None:
         """Keep a map.
 
-        Raises
-        ------
-        OSError
-            If the disk is full.
+        Raises OSError if the disk is full.
         """
         size = depth_map.depth_m.nbytes + depth_map.wanted.nbytes + depth_map.colours.nbytes
         if size <= self._left:
@@ -90,10 +87,7 @@ class DepthStore:
     def depths(self, number: int) -> DepthMap:
         """A map with its depths; which are wanted, and colours, may be missing.
 
-        Raises
-        ------
-        OSError
-            If it cannot be read.
+        Raises OSError if it cannot be read.
         """
         size = self._stored.get(number)
         if size is None:
@@ -104,10 +98,7 @@ class DepthStore:
     def whole(self, number: int) -> DepthMap:
         """A map with all that belongs to it.
 
-        Raises
-        ------
-        OSError
-            If it cannot be read.
+        Raises OSError if it cannot be read.
         """
         size = self._stored.get(number)
         if size is None:
@@ -141,15 +132,8 @@ def densify(
 ) -> dict[str, Any]:
     """Stereo on neighbouring photos, fused by agreement, thinned, cleaned; points with normals and colours.
 
-    Returns
-    -------
-    dict
-        dense_points, depth_maps, point_spacing_mm (in units of the model where it has no scale).
-
-    Raises
-    ------
-    StageError
-        If no depth survives.
+    Returns dense_points, depth_maps, point_spacing_mm (in units of the model where it has no scale). Raises StageError
+    if no depth survives.
     """
     views, points = read_views(sparse, region)
     partners = rank_partners(views, points, region, most=2 * max(VOTING_PHOTOS, settings.stereo_partners))
@@ -296,10 +280,7 @@ def in_order(work: Callable[[T], S], items: Iterable[T], threads: int) -> Iterat
 def require_cuda() -> None:
     """Check that patch-match can run here.
 
-    Raises
-    ------
-    InputError
-        If pycolmap has no CUDA or there is no device.
+    Raises InputError if pycolmap has no CUDA or there is no device.
     """
     if not pycolmap.has_cuda:
         raise InputError("dense: patch-match needs a pycolmap with CUDA (package pycolmap-cuda12); stereo needs none")
@@ -321,15 +302,7 @@ def patch_match(
     J. L. Schoenberger et al., Pixelwise view selection for unstructured multi-view stereo, ECCV 2016, doi
     10.1007/978-3-319-46487-9_31.
 
-    Returns
-    -------
-    dict
-        As of `densify`.
-
-    Raises
-    ------
-    StageError
-        If no points come out.
+    Returns what `densify` returns. Raises StageError if no points come out.
     """
     with tempfile.TemporaryDirectory(prefix=temporary_prefix("patch-match"), dir=out.parent) as scratch:
         work = Path(scratch) / "work"

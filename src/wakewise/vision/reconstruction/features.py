@@ -147,39 +147,15 @@ def match_photos(
 ) -> dict[str, Any]:
     """Find SIFT features, match and verify; write COLMAP's database whole.
 
-    Parameters
-    ----------
-    focal_px : float, optional
-        Focal length to start from, in pixels of these photos; else from EXIF or 1.2 times the longer side, of a
-        fisheye .4 times.
-    pairs : list of two photo names
-        What to match.
-    store : PhotoStore, optional
-        Photos that are decoded already.
-    lens : Lens, optional
-        The camera that took them all, instead of a focal length.
-    groups : tuple of LensGroup, optional
-        Which photos share a lens; found from the photos if not given.
-    poses : dict, optional
-        Rough R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name: pairs are matched along epipolar lines first,
-        and only those that do not verify among all features.
-    may_be_none : bool
-        Whether it is no failure that nothing matches, as where the cameras are known.
-    look_alikes : int
-        With how many others each is matched besides, because they look alike.
-
-    Returns
-    -------
-    dict
-        features_per_image, inlier_matches (verified, all pairs together), verified_pairs, pairs, posed_pairs (those
-        verified along epipolar lines).
-
-    Raises
-    ------
-    InputError
-        If a pair names a photo that is not there.
-    StageError
-        If no pair of photos could be verified.
+    `focal_px`: focal length to start from, in pixels of these photos; else from EXIF or 1.2 times the longer side, of a
+    fisheye .4 times. `pairs`: what to match. `store`: photos that are decoded already. `lens`: the camera that took
+    them all, instead of a focal length. `groups`: which photos share a lens; found from the photos if not given.
+    `poses`: rough R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name: pairs are matched along epipolar lines
+    first, and only those that do not verify among all features. `may_be_none`: whether it is no failure that nothing
+    matches, as where the cameras are known. `look_alikes`: with how many others each is matched besides, because they
+    look alike. Returns features_per_image, inlier_matches (verified, all pairs together), verified_pairs, pairs,
+    posed_pairs (those verified along epipolar lines). Raises InputError if a pair names a photo that is not there;
+    StageError if no pair of photos could be verified.
     """
     names = [photo.name for photo in photos]
     _check_pairs(names, pairs)

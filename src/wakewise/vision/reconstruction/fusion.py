@@ -159,15 +159,9 @@ def fuse(
 ) -> Array:
     """Points that other maps confirm, shape (n, 9): position, colour (red first, 0 to 1), unit direction to the camera.
 
-    Parameters
-    ----------
-    maps : mapping or sequence
-        Depth maps by number: `index` whole, the neighbours with their depths.
-    neighbours : list of int
-        Which maps may vote; the map of the same two photos the other way round is not independent and must not be
-        among them.
-    agreeing : int
-        Votes needed; a point is also dropped where more maps look through it than agree.
+    `maps`: depth maps by number: `index` whole, the neighbours with their depths. `neighbours`: which maps may vote;
+    the map of the same two photos the other way round is not independent and must not be among them. `agreeing`: votes
+    needed; a point is also dropped where more maps look through it than agree.
     """
     own = maps[index]
     if not neighbours:

@@ -83,12 +83,8 @@ def match_by_poses(
 ) -> Pairs:
     """Match pairs along epipolar lines and write those that verify into COLMAP's database; return the others.
 
-    Parameters
-    ----------
-    poses : dict
-        R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name; a pair without both is returned.
-    most_bytes : float
-        Of descriptors in memory; where there are more, all pairs are returned.
+    `poses`: R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name; a pair without both is returned. `most_bytes`:
+    of descriptors in memory; where there are more, all pairs are returned.
     """
     link = pycolmap.Database.open(database)
     try:
@@ -255,10 +251,7 @@ def verify(first_xy: Array, second_xy: Array, pose: RelativePose, focal_px: floa
     from pulling (P. W. Holland and R. E. Welsch, Communications in Statistics A6(9), 1977, doi
     10.1080/03610927708827533, on reweighted least squares).
 
-    Parameters
-    ----------
-    first_xy, second_xy : ndarray, shape (n, 2)
-        On the planes at unit depth.
+    `first_xy`, `second_xy`, shape (n, 2): on the planes at unit depth.
     """
     n = len(first_xy)
     if n < MIN_VERIFIED:

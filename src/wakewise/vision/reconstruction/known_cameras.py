@@ -38,10 +38,7 @@ Pose = tuple[Array, Array]
 def read_colmap(folder: Path) -> tuple[dict[str, Pose], dict[str, Lens]]:
     """Poses and lenses by photo name from images and cameras (.bin before .txt).
 
-    Raises
-    ------
-    InputError
-        If a file is missing or damaged, or a camera is of a model that is not known here.
+    Raises InputError if a file is missing or damaged, or a camera is of a model that is not known here.
     """
     binary = (folder / "images.bin").is_file()
     suffix = ".bin" if binary else ".txt"
@@ -151,17 +148,9 @@ class KnownCameras:
 def read_known_cameras(path: Path) -> KnownCameras:
     """Poses and lenses of photographs.
 
-    Parameters
-    ----------
-    path : Path
-        A folder with COLMAP's cameras and images (.txt or .bin; `sparse/0` below it is looked into, too), nerfstudio's
-        transforms.json or a folder that holds it (OpenGL axes: right, up, back), a CSV file, or a folder of Strecha's
-        .camera files.
-
-    Raises
-    ------
-    InputError
-        If nothing of these is there, or a file does not hold what it should.
+    `path`: a folder with COLMAP's cameras and images (.txt or .bin; `sparse/0` below it is looked into, too),
+    nerfstudio's transforms.json or a folder that holds it (OpenGL axes: right, up, back), a CSV file, or a folder of
+    Strecha's .camera files. Raises InputError if nothing of these is there, or a file does not hold what it should.
     """
     if path.is_dir():
         for folder in (path, path / "sparse" / "0", path / "sparse"):
@@ -189,10 +178,8 @@ def match_known(known: KnownCameras, photos: tuple[Photo, ...]) -> KnownCameras:
 
     A lens of a photo of the same shape but another size, as of photographs that were made smaller, is scaled.
 
-    Raises
-    ------
-    InputError
-        If fewer than two photos have one, a name fits two cameras, or a lens has another shape than its photo.
+    Raises InputError if fewer than two photos have one, a name fits two cameras, or a lens has another shape than its
+    photo.
     """
     by_file, by_stem = _by(known.positions, lambda p: p.name), _by(known.positions, lambda p: p.stem)
     rotations, positions, lenses = {}, {}, {}
@@ -359,17 +346,9 @@ def _read_strecha(files: list[Path]) -> KnownCameras:
 def read_reference_cameras(path: Path) -> dict[str, Array]:
     """Camera centres in m, shape (3,), by photo name.
 
-    Parameters
-    ----------
-    path : Path
-        A folder of `<photo>.camera` files (C. Strecha et al., CVPR 2008, doi 10.1109/CVPR.2008.4587706: rows of K, a
-        row of zeros, rows of the camera-to-world rotation, the camera centre, the image size), or a CSV file with
-        columns name, x_m, y_m, z_m.
-
-    Raises
-    ------
-    InputError
-        If nothing is there, or a file does not hold what it should.
+    `path`: a folder of `<photo>.camera` files (C. Strecha et al., CVPR 2008, doi 10.1109/CVPR.2008.4587706: rows of K,
+    a row of zeros, rows of the camera-to-world rotation, the camera centre, the image size), or a CSV file with columns
+    name, x_m, y_m, z_m. Raises InputError if nothing is there, or a file does not hold what it should.
     """
     if path.is_dir():
         files = sorted(path.glob("*.camera"))
@@ -429,10 +408,7 @@ def _position(path: Path, line: int, words: list[str | None]) -> Array:
 def match_references(references: dict[str, Array], names: Iterable[str]) -> dict[str, Array]:
     """References by the photos' own names; a name matches whole or without its suffix (0001.png for 0001.jpg).
 
-    Raises
-    ------
-    InputError
-        If fewer than three photos have a reference.
+    Raises InputError if fewer than three photos have a reference.
     """
     by_stem = {Path(name).stem: position for name, position in references.items()}
     photos = list(names)

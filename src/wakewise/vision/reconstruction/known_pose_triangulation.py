@@ -39,14 +39,8 @@ class FixedPoseModel:
 def map_at_poses(database: Path, poses: Poses, photos: int, progress: Progress) -> FixedPoseModel:
     """Model of the photos at these poses with what points their matches give.
 
-    Parameters
-    ----------
-    database : Path
-        COLMAP's, with matches; its cameras are the lenses.
-    poses : dict
-        R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name; a photo without one is left out.
-    photos : int
-        How many there are, for the progress.
+    `database`: COLMAP's, with matches; its cameras are the lenses. `poses`: R_WC, shape (3, 3), and p_WC_m, shape (3,),
+    by photo name; a photo without one is left out. `photos`: how many there are, for the progress.
     """
     silence_logging()
     link = pycolmap.Database.open(database)
@@ -85,10 +79,7 @@ def map_at_poses(database: Path, poses: Poses, photos: int, progress: Progress) 
 def common_region(model: pycolmap.Reconstruction) -> RegionOfInterest | None:
     """What all cameras look at, where most see too few sparse points to tell; None where they do, or look about.
 
-    Raises
-    ------
-    StageError
-        If photos see too few points, and their lines of sight do not meet.
+    Raises StageError if photos see too few points, and their lines of sight do not meet.
     """
     images = [image for image in model.images.values() if image.has_pose]
     if sum(image.num_points3D >= MIN_SHARED for image in images) > 0.75 * len(images):

@@ -36,17 +36,9 @@ def group_photos(
 
     Two that differ in size, folder, or in what EXIF says of the camera are of two lenses, whatever else.
 
-    Parameters
-    ----------
-    patterns : mapping, optional
-        Name of a lens to a shell pattern of its photos' names (`left_*`); a photo that fits several is of the first.
-    lenses : Lens or mapping, optional
-        One lens of them all, or those of groups by name.
-
-    Raises
-    ------
-    InputError
-        If no photo fits a pattern, a lens belongs to no group, or has another size than the group's photos.
+    `patterns`: name of a lens to a shell pattern of its photos' names (`left_*`); a photo that fits several is of the
+    first. `lenses`: one lens of them all, or those of groups by name. Raises InputError if no photo fits a pattern, a
+    lens belongs to no group, or has another size than the group's photos.
     """
     patterns = dict(patterns or {})
     found: dict[_Key, list[Photo]] = {}
@@ -89,10 +81,7 @@ def group_photos(
 def known_groups(photos: tuple[Photo, ...], lenses: Mapping[str, Lens]) -> tuple[LensGroup, ...]:
     """Photographs by lenses that are known photo by photo: those with the same numbers share one.
 
-    Raises
-    ------
-    InputError
-        If a photo has none.
+    Raises InputError if a photo has none.
     """
     found: dict[tuple[float, ...], list[str]] = {}
     for photo in photos:

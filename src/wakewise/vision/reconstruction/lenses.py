@@ -76,10 +76,7 @@ class Lens:
 def lens_of(camera: pycolmap.Camera) -> Lens:
     """Lens of a camera of a sparse model.
 
-    Raises
-    ------
-    StageError
-        If its distortion is of another kind than OpenCV's.
+    Raises StageError if its distortion is of another kind than OpenCV's.
     """
     name = str(camera.model.name)
     if name not in LAYOUTS:
@@ -90,10 +87,7 @@ def lens_of(camera: pycolmap.Camera) -> Lens:
 def read_lens(path: Path) -> Lens:
     """The camera of COLMAP's cameras.txt, given the file or a folder that holds it, or of what `calibrate` wrote.
 
-    Raises
-    ------
-    InputError
-        If nothing is there, it holds no camera or several, or the camera is not of a known model.
+    Raises InputError if nothing is there, it holds no camera or several, or the camera is not of a known model.
     """
     file = path / "cameras.txt" if path.is_dir() else path
     if not file.is_file():

@@ -77,33 +77,16 @@ def map_photos(
     10.1109/CVPR.2016.445. Global: L. Pan et al., Global structure-from-motion revisited, ECCV 2024, doi
     10.1007/978-3-031-73661-2_4.
 
-    Parameters
-    ----------
-    photos : int
-        How many there are, for the progress and the messages.
-    references : dict, optional
-        Camera centres in m, shape (3,), by photo name. They fix place, turn and scale by a robust similarity; the
-        model's shape does not bend to them unless `position_priors` is set.
-    store : PhotoStore, optional
-        Photos that are decoded already.
-    poses : dict, optional
-        Rough R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name, to begin the model from (see `seeded`); where
-        the result does not pass, the model is built from the photos alone.
-    fixed : dict, optional
-        The same, known so well that they stay as they are, with their lenses (see `fixed`).
-
-    Returns
-    -------
-    dict
-        mapping (how the model came about, one of `MAPPINGS`), poses_refused (why not from the poses),
-        registered_images, points, reprojection_px, reprojection_met, track_length, focal_px, cameras_rmse_mm and
-        cameras_max_mm over all registered photos with a reference, reference_inliers, scale, surface_distance_m (median
-        from camera to sparse point), suspicion; None where no references were given.
-
-    Raises
-    ------
-    StageError
-        If too few photos register or the model cannot be aligned.
+    `photos`: how many there are, for the progress and the messages. `references`: camera centres in m, shape (3,), by
+    photo name. They fix place, turn and scale by a robust similarity; the model's shape does not bend to them unless
+    `position_priors` is set. `store`: photos that are decoded already. `poses`: rough R_WC, shape (3, 3), and p_WC_m,
+    shape (3,), by photo name, to begin the model from (see `seeded`); where the result does not pass, the model is
+    built from the photos alone. `fixed`: the same, known so well that they stay as they are, with their lenses (see
+    `fixed`). Returns mapping (how the model came about, one of `MAPPINGS`), poses_refused (why not from the poses),
+    registered_images, points, reprojection_px, reprojection_met, track_length, focal_px, cameras_rmse_mm and
+    cameras_max_mm over all registered photos with a reference, reference_inliers, scale, surface_distance_m (median
+    from camera to sparse point), suspicion; None where no references were given. Raises StageError if too few photos
+    register or the model cannot be aligned.
     """
     with database_folder(sparse, 4.0 * database.stat().st_size) as room:
         # A copy, as even reading makes COLMAP write into it.

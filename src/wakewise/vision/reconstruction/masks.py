@@ -46,10 +46,8 @@ class Masks:
 def read_masks(photos: Path, found: tuple[Photo, ...], folder: Path | None) -> Masks | None:
     """Masks of photographs, from a folder, else from their transparency; None if there are none.
 
-    Raises
-    ------
-    InputError
-        If the folder is none or holds masks of no photo, or a mask has another size than its photo or hides it all.
+    Raises InputError if the folder is none or holds masks of no photo, or a mask has another size than its photo or
+    hides it all.
     """
     if folder is None:
         files = {photo.name: photos / photo.name for photo in found if _has_alpha(photos / photo.name)}
@@ -129,10 +127,7 @@ def _has_alpha(path: Path) -> bool:
 def _read(path: Path) -> BoolArray:
     """What is white, or opaque.
 
-    Raises
-    ------
-    InputError
-        If it is no image.
+    Raises InputError if it is no image.
     """
     image: Image | None = read_picture(path, cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:

@@ -41,17 +41,8 @@ def mesh_points(
     So are crumbs, pieces that hang together with nothing and are next to nothing beside the largest. Points farther
     from the subject than it is long are left out.
 
-    Returns
-    -------
-    dict
-        mesh_vertices, mesh_faces, mesh_points_left_out.
-
-    Raises
-    ------
-    StageError
-        If no surface comes out.
-    EnvironmentFailure
-        If the disk is full.
+    Returns mesh_vertices, mesh_faces, mesh_points_left_out. Raises StageError if no surface comes out;
+    EnvironmentFailure if the disk is full.
     """
     whole = read_cloud(dense)
     kept = near_subject(whole.points_m)
@@ -97,14 +88,8 @@ def mesh_model(
     No figure of a model needs its surface, so this may come after all that does. `held`: the process that started this
     one keeps others out of the folder.
 
-    Raises
-    ------
-    InputError
-        If there are no dense points of a reconstruction.
-    StageError
-        If no surface comes out of them.
-    EnvironmentFailure
-        If the disk is full, or a file cannot be read or written.
+    Raises InputError if there are no dense points of a reconstruction; StageError if no surface comes out of them;
+    EnvironmentFailure if the disk is full, or a file cannot be read or written.
     """
     dense, mesh = out / "dense.ply", out / "mesh.ply"
     known = read_stamp(out, "dense")

@@ -40,20 +40,9 @@ def choose_pairs(
 ) -> Pairs:
     """Pairs as the settings ask for them.
 
-    Parameters
-    ----------
-    names : list of str
-        Photo names in order.
-    centres_W_m, axes_W : dict, optional
-        Camera centres and optical axes, shape (3,) each, by name. Without axes all are taken to look the same way.
-
-    neighbours : int
-        How many each is matched with at least, by poses.
-
-    Raises
-    ------
-    InputError
-        If pairs by poses are asked for and not every photo has a known position.
+    `names`: photo names in order. `centres_W_m`, `axes_W`: camera centres and optical axes, shape (3,) each, by name.
+    Without axes all are taken to look the same way. `neighbours`: how many each is matched with at least, by poses.
+    Raises InputError if pairs by poses are asked for and not every photo has a known position.
     """
     known = centres_W_m is not None and all(name in centres_W_m for name in names)
     if settings.matching == "poses" and not known:
@@ -91,13 +80,8 @@ def sequence_pairs(names: list[str], overlap: int) -> Pairs:
 def pose_pairs(names: list[str], centres_W_m: Array, axes_W: Array | None, neighbours: int) -> Pairs:
     """Each photo with the nearest others that look the same way, and what more it takes to hang all together.
 
-    Parameters
-    ----------
-    centres_W_m : ndarray, shape (n, 3)
-    axes_W : ndarray, shape (n, 3), optional
-        Unit optical axes; photos whose axes are more than 45 deg apart are no neighbours.
-    neighbours : int
-        How many each is paired with at least, if there are so many.
+    `centres_W_m` has shape (n, 3). `axes_W`, shape (n, 3): unit optical axes; photos whose axes are more than 45 deg
+    apart are no neighbours. `neighbours`: how many each is paired with at least, if there are so many.
     """
     n = len(names)
     centres = np.asarray(centres_W_m, dtype=np.float64)

@@ -50,10 +50,7 @@ def fit_per_photo_intrinsics(
 ) -> PerPhotoIntrinsics:
     """Map with a lens for each photo.
 
-    Raises
-    ------
-    StageError
-        If COLMAP fails.
+    Raises StageError if COLMAP fails.
     """
     copy = Path(shutil.copyfile(database, scratch / "own.db"))
     link = pycolmap.Database.open(copy)

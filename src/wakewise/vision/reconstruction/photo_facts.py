@@ -48,10 +48,7 @@ class ModelStatistics:
 def model_facts(model: Path) -> ModelStatistics:
     """Read sparse/ and database.db of a model's folder.
 
-    Raises
-    ------
-    InputError
-        If it holds no sparse model.
+    Raises InputError if it holds no sparse model.
     """
     if not (model / "sparse" / "images.bin").is_file() or not (model / "database.db").is_file():
         raise InputError(f"{model}: holds no model (sparse/, database.db)")

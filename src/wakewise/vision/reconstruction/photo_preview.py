@@ -98,10 +98,8 @@ def preview_photos(
 ) -> tuple[PhotoPreview, dict[str, bytes]]:
     """Look at a folder of photographs; also small JPEG copies of them, by name.
 
-    Raises
-    ------
-    InputError
-        If they cannot be read, see `read_photos`; if one is so narrow that nothing of it is left in a small copy.
+    Raises InputError if they cannot be read, see `read_photos`; if one is so narrow that nothing of it is left in a
+    small copy.
     """
     store = PhotoStore(folder)
     found = read_photos(folder, store, threads)

@@ -109,10 +109,7 @@ class PhotoStore:
     def image(self, name: str) -> Image:
         """Colours of a photo, shape (h, w, 3), blue first; not to be written to.
 
-        Raises
-        ------
-        EnvironmentFailure
-            If it could be read before and cannot be any more.
+        Raises EnvironmentFailure if it could be read before and cannot be any more.
         """
         kept = self._kept.get(name)
         if kept is not None:
@@ -142,10 +139,7 @@ def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2)
     Where the folder holds no photographs but folders of them, as of the cameras of a rig, theirs are read, and are
     named `folder/file`. What was decoded goes to `store`.
 
-    Raises
-    ------
-    InputError
-        If the folder is missing, holds no photographs or fewer than two, or a file cannot be decoded.
+    Raises InputError if the folder is missing, holds no photographs or fewer than two, or a file cannot be decoded.
     """
     allowed = ", ".join(SUFFIXES)
     if not folder.is_dir():
@@ -233,10 +227,7 @@ def _read_photo(folder: Path, path: Path, store: PhotoStore | None) -> Photo:
 def without_duplicates(photos: tuple[Photo, ...]) -> tuple[tuple[Photo, ...], int]:
     """Photos less those whose bytes another one has, which show nothing new; and how many those were.
 
-    Raises
-    ------
-    InputError
-        If fewer than two different ones are left.
+    Raises InputError if fewer than two different ones are left.
     """
     first: dict[str, Photo] = {}
     for photo in photos:
@@ -301,9 +292,6 @@ def decode(data: bytes, name: str) -> Image | None:
 
     The camera's orientation tag is ignored, as COLMAP ignores it, so that pixels mean the same to both.
 
-    Raises
-    ------
-    InputError
-        If the image `name` has more pixels than are allowed.
+    Raises InputError if the image `name` has more pixels than are allowed.
     """
     return decode_picture(data, name, AS_STORED)

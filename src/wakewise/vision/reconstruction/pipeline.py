@@ -99,10 +99,7 @@ class ReconstructionRequest:
 def cut_cloud(path: Path, box: CropBox) -> int:
     """Keep of a cloud on disk what lies in a box; how many points that is.
 
-    Raises
-    ------
-    StageError
-        If too little is left; the message says where the points are.
+    Raises StageError if too little is left; the message says where the points are.
     """
     cloud = read_cloud(path)
     kept = box.holds(cloud.points_m)
@@ -329,42 +326,19 @@ def reconstruct(
 
     A stage whose files are there, made from the same photos with the same settings, is skipped.
 
-    Parameters
-    ----------
-    photos : Path
-        Folder of photographs.
-    focal_px : float, optional
-        Focal length in pixels to start from; it is refined.
-    lens : Lens or mapping, optional
-        Camera that took all the photos, such as a trial's in its cameras.txt, or one by name of a group; refined unless
-        the settings say no.
-    lens_patterns : mapping, optional
-        Names of lenses and shell patterns of their photos' names; see `lens_groups.group_photos`.
-    pairs : sequence of two photo names, optional
-        Which photos to match; else the settings choose.
-    reference_positions : dict, optional
-        Camera centres in m, shape (3,), by photo name; they fix scale and frame.
-    reference_rotations : dict, optional
-        R_WC, shape (3, 3), by photo name, in the frame of the references (optical axis last): with them pairs are
-        chosen, matched and mapped from the poses, unless the settings say no or the photos say that they do not fit.
-    region : (centre, radius), optional
-        What the dense model is wanted of, in the frame of the references: shape (3,) in m, and m.
-    known : KnownCameras, optional
-        Poses and lenses of photos, in place of references and lenses: kept as they are, or where mapping begins, as the
-        settings say.
-    wishes : Wishes, optional
-        Bars or fixes that give scale, masks, a box to cut to, the last stage.
-    progress : callable
-        Called with (done, total, note) in units of a stage's own work.
-
-    Raises
-    ------
-    InputError
-        If the photos, references, pairs or region cannot be used.
-    StageError
-        If too little of it fits together.
-    EnvironmentFailure
-        If the disk is full, or a file cannot be read or written.
+    `photos`: folder of photographs. `focal_px`: focal length in pixels to start from; it is refined. `lens`: camera
+    that took all the photos, such as a trial's in its cameras.txt, or one by name of a group; refined unless the
+    settings say no. `lens_patterns`: names of lenses and shell patterns of their photos' names; see
+    `lens_groups.group_photos`. `pairs`: which photos to match; else the settings choose. `reference_positions`: camera
+    centres in m, shape (3,), by photo name; they fix scale and frame. `reference_rotations`: R_WC, shape (3, 3), by
+    photo name, in the frame of the references (optical axis last): with them pairs are chosen, matched and mapped from
+    the poses, unless the settings say no or the photos say that they do not fit. `region`, (centre, radius): what the
+    dense model is wanted of, in the frame of the references: shape (3,) in m, and m. `known`: poses and lenses of
+    photos, in place of references and lenses: kept as they are, or where mapping begins, as the settings say. `wishes`:
+    bars or fixes that give scale, masks, a box to cut to, the last stage. `progress`: called with (done, total, note)
+    in units of a stage's own work. Raises InputError if the photos, references, pairs or region cannot be used;
+    StageError if too little of it fits together; EnvironmentFailure if the disk is full, or a file cannot be read or
+    written.
     """
     start = time.perf_counter()
     if out.resolve() == photos.resolve():

@@ -46,19 +46,9 @@ def map_from_poses(
 ) -> SeededModel:
     """Model from verified matches and rough poses.
 
-    Parameters
-    ----------
-    database : Path
-        COLMAP's, with matches; it may be written into.
-    poses : dict
-        R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name; every photo with matches needs one.
-    photos : int
-        How many there are, for the progress.
-
-    Raises
-    ------
-    StageError
-        If COLMAP fails.
+    `database`: COLMAP's, with matches; it may be written into. `poses`: R_WC, shape (3, 3), and p_WC_m, shape (3,), by
+    photo name; every photo with matches needs one. `photos`: how many there are, for the progress. Raises StageError if
+    COLMAP fails.
     """
     silence_logging()
     link = pycolmap.Database.open(database)

@@ -33,19 +33,8 @@ def solve(
 ) -> list[pycolmap.Reconstruction]:
     """Every model that comes about, the one with most photos first.
 
-    Parameters
-    ----------
-    database : Path
-        COLMAP's, with matches; it may be written into.
-    scratch : Path
-        Folder to work in.
-    photos : int
-        How many there are, for the progress.
-
-    Raises
-    ------
-    StageError
-        If COLMAP fails.
+    `database`: COLMAP's, with matches; it may be written into. `scratch`: folder to work in. `photos`: how many there
+    are, for the progress. Raises StageError if COLMAP fails.
     """
     done = [0]
 
@@ -109,12 +98,7 @@ def solve_again(
     Where all pairs were matched, or none of those that were not verifies, the models are as they were. Those that look
     most alike are tried first, up to `SECOND_CHANCES` pairs.
 
-    Parameters
-    ----------
-    database : Path
-        COLMAP's; what is found is written into it.
-    models : list of Reconstruction
-        From `solve`, the largest first.
+    `database`: COLMAP's; what is found is written into it. `models`: from `solve`, the largest first.
     """
     link = pycolmap.Database.open(database)
     try:

@@ -47,16 +47,8 @@ class GroundPlane:
 def level_of(points: Array, eyes: Array) -> GroundPlane:
     """Plane of least squares of points, less those far above or below it, which are the subject's relief.
 
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-    eyes : ndarray, shape (k, 3)
-        Cameras: they are above.
-
-    Raises
-    ------
-    StageError
-        If the points lie on a line.
+    `points` has shape (n, 3). `eyes`, shape (k, 3): cameras: they are above. Raises StageError if the points lie on a
+    line.
     """
     kept = points
     for _ in range(ROUNDS):
@@ -109,10 +101,7 @@ class SurfaceExtent:
 def surface_of(path: Path) -> tuple[Array, IntArray]:
     """Vertices and faces of a mesh on disk.
 
-    Raises
-    ------
-    StageError
-        If it holds no triangles.
+    Raises StageError if it holds no triangles.
     """
     mesh = trimesh.load(path, process=False) if path.is_file() else None
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
@@ -154,27 +143,12 @@ def measure_halves(
 ) -> dict[str, Any]:
     """Measure a model and two made of half its photographs each; extent.json in its folder.
 
-    Parameters
-    ----------
-    names : list of str
-        Photographs with a place, in order; every other one is of a half.
-    make : callable
-        Makes a model of these photographs in a folder, in the frame of these camera places (m or units).
-    metric : bool
-        Whether the model's unit is the metre.
-
-    Returns
-    -------
-    dict
-        For each of area, plan_area, rugosity and volume: whole, halves, repeat_pct (difference of the halves over their
-        mean); unit, shared_pct (of the whole's plan that both halves have too, over which all is measured).
-
-    Raises
-    ------
-    InputError
-        If there are too few photographs.
-    StageError
-        If a half gives no model, or the halves share nothing.
+    `names`: photographs with a place, in order; every other one is of a half. `make`: makes a model of these
+    photographs in a folder, in the frame of these camera places (m or units). `metric`: whether the model's unit is the
+    metre. Returns for each of area, plan_area, rugosity and volume: whole, halves, repeat_pct (difference of the halves
+    over their mean); unit, shared_pct (of the whole's plan that both halves have too, over which all is measured).
+    Raises InputError if there are too few photographs; StageError if a half gives no model, or the halves share
+    nothing.
     """
     if len(names) < LEAST_PHOTOS:
         raise InputError(f"halves: {len(names)} photos have a place, two models need at least {LEAST_PHOTOS} together")

@@ -45,10 +45,7 @@ def run_stage(
 
     The stamp is removed before and written after the work, so that a stage that was stopped is done again.
 
-    Raises
-    ------
-    EnvironmentFailure
-        If a file cannot be read or written, or the disk is full; whatever `work` raises else.
+    Raises EnvironmentFailure if a file cannot be read or written, or the disk is full; whatever `work` raises else.
     """
     stamp = folder / "stages" / f"{name}.json"
     known = read_stamp(folder, name)
@@ -85,10 +82,7 @@ def invalidate_stage(folder: Path, name: str, changed: str) -> None:
 def need_room(folder: Path, size_bytes: float, name: str) -> None:
     """Check for room before a stage whose library ends the whole process when the disk is full, as COLMAP's does.
 
-    Raises
-    ------
-    EnvironmentFailure
-        If less is free than the stage may write.
+    Raises EnvironmentFailure if less is free than the stage may write.
     """
     free = shutil.disk_usage(folder).free
     size_bytes += 1e6 * RESERVE_MB
@@ -109,10 +103,7 @@ def no_room(fault: OSError, folder: Path) -> str:
 def make_folder(folder: Path) -> None:
     """Make a folder for results.
 
-    Raises
-    ------
-    InputError
-        If it cannot be made, such as where a file is.
+    Raises InputError if it cannot be made, such as where a file is.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -83,12 +83,8 @@ def pair_depth(
 ) -> DepthMap | None:
     """Depth map of view i from the pair (i, j), which must be rectifiable; None if too little of it can be seen.
 
-    Parameters
-    ----------
-    scale : float
-        Rectified pixels per pixel of the photo; less is taken where the range of disparities would be too wide.
-    paths : int
-        Directions that smoothness is looked for along, 3 or 8.
+    `scale`: rectified pixels per pixel of the photo; less is taken where the range of disparities would be too wide.
+    `paths`: directions that smoothness is looked for along, 3 or 8.
     """
     one, two = views[i], views[j]
     focus = one.focus_W_m

@@ -82,10 +82,7 @@ def is_film(path: Path) -> bool:
 def take_frames(film: Path, out: Path, progress: Progress = no_progress) -> tuple[Path, VideoFrames]:
     """Folder of the frames of a film, `out/frames`, made unless it is there, and what was taken.
 
-    Raises
-    ------
-    InputError
-        If the film cannot be read, or its camera hardly moves.
+    Raises InputError if the film cannot be read, or its camera hardly moves.
     """
     make_folder(out)
     folder = out / "frames"
@@ -154,13 +151,8 @@ def _take(film: Path, folder: Path, progress: Progress) -> VideoFrames:
 def choose_frames(way: Array, sharpness: Array, step: float) -> IntArray:
     """Indices of the sharpest frame of each stretch of movement.
 
-    Parameters
-    ----------
-    way : ndarray, shape (n,)
-        How far the picture has moved since the first frame; never falls.
-    sharpness : ndarray, shape (n,)
-    step : float
-        Length of a stretch and its pause together, in units of `way`: a frame is looked for within its first half.
+    `way`, shape (n,): how far the picture has moved since the first frame; never falls. `sharpness` has shape (n,).
+    `step`: length of a stretch and its pause together, in units of `way`: a frame is looked for within its first half.
     """
     place = (np.asarray(way) - way[0]) / step
     cell = np.floor(place).astype(np.int64)
@@ -264,10 +256,7 @@ def _small(image: Image) -> Image:
 def _opened(film: Path) -> Iterator[cv2.VideoCapture]:
     """A film to read, quietly.
 
-    Raises
-    ------
-    InputError
-        If it is none, or in a code that OpenCV's FFmpeg does not read.
+    Raises InputError if it is none, or in a code that OpenCV's FFmpeg does not read.
     """
     with no_stderr():
         reader = cv2.VideoCapture(str(film), cv2.CAP_FFMPEG)

@@ -53,10 +53,7 @@ class AtlasLayout:
 def lay_out(faces: int) -> AtlasLayout:
     """Squares in rows, two triangles in each; the smallest picture in which squares have their least side.
 
-    Raises
-    ------
-    StageError
-        If there are more triangles than the largest picture holds.
+    Raises StageError if there are more triangles than the largest picture holds.
     """
     squares = -(-faces // 2)
     for side in SIDES_PX:
@@ -192,10 +189,7 @@ def _corners(cell: int) -> Array:
 def write_atlas(model: Path, photos: Path, out: Path, progress: Progress = no_progress) -> float:
     """Write textured.obj, textured.mtl, textured.png and textured.glb of a model's mesh.ply; the share that is seen.
 
-    Raises
-    ------
-    StageError
-        If there is no surface, no photograph sees it, or it has too many triangles.
+    Raises StageError if there is no surface, no photograph sees it, or it has too many triangles.
     """
     path = model / "mesh.ply"
     surface = trimesh.load(path, process=False) if path.is_file() else None

@@ -68,15 +68,8 @@ def srgb_decode(image: Photo8) -> NDArray[np.float32]:
 def fit_water(photos: Sequence[tuple[Photo8, NDArray[np.float32]]]) -> WaterFit:
     """Fit the water between camera and scene to photographs of one place.
 
-    Parameters
-    ----------
-    photos : sequence of (image, range_m)
-        RGB, shape (h, w, 3), and the range along each pixel's ray in m, shape (h, w); NaN or infinite where unknown.
-
-    Raises
-    ------
-    InputError
-        If shapes differ or too few pixels have a range.
+    `photos`: RGB, shape (h, w, 3), and the range along each pixel's ray in m, shape (h, w); NaN or infinite where
+    unknown. Raises InputError if shapes differ or too few pixels have a range.
     """
     colours, ranges = [], []
     for image, range_m in photos:
@@ -166,16 +159,8 @@ def _gains(linear: Array) -> Array:
 def remove_water(image: Photo8, range_m: NDArray[np.float32], fit: WaterFit) -> Photo8:
     """The photograph as it would be without the water between.
 
-    Parameters
-    ----------
-    image : ndarray of uint8, shape (h, w, 3), RGB
-    range_m : ndarray, shape (h, w)
-        Range along each pixel's ray; where it is unknown, or beyond `fit.reach_m`, that is taken.
-    fit : WaterFit
-
-    Returns
-    -------
-    ndarray of uint8, shape (h, w, 3)
+    `image` has shape (h, w, 3). `range_m`, shape (h, w): range along each pixel's ray; where it is unknown, or beyond
+    `fit.reach_m`, that is taken. Returns ndarray of uint8, shape (h, w, 3).
     """
     if image.shape[:2] != range_m.shape:
         raise InputError(f"colour: image of {image.shape[:2]} and ranges of {range_m.shape}, must be alike")

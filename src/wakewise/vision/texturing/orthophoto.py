@@ -36,20 +36,9 @@ def write_orthophoto(
 
     The plane is the subject's own (see `level_of`); pictures have its across to the right and its along upwards.
 
-    Parameters
-    ----------
-    cell : float, optional
-        Side of a pixel in units of the model; one and a half point spacings if not given.
-
-    Returns
-    -------
-    dict
-        What orthophoto.json holds: cell, columns, rows, corner and axes in the model, step and lowest of the heights.
-
-    Raises
-    ------
-    StageError
-        If the subject is no plane, or nothing of it is seen.
+    `cell`: side of a pixel in units of the model; one and a half point spacings if not given. Returns what
+    orthophoto.json holds: cell, columns, rows, corner and axes in the model, step and lowest of the heights. Raises
+    StageError if the subject is no plane, or nothing of it is seen.
     """
     cloud = read_cloud(model / "dense.ply")
     views, _ = read_views(model / "sparse", None)

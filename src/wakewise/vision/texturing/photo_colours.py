@@ -95,19 +95,9 @@ def correct_photos(
 ) -> CorrectionResult:
     """Write colour-corrected copies of the photographs of a folder, JPEG, each whole; those that are there stay.
 
-    Parameters
-    ----------
-    photos : Path
-        Folder of photographs.
-    out : Path
-        Folder to write to; must not be `photos`.
-    model : Path, optional
-        Folder with sparse/ and maybe mesh.ply, reconstructed from the same photographs.
-
-    Raises
-    ------
-    InputError
-        If there are no photographs, or `out` is where they are.
+    `photos`: folder of photographs. `out`: folder to write to; must not be `photos`. `model`: folder with sparse/ and
+    maybe mesh.ply, reconstructed from the same photographs. Raises InputError if there are no photographs, or `out` is
+    where they are.
     """
     if out.resolve() == photos.resolve():
         raise InputError(f"--out {out}: is the folder of the photographs, must be another")
@@ -151,10 +141,7 @@ def correct_photos(
 def estimate_water(photos: Path, names: Sequence[str], model: Path) -> tuple[WaterFit | None, str | None]:
     """Optics of the water, fitted to photographs and the ranges of their model; None with the reason.
 
-    Raises
-    ------
-    InputError
-        If a photograph cannot be read.
+    Raises InputError if a photograph cannot be read.
     """
     depths, why_not = _depths(model, list(names))
     return (None, why_not) if depths is None else _fitted(photos, names, depths, no_progress)

@@ -41,20 +41,9 @@ def write_textured(
 ) -> float:
     """Write the mesh of a model as GLB with a colour at every vertex, and give the share of vertices seen, 0 to 1.
 
-    Parameters
-    ----------
-    model : Path
-        Folder with sparse/ and mesh.ply.
-    photos : Path
-        Folder of the photographs.
-    out : Path
-        Ends in .glb. Metres; x east, y up, z south of a model in NED with the bed at `bed_z_m`; if that is None, the
-        axes are the model's own.
-
-    Raises
-    ------
-    StageError
-        If the mesh holds no triangles or no photograph sees it.
+    `model`: folder with sparse/ and mesh.ply. `photos`: folder of the photographs. `out`: ends in .glb. Metres; x east,
+    y up, z south of a model in NED with the bed at `bed_z_m`; if that is None, the axes are the model's own. Raises
+    StageError if the mesh holds no triangles or no photograph sees it.
     """
     surface = trimesh.load(model / "mesh.ply", process=False)
     if not isinstance(surface, trimesh.Trimesh) or not len(surface.faces):
@@ -86,10 +75,7 @@ def write_textured(
 def read_textured(path: Path) -> tuple[Array, IntArray, Array]:
     """Vertices (n, 3), faces (m, 3) and linear colours (n, 3), 0 to 1, of a file that `write_textured` wrote.
 
-    Raises
-    ------
-    ValueError
-        If the file is another kind of GLB.
+    Raises ValueError if the file is another kind of GLB.
     """
     data = path.read_bytes()
     if data[:4] != b"glTF":

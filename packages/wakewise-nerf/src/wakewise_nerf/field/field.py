@@ -26,12 +26,8 @@ class HashGrid(torch.nn.Module):
 
     A level with no more corners than `2 ** table_log2` has an entry for each; a finer one shares entries by a hash.
 
-    Parameters
-    ----------
-    coarsest, finest : int
-        Cells along the cube at the first and the last level; between them they grow geometrically (eqs. 2, 3).
-    generator : torch.Generator
-        Draws the first values, even in +-1e-4 as in the paper.
+    `coarsest`, `finest`: cells along the cube at the first and the last level; between them they grow geometrically
+    (eqs. 2, 3). `generator`: draws the first values, even in +-1e-4 as in the paper.
     """
 
     def __init__(
@@ -54,10 +50,7 @@ class HashGrid(torch.nn.Module):
     def corners(self, positions: Any) -> tuple[Any, Any]:
         """Rows of the table and trilinear weights of the corners about positions, both of shape (n, levels, 8).
 
-        Parameters
-        ----------
-        positions : tensor, shape (n, 3)
-            In the unit cube; what lies outside is taken on by the cells at its faces.
+        `positions`, shape (n, 3): in the unit cube; what lies outside is taken on by the cells at its faces.
         """
         scaled = positions[:, None, :] * self.cells  # (n, levels, 3)
         low = torch.minimum(scaled.detach().floor().clamp(min=0.0), self.cells - 1.0)
@@ -229,10 +222,7 @@ BATCH = 2**18
 class OccupancyGrid(torch.nn.Module):
     """Grid of the largest density met of late, `cells` along each side of the contracted cube.
 
-    Parameters
-    ----------
-    interval : float
-        Length of an interval across the region, in radii.
+    `interval`: length of an interval across the region, in radii.
     """
 
     density: Any
@@ -263,12 +253,8 @@ class OccupancyGrid(torch.nn.Module):
     def update(self, field: Any, generator: Any, *, all_cells: bool, apply: bool) -> None:
         """Ask the field about a point in each cell, or in an eighth of the cells and all occupied ones; then decide.
 
-        Parameters
-        ----------
-        generator : torch.Generator
-            On the device of the grid; chooses cells and the points in them.
-        apply : bool
-            Whether cells may become empty; before, only densities are gathered.
+        `generator`: on the device of the grid; chooses cells and the points in them. `apply`: whether cells may become
+        empty; before, only densities are gathered.
         """
         device, count = self.density.device, self.cells**3
         if all_cells:

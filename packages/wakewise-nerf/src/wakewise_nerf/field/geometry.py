@@ -48,10 +48,7 @@ class DepthCamera:
 def depth_camera(photo: PosedPhoto, depth_px: float) -> DepthCamera | None:
     """Look from where a photo was taken at the middle of what it saw of the region, just wide enough; None if in vain.
 
-    Parameters
-    ----------
-    depth_px : float
-        Size of a pixel, in the photo's pixels.
+    `depth_px`: size of a pixel, in the photo's pixels.
     """
     rays = photo.directions_W.reshape(-1, 3).astype(np.float64)
     rays = rays[np.isfinite(rays).all(axis=1)]
@@ -77,12 +74,7 @@ def depth_map(
 ) -> DepthMap:
     """A rendered view as fusion wants it.
 
-    Parameters
-    ----------
-    distance_m : ndarray, shape (h, w)
-        Along the rays; 0 where nothing is.
-    colours : ndarray, shape (h, w, 3)
-        Red first.
+    `distance_m`, shape (h, w): along the rays; 0 where nothing is. `colours`, shape (h, w, 3): red first.
     """
     rays = camera.directions_C()
     depth = distance_m * rays[:, :, 2]
@@ -107,10 +99,7 @@ def depth_map(
 def fuse_depth(maps: list[DepthMap], agreeing: int, progress: Progress) -> tuple[OrientedPointCloud, float]:
     """Points that `agreeing` other maps confirm within a pixel's footprint, thinned and cleaned; and their spacing.
 
-    Raises
-    ------
-    StageError
-        If hardly any point is confirmed.
+    Raises StageError if hardly any point is confirmed.
     """
     footprints = [np.median(m.depth_m[m.wanted]) / m.focal_px for m in maps if m.wanted.any()]
     if not footprints:

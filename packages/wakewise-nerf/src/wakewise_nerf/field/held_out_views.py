@@ -97,10 +97,8 @@ def judge(
 ) -> dict[str, Any]:
     """Compare each held-out photo with its render; leave `<name>.png` with the photo left and the render right.
 
-    Returns
-    -------
-    dict
-        psnr_db and ssim, means over the photos, each on the rectangle about the region; psnr_min_db; views, by name.
+    Returns psnr_db and ssim, means over the photos, each on the rectangle about the region; psnr_min_db; views, by
+    name.
     """
     views: dict[str, dict[str, float | None]] = {}
     scores: list[tuple[float, float | None]] = []

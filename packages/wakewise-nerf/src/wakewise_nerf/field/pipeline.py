@@ -44,34 +44,14 @@ def build_field(
     A stage whose files are there, made from the same photos and poses with the same settings, is skipped; a training
     that was stopped goes on from its last checkpoint.
 
-    Parameters
-    ----------
-    folder : Path
-        A folder that `reconstruct` left: sparse/ is read.
-    photos : Path
-        The folder of photos that it was made from.
-    region : (centre, radius), optional
-        What the field is wanted of, in the model's frame: shape (3,) in m, and m. If not given, where the sparse
-        points are.
-    device : str
-        auto, cpu or cuda.
-    progress : callable
-        Called with (done, total, note) in units of a stage's own work.
-
-    Returns
-    -------
-    dict
-        psnr_db, psnr_min_db, ssim (means over held-out views on the rectangle about the region), train_views,
-        held_out_views, views (by name), loss, steps, rays_per_step, occupied_pct, points, point_spacing_mm,
-        mesh_vertices, mesh_faces, mesh_points_left_out, parameters, device, stages_s,
-        skipped, wall_s, and why for what is None.
-
-    Raises
-    ------
-    InputError
-        If PyTorch, CUDA, the model or the photos are missing or of no use.
-    StageError
-        If too little can be learnt from them.
+    `folder`: a folder that `reconstruct` left: sparse/ is read. `photos`: the folder of photos that it was made from.
+    `region`, (centre, radius): what the field is wanted of, in the model's frame: shape (3,) in m, and m. If not given,
+    where the sparse points are. `device`: auto, cpu or cuda. `progress`: called with (done, total, note) in units of a
+    stage's own work. Returns psnr_db, psnr_min_db, ssim (means over held-out views on the rectangle about the region),
+    train_views, held_out_views, views (by name), loss, steps, rays_per_step, occupied_pct, points, point_spacing_mm,
+    mesh_vertices, mesh_faces, mesh_points_left_out, parameters, device, stages_s, skipped, wall_s, and why for what is
+    None. Raises InputError if PyTorch, CUDA, the model or the photos are missing or of no use; StageError if too little
+    can be learnt from them.
     """
     began = time.perf_counter()
     where = pick_device(device)

@@ -44,10 +44,7 @@ class PosedPhoto:
 def read_model(sparse: Path) -> pycolmap.Reconstruction:
     """Sparse model of a folder.
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    Raises InputError if there is none.
     """
     if not (sparse / "images.bin").is_file():
         raise InputError(
@@ -80,12 +77,8 @@ def read_posed(
     Rays follow the photo's own camera model, so that nothing is resampled to undo a distortion; COLMAP has the centre
     of the first pixel at (0.5, 0.5).
 
-    Raises
-    ------
-    InputError
-        If a photo is missing or is not the one that was registered, or there are too many pixels.
-    StageError
-        If too few photos see the region.
+    Raises InputError if a photo is missing or is not the one that was registered, or there are too many pixels;
+    StageError if too few photos see the region.
     """
     found = []
     grids: dict[tuple[int, int, int], Array] = {}

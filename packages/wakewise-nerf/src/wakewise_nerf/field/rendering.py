@@ -42,10 +42,7 @@ def interval_edges(origins: Any, directions: Any, samples: int) -> Any:
     Evenly across the unit ball; before and behind it they widen as `contract` shrinks space, so that an interval is
     about as long in shrunk space as in the ball. A ray that passes the ball by has intervals of length 0 there.
 
-    Parameters
-    ----------
-    origins, directions : tensor, shape (n, 3)
-        In radii about the region's centre; unit directions.
+    `origins`, `directions`, shape (n, 3): in radii about the region's centre; unit directions.
     """
     middle = -(origins * directions).sum(dim=1, keepdim=True)
     gap = (origins * origins).sum(dim=1, keepdim=True) - middle**2
@@ -93,17 +90,9 @@ def render(
 ) -> RenderedRays:
     """Colour, opacity and depth of rays.
 
-    Parameters
-    ----------
-    occupancy : Occupancy or None
-        Which points may hold something; None asks the field about all.
-    origins, directions : tensor, shape (n, 3)
-    samples : int
-        Intervals across the unit ball.
-    jitter : tensor, shape (n, 1), optional
-        Where in its interval each ray's points lie, 0 to 1; the middle if not given.
-    colours : bool
-        Depth alone needs no colours.
+    `occupancy`: which points may hold something; None asks the field about all. `origins`, `directions` have shape (n,
+    3). `samples`: intervals across the unit ball. `jitter`, shape (n, 1): where in its interval each ray's points lie,
+    0 to 1; the middle if not given. `colours`: depth alone needs no colours.
     """
     edges = interval_edges(origins, directions, samples)
     lengths = edges[:, 1:] - edges[:, :-1]

@@ -83,10 +83,7 @@ PROFILES = {
 def profile(name: str) -> FieldSettings:
     """Settings of a profile by name.
 
-    Raises
-    ------
-    InputError
-        If there is no such profile.
+    Raises InputError if there is no such profile.
     """
     if name not in PROFILES:
         raise InputError(f"--profile {name}: there is no such profile; allowed are {', '.join(sorted(PROFILES))}")
@@ -99,10 +96,7 @@ DEVICES = ("auto", "cpu", "cuda")
 def require_torch() -> None:
     """Say in one line what to install where PyTorch is missing.
 
-    Raises
-    ------
-    MissingExtra
-        If there is no PyTorch.
+    Raises MissingExtra if there is no PyTorch.
     """
     need("a neural field", "nerf")
 
@@ -110,12 +104,8 @@ def require_torch() -> None:
 def pick_device(name: str) -> Any:
     """The device by name, a `torch.device`; auto takes CUDA where there is one.
 
-    Raises
-    ------
-    MissingExtra
-        If there is no PyTorch.
-    InputError
-        If there is no such device, or CUDA was asked for and cannot be had.
+    Raises MissingExtra if there is no PyTorch; InputError if there is no such device, or CUDA was asked for and cannot
+    be had.
     """
     require_torch()
     import torch

@@ -109,15 +109,8 @@ def train(
 ) -> TrainingState:
     """Train to the last step, from the checkpoint where it is of the same key.
 
-    Parameters
-    ----------
-    key : str
-        Fingerprint of all that the result depends on; a checkpoint of another is overwritten.
-
-    Raises
-    ------
-    StageError
-        If the loss is no longer finite.
+    `key`: fingerprint of all that the result depends on; a checkpoint of another is overwritten. Raises StageError if
+    the loss is no longer finite.
     """
     torch.set_num_threads(settings.threads)
     training = TrainingState(settings, device)

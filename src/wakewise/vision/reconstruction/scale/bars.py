@@ -98,10 +98,7 @@ class ScaleBars:
 def parse_bar(words: str) -> ScaleBar:
     """A bar of `A,B,LENGTH[,SIGMA]`: numbers of two targets, and metres.
 
-    Raises
-    ------
-    InputError
-        If it is not of that form.
+    Raises InputError if it is not of that form.
     """
     parts = [part.strip() for part in words.split(",")]
     try:
@@ -141,10 +138,7 @@ class _BarsFile(Settings):
 def read_bars(path: Path) -> ScaleBars:
     """Bars of a YAML file: `bars` (ends, length_m, sigma_m), `targets`, `tag_m`, `board`.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read or says something else.
+    Raises InputError if it cannot be read or says something else.
     """
     value = yaml_file(path)
     if not isinstance(value, dict):
@@ -241,10 +235,7 @@ def fit_scale(bars: list[BarMeasurement], keep: bool = False) -> ScaleFit:
     The uncertainty is that of the mean, enlarged where bars scatter by more than they say (R. T. Birge, Physical Review
     40, 1932, doi 10.1103/PhysRev.40.207).
 
-    Raises
-    ------
-    InputError
-        If a bar differs from what the others say by more than can be believed.
+    Raises InputError if a bar differs from what the others say by more than can be believed.
     """
     scales = np.array([bar.scale for bar in bars])
     weights = np.array([1.0 / (bar.share * bar.scale) ** 2 for bar in bars])

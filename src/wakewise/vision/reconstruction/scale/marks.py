@@ -39,10 +39,7 @@ def find_marks(
 ) -> tuple[str, Sightings]:
     """The targets' family and where each target of it is seen.
 
-    Raises
-    ------
-    InputError
-        If none of the wanted targets is seen.
+    Raises InputError if none of the wanted targets is seen.
     """
     if family is None:
         family = _told(store, names, wanted, threads, progress)
@@ -108,10 +105,7 @@ def find_board(
 ) -> tuple[Mapping[int, Array], dict[int, dict[str, Array]]]:
     """A ChArUco board's inner corners: places on it in m, shape (3,), and by photograph in pixels, shape (1, 2).
 
-    Raises
-    ------
-    StageError
-        If no marker of a known dictionary is in the photographs that are looked at first.
+    Raises StageError if no marker of a known dictionary is in the photographs that are looked at first.
     """
     some = names[:: max(1, -(-len(names) // TRIED))]
     _, detector = board_detector([_grey(store.image(name)) for name in some], board)

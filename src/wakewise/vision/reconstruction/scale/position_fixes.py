@@ -101,17 +101,9 @@ class _Told:
 def read_fixes(path: Path) -> PositionFixes:
     """Fixes of a CSV file.
 
-    Parameters
-    ----------
-    path : Path
-        Columns `name` and `depth_m` (down from the surface), or these and `lat_deg`, `lon_deg` (WGS 84) or `north_m`,
-        `east_m`; with `sigma_m` (of each horizontal axis) and `depth_sigma_m` where they are known. Empty cells say
-        nothing.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or a row says what cannot be.
+    `path`: columns `name` and `depth_m` (down from the surface), or these and `lat_deg`, `lon_deg` (WGS 84) or
+    `north_m`, `east_m`; with `sigma_m` (of each horizontal axis) and `depth_sigma_m` where they are known. Empty cells
+    say nothing. Raises InputError if it cannot be read, or a row says what cannot be.
     """
     columns = "name, depth_m, lat_deg, lon_deg (or north_m, east_m), sigma_m, depth_sigma_m"
     told: dict[str, _Told] = {}
@@ -142,10 +134,7 @@ def read_fixes(path: Path) -> PositionFixes:
 def exif_fixes(folder: Path) -> PositionFixes:
     """Fixes that cameras wrote into the photos of a folder.
 
-    Raises
-    ------
-    InputError
-        If no photo holds one with a height.
+    Raises InputError if no photo holds one with a height.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: is no folder of photos, only theirs hold fixes")
@@ -230,10 +219,7 @@ def _row(where: str, row: Mapping[str, str | None]) -> _Told:
 def _flattened(told: Mapping[str, _Told], source: str) -> PositionFixes:
     """All in metres, about the first that has degrees.
 
-    Raises
-    ------
-    InputError
-        If some are in degrees and some in metres, or they lie too far apart.
+    Raises InputError if some are in degrees and some in metres, or they lie too far apart.
     """
     origin = next((one.angles for one in told.values() if one.angles is not None), None)
     if origin is not None and any(one.flat is not None for one in told.values()):
@@ -308,10 +294,7 @@ class Georeference:
 def place_by_fixes(centres: Mapping[str, Array], fixes: PositionFixes) -> Georeference:
     """Fit cameras' places in a model, shape (3,) by photo, to fixes.
 
-    Raises
-    ------
-    InputError
-        If too few of the photos have a fix.
+    Raises InputError if too few of the photos have a fix.
     """
     found = {name: fix for name in sorted(centres) if (fix := fixes.of(name)) is not None}
     names = [name for name, fix in found.items() if np.isfinite(fix.place_W_m[2])]

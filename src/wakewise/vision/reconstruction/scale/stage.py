@@ -34,22 +34,11 @@ def scale_model(
 ) -> dict[str, Any]:
     """Scale a sparse model so that bars have their lengths; about its origin, without turning it.
 
-    Parameters
-    ----------
-    keep : bool
-        Leave the model as it is: its scale comes from elsewhere, and the bars check it.
-
-    Returns
-    -------
-    dict
-        scale_bars: used (False where the bars only check), model_off_pct (how much longer lengths of the model are than
-        by the bars, 0 where they are used), uncertainty_pct, family, bars (each bar's residual), targets (photographs,
-        error in px, sides in mm and middle in m of each).
-
-    Raises
-    ------
-    InputError
-        If a target is seen in fewer than two registered photographs, its size is not what was said, or bars disagree.
+    `keep`: leave the model as it is: its scale comes from elsewhere, and the bars check it. Returns scale_bars: used
+    (False where the bars only check), model_off_pct (how much longer lengths of the model are than by the bars, 0 where
+    they are used), uncertainty_pct, family, bars (each bar's residual), targets (photographs, error in px, sides in mm
+    and middle in m of each). Raises InputError if a target is seen in fewer than two registered photographs, its size
+    is not what was said, or bars disagree.
     """
     views = {view.name: view for view in read_views(sparse, None)[0]}
     names = sorted(views)
@@ -89,23 +78,11 @@ def scale_model(
 def place_model(sparse: Path, fixes: PositionFixes, keep: bool = False) -> dict[str, Any]:
     """Lay a sparse model where fixes say that its cameras were, in m, down along its third axis.
 
-    Parameters
-    ----------
-    keep : bool
-        Leave the model as it is: its scale comes from elsewhere, and the fixes check it.
-
-    Returns
-    -------
-    dict
-        scale_fixes: used, why (not, in words), photos, uncertainty_pct (None where the scale is open), model_off_pct
-        (how much longer lengths of the model are than by the fixes; None where these give the scale),
-        horizontal_rms_m and depth_rms_m (of what is left), far (photos whose fix does not fit), north_known, origin_deg
-        (latitude and longitude of the frame's origin).
-
-    Raises
-    ------
-    InputError
-        If too few registered photos have a fix.
+    `keep`: leave the model as it is: its scale comes from elsewhere, and the fixes check it. Returns scale_fixes: used,
+    why (not, in words), photos, uncertainty_pct (None where the scale is open), model_off_pct (how much longer lengths
+    of the model are than by the fixes; None where these give the scale), horizontal_rms_m and depth_rms_m (of what is
+    left), far (photos whose fix does not fit), north_known, origin_deg (latitude and longitude of the frame's origin).
+    Raises InputError if too few registered photos have a fix.
     """
     model = pycolmap.Reconstruction(sparse)
     centres = {image.name: np.asarray(image.projection_center()) for image in model.images.values() if image.has_pose}
@@ -212,10 +189,7 @@ def _unseen(number: int, family: str, sightings: Sightings, bars: ScaleBars) -> 
 def _check_sizes(said: list[dict[str, Any]], tag_m: float | None, uncertainty_pct: float) -> None:
     """Refuse targets that were printed at another size than was said, or that are no squares.
 
-    Raises
-    ------
-    InputError
-        Names the first and what its sides are.
+    Raises InputError: names the first and what its sides are.
     """
     for one in said:
         sides = np.array(one["sides_mm"])
