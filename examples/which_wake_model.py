@@ -5,8 +5,7 @@ from pathlib import Path
 
 import wakewise as ww
 from wakewise.wake.models import OWN_MODELS
-from wakewise.wake.samples import read_samples
-from wakewise.wake.scores import score
+from wakewise.wake.samples import read_samples, score
 from wakewise_paper.flows import oracle_jets
 from wakewise_paper.wake_validation import sampled
 

@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.allocation import Weights, compile_layout, min_norm_allocation, min_wash_allocation
-from wakewise.allocation.allocate import is_incoherent
+from wakewise.allocation.allocate import convex_allocation, is_incoherent
 from wakewise.allocation.branch_and_bound import coordinates, global_minimum
-from wakewise.allocation.convex import convex_allocation
 from wakewise.allocation.layout import independent_blocks
 from wakewise.allocation.line_search import cost
 from wakewise.core.errors import InputError

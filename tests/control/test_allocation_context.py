@@ -55,11 +55,11 @@ def test_an_unknown_current_leaves_the_water_still():
 def test_what_shares_are_chosen_by_is_the_mean_of_two_beliefs(current):
     """Shares are chosen by both, priced by the reckoned one; the mechanism off, or a foreign model: that alone."""
     here, eyes = estimate(*current), watch()
-    astray = eyes.view.astray(here.X_WB)
+    astray = eyes.view.scattered_gram(here.X_WB)
     sure = watch(direction_uncertainty=False).influence(here, THRUSTS)
     seen = eyes.influence(here, THRUSTS)
     np.testing.assert_allclose(seen.gram, (1.0 - DOUBT) * sure.gram + DOUBT * np.diag(astray), rtol=1e-12)
-    np.testing.assert_array_equal(seen.sent, sure.sent)
+    np.testing.assert_array_equal(seen.actual, sure.actual)
     foreign = Foreign()
     np.testing.assert_array_equal(watch(foreign).influence(here, THRUSTS).gram, watch(foreign).gram(here, THRUSTS))
 
@@ -68,13 +68,13 @@ def test_a_stated_current_is_believed_against_the_estimate():
     """What a user states stands, whatever the estimator finds and however sure it is."""
     found = watch(current_m_s=(0.0, 0.02, 0.0)).flow(estimate(0.05, 0.0, 0.0, current_covariance=np.eye(3)), THRUSTS)
     np.testing.assert_array_equal(found.current_W_m_s, [0.0, 0.02, 0.0])
-    assert found.unsure_m_s == pytest.approx(CURRENT_SPREAD * 0.02)
+    assert found.current_std_m_s == pytest.approx(CURRENT_SPREAD * 0.02)
 
 
 def test_what_the_estimator_is_unsure_of_is_added():
     """In squares: a component's variance and the share of the current."""
     found = watch().flow(estimate(0.0, 0.1, 0.0, current_covariance=np.diag([1e-4, 4e-4, 4e-4])), THRUSTS)
-    assert found.unsure_m_s == pytest.approx(np.sqrt(3e-4 + (CURRENT_SPREAD * 0.1) ** 2))
+    assert found.current_std_m_s == pytest.approx(np.sqrt(3e-4 + (CURRENT_SPREAD * 0.1) ** 2))
 
 
 def test_shares_make_the_wrench_and_are_never_worse_than_those_of_before_by_their_own_matrix():

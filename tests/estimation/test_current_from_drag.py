@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.geometry import matrix_from_quat, quat_from_euler
-from wakewise.estimation.current_from_drag import KNOWN_M_S, current_if_known, current_of_force, level_drag
+from wakewise.estimation.current_from_drag import KNOWN_M_S, current_from_force, current_if_known, level_drag
 from wakewise.robot.vehicles import acceleration, compile_body, load_vehicle, with_each_drag
 
 TIGHT = 1e-4 * np.eye(3)
@@ -15,7 +15,7 @@ TIGHT = 1e-4 * np.eye(3)
 def test_the_drag_of_a_current_gives_the_current_back(name, current):
     """Forward by the vehicle's drag, back by Newton: to a thousandth of a mm/s, pitched and turned as it may be."""
     packed, q = compile_body(load_vehicle(name)).packed, quat_from_euler(0.05, -0.6, 2.0)
-    found = current_of_force(packed, q, *level_drag(packed, q, *current))
+    found = current_from_force(packed, q, *level_drag(packed, q, *current))
     assert found[:2] == pytest.approx(current, abs=1e-6)
 
 
@@ -29,7 +29,7 @@ def test_level_drag_is_what_the_vehicle_would_set_off_with():
 
 def test_no_force_is_no_current():
     """Zero in, zero out, and the slope of creeping flow."""
-    found = current_of_force(compile_body(load_vehicle("paper")).packed, np.array([1.0, 0, 0, 0]), 0.0, 0.0)
+    found = current_from_force(compile_body(load_vehicle("paper")).packed, np.array([1.0, 0, 0, 0]), 0.0, 0.0)
     assert np.isfinite(found).all() and not found[:2].any() and found[2] > 0.0 and found[5] > 0.0
 
 
@@ -82,7 +82,7 @@ def test_the_current_told_is_that_of_a_readable_twin():
     values, axes = np.linalg.eigh(around[:2, :2])
     reach = (axes * np.sqrt(2.0 * values)).T
     forces = force[:2] + np.concatenate([reach, -reach])
-    told = np.array([current_of_force(packed, q, *f)[:2] for packed in sets for f in forces])
+    told = np.array([current_from_force(packed, q, *f)[:2] for packed in sets for f in forces])
     level = told.mean(axis=0)
     spread = (told - level).T @ (told - level) / len(told) + 0.2**2 * np.outer(level, level)
     current, covariance = current_if_known(sets, q, force, around, 0.2)

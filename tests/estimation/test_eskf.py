@@ -109,7 +109,7 @@ def test_noise_is_averaged_away():
     assert rms(late[:, 3:6]) < 0.003
     assert rms(late[:, 6:9]) < np.radians(0.1)
     assert rms(late[:, 9:]) < 0.006
-    assert state.refused <= 2
+    assert state.rejected <= 2
     assert state.late == 0
 
 
@@ -187,7 +187,7 @@ def test_wrong_poses_are_left_out():
     """Every tenth pose half a metre off changes next to nothing, and each is counted."""
     errors, _, state = record(seconds=8.0, outlier_every=10)
     assert rms(errors[200:, :3]) < 0.002
-    assert 45 <= state.refused <= 55
+    assert 45 <= state.rejected <= 55
 
 
 def test_a_sudden_load_is_noticed_and_found():
@@ -206,10 +206,10 @@ def test_a_sudden_load_is_noticed_and_found():
 
 
 def test_waves_are_followed():
-    """A load that swings by 1 N at 0.3 Hz, far beyond the assumed noise, costs millimetres and no refused poses."""
+    """A load that swings by 1 N at 0.3 Hz, far beyond the assumed noise, costs millimetres and no rejected poses."""
     errors, _, state = record(seconds=12.0, load_W_N=lambda t: np.array([np.sin(0.6 * np.pi * t), 0.0, 0.0]))
     assert rms(errors[200:, :3]) < 0.004
-    assert state.refused < 20
+    assert state.rejected < 20
 
 
 def test_what_is_broken_or_too_old_is_left_out():
@@ -243,7 +243,7 @@ def test_order_of_arrival_does_not_matter():
             state, _ = filter_.step(state, DT, batch, np.full(8, 0.1))
         settled.append(state)
     np.testing.assert_allclose(settled[0].mean, settled[1].mean, atol=1e-12)
-    assert settled[0].taken == settled[1].taken == 40
+    assert settled[0].accepted == settled[1].accepted == 40
 
 
 @pytest.mark.parametrize(("ratio", "least", "most"), [(0.5, 1.0, 3.2), (1.0, 4.0, 8.0), (2.0, 12.0, 40.0)])

@@ -74,27 +74,27 @@ def test_a_pose_is_taken_as_the_textbook_has_it_and_heeded(slow):
     """The camera's slow shift and turn are part of what is expected; the noise follows the normalised innovations."""
     rng = np.random.default_rng(0)
     mean, P, H = random_mean(rng), random_covariance(rng), selecting(0, slow, 6)
-    p_m, q, leaning = rng.normal(size=3), unit_quaternion(rng), 0.1 * rng.normal(size=6)
+    p_m, q, innovation_mean = rng.normal(size=3), unit_quaternion(rng), 0.1 * rng.normal(size=6)
     bent = np.zeros(6) if slow == NOTHING else mean[slow + 1 : slow + 7]
     expected_q = quat_multiply(mean[3:7], quat_from_rotvec(bent[3:]))
     turned = rotvec_from_quat(quat_multiply(quat_conjugate(expected_q), q))
     residual, std = np.concatenate([p_m - mean[:3] - bent[:3], turned]), np.repeat([0.003, 0.005], 3)
     expected = updated(mean, P, H, residual, std)
     innovation = residual / np.sqrt(np.diag(H @ P @ H.T) + std**2)
-    leant = leaning + (np.clip(innovation, -3.0, 3.0) - leaning) / 15
+    leant = innovation_mean + (np.clip(innovation, -3.0, 3.0) - innovation_mean) / 15
     louder = 2.0 * np.exp(0.1 * (min((leant**2).max() / (9.0 / 29.0), 10.0) - 1.0))
-    distance, scale = correct_by_pose(mean, P, p_m, q, slow, 0.003, 0.005, np.inf, leaning, 2.0)
-    for one, other in zip((mean, P, distance, leaning, scale), (*expected, leant, louder), strict=True):
+    distance, scale = correct_by_pose(mean, P, p_m, q, slow, 0.003, 0.005, np.inf, innovation_mean, 2.0)
+    for one, other in zip((mean, P, distance, innovation_mean, scale), (*expected, leant, louder), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
 
 
 def test_noise_is_bounded_both_ways():
     """Poses that agree bring the scale back to 1 and not below; those that do not, to 300 and not above."""
     for far, scale, bound in ((0.0, 1.001, 1.0), (9.0, 299.0, 300.0)):
-        mean, P, leaning = np.zeros(ERRORS + 1), 1e-6 * np.eye(ERRORS), np.full(6, far / 3.0)
+        mean, P, innovation_mean = np.zeros(ERRORS + 1), 1e-6 * np.eye(ERRORS), np.full(6, far / 3.0)
         mean[3] = 1.0
         p_m, q = np.full(3, far), np.array([1.0, 0.0, 0.0, 0.0])
-        assert correct_by_pose(mean, P, p_m, q, NOTHING, 0.003, 0.005, 1.0, leaning, scale)[1] == bound
+        assert correct_by_pose(mean, P, p_m, q, NOTHING, 0.003, 0.005, 1.0, innovation_mean, scale)[1] == bound
 
 
 def test_an_accelerometer_is_taken_as_the_textbook_has_it():

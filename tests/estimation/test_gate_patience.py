@@ -28,25 +28,25 @@ def told(priors: Priors, places: list[np.ndarray]) -> tuple[list[float], int]:
         seen = Measurement(time_s=(k + 1) * DT, X_WB=Pose(place))
         state, estimate = filter_.step(state, DT, (seen,), np.zeros(8))
         north.append(float(estimate.X_WB.p_m[0]))
-    return north, state.refused
+    return north, state.rejected
 
 
 @pytest.mark.parametrize("patience", [4, 15])
 def test_it_gives_in_after_so_many_wrong_poses_in_a_row(patience: int) -> None:
     """Until then the place stays; after it the filter goes where all poses say the vehicle is."""
     priors = Priors(gate_patience=patience, settle_s=0.0)
-    north, refused = told(priors, [HERE] * 20 + [THERE] * (patience + 10))
+    north, rejected = told(priors, [HERE] * 20 + [THERE] * (patience + 10))
     assert max(np.abs(north[: 20 + patience])) < 0.02
     assert north[-1] == pytest.approx(0.1, abs=0.02)
-    assert refused == patience
+    assert rejected == patience
 
 
 def test_a_right_pose_in_between_ends_the_row() -> None:
     """Wrong poses that are never so many in a row are left out for good, however many they are together."""
     row = [THERE] * 3 + [HERE]
-    north, refused = told(Priors(gate_patience=4, settle_s=0.0), [HERE] * 20 + row * 10)
+    north, rejected = told(Priors(gate_patience=4, settle_s=0.0), [HERE] * 20 + row * 10)
     assert max(np.abs(north)) < 0.02
-    assert refused == 30
+    assert rejected == 30
 
 
 @pytest.mark.parametrize("period_s", [0.01, 0.04])

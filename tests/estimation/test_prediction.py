@@ -67,10 +67,10 @@ def test_every_unknown_moves_the_vehicle_as_the_jacobian_says():
 def test_lasting_errors_keep_their_spread():
     """Without measurements a Gauss-Markov error forgets what was known of it and ends at its stated spread."""
     rng = np.random.default_rng(0)
-    spread, lasts_s = np.full(ERRORS - CURRENT, 0.2), np.full(ERRORS - CURRENT, 0.1)
+    spread, time_constants_s = np.full(ERRORS - CURRENT, 0.2), np.full(ERRORS - CURRENT, 0.1)
     mean, P = random_mean(rng), np.zeros((ERRORS, ERRORS))
     for _ in range(100):
-        predict(PACKED, ALLOCATION, mean, P, np.zeros(8), REST, 0.01, SILENT, spread, lasts_s)
+        predict(PACKED, ALLOCATION, mean, P, np.zeros(8), REST, 0.01, SILENT, spread, time_constants_s)
     np.testing.assert_allclose(np.sqrt(np.diag(P)[CURRENT:]), 0.2, rtol=1e-6)
     assert np.abs(mean[1 + CURRENT :]).max() < 1e-3
 

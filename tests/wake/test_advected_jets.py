@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 
 from wakewise.core.errors import InputError
 from wakewise.wake import GaussianJet, PaperJet, RoundJet, gram, wake_model
-from wakewise.wake.advected_jets import OPPOSED, PUFF, SECTIONS, CrossFlow, plumes
-from wakewise.wake.disturbance import carried_velocity
+from wakewise.wake.advected_jets import LINE_PUFF_GROWTH, OPPOSING_SHARE, SECTIONS, CrossFlow, plumes
+from wakewise.wake.disturbance import advected_velocity
 
 AREA = 0.0045
 D = float(np.sqrt(4.0 * AREA / np.pi))
@@ -17,7 +17,7 @@ WHOLE = np.array([[np.inf, 1.0]])
 
 
 def flow(current=(0.0, 0.0, 0.0), unsure=0.0, thrusts=(1.0,)):
-    return CrossFlow(current_W_m_s=np.array(current, float), unsure_m_s=unsure, thrusts_N=np.array(thrusts, float))
+    return CrossFlow(current_W_m_s=np.array(current, float), current_std_m_s=unsure, thrusts_N=np.array(thrusts, float))
 
 
 def curve(current, thrust=1.0, unsure=0.0, jet=None):
@@ -60,13 +60,13 @@ def test_the_path_is_that_of_the_equations():
         core = np.sqrt(max(thrust / RHO / (np.pi * still**2) + (np.pi / 8 - 0.5) * b**2, 0.0)) - np.sqrt(np.pi / 8) * b
         a = max(core, 0.0)
         chi = (a**2 + np.sqrt(np.pi / 2) * a * b + b**2 / 2) / (a**2 + np.sqrt(np.pi) * a * b + b**2)
-        along = current[0] * (OPPOSED if current[0] < 0 else 1.0)
+        along = current[0] * (OPPOSING_SHARE if current[0] < 0 else 1.0)
         strength = chi * still**2 / max(grown / s, 1.0) ** 2
         roots = np.roots([chi**2, 2 * chi * along, current @ current, 0.0, -(strength**2)])
         U = max(r.real for r in roots if abs(r.imag) < 1e-9)
         v = chi * U * AHEAD[0] + current
         cosine = np.clip(v[0] / np.linalg.norm(v), 0.0, 1.0)
-        return [*v, chi * U, chi * U * (cosine + PUFF * np.sqrt(1 - cosine**2))]
+        return [*v, chi * U, chi * U * (cosine + LINE_PUFF_GROWTH * np.sqrt(1 - cosine**2))]
 
     found = curve(current, thrust)
     rho = RoundJet().water_density_kg_m3
@@ -101,7 +101,7 @@ def test_every_section_carries_the_thrust(current):
     rows = found[(found[:, 4] > 1.5)]
     still = RoundJet().speed(rows[:, 4], np.zeros(len(rows)), np.ones(len(rows)), np.full(len(rows), AREA))
     U = rows[:, 5] * still
-    along = c[0] * (OPPOSED if c[0] < 0 else 1.0)
+    along = c[0] * (OPPOSING_SHARE if c[0] < 0 else 1.0)
     speed = np.sqrt((0.5 * U) ** 2 + U * along + c @ c)
     np.testing.assert_allclose(U * speed * rows[:, 6] ** 2, 0.5 * still**2, rtol=2e-3)
 
@@ -127,7 +127,7 @@ def test_points_in_a_plume_have_the_speed_of_the_nearest_section():
     found = curve(c)
     rng = np.random.default_rng(2)
     points = found[5:20:3, :3] + rng.normal(scale=0.03, size=(5, 3))
-    fast = carried_velocity(jet, points, np.zeros((1, 3)), AHEAD, np.array([AREA]), np.ones(1), flow(c))[0]
+    fast = advected_velocity(jet, points, np.zeros((1, 3)), AHEAD, np.array([AREA]), np.ones(1), flow(c))[0]
     np.testing.assert_array_equal(fast[:, 1:], 0.0)
     for point, u in zip(points, fast[:, 0], strict=True):
         best = 0.0
@@ -162,8 +162,10 @@ def test_d_stays_a_sum_of_squares():
 
 def test_a_thruster_at_rest_is_guessed_to_push_a_share_of_the_mean():
     """Both signs have a size, so that a jet that would be new is seen too."""
-    assert np.array_equal(flow(thrusts=(1.0, -3.0, 0.0, 0.0)).guessed, [1.0, 0.5, 0.5, 0.5, 0.5, 3.0, 0.5, 0.5])
-    assert flow(thrusts=(0.0, 0.0)).guessed.min() > 0.0
+    assert np.array_equal(
+        flow(thrusts=(1.0, -3.0, 0.0, 0.0)).nominal_thrusts_N, [1.0, 0.5, 0.5, 0.5, 0.5, 3.0, 0.5, 0.5]
+    )
+    assert flow(thrusts=(0.0, 0.0)).nominal_thrusts_N.min() > 0.0
 
 
 def test_what_is_wrong_is_refused():
@@ -188,4 +190,4 @@ def test_models_from_outside_have_no_law_that_a_current_could_carry():
     moving = flow((0.1, 0.0, 0.0), thrusts=np.ones(6))
     np.testing.assert_array_equal(gram(Outside(), *place, flow=moving), gram(Outside(), *place))
     with pytest.raises(InputError, match="outside"):
-        carried_velocity(Outside(), place[0], *place[2:], np.ones(6), moving)
+        advected_velocity(Outside(), place[0], *place[2:], np.ones(6), moving)

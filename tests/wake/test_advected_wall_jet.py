@@ -4,7 +4,7 @@ import numpy as np
 
 from wakewise.wake import ImpingingJet, RoundJet, gram
 from wakewise.wake.advected_jets import CrossFlow
-from wakewise.wake.disturbance import carried_velocity
+from wakewise.wake.disturbance import advected_velocity
 from wakewise.wake.wall_jet import wall_velocity
 
 BED = 0.5
@@ -14,7 +14,7 @@ DOWN = np.array([[0.0, 0.0, 1.0]])
 
 
 def flow(*current, unsure=0.0, thrusts=(1.0,)):
-    return CrossFlow(current_W_m_s=np.array(current, float), unsure_m_s=unsure, thrusts_N=np.array(thrusts, float))
+    return CrossFlow(current_W_m_s=np.array(current, float), current_std_m_s=unsure, thrusts_N=np.array(thrusts, float))
 
 
 def near_bed(*x, y=0.0):
@@ -23,7 +23,7 @@ def near_bed(*x, y=0.0):
 
 def speeds(points, current, unsure=0.0, direction=DOWN):
     """Speed along the bed of a jet of 1 N from half a metre above it."""
-    found = carried_velocity(
+    found = advected_velocity(
         MODEL, points, np.zeros((1, 3)), direction, AREA, np.ones(1), flow(*current, unsure=unsure)
     )
     return np.linalg.norm(found[0, :, :2], axis=1)
@@ -35,7 +35,7 @@ def test_without_a_current_wall_jets_are_those_of_still_water():
     points = np.column_stack([rng.uniform(-1, 1, (60, 2)), BED - rng.uniform(0, 0.1, 60)])
     slant = np.array([[0.6, 0.0, 0.8]])
     for direction in (DOWN, slant):
-        found = carried_velocity(MODEL, points, np.zeros((1, 3)), direction, AREA, np.ones(1), flow(0.0, 0.0, 0.0))
+        found = advected_velocity(MODEL, points, np.zeros((1, 3)), direction, AREA, np.ones(1), flow(0.0, 0.0, 0.0))
         free = RoundJet().unit_velocity(points, np.zeros((1, 3)), direction, AREA)
         wall = wall_velocity(points, np.zeros((1, 3)), direction, AREA, MODEL.numbers)
         np.testing.assert_allclose(found, free + wall, rtol=1e-4, atol=1e-6)

@@ -13,10 +13,16 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.wake.calibration import FAMILIES, calibrate, family, split_samples
-from wakewise.wake.fit_file import fit_figures, read_wake_settings, write_fit
-from wakewise.wake.samples import JetSamples
-from wakewise.wake.scores import score, score_speeds
+from wakewise.wake.calibration import (
+    FAMILIES,
+    calibrate,
+    family,
+    fit_figures,
+    read_wake_settings,
+    split_samples,
+    write_fit,
+)
+from wakewise.wake.samples import JetSamples, score, score_speeds
 
 TRUTH = {
     "paper-calibrated": [0.05],

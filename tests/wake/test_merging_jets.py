@@ -10,7 +10,7 @@ from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake import ImpingingJet, InfluenceModel, RoundJet, disturbance
 from wakewise.wake.advected_jets import CrossFlow
-from wakewise.wake.disturbance import carried_velocity
+from wakewise.wake.disturbance import advected_velocity
 from wakewise.wake.merging_jets import joined_jets, merging_pairs, with_merging_jets
 
 VEHICLE = load_vehicle("paper")
@@ -27,13 +27,13 @@ def test_two_equal_jets_join_along_the_middle_with_the_sum_of_their_momenta():
     """Jets at right angles in a plane: the joined one starts where both have come as far, with sqrt(2) the momentum."""
     origins = np.array([[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]])
     axes = -np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]]) / np.sqrt(2.0)
-    met = joined_jets(origins, axes, ((0, 1),))
-    assert (met.first.tolist(), met.second.tolist()) == ([0], [1])
-    np.testing.assert_allclose(met.directions, [[1.0, 0.0, 0.0]], atol=1e-12)
-    np.testing.assert_allclose(met.momentum, np.sqrt(2.0))
-    np.testing.assert_allclose(met.share, 1.0)
+    merged = joined_jets(origins, axes, ((0, 1),))
+    assert (merged.first.tolist(), merged.second.tolist()) == ([0], [1])
+    np.testing.assert_allclose(merged.directions, [[1.0, 0.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(merged.momentum, np.sqrt(2.0))
+    np.testing.assert_allclose(merged.share, 1.0)
     # They cross 0.3 m ahead after 0.3 sqrt(2) m each.
-    np.testing.assert_allclose(met.origins_m, [[0.3 - 0.3 * np.sqrt(2.0), 0.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(merged.origins_m, [[0.3 - 0.3 * np.sqrt(2.0), 0.0, 0.0]], atol=1e-12)
 
 
 def test_jets_that_pass_part_or_face_each_other_do_not_join():
@@ -62,11 +62,13 @@ def test_the_gram_matrix_of_meeting_jets_is_the_single_jets_and_one_product_per_
     more = view.gram(X_WB) - plain.gram(X_WB)
     np.testing.assert_allclose(more, more.T)
     assert more.min() >= 0.0 and np.all(np.diag(more) == 0.0)
-    met = joined_jets(VEHICLE.thruster_positions_B_m, VEHICLE.thruster_axes_B, ((0, 1),))
-    k = np.flatnonzero((met.first == 0) & (met.second == 1))[0]
+    merged = joined_jets(VEHICLE.thruster_positions_B_m, VEHICLE.thruster_axes_B, ((0, 1),))
+    k = np.flatnonzero((merged.first == 0) & (merged.second == 1))[0]
     area = VEHICLE.disk_areas_m2[:1]
-    speed = RoundJet().unit_velocity(AHEAD.points_W_m, met.origins_m[k : k + 1], met.directions[k : k + 1], area)[0]
-    D = met.momentum[k] * met.share[k] * float(AHEAD.weights @ np.sum(speed**2, axis=1))
+    speed = RoundJet().unit_velocity(AHEAD.points_W_m, merged.origins_m[k : k + 1], merged.directions[k : k + 1], area)[
+        0
+    ]
+    D = merged.momentum[k] * merged.share[k] * float(AHEAD.weights @ np.sum(speed**2, axis=1))
     assert D > 1e-4 and 2.0 * more[0, 1] == pytest.approx(D, rel=1e-9)
 
 
@@ -85,28 +87,30 @@ def test_knowing_that_jets_meet_moves_the_push_to_the_rear():
 
 
 def test_what_two_jets_become_turns_to_the_stronger_and_the_two_end_there():
-    """In a flow the joined jet of unequal thrusts leaves the bisector; squarely met, the single ones do not go on."""
+    """In a flow the joined jet of unequal thrusts leaves the bisector; squarely merged, the single ones do not go
+    on.
+    """
     origins = np.array([[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]])
     axes = -np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]]) / np.sqrt(2.0)
-    met = joined_jets(origins, axes, ((0, 1),), np.array([3.0, 1.0, 1e-9, 1e-9]))
-    np.testing.assert_allclose(met.momentum * met.strength_N, np.sqrt(10.0))
-    np.testing.assert_allclose(met.directions[0], np.array([4.0, -2.0, 0.0]) / np.sqrt(20.0), atol=1e-12)
-    np.testing.assert_allclose(met.ways_m, [[0.3 * np.sqrt(2.0)] * 2])
+    merged = joined_jets(origins, axes, ((0, 1),), np.array([3.0, 1.0, 1e-9, 1e-9]))
+    np.testing.assert_allclose(merged.momentum * merged.strength_N, np.sqrt(10.0))
+    np.testing.assert_allclose(merged.directions[0], np.array([4.0, -2.0, 0.0]) / np.sqrt(20.0), atol=1e-12)
+    np.testing.assert_allclose(merged.ways_m, [[0.3 * np.sqrt(2.0)] * 2])
     ahead = with_merging_jets(InfluenceModel.of(VEHICLE, AHEAD, RoundJet()), LAYOUT)
     slow = np.array([1e-9, 0.0, 0.0])
     pair = {}
     for thrusts in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0)):
         T = np.array([*thrusts, 0, 0, 0, 0, 0, 0])
-        G = ahead.gram(Pose(np.zeros(3)), CrossFlow(current_W_m_s=slow, unsure_m_s=0.0, thrusts_N=T))
+        G = ahead.gram(Pose(np.zeros(3)), CrossFlow(current_W_m_s=slow, current_std_m_s=0.0, thrusts_N=T))
         pair[thrusts] = disturbance(G, T)
     assert pair[1.0, 1.0] > 20.0 * max(pair[1.0, 0.0], pair[0.0, 1.0]), "only both together blow ahead"
 
 
 def test_a_bow_jet_is_charged_for_the_one_it_would_meet():
-    """In a flow, of a pair that rests, each costs half of what the two would become; without the lever nothing."""
+    """In a flow, of a pair that rests, each costs half of what the two would become; without the mechanism nothing."""
     plain = InfluenceModel.of(VEHICLE, AHEAD, RoundJet())
     flow = CrossFlow(
-        current_W_m_s=np.array([0.0, 1e-9, 0.0]), unsure_m_s=0.0, thrusts_N=np.array([0, 0, -1.0, -1, 0, 0, 0, 0])
+        current_W_m_s=np.array([0.0, 1e-9, 0.0]), current_std_m_s=0.0, thrusts_N=np.array([0, 0, -1.0, -1, 0, 0, 0, 0])
     )
     more = with_merging_jets(plain, LAYOUT).gram(Pose(np.zeros(3)), flow) - plain.gram(Pose(np.zeros(3)), flow)
     charge = np.diag(more)
@@ -118,14 +122,14 @@ def test_a_bow_jet_is_charged_for_the_one_it_would_meet():
 def test_as_sent_a_pair_that_rests_leaves_nothing_and_both_leave_what_they_become():
     """The matrix that the bound on power asks: one bow jet alone is not charged, both are as much as by `gram`."""
     flow = CrossFlow(
-        current_W_m_s=np.array([0.0, 1e-9, 0.0]), unsure_m_s=0.0, thrusts_N=np.array([0, 0, -1.0, -1, 0, 0, 0, 0])
+        current_W_m_s=np.array([0.0, 1e-9, 0.0]), current_std_m_s=0.0, thrusts_N=np.array([0, 0, -1.0, -1, 0, 0, 0, 0])
     )
     plain = InfluenceModel.of(VEHICLE, AHEAD, RoundJet())
-    seen = with_merging_jets(plain, LAYOUT).seen(Pose(np.zeros(3)), flow)
+    seen = with_merging_jets(plain, LAYOUT).matrices(Pose(np.zeros(3)), flow)
     one, both = np.array([1.0, 0, 0, 0, 0, 0, 0, 0]), np.array([1.0, 1, 0, 0, 0, 0, 0, 0])
     alone = disturbance(plain.gram(Pose(np.zeros(3)), flow), one)
-    assert disturbance(seen.sent, one) == pytest.approx(alone) and disturbance(seen.gram, one) > 2.0 * alone
-    assert disturbance(seen.sent, both) == pytest.approx(disturbance(seen.gram, both))
+    assert disturbance(seen.actual, one) == pytest.approx(alone) and disturbance(seen.gram, one) > 2.0 * alone
+    assert disturbance(seen.actual, both) == pytest.approx(disturbance(seen.gram, both))
 
 
 def meet_twin(origins, axes, pairs, sizes):
@@ -153,36 +157,43 @@ def meet_twin(origins, axes, pairs, sizes):
 
 
 def seen_twin(view, X_WB, flow):
-    """`MergingJetsModel.seen` in a flow, jet by jet: matrices to choose by and as sent."""
+    """`MergingJetsModel.matrices` in a flow, jet by jet: matrices to choose by and as sent."""
     origins, axes = X_WB.apply(view.positions_B_m), view.axes_B @ X_WB.R.T
     n = len(origins)
     weak = 0.25 * np.mean(np.abs(flow.thrusts_N))
     pushing = np.concatenate([flow.thrusts_N, -flow.thrusts_N])
-    met = joined_jets(origins, axes, view.pairs, np.where(pushing > weak, pushing, flow.guessed))
-    real = (pushing[met.first] > weak) & (pushing[met.second] > weak)
+    merged = joined_jets(origins, axes, view.pairs, np.where(pushing > weak, pushing, flow.nominal_thrusts_N))
+    real = (pushing[merged.first] > weak) & (pushing[merged.second] > weak)
     ends, chosen = np.tile([np.inf, 1.0], (2 * n, 1)), []
-    for k in np.argsort(-met.share, kind="stable"):
-        a, b = met.first[k], met.second[k]
+    for k in np.argsort(-merged.share, kind="stable"):
+        a, b = merged.first[k], merged.second[k]
         if real[k] and ends[a, 1] == 1.0 and ends[b, 1] == 1.0:
-            ends[a], ends[b] = (met.ways_m[k, 0], 1.0 - met.share[k]), (met.ways_m[k, 1], 1.0 - met.share[k])
+            ends[a], ends[b] = (
+                (merged.ways_m[k, 0], 1.0 - merged.share[k]),
+                (merged.ways_m[k, 1], 1.0 - merged.share[k]),
+            )
             chosen.append(k)
 
     def one(k):
-        place = (met.origins_m[k : k + 1], met.directions[k : k + 1], view.areas_m2[met.first[k : k + 1] % n])
-        return carried_velocity(view.wake, view.points_W_m, *place, (met.momentum * met.strength_N)[k : k + 1], flow)[0]
+        place = (merged.origins_m[k : k + 1], merged.directions[k : k + 1], view.areas_m2[merged.first[k : k + 1] % n])
+        return advected_velocity(
+            view.wake, view.points_W_m, *place, (merged.momentum * merged.strength_N)[k : k + 1], flow
+        )[0]
 
     slots = (np.concatenate([origins, origins]), np.concatenate([-axes, axes]), np.tile(view.areas_m2, 2))
-    velocity = carried_velocity(view.wake, view.points_W_m, *slots, flow.guessed, flow, ends)
+    velocity = advected_velocity(view.wake, view.points_W_m, *slots, flow.nominal_thrusts_N, flow, ends)
     for k in chosen:
-        a, b = met.first[k], met.second[k]
-        joined = met.share[k] * np.sqrt(met.momentum[k] * met.strength_N[k]) / (pushing[a] + pushing[b]) * one(k)
+        a, b = merged.first[k], merged.second[k]
+        joined = (
+            merged.share[k] * np.sqrt(merged.momentum[k] * merged.strength_N[k]) / (pushing[a] + pushing[b]) * one(k)
+        )
         velocity[a] += np.sqrt(pushing[a]) * joined
         velocity[b] += np.sqrt(pushing[b]) * joined
     charged = np.einsum("n,inx,jnx->ij", view.weights, velocity, velocity)
     sent = charged.copy()
-    for k in np.flatnonzero(~real & (met.share > 0.1)):
-        a, b = met.first[k], met.second[k]
-        half = 0.5 * met.momentum[k] * met.share[k] * float(view.weights @ np.sum(one(k) ** 2, axis=1))
+    for k in np.flatnonzero(~real & (merged.share > 0.1)):
+        a, b = merged.first[k], merged.second[k]
+        half = 0.5 * merged.momentum[k] * merged.share[k] * float(view.weights @ np.sum(one(k) ** 2, axis=1))
         charged[[a, b], [a, b]] += half
         sent[[a, b], [b, a]] += half
     return charged, sent
@@ -211,9 +222,9 @@ def test_in_a_flow_the_matrices_are_those_of_jets_taken_one_by_one(wake):
         X_WB = Pose(0.1 * rng.normal(size=3), quat_from_rotvec(0.2 * rng.normal(size=3)))
         thrusts = rng.normal(size=8) * rng.integers(0, 2, 8)
         thrusts[:2] = np.abs(thrusts[:2]) + 1.0
-        flow = CrossFlow(current_W_m_s=0.05 * rng.normal(size=3), unsure_m_s=0.02, thrusts_N=thrusts)
-        seen, (charged, sent) = view.seen(X_WB, flow), seen_twin(view, X_WB, flow)
+        flow = CrossFlow(current_W_m_s=0.05 * rng.normal(size=3), current_std_m_s=0.02, thrusts_N=thrusts)
+        seen, (charged, sent) = view.matrices(X_WB, flow), seen_twin(view, X_WB, flow)
         np.testing.assert_allclose(seen.gram, charged, rtol=1e-9, atol=1e-15)
-        np.testing.assert_allclose(seen.sent, sent, rtol=1e-9, atol=1e-15)
-        joins += not np.array_equal(seen.gram, seen.sent)
+        np.testing.assert_allclose(seen.actual, sent, rtol=1e-9, atol=1e-15)
+        joins += not np.array_equal(seen.gram, seen.actual)
     assert joins > 0

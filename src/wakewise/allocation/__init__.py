@@ -1,15 +1,16 @@
-"""Thruster allocation: one wrench to n thrusts, exactly, for any layout.
+"""Control allocation: a wrench to n thrusts through the allocation matrix and its null space, for any thruster layout.
 
-An over-actuated vehicle has many sets of thrusts for one wrench: the null space of its allocation matrix. This room
-finds the one that is best, the least thrusts (`pseudo_inverse`, `min_norm_allocation`) or those whose jets disturb a
-target least (`min_wash_allocation`), with a proof of the minimum, within limits, with failed thrusters and priorities.
-It knows arrays and errors only, so that it is a library of its own: nothing here knows what a vehicle or a wake is. D
-comes in as the Gram matrix G of `s' G s`, where s are roots of thrusts.
+An over-actuated vehicle has many thrusts for one wrench. This package computes the least thrusts (pseudo-inverse), or
+those of least disturbance (`min_wash_allocation`) with a proof of the global minimum, within limits, with failed
+thrusters and axis priorities. It depends on arrays and errors only. The disturbance enters as the Gram matrix G of
+s' G s, where s are square roots of thrusts.
 
-Start reading in `allocate.py` (what is asked and answered). `layout.py` is the matrix and its null space,
-`attainable_set.py` what the limits leave. The search for the minimum: `line_search.py` for one or two spare thrusts,
-`branch_and_bound.py` with `coordinate_descent.py` for more, `convex.py` for the convex cost of effort alone.
-`power_budget.py` bounds the electrical power.
+- `allocate.py`: the functions and their results; the convex case (incoherent sum, diagonal G).
+- `layout.py`: allocation matrix B, pseudo-inverse, null space. `attainable_set.py`: largest feasible share of a wrench,
+  axis priorities.
+- `line_search.py`: exact minimum along a line of the null space. `coordinate_descent.py`: multistart descent;
+  `branch_and_bound.py`: global minimum with a proven gap.
+- `power_budget.py`: null-space allocation within a bound on electrical power.
 """
 
 from wakewise.allocation.allocate import (

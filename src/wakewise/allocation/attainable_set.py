@@ -1,6 +1,6 @@
-"""What of a wrench can be made within limits: all of it, its largest share, or its axes in an order of priority.
+"""Attainable wrenches within thrust limits: the whole wrench, its largest share, or its axes in an order of priority.
 
-Solvers are imported where they are needed: layouts whose null space is lines need none, nor SciPy.
+Solvers are imported where they are needed: layouts whose null space is lines need neither them nor SciPy.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def largest_feasible_share(layout: Layout, thrusts: Array) -> tuple[Array, float
     if len(layout.lines) != layout.k:
         result, scale = _within_polytope(layout, thrusts)
     else:
-        silent = np.all(np.abs(layout.null) < 1e-12, axis=1)
-        scale = _box_scale(thrusts[silent], lower[silent], upper[silent])
+        immovable = np.all(np.abs(layout.null) < 1e-12, axis=1)
+        scale = _box_scale(thrusts[immovable], lower[immovable], upper[immovable])
         for line in layout.lines:
             scale = min(scale, _line_scale(thrusts, line, lower, upper))
         result = scale * thrusts

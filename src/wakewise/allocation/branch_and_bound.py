@@ -1,16 +1,14 @@
-"""Branch and bound over boxes: the global minimum for null spaces of any dimension, with a proven gap.
+"""Branch and bound: global minimum of the allocation cost for null spaces of any dimension, with a proven gap.
 
-As many thrusters as the null space has dimensions set all the others. Those of least thrust in the best answer known
-are taken as coordinates, since minima lie where thrusters rest; a box of their thrusts has 2^k corners and a lower
-bound (`cells`). Boxes are taken in the order of their bounds and halved along the side that loosens the bound most.
+As many thrusters as the null space has dimensions determine all others. Those of least thrust in the incumbent are the
+coordinates, since minima lie where thrusters are idle. A box of their thrusts has 2^k corners and a lower bound; boxes
+are taken in the order of their bounds and halved along the side that improves the bound most.
 
-A proven lower bound on the cost within a convex cell of thrusts, from its corners alone.
-
-Within a cell of fixed signs the cost of `search` is concave (terms with G_ij > 0) plus convex (squares, G_ii |T_i|,
-terms with G_ij < 0). With the convex part replaced by a tangent plane the whole is concave, so no point of the cell
-lies below the least corner. Where a thrust changes sign within the cell, its terms with G_ij > 0 count as zero or as
-what their partners leave of them at least, |T_i| has the tangents of a vee, and for G_ij < 0 the means inequality
-sqrt(x y) <= (r x + y / r) / 2 holds with |T_i| at the corners, since |T_i| lies below its own interpolation.
+Lower bound of a cell from its corners. Where the signs are fixed, the cost (`line_search`) is concave (terms with
+G_ij > 0) plus convex (squares, G_ii |T_i|, terms with G_ij < 0). With the convex part replaced by a tangent plane the
+whole is concave, so its minimum is at a corner. Where a thrust changes sign within the cell, its terms with G_ij > 0
+count as zero or as the least that their partners leave; |T_i| has the tangents of a vee; for G_ij < 0
+sqrt(x y) <= (r x + y / r) / 2, with |T_i| interpolated from the corners.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""Where directions of the null space are coupled: which are, thrusts to start from, and descent from there.
+"""Multistart descent in a coupled null space: coupled directions, starting points, local minima without proof.
 
-Descent is to a minimum, quickly and without proof. It builds on `search.line_minimum`, which is exact along a line; the
-cost f is defined there. `boxes` proves.
+Descent is by `line_search.line_minimum`, which is exact along a line; `branch_and_bound` proves the minimum.
 """
 
 from __future__ import annotations
@@ -132,7 +131,7 @@ def _move(
 def descend(
     G: Array, thrusts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, sweeps: int
 ) -> float:
-    """Line searches along the null vectors and along what keeps silent thrusters silent; in place, returns f."""
+    """Line searches along the null vectors and along what keeps immovable thrusters immovable; in place, returns f."""
     n, k = null.shape
     held = np.empty((n, k))
     for _ in range(sweeps):

@@ -1,4 +1,4 @@
-"""An allocation matrix with its limits, and what follows from them before any wrench is asked for."""
+"""Layout of thrusters: allocation matrix B, thrust limits, pseudo-inverse, null space and its independent blocks."""
 
 from __future__ import annotations
 

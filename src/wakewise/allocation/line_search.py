@@ -1,17 +1,16 @@
-"""Kernels that look for the thrusts of least cost among all that make the same wrench.
+"""Global minimum of the allocation cost along a line of the null space, with a proven gap.
 
-The cost of thrusts T is f(T) = w_D s' G s + w_u |T|^2 + w_p |T - T_previous|^2 with s_i = sqrt|T_i| in the slot of the
-jet that thruster i then sends out (G is 2n x 2n: jets of T > 0 first, jets of T < 0 after).
+The cost of thrusts T is f(T) = w_D s' G s + w_u |T|^2 + w_p |T - T_previous|^2, with s_i = sqrt|T_i| in the slot of the
+jet that thruster i emits (G is 2n x 2n: jets of T > 0 first, jets of T < 0 after).
 
-Along a line T = base + t direction, between two sign changes of any thrust, f falls into three parts:
+Along T = base + t direction, between two sign changes of any thrust, f has three parts:
 
-- a parabola: |T_i| is linear there, and the two square terms are squares;
-- concave: geometric means sqrt(T_i T_j) with G_ij > 0 (the geometric mean of two positive linear functions is concave);
+- a parabola: |T_i| is linear, the two square terms are quadratic;
+- concave: geometric means sqrt(T_i T_j) with G_ij > 0;
 - convex: the same with G_ij < 0.
 
-On an interval the concave part lies above its chord and the convex part above its end tangents, so the least value of
-parabola + chord + tangents is a lower bound on f. `line_minimum` splits intervals until no bound lies below the best
-value found: the minimum is global, and the gap is proven, not hoped for.
+On an interval the concave part lies above its chord and the convex part above its end tangents; the minimum of parabola
++ chord + tangents is a lower bound. `line_minimum` splits intervals until no bound lies below the best value.
 """
 
 from __future__ import annotations

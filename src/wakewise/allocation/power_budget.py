@@ -1,27 +1,27 @@
-"""Electrical power of thrusts, and gentle allocation within a bound on it.
+"""Power-constrained null-space allocation: least disturbance subject to P(T) <= beta(v0) P(T_0).
 
-Of all thrusts that make a wrench, T_0 are the least (pseudo-inverse) and T_1 the gentlest. The power of a propeller
-grows as |T|^1.5 (actuator disk at bollard pull). Load on half of the thrusters needs sqrt(2) times the power, more
-where they run in reverse. The bound is kept by going a part of the way from T_0 to T_1. All points between make the
-same wrench within limits, and power is convex in thrust, so the allowed part of a way is an interval that begins at
-T_0.
+T_0 are the least thrusts of a wrench, T_1 those of least disturbance. The electrical power of a propeller grows as
+|T|^1.5 (actuator disk at bollard pull). All points between T_0 and T_1 make the same wrench within limits, and power is
+convex, so the allowed part of the way from T_0 to T_1 is an interval that begins at T_0. A higher weight on effort
+cannot do the same: D is concave in a thrust between sign changes, so its minimum jumps from T_1 to about T_0.
 
-A higher price on effort cannot do the same. D is made of roots of thrusts, so along a way it is concave between two
-thrusters' rests, and its weighted sum with effort has minima at rests alone. With a rising price the minimum jumps from
-the gentlest thrusts to about the least ones, past all that the bound allows.
+*Choice.* Each block of the null space (horizontal, vertical) is scaled by itself. Of all such points within the bound
+that of the least product of cost and power is taken: D goes as the square of a speed, so 2 % of power must save 1 % of
+speed. The cost of water that counts as calm is added to the cost, `standing_W` to the power.
 
-Trade. Parts of the null space that share no thruster (the horizontal ones, the vertical ones) are each gone along by
-themselves. Of all such points within the bound that of the least product of cost and power is taken: D goes as the
-square of a speed, so 2 % of power must save 1 % of speed. The cost of what counts as calm is added to the cost, as
-nobody gains by water stiller than that; `standing_W` is added to the power.
+*Bound.* beta depends on the mean speed v0 that T_0 would leave at the target (wake model over its bias `MODEL_BIAS`),
+linear in between:
 
-Bound. It goes with the mean speed that the least thrusts would leave at the target, by the wake model and its known
-bias `MODEL_BIAS`: `CALM` times the power of the least thrusts up to `CALM_M_S`, `TROUBLE` at `TROUBLE_M_S`, `MOST` from
-`MOST_M_S` on, straight in between. The first two were set beforehand: a flight may cost 1.3 times the energy of `dp`
-where that leaves more than 10 mm/s, 1.05 times where it leaves less than 5 (docs/research-log/0036). Of what lies above
-1, a twentieth stays for what the bound does not see: pulses, the lag of rotors, corrections between two searches. A
-step may cost more than a flight, since other steps cost less (docs/research-log/0065). A ballasted vehicle hovers on 1
-to 2 W, and a quarter of that is no price, hence `standing_W` (docs/research-log/0078).
+| v0 | beta |
+|---|---|
+| up to `CALM_M_S` | `CALM` |
+| `TROUBLE_M_S` | `TROUBLE` |
+| from `MOST_M_S` | `MOST` |
+
+`CALM` and `TROUBLE` were set beforehand: 1.3 times the energy of `dp` where that leaves more than 10 mm/s, 1.05 times
+below 5 mm/s (docs/research-log/0036). A twentieth of the excess is kept for pulses, rotor lag and corrections between
+two searches. A step may exceed the bound of a flight (docs/research-log/0065). `standing_W` counts because a ballasted
+vehicle hovers on 1 to 2 W (docs/research-log/0078).
 """
 
 from __future__ import annotations

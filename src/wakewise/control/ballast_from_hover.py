@@ -22,7 +22,7 @@ import numpy as np
 from wakewise.core.arrays import Array, freeze, frozen
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import matrix_from_quat
-from wakewise.estimation.current_from_drag import current_of_force
+from wakewise.estimation.current_from_drag import current_from_force
 from wakewise.estimation.settings import Priors
 from wakewise.robot.vehicles import Vehicle, compile_body, coriolis_wrench, damping_wrench, restoring_wrench
 from wakewise.robot.vehicles.ballast import BallastBlock, net_buoyancy_N
@@ -195,7 +195,7 @@ def _of_current(vehicle: Vehicle, q: Array, load_B: Array) -> Array:
     """Vertical force and moment in B that go with a load's level part where that is a current's drag, shape (4,)."""
     body, R = compile_body(vehicle), np.asarray(matrix_from_quat(q))
     level = R @ load_B[:3]
-    found = current_of_force(body.packed.copy(), q.copy(), float(level[0]), float(level[1]))
+    found = current_from_force(body.packed.copy(), q.copy(), float(level[0]), float(level[1]))
     if not np.isfinite(found).all():
         return np.zeros(4)
     past = np.concatenate([-np.array([found[0], found[1], 0.0]) @ R, np.zeros(3)])

@@ -88,7 +88,7 @@ class AllocationContext:
 
     def gram(self, estimate: BodyState, thrusts_N: Array) -> Array:
         """Matrix G of D = s' G s, shape (2 n, 2 n), at an estimate and in its current, by the wake model alone."""
-        return self.view.seen(estimate.X_WB, self.flow(estimate, thrusts_N)).gram
+        return self.view.matrices(estimate.X_WB, self.flow(estimate, thrusts_N)).gram
 
     def influence(self, estimate: BodyState, thrusts_N: Array) -> InfluenceMatrices:
         """Matrices of D at an estimate and in its current: to choose thrusts by, and of thrusts as sent.
@@ -96,11 +96,11 @@ class AllocationContext:
         To choose by, the mean over jets that go where they are sent and jets that miss it. As sent, the first alone: a
         doubt is a reason to choose, but no wash that would be worth power.
         """
-        found = self.view.seen(estimate.X_WB, self.flow(estimate, thrusts_N))
-        astray = self.view.astray(estimate.X_WB) if self.settings.direction_uncertainty else None
-        if astray is None:
+        found = self.view.matrices(estimate.X_WB, self.flow(estimate, thrusts_N))
+        scattered = self.view.scattered_gram(estimate.X_WB) if self.settings.direction_uncertainty else None
+        if scattered is None:
             return found
-        return InfluenceMatrices(gram=(1.0 - DOUBT) * found.gram + np.diag(DOUBT * astray), sent=found.sent)
+        return InfluenceMatrices(gram=(1.0 - DOUBT) * found.gram + np.diag(DOUBT * scattered), actual=found.actual)
 
     def flow(self, estimate: BodyState, thrusts_N: Array) -> CrossFlow | None:
         """The current, and the thrusts, shape (n,), whose jets it carries; None where it does not count.
@@ -111,8 +111,8 @@ class AllocationContext:
         if current is None:
             return None
         variance = 0.0 if found is None else float(found.trace()) / 3.0
-        unsure_m_s = math.sqrt(variance + CURRENT_SPREAD**2 * float(current @ current))
-        return CrossFlow(current_W_m_s=current, unsure_m_s=unsure_m_s, thrusts_N=thrusts_N)
+        current_std_m_s = math.sqrt(variance + CURRENT_SPREAD**2 * float(current @ current))
+        return CrossFlow(current_W_m_s=current, current_std_m_s=current_std_m_s, thrusts_N=thrusts_N)
 
     def cost(self, thrusts_N: Array, gram: Array, previous_N: Array | None = None) -> float:
         """What thrusts of one wrench, shape (n,), are compared by under a Gram matrix: their cost and their power.
@@ -164,7 +164,7 @@ class AllocationContext:
         Least changes would send the noise of the wrench through thrusters that rest because they blow at the target.
         """
         return self.allocator.allocate(
-            wrench_B, influence.gram, influence.sent, self.weights, self.view.total_weight, previous_N
+            wrench_B, influence.gram, influence.actual, self.weights, self.view.total_weight, previous_N
         )
 
     def as_found(self, wrench_B: Array, influence: InfluenceMatrices, thrusts_N: Array) -> Allocation:
@@ -193,7 +193,7 @@ class AllocationContext:
         if not (np.isfinite(first.gram).all() and np.isfinite(there.gram).all()):
             return None
         free = replace(self.weights, previous=0.0)
-        found = self.allocator.allocate(wrench_B, there.gram, there.sent, free, self.view.total_weight)
+        found = self.allocator.allocate(wrench_B, there.gram, there.actual, free, self.view.total_weight)
         own = there if self._current(estimate)[0] is None else self.influence(estimate, found.thrusts_N)
         best, seen = min(((least, there), (found, own)), key=lambda pair: self.cost(pair[0].thrusts_N, pair[1].gram))
         if best.scale < FULL or not self.cost(best.thrusts_N, seen.gram) < (1.0 - RESTART_GAIN) * self.cost(

@@ -1,10 +1,13 @@
-"""Estimation: from camera poses, tracking, an inertial unit and depth to where the vehicle is, how it moves, how sure.
+"""State estimation: an error-state extended Kalman filter (ESKF, EKF) on the vehicle's equations of motion.
 
-Start reading in `eskf.py`: `ErrorStateFilter` is an error-state extended Kalman filter (EKF) on the nominal
-vehicle's equations; `FilterSettings` states the noise of the sensors that it assumes, `Priors` in `settings.py` what
-it takes for granted. `eskf_kernels.py` is the compiled motion, `eskf_kernels.py` and `corrections.py` what time and
-what each kind of measurement do to mean and covariance, `eskf_kernels.py` what a vehicle at rest tells of its biases,
-`current_from_drag.py` what its load tells of the current.
+It estimates pose, twist, unmodelled load, current and sensor biases, with their covariance, from camera poses, optical
+tracking, an inertial unit and depth.
+
+- `eskf.py`: the filter (`ErrorStateFilter`); measurement queue, gates, adaptive noise.
+- `eskf_kernels.py`: layout of the state; compiled prediction of mean and covariance.
+- `corrections.py`: compiled measurement updates.
+- `current_from_drag.py`: current from the estimated load at rest.
+- `settings.py`: sensor noise (`FilterSettings`) and prior standard deviations (`Priors`).
 """
 
 from wakewise.estimation.eskf import ErrorStateFilter, FilterState

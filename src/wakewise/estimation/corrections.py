@@ -1,9 +1,9 @@
-"""Compiled corrections of the error-state filter: what each kind of measurement does to mean and covariance.
+"""Compiled measurement updates of the error-state Kalman filter.
 
-Mean and covariance are laid out as in `kernels`. The covariance is symmetric to the bit and left so: where a
-measurement tells single errors or sums of two, its product with the Jacobian is made of the covariance's own rows.
+Mean and covariance are laid out as in `eskf_kernels`. P stays symmetric to the last bit. Where a measurement is an
+entry of the error or a sum of two, H P consists of rows of P.
 
-Every kernel returns the squared Mahalanobis distance of its residual; where that exceeds `gate` nothing is changed.
+Every kernel returns the squared Mahalanobis distance of its innovation; beyond `gate` nothing is changed.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from wakewise.core.jit.njit import assign, njit
 from wakewise.estimation.eskf_kernels import DRAG, GAINS, quat_minus, quat_plus, specific_force, turn
 
 NOTHING = -1
-"""In place of where a second error begins, if a measurement tells only one."""
+"""Index in place of a second error, if a measurement has only one."""
 _MEMORY = 15  # poses that the mean of innovations goes back, a quarter of a second at 62 Hz
-_CHANCE = 9.0 / (2 * _MEMORY - 1)  # square of three sigmas of that mean for a filter whose noise is right
-_CLIP = 3.0  # one wrong pose counts for no more sigmas than this
-_LARGEST_SURPRISE = 10.0
-_HASTE = 0.1  # growth of the noise per pose and unit of surprise: at most tenfold in 3 poses, back by half in 7
+_EXPECTED_SQUARE = 9.0 / (2 * _MEMORY - 1)  # square of three sigmas of that mean for a filter whose noise is right
+_CLIP = 3.0  # sigmas at which one innovation is clipped
+_MAX_SURPRISE = 10.0
+_ADAPTATION_RATE = 0.1  # growth of the noise per pose: at most tenfold in 3 poses, halved in 7
 _NOISIEST = 300.0
 
 
@@ -77,7 +77,7 @@ def correct(mean: Array, P: Array, H: Array, residual: Array, std: float, gate: 
     """Correct by a measurement with rows H, shape (m, E), residual (m,) and the same white noise in each."""
     PH = np.zeros(H.shape)
     for i in range(H.shape[0]):
-        # Row by row of P, as much of it as the measurement knows of: for few rows quicker than a product of matrices.
+        # Only the rows of P with a nonzero entry of H: for few rows faster than a product of matrices.
         for k in range(H.shape[1]):
             if H[i, k] != 0.0:
                 for r in range(H.shape[1]):
@@ -107,7 +107,7 @@ def _rows(P: Array, first: int, second: int, size: int) -> tuple[Array, Array]:
 
 @njit
 def correct_by_sum(mean: Array, P: Array, measured: Array, first: int, second: int, std: float, gate: float) -> float:
-    """Correct by what a sensor tells of the mean itself: a place, a depth, a rate, and its own slow error on top.
+    """Correct by a sensor that measures entries of the mean (position, depth, body rate), with a slow error of its own.
 
     - `first`, `second`: where what it tells and its slow error begin among the errors; `NOTHING` for a sensor without
       one.
@@ -135,7 +135,7 @@ def correct_by_pose(
     std_m: float,
     std_rad: float,
     gate: float,
-    leaning: Array,
+    innovation_mean: Array,
     scale: float,
 ) -> tuple[float, float]:
     """Correct by a camera's pose; returns the distance, and the scale of the model's noise from now on.
@@ -143,7 +143,7 @@ def correct_by_pose(
     - `p_m`, `q`, shape (3,) and (4,): the pose.
     - `slow`: where the camera's slow error, shift in W and turn in B, begins among the errors, or `NOTHING`.
     - `std_m`, `std_rad`: white noise.
-    - `leaning`, shape (6,): running mean of the normalised innovations; taken on in place.
+    - `innovation_mean`, shape (6,): running mean of the normalised innovations; taken on in place.
     - `scale`: scale of the model's noise so far.
     - Shapes: `mean`, `P` (E + 1,) and (E, E).
     """
@@ -158,20 +158,20 @@ def correct_by_pose(
     assign(residual[3:], quat_minus(expected_q, q))
     for i in range(6):
         S[i, i] += std_m**2 if i < 3 else std_rad**2
-    scale = _heed(leaning, residual, S, scale)
+    scale = _adapt_noise(innovation_mean, residual, S, scale)
     return float(_update(mean, P, PH, S, residual, gate)), scale
 
 
 @njit
-def _heed(leaning: Array, residual: Array, S: Array, scale: float) -> float:
-    """Let the model's noise follow what the innovations of poses, of covariance S, say about it."""
+def _adapt_noise(innovation_mean: Array, residual: Array, S: Array, scale: float) -> float:
+    """Scale of the process noise, adapted to the running mean of the normalised innovations of covariance S."""
     most = 0.0
     for i in range(6):
         innovation = min(max(residual[i] / np.sqrt(S[i, i]), -_CLIP), _CLIP)
-        leaning[i] += (innovation - leaning[i]) / _MEMORY
-        most = max(most, leaning[i] ** 2)
-    surprise = min(most / _CHANCE, _LARGEST_SURPRISE)
-    return float(min(max(scale * np.exp(_HASTE * (surprise - 1.0)), 1.0), _NOISIEST))
+        innovation_mean[i] += (innovation - innovation_mean[i]) / _MEMORY
+        most = max(most, innovation_mean[i] ** 2)
+    surprise = min(most / _EXPECTED_SQUARE, _MAX_SURPRISE)
+    return float(min(max(scale * np.exp(_ADAPTATION_RATE * (surprise - 1.0)), 1.0), _NOISIEST))
 
 
 @njit
@@ -186,7 +186,7 @@ def correct_by_force(
     std_m_s2: float,
     gate: float,
 ) -> float:
-    """Correct by an accelerometer: dv/dt + omega x v - R' g, seen through tilt, the unmodelled force and the bias."""
+    """Correct by an accelerometer: dv/dt + omega x v - R' g, by tilt, unmodelled force and bias."""
     H = np.empty((3, P.shape[0]))
     down_B = turn(mean[3:7], np.array([0.0, 0.0, GRAVITY_M_S2]), -1.0)
     expected = specific_force(packed, allocation, mean, thrusts_N, rest_q, down_B, H)

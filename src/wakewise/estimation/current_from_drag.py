@@ -1,15 +1,13 @@
-"""The current, from the force that holds the vehicle in it: how fast water must run past to pull as the load does.
+"""Current from drag: the horizontal current whose drag equals the estimated horizontal load of a vehicle at rest.
 
-At rest a current shows itself as a force that the model does not explain, and so do trim and a cable. Trim pulls
-straight up or down, so the level part of the force is the current's if no cable is out: its drag, by the vehicle's own
-nominal drag, is turned round for a level current. Nothing is said of a current that rises or sinks, which trim cannot
-be told from. A level pull that is no drag, such as a cable's, is taken for a current: 0.3 N look like some 4 cm/s on a
-small vehicle.
+Trim is a vertical force, so the horizontal load is the current's drag unless a tether pulls. Drag of the nominal
+vehicle is inverted for a horizontal current. A vertical current cannot be told from trim. A tether's pull is taken for
+a current: 0.3 N look like 4 cm/s on a small vehicle.
 
-How sure it is follows from the covariance of the force, in which the thrusters' gains are, and from what drag may be.
-That is most of it: published sets of drag for one vehicle (its `drag_cases`) differ by their linear part, which is all
-that counts below a decimetre a second. What pulls like 1.5 cm/s by one set is 4 cm/s by another. So each set tells its
-own current; the mean of them is told, and their spread is in its covariance.
+The covariance is that of the force (which contains the thrusters' gains) and of the drag coefficients. Published
+coefficients of one vehicle (its `drag_cases`) differ in their linear part, which dominates below 0.1 m/s: the load of
+1.5 cm/s by one set is that of 4 cm/s by another. The result is the mean over all sets, and their spread is in its
+covariance.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ from wakewise.core.jit.njit import njit
 from wakewise.robot.vehicles.kernels import damping, rotate
 
 KNOWN_M_S = 0.02
-"""A current is told once it is known to this, one sigma per axis: half of what runs in a still tank or a calm bay."""
+"""Standard deviation per axis below which a current is reported: half of the current in a still tank or calm bay."""
 _START_M_S = 0.1
 _STEP_M_S = 1e-4
 _CLOSE_M_S = 1e-6
@@ -40,10 +38,8 @@ def level_drag(packed: Array, q: Array, north_m_s: float, east_m_s: float) -> tu
 
 
 @njit
-def current_of_force(packed: Array, q: Array, north_N: float, east_N: float) -> Array:
-    """Level current whose drag on a vehicle at rest is a level force, and that drag's slope.
-
-    Newton's method; drag grows ever faster with speed, so it cannot run away.
+def current_from_force(packed: Array, q: Array, north_N: float, east_N: float) -> Array:
+    """Horizontal current whose drag on a vehicle at rest is a given force, and the slope of that drag; Newton's method.
 
     `packed`: the vehicle's numbers (see `wakewise.robot.vehicles.kernels`). `q`, shape (4,): attitude q_WB at rest.
     Returns shape (6,): North and east in m/s, then d force / d current row by row in N s/m; all NaN where none was
@@ -75,8 +71,8 @@ def current_of_force(packed: Array, q: Array, north_N: float, east_N: float) -> 
 
 
 @njit
-def _likely_forces(force_W_N: Array, covariance: Array) -> Array:
-    """Four level forces, shape (4, 2), of the mean and the covariance that a force's level part has."""
+def _sigma_points(force_W_N: Array, covariance: Array) -> Array:
+    """Four sigma points of the horizontal force, shape (4, 2), with its mean and covariance."""
     a, b, c = covariance[0, 0], covariance[0, 1], covariance[1, 1]
     middle, half, angle = 0.5 * (a + c), np.hypot(0.5 * (a - c), b), 0.5 * np.arctan2(2.0 * b, a - c)
     forces = np.empty((4, 2))
@@ -92,23 +88,23 @@ def _likely_forces(force_W_N: Array, covariance: Array) -> Array:
 
 
 @njit
-def _each_told(sets: Array, rest_q: Array, force_W_N: Array, force_covariance: Array) -> Array:
+def _current_samples(sets: Array, rest_q: Array, force_W_N: Array, force_covariance: Array) -> Array:
     """North and east by each set of drag and each likely force, shape (sets * 4, 2), the first set's first."""
-    forces = _likely_forces(force_W_N, force_covariance)
-    told = np.empty((sets.shape[0] * 4, 2))
-    for k in range(told.shape[0]):
-        found = current_of_force(sets[k // 4], rest_q, forces[k % 4, 0], forces[k % 4, 1])
-        told[k, 0], told[k, 1] = found[0], found[1]
-    return told
+    forces = _sigma_points(force_W_N, force_covariance)
+    samples = np.empty((sets.shape[0] * 4, 2))
+    for k in range(samples.shape[0]):
+        found = current_from_force(sets[k // 4], rest_q, forces[k % 4, 0], forces[k % 4, 1])
+        samples[k, 0], samples[k, 1] = found[0], found[1]
+    return samples
 
 
 @njit
-def _told_current(
+def _estimated_current(
     sets: Array, rest_q: Array, force_W_N: Array, force_covariance: Array, drag_std: float, answer: Array
 ) -> bool:
     """Write current and covariance, row by row, to `answer`, shape (4, 3); False while it is not known."""
-    told = _each_told(sets, rest_q, force_W_N, force_covariance)
-    own, many = told[:4], told.shape[0]
+    samples = _current_samples(sets, rest_q, force_W_N, force_covariance)
+    own, many = samples[:4], samples.shape[0]
     unsure = 0.0
     for i in range(2):
         middle = 0.25 * (own[0, i] + own[1, i] + own[2, i] + own[3, i])
@@ -117,16 +113,16 @@ def _told_current(
     answer[:] = 0.0
     for i in range(2):
         for k in range(many):
-            answer[0, i] += told[k, i] / many
+            answer[0, i] += samples[k, i] / many
     north, east = answer[0, 0], answer[0, 1]
-    # Not a number, where one set found none, is not known either.
+    # NaN, where one set has no solution, is not known either.
     if not (0.5 * unsure <= KNOWN_M_S**2 and np.isfinite(north + east)):
         return False
     for i in range(2):
         for j in range(2):
             answer[1 + i, j] = drag_std**2 * answer[0, i] * answer[0, j]
             for k in range(many):
-                answer[1 + i, j] += (told[k, i] - answer[0, i]) * (told[k, j] - answer[0, j]) / many
+                answer[1 + i, j] += (samples[k, i] - answer[0, i]) * (samples[k, j] - answer[0, j]) / many
     return True
 
 
@@ -137,15 +133,16 @@ def current_if_known(
 
     - `sets`, shape (k, 20, 6): numbers of the vehicle with each drag that it may have, each alike; the nominal one
       first.
-    - `rest_q`, shape (4,): attitude that the force is told for.
+    - `rest_q`, shape (4,): attitude that the force is samples for.
     - `force_W_N`, `force_covariance`, shape (3,) and (3, 3): force at rest that the model does not explain, and how
       sure that is.
     - `drag_std`: relative error of each drag.
     """
-    # Drag without a linear part has no slope at rest: its current is told from four forces about the one found, whose
-    # mean and covariance are right (S. J. Julier and J. K. Uhlmann, Proc. IEEE 92 (2004) 401).
+    # Unscented transform, because drag without a linear part has no slope at rest (S. J. Julier and J. K. Uhlmann,
+    # Proc.
+    # IEEE 92 (2004) 401).
     answer = np.empty((4, 3))
-    known = _told_current(
+    known = _estimated_current(
         np.asarray(sets), rest_q, np.array(force_W_N), np.array(force_covariance), float(drag_std), answer
     )
     return (answer[0], answer[1:]) if known else None

@@ -1,32 +1,22 @@
-"""Where the vehicle is, how it moves and how sure that is, from camera poses, tracking, an inertial unit and depth.
+"""Error-state extended Kalman filter (ESKF): pose, twist, load and current from camera, tracking, inertial unit, depth.
 
-An error-state Kalman filter (J. Sola, Quaternion kinematics for the error-state Kalman filter, arXiv:1711.02508,
-section 5, for the error of attitude in the body): the mean moves by the vehicle's own equations under the commanded
-thrusts; the covariance moves by the Jacobian of the very same step.
+After J. Sola, Quaternion kinematics for the error-state Kalman filter, arXiv:1711.02508, section 5, with the attitude
+error in the body. The mean is predicted by the vehicle's equations of motion under the commanded thrusts, the
+covariance by the Jacobian of the same step.
 
-**What is not known** stays so for longer than a sample, so it is no white noise: the gains of the thrusters, drag,
-inertia and the current are states with a stated spread, next to a force and a moment that nothing explains (trim,
-tether, the current at rest, see `resting`) and the inertial unit's biases. While a vehicle hovers these cannot be told
-apart and need not be; when the camera is lost and the vehicle sets off, they carry it away from its estimate, and the
-covariance knows it.
+*States.* Pose, twist, thruster gains, drag, inertia, current, unmodelled force and moment at rest (trim, tether, the
+current's drag), inertial biases, and slow errors of the sensors whose standard deviation is set: camera (calibration,
+refraction), tracking, depth zero. Gains, drag and current are not observable in hover; their covariance stays.
 
-**Slow errors of the sensors** (a camera's calibration, map and refraction, the tracking's own, the pressure sensor's
-zero), if their spread is stated, are states, too: they do not average out, and the covariance then says so.
+*Late measurements* are processed in the order of their time stamps. The stored state is `settle_s` behind the present;
+each step predicts a copy of it to now. Measurements later than `settle_s` are left out and counted.
 
-**Late measurements** are taken in the order in which they were made. The filter lives `settle_s` behind the present,
-where nothing is missing any more; for the answer of each step a copy of it runs on to now with what has arrived so
-far, mostly the inertial unit. A measurement later than `settle_s` is left out and counted.
+*Adaptive process noise.* The running mean of the normalised innovations of poses scales the process noise (after R. K.
+Mehra, Approaches to adaptive filtering, IEEE Trans. Autom. Control 17 (1972) 693, doi 10.1109/TAC.1972.1100100): it
+grows after a sudden load and shrinks back to the settings.
 
-**Sudden loads**: the model's errors are small as long as nothing pulls at the vehicle, and a filter that says so is
-surprised by a wave, a tether or a thruster that fails: its innovations then lean to one side for a while. Their running
-mean, in units of what chance allows, is the surprise (after R. K. Mehra, Approaches to adaptive filtering, IEEE Trans.
-Autom. Control 17 (1972) 693, doi 10.1109/TAC.1972.1100100): above 1 the model's noise grows, below it shrinks back to
-the settings.
-
-**The current** is told from the level part of the load at rest (`current`), once that is known.
-
-**Wrong measurements** (chance below `gate` by the filter's own covariance) are left out and counted; after
-`gate_patience` poses in a row the filter gives in: it takes itself to know as little as at the start.
+*Gates.* Measurements with a Mahalanobis distance beyond the chi-squared quantile of `gate` are rejected and counted.
+After `gate_patience` rejected poses in a row the initial covariance is added.
 """
 
 from __future__ import annotations
@@ -50,12 +40,12 @@ from wakewise.robot.vehicles import Vehicle, compile_body, with_each_drag
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FilterState:
-    """Everything that the filter remembers.
+    """State of the filter.
 
     `mean`, shape (E + 1,), and `covariance`, shape (E, E), as laid out in `kernels`, hold at `settled_s`; so do
     `thrusts_N`, shape (n,), what the thrusters are believed to give, behind their commands. `rest_q`, shape (4,), is
-    the attitude that the unmodelled load is told for, the first one. `time_s` is now, on the clock of the measurements.
-    `commands` (from when, thrusts) and `waiting` measurements are what lies between.
+    the attitude that the unmodelled load is values for, the first one. `time_s` is now, on the clock of the
+    measurements. `commands` (start time, thrusts) and `pending` measurements lie between the two times.
     """
 
     time_s: float
@@ -65,21 +55,23 @@ class FilterState:
     thrusts_N: Array
     rest_q: Array
     commands: tuple[tuple[float, Array], ...] = ()
-    waiting: tuple[Measurement, ...] = ()
-    poses_refused_in_a_row: int = 0
-    leaning: Array = field(default_factory=lambda: np.zeros(6))
+    pending: tuple[Measurement, ...] = ()
+    consecutive_rejected_poses: int = 0
+    innovation_mean: Array = field(default_factory=lambda: np.zeros(6))
     noise_scale: float = 1.0
-    taken: int = 0
-    refused: int = 0
+    accepted: int = 0
+    rejected: int = 0
     late: int = 0
 
     def __post_init__(self) -> None:
         errors = len(self.mean) - 1
-        freeze(self, mean=(errors + 1,), covariance=(errors, errors), thrusts_N=(None,), rest_q=(4,), leaning=(6,))
+        freeze(
+            self, mean=(errors + 1,), covariance=(errors, errors), thrusts_N=(None,), rest_q=(4,), innovation_mean=(6,)
+        )
 
     @property
     def unmodelled_force_W_N(self) -> Array:
-        """Force at rest that the model does not explain, the current's drag in it, shape (3,), in the world."""
+        """Unmodelled force at rest in the world, shape (3,), including the drag of the current."""
         return self.mean[13:16]
 
     @property
@@ -142,7 +134,7 @@ class ErrorStateFilter:
         )
         n = self._B.shape[1]
         lasting = np.repeat([s.current_std_m_s, s.drag_std, s.inertia_std, s.gain_std], [3, 6, 6, n])
-        lasts_s = np.full(len(lasting), s.lasting_s)
+        time_constants_s = np.full(len(lasting), s.lasting_s)
         self._slow = {"camera": NOTHING, "tracking": NOTHING, "depth": NOTHING}
         """Where the slow errors of the sensors begin among the errors."""
         for sensor, spreads, time_s in (
@@ -153,13 +145,13 @@ class ErrorStateFilter:
             if spreads.any():
                 self._slow[sensor] = CURRENT + len(lasting)
                 lasting = np.concatenate([lasting, spreads])
-                lasts_s = np.concatenate([lasts_s, np.full(len(spreads), time_s)])
-        self._lasting, self._lasts_s = lasting, lasts_s
+                time_constants_s = np.concatenate([time_constants_s, np.full(len(spreads), time_s)])
+        self._lasting, self._time_constants_s = lasting, time_constants_s
         self._start_covariance = np.diag(np.square(np.concatenate([np.repeat(spread, 3), lasting])))
         self._errors = len(self._start_covariance)
 
     def init(self, start: BodyState) -> FilterState:
-        """State at the start, from a first guess; thrusters still, no bias, nothing unmodelled."""
+        """State at the start; zero thrust, bias and unmodelled load."""
         mean = np.zeros(self._errors + 1)
         mean[:3], mean[3:7], mean[7:13] = start.X_WB.p_m, start.X_WB.q, start.nu_B
         return FilterState(
@@ -174,157 +166,159 @@ class ErrorStateFilter:
     def step(
         self, state: FilterState, dt_s: float, measurements: tuple[Measurement, ...], thrusts_N: Array
     ) -> tuple[FilterState, BodyState]:
-        """Advance by `dt_s` under the commanded thrusts, shape (n,), take in what was measured, say where we are."""
+        """Predict by `dt_s` under the commanded thrusts, shape (n,), correct by the measurements, return the
+        estimate.
+        """
         now_s = state.time_s + dt_s
         commands = (*state.commands, (state.time_s, np.where(np.isfinite(thrusts_N), thrusts_N, 0.0)))
         fresh = tuple(m for m in measurements if m.time_s > state.settled_s - TICK_S)
-        waiting = tuple(sorted((*state.waiting, *fresh), key=lambda m: m.time_s))
+        pending = tuple(sorted((*state.pending, *fresh), key=lambda m: m.time_s))
         settled_s = max(now_s - self.priors.settle_s, state.settled_s)
-        due = tuple(m for m in waiting if m.time_s <= settled_s + TICK_S)
-        rest = waiting[len(due) :]
-        walk = _Walk(state, commands)
+        due = tuple(m for m in pending if m.time_s <= settled_s + TICK_S)
+        rest = pending[len(due) :]
+        work = _WorkingState(state, commands)
         for measured in due:
-            self._advance(walk, min(measured.time_s, settled_s))
-            self._take(walk, measured)
-        self._advance(walk, settled_s)
+            self._advance(work, min(measured.time_s, settled_s))
+            self._correct(work, measured)
+        self._advance(work, settled_s)
         begun = max((k for k, (since, _) in enumerate(commands) if since <= settled_s + TICK_S), default=0)
         settled = FilterState(
             time_s=now_s,
             settled_s=settled_s,
-            mean=walk.mean,
-            covariance=walk.P,
-            thrusts_N=walk.thrusts_N,
+            mean=work.mean,
+            covariance=work.P,
+            thrusts_N=work.thrusts_N,
             rest_q=state.rest_q,
             commands=commands[begun:],
-            waiting=rest,
-            poses_refused_in_a_row=walk.refused_in_a_row,
-            leaning=walk.leaning,
-            noise_scale=walk.noise_scale,
-            taken=walk.taken,
-            refused=walk.refused,
+            pending=rest,
+            consecutive_rejected_poses=work.rejected_in_a_row,
+            innovation_mean=work.innovation_mean,
+            noise_scale=work.noise_scale,
+            accepted=work.accepted,
+            rejected=work.rejected,
             late=state.late + len(measurements) - len(fresh),
         )
-        return settled, self._present(walk, rest, now_s)
+        return settled, self._present(work, rest, now_s)
 
-    def _present(self, walk: _Walk, rest: tuple[Measurement, ...], now_s: float) -> BodyState:
-        """Carry the settled state on to now with what has arrived meanwhile; kept for this answer only."""
+    def _present(self, work: _WorkingState, rest: tuple[Measurement, ...], now_s: float) -> BodyState:
+        """Predict from `settled_s` to now with the pending measurements; the result is not stored."""
         for measured in rest:
-            self._advance(walk, min(measured.time_s, now_s))
-            self._take(walk, measured)
-        self._advance(walk, now_s)
-        mean = walk.mean
-        load_B = residual_wrench(self._packed, self._B, mean, walk.thrusts_N, walk.rest_q)
-        force_W_N, around = mean[13:16], walk.P[FORCE : FORCE + 3, FORCE : FORCE + 3]
-        water = current_if_known(self._drags, walk.rest_q, force_W_N, around, self.priors.drag_std)
+            self._advance(work, min(measured.time_s, now_s))
+            self._correct(work, measured)
+        self._advance(work, now_s)
+        mean = work.mean
+        load_B = residual_wrench(self._packed, self._B, mean, work.thrusts_N, work.rest_q)
+        force_W_N, around = mean[13:16], work.P[FORCE : FORCE + 3, FORCE : FORCE + 3]
+        water = current_if_known(self._drags, work.rest_q, force_W_N, around, self.priors.drag_std)
         current, spread = (None, None) if water is None else water
         return BodyState(
             X_WB=Pose(mean[:3], mean[3:7]),
             nu_B=mean[7:13],
             load_B=load_B,
-            covariance=walk.P[:12, :12],
+            covariance=work.P[:12, :12],
             current_W_m_s=current,
             current_covariance=spread,
         )
 
-    def _advance(self, walk: _Walk, until_s: float) -> None:
-        """Move on to a time, command by command."""
-        if until_s - walk.time_s > TICK_S:
-            walk.time_s = advance(
+    def _advance(self, work: _WorkingState, until_s: float) -> None:
+        """Predict to a time, command by command."""
+        if until_s - work.time_s > TICK_S:
+            work.time_s = advance(
                 self._packed,
                 self._B,
                 self._lag_s,
-                walk.mean,
-                walk.P,
-                walk.thrusts_N,
-                walk.rest_q,
-                walk.since_s,
-                walk.commands_N,
-                walk.time_s,
+                work.mean,
+                work.P,
+                work.thrusts_N,
+                work.rest_q,
+                work.since_s,
+                work.commands_N,
+                work.time_s,
                 until_s,
                 self._noise,
-                walk.noise_scale,
+                work.noise_scale,
                 self._lasting,
-                self._lasts_s,
+                self._time_constants_s,
             )
 
-    def _take(self, walk: _Walk, measured: Measurement) -> None:
+    def _correct(self, work: _WorkingState, measured: Measurement) -> None:
         s, slow = self.settings, self._slow
         if measured.X_WB is not None:
-            self._take_pose(walk, measured.X_WB)
+            self._correct_pose(work, measured.X_WB)
         if measured.p_WB_m is not None:
-            self._take_sum(walk, measured.p_WB_m, 0, slow["tracking"], s.tracking_std_m)
+            self._correct_sum(work, measured.p_WB_m, 0, slow["tracking"], s.tracking_std_m)
         if measured.depth_m is not None:
-            self._take_sum(walk, (measured.depth_m,), 2, slow["depth"], s.depth_std_m)
+            self._correct_sum(work, (measured.depth_m,), 2, slow["depth"], s.depth_std_m)
         if measured.omega_B_rad_s is not None:
-            self._take_sum(walk, measured.omega_B_rad_s, TURNING, GYRO, s.gyro_std_rad_s)
+            self._correct_sum(work, measured.omega_B_rad_s, TURNING, GYRO, s.gyro_std_rad_s)
         if measured.force_B_m_s2 is not None:
-            self._take_force(walk, measured.force_B_m_s2, measured.time_s)
+            self._correct_force(work, measured.force_B_m_s2, measured.time_s)
 
-    def _take_pose(self, walk: _Walk, seen: Pose) -> None:
-        """Camera: where the vehicle is; what poses say together is heeded by the model's noise."""
-        if walk.refused_in_a_row >= self.priors.gate_patience:
-            walk.P += self._start_covariance
-        distance, walk.noise_scale = correct_by_pose(
-            walk.mean,
-            walk.P,
+    def _correct_pose(self, work: _WorkingState, seen: Pose) -> None:
+        """Correct by a camera pose and adapt the process noise."""
+        if work.rejected_in_a_row >= self.priors.gate_patience:
+            work.P += self._start_covariance
+        distance, work.noise_scale = correct_by_pose(
+            work.mean,
+            work.P,
             seen.p_m,
             seen.q,
             self._slow["camera"],
             self.settings.position_std_m,
             self.settings.attitude_std_rad,
             self._gate[6],
-            walk.leaning,
-            walk.noise_scale,
+            work.innovation_mean,
+            work.noise_scale,
         )
-        walk.refused_in_a_row = 0 if walk.count(distance, self._gate[6]) else walk.refused_in_a_row + 1
+        work.rejected_in_a_row = 0 if work.count(distance, self._gate[6]) else work.rejected_in_a_row + 1
 
-    def _take_sum(self, walk: _Walk, told: ArrayLike, first: int, second: int, std: float) -> None:
-        """A sensor of the errors from `first` on, its own slow error from `second` on."""
-        measured = _numbers(told)
+    def _correct_sum(self, work: _WorkingState, values: ArrayLike, first: int, second: int, std: float) -> None:
+        """Correct by a sensor of the errors from `first` on, with its slow error from `second` on."""
+        measured = _numbers(values)
         if measured is not None:
             gate = self._gate[len(measured)]
-            walk.count(correct_by_sum(walk.mean, walk.P, measured, first, second, std, gate), gate)
+            work.count(correct_by_sum(work.mean, work.P, measured, first, second, std, gate), gate)
 
-    def _take_force(self, walk: _Walk, told: ArrayLike, time_s: float) -> None:
-        """Accelerometer: the white error of the modelled acceleration, over one of its periods, counts as noise."""
-        force_B_m_s2 = _numbers(told)
+    def _correct_force(self, work: _WorkingState, values: ArrayLike, time_s: float) -> None:
+        """Correct by the accelerometer; noise includes the modelled acceleration's white error over one period."""
+        force_B_m_s2 = _numbers(values)
         if force_B_m_s2 is None:
             return
-        period_s = max(time_s - walk.force_s, 1e-3) if walk.force_s is not None else 0.02
-        walk.force_s = time_s
+        period_s = max(time_s - work.force_s, 1e-3) if work.force_s is not None else 0.02
+        work.force_s = time_s
         std = math.hypot(
             self.settings.accelerometer_std_m_s2, self.priors.acceleration_noise_m_s2 / math.sqrt(period_s)
         )
         gate = self._gate[3]
         distance = correct_by_force(
-            self._packed, self._B, walk.mean, walk.P, walk.thrusts_N, walk.rest_q, force_B_m_s2, std, gate
+            self._packed, self._B, work.mean, work.P, work.thrusts_N, work.rest_q, force_B_m_s2, std, gate
         )
-        walk.count(distance, gate)
+        work.count(distance, gate)
 
 
-def _numbers(told: ArrayLike) -> Array | None:
-    """What a sensor told, shape (m,), or None where that is no number."""
-    measured = np.array(told, dtype=np.float64)
+def _numbers(values: ArrayLike) -> Array | None:
+    """Values of a sensor, shape (m,), or None if one is not finite."""
+    measured = np.array(values, dtype=np.float64)
     return measured if math.isfinite(sum(measured.tolist())) else None
 
 
-class _Walk:
-    """The filter on its way from one settled instant to the next, and on to now; lives for one step."""
+class _WorkingState:
+    """Working copy of the state during one step."""
 
     def __init__(self, state: FilterState, commands: tuple[tuple[float, Array], ...]) -> None:
         self.time_s = state.settled_s
         self.mean, self.P = state.mean.copy(), state.covariance.copy()
         self.thrusts_N, self.rest_q = state.thrusts_N.copy(), state.rest_q
-        self.refused_in_a_row = state.poses_refused_in_a_row
-        self.leaning, self.noise_scale = state.leaning.copy(), state.noise_scale
-        self.taken, self.refused = state.taken, state.refused
+        self.rejected_in_a_row = state.consecutive_rejected_poses
+        self.innovation_mean, self.noise_scale = state.innovation_mean.copy(), state.noise_scale
+        self.accepted, self.rejected = state.accepted, state.rejected
         self.force_s: float | None = None
         self.since_s = np.array([since for since, _ in commands])
         self.commands_N = np.array([thrusts for _, thrusts in commands])
 
     def count(self, distance: float, gate: float) -> bool:
-        """Count a measurement as taken or refused; returns whether it was taken."""
+        """Count a measurement as accepted or rejected; returns whether it was accepted."""
         right = distance <= gate
-        self.taken += right
-        self.refused += not right
+        self.accepted += right
+        self.rejected += not right
         return right

@@ -1,29 +1,25 @@
-"""Compiled motion of the error-state filter; see `error_state` for what it means.
+"""Compiled prediction of the error-state extended Kalman filter (`eskf`): mean, covariance, thrusts.
 
-`mean`, shape (40 + n [+ up to 10],) for n thrusters: position in W (0:3), quaternion q_WB (3:7), twist in B (7:13),
-unmodelled force in W (13:16) and moment in B (16:19), what the current does at rest included (`resting`), gyro bias
-(19:22), accelerometer bias (22:25), current in W (25:28); then by how much of itself the truth differs from the nominal
-in drag (28:34) and inertia (34:40) per degree of freedom and in each thruster's gain (40:40 + n); last, if asked for,
-the sensors' slow errors: the camera's shift in W and turn in B, the tracking's shift in W, the depth's bias. `P` is the
-covariance of the error, which has one entry less: position in W (0:3), turn, a rotation vector in B (3:6), then as in
-`mean`, each place one lower.
+`mean`, shape (40 + n [+ up to 10],) for n thrusters:
 
-What a current does to the vehicle at rest, taken out of its motion and put into the load that nothing explains.
+| index | entry |
+|---|---|
+| 0:3, 3:7 | position in W, quaternion q_WB |
+| 7:13 | twist in B |
+| 13:16, 16:19 | unmodelled force in W, moment in B, both at rest |
+| 19:22, 22:25 | gyro bias, accelerometer bias |
+| 25:28 | current in W |
+| 28:34, 34:40 | relative error of drag and inertia, per degree of freedom |
+| 40:40 + n | relative error of each thruster's gain |
+| then, optional | camera: shift in W, turn in B; tracking: shift in W; depth: bias |
 
-At rest a current's drag and Munk moment cannot be told from any other load, and nothing need tell them apart. Yet they
-go with the square of the current: a filter that reckons with them as such holds for knowledge of the current what is
-only the bend of that curve, taken at one estimate after the other. So the unmodelled force and moment of the filter
-are those *at rest*, in one attitude, the first one, with drag and Munk moment of the current in them; to the
-equations of motion comes only by how much either differs once the vehicle moves or has turned. That is the same
-model, in variables in which hovering says nothing of the current.
+`P` is the covariance of the error, which has one entry less: the attitude error is a rotation vector in B at 3:6, every
+later entry is one index lower. P is symmetric to the last bit; `corrections` uses its rows as columns.
 
-The current is `mean[25:28]`, `own` the vehicle's packed numbers with drag and inertia as believed (see
-`wakewise.robot.vehicles.kernels`), `rest_q` the attitude.
-
-Compiled prediction of the error-state filter: mean, covariance and thrusts from one time to the next.
-
-Mean and covariance are laid out as in `kernels`. A covariance that is symmetric to the bit stays so: `corrections`
-reads rows of it for columns.
+The unmodelled force and moment are those at rest in the first attitude `rest_q`: they include drag and Munk moment of
+the current, which cannot be told from other loads there. The equations of motion add only the difference that motion
+and rotation make. In these variables hover carries no information on the current; as separate states the curvature of
+the quadratic drag would appear as information.
 """
 
 from __future__ import annotations
@@ -57,7 +53,7 @@ def turn(q: Array, v: Array, sign: float) -> Array:
 
 
 @njit
-def _past_at_rest(mean: Array, rest_q: Array) -> tuple[float, float, float, float, float, float]:
+def _relative_twist_at_rest(mean: Array, rest_q: Array) -> tuple[float, float, float, float, float, float]:
     x, y, z = rotate(-rest_q[0], rest_q[1], rest_q[2], rest_q[3], mean[25], mean[26], mean[27])
     return -x, -y, -z, 0.0, 0.0, 0.0
 
@@ -68,7 +64,7 @@ def drag_at_rest(own: Array, mean: Array, rest_q: Array) -> Array:
 
     Force in W, moment in B.
     """
-    past = _past_at_rest(mean, rest_q)
+    past = _relative_twist_at_rest(mean, rest_q)
     drag, munk = damping(own, past), coriolis(own, past)
     wrench = np.empty(6)
     assign(wrench[:3], turn(rest_q, np.array([drag[0], drag[1], drag[2]]), 1.0))
@@ -93,10 +89,8 @@ def _momentum(own: Array, v: Three) -> Three:
 
 @njit(apart=True)
 def drag_at_rest_jacobian(own: Array, mean: Array, rest_q: Array) -> Array:
-    """By what `drag_at_rest`, with its force in B, changes with current (3), drag (6) and inertia (6), shape (6,
-    15).
-    """
-    past = _past_at_rest(mean, rest_q)
+    """Jacobian of `drag_at_rest`, force in B, by current (3), drag (6) and inertia (6), shape (6, 15)."""
+    past = _relative_twist_at_rest(mean, rest_q)
     v, drag = (past[0], past[1], past[2]), damping(own, past)
     h = _momentum(own, v)
     effect = np.zeros((6, 15))
@@ -134,7 +128,7 @@ def _turn_as_at_rest(force: Array, q: Array, rest_q: Array) -> None:
 
 
 _INSTANT_S = 1e-7
-TURNING, MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, INERTIA, GAINS = 9, 12, 12, 15, 18, 21, 24, 33, 39
+TURNING, MOVING, FORCE, MOMENT, GYRO, ACCELEROMETER, CURRENT, INERTIA, GAINS = 9, 12, 12, 15, 18, 21, 24, 33, 39
 """Where blocks of the error begin, the body rate's first; MOVING is how many entries the equations of motion move."""
 
 
@@ -172,7 +166,7 @@ def quat_minus(q: Array, other: Array) -> Array:
 
 @njit(apart=True)
 def adapted_parameters(packed: Array, mean: Array) -> Array:
-    """The vehicle's packed numbers with the drag and the inertia that the mean now believes in, shape (20, 6)."""
+    """The vehicle's packed numbers with the estimated drag and inertia, shape (20, 6)."""
     own = packed.copy()
     for i in range(6):
         drag, root = 1.0 + mean[1 + DRAG + i], np.sqrt(1.0 + mean[1 + INERTIA + i])
@@ -189,7 +183,7 @@ def adapted_parameters(packed: Array, mean: Array) -> Array:
 
 @njit(apart=True)
 def model_residual(own: Array, mean: Array, rest_q: Array) -> Array:
-    """Wrench in B of what the model does not explain, shape (6,)."""
+    """Unmodelled wrench in B, shape (6,)."""
     wrench, q = drag_at_rest(own, mean, rest_q), mean[3:7]
     x, y, z = mean[13] + wrench[0], mean[14] + wrench[1], mean[15] + wrench[2]
     wrench[0], wrench[1], wrench[2] = rotate(-q[0], q[1], q[2], q[3], x, y, z)
@@ -199,8 +193,8 @@ def model_residual(own: Array, mean: Array, rest_q: Array) -> Array:
 
 
 @njit
-def _push(wrench: Array, allocation: Array, mean: Array, thrusts_N: Array) -> None:
-    """Add to a wrench in B that of thrusts, with the gains believed in."""
+def _add_thrust_wrench(wrench: Array, allocation: Array, mean: Array, thrusts_N: Array) -> None:
+    """Add to a wrench in B that of thrusts with the estimated gains."""
     for k in range(thrusts_N.shape[0]):
         thrust = (1.0 + mean[1 + GAINS + k]) * thrusts_N[k]
         for i in range(6):
@@ -208,7 +202,7 @@ def _push(wrench: Array, allocation: Array, mean: Array, thrusts_N: Array) -> No
 
 
 @njit
-def _past(mean: Array) -> tuple[float, float, float, float, float, float]:
+def _relative_twist(mean: Array) -> tuple[float, float, float, float, float, float]:
     """Twist relative to the water, in B."""
     x, y, z = rotate(-mean[3], mean[4], mean[5], mean[6], mean[25], mean[26], mean[27])
     return mean[7] - x, mean[8] - y, mean[9] - z, mean[10], mean[11], mean[12]
@@ -216,11 +210,11 @@ def _past(mean: Array) -> tuple[float, float, float, float, float, float]:
 
 @njit
 def residual_wrench(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
-    """Wrench in B, shape (6,), that the nominal vehicle in still water lacks to move as the mean has it."""
+    """Wrench in B, shape (6,), to add to the nominal vehicle in still water so that it moves like the mean."""
     vehicle = adapted_parameters(packed, mean)
     wrench = model_residual(vehicle, mean, rest_q)
-    _push(wrench, allocation, mean, thrusts_N)
-    own = damping(vehicle, _past(mean))
+    _add_thrust_wrench(wrench, allocation, mean, thrusts_N)
+    own = damping(vehicle, _relative_twist(mean))
     still = damping(packed, (mean[7], mean[8], mean[9], mean[10], mean[11], mean[12]))
     for i in range(6):
         for k in range(thrusts_N.shape[0]):
@@ -230,11 +224,11 @@ def residual_wrench(packed: Array, allocation: Array, mean: Array, thrusts_N: Ar
 
 
 @njit(apart=True)
-def _effects(own: Array, mean: Array, inputs: Array) -> Array:
+def _parameter_jacobian(own: Array, mean: Array, inputs: Array) -> Array:
     """Wrench, shape (6, 12), by the relative change of drag and of inertia in each degree of freedom."""
     rate = np.empty(13)
     rate_kernel(own, mean[:13], inputs, rate)
-    past, w = _past(mean), mean[10:13]
+    past, w = _relative_twist(mean), mean[10:13]
     b = (mean[7] - past[0], mean[8] - past[1], mean[9] - past[2])
     # Acceleration relative to the water, which in B turns against the body.
     a = rate[7:].copy()
@@ -264,7 +258,7 @@ def _effects(own: Array, mean: Array, inputs: Array) -> Array:
 
 @njit(apart=True)
 def _add_current(F: Array, A: Array, mean: Array, dt_s: float) -> None:
-    """Add to F's columns of the current: it acts as a velocity the other way, and turns in B."""
+    """Add to F's columns of the current, which acts as a velocity of the opposite sign and turns in B."""
     q, w = mean[3:7], mean[10:13]
     for j in range(3):
         seen = _world_axis(q, j)
@@ -294,7 +288,7 @@ def _world_axis(q: Array, j: int) -> Three:
 def _wrench_by_error(
     own: Array, allocation: Array, mean: Array, load_B: Array, thrusts_N: Array, rest_q: Array, errors: int
 ) -> Array:
-    """What the wrench in B changes by with the errors at the step's start, shape (6, errors)."""
+    """Jacobian of the wrench in B by the errors at the start of the step, shape (6, errors)."""
     by = np.zeros((6, errors))
     # A turn of the body turns the force that it sees by S(load_B).
     by[1, 3], by[2, 3] = load_B[2], -load_B[1]
@@ -330,11 +324,11 @@ def propagate_mean(
     inputs = np.empty(9)
     assign(inputs[:6], load_B)
     assign(inputs[6:], mean[25:28])
-    _push(inputs, allocation, mean, thrusts_N)
+    _add_thrust_wrench(inputs, allocation, mean, thrusts_N)
     before = mean.copy()
     A, B = np.empty((MOVING, MOVING)), np.empty((MOVING, 6))
     rk4_jacobian_kernel(own, mean[:13], inputs, dt_s, A, B)
-    effect = _effects(own, _halfway(before, mean), inputs)
+    effect = _parameter_jacobian(own, _halfway(before, mean), inputs)
     for i in range(6):
         for j in range(12):
             by[i, DRAG + j] += effect[i, j]
@@ -362,7 +356,7 @@ def _halfway(before: Array, after: Array) -> Array:
 def specific_force(
     packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array, down_B: Array, H: Array
 ) -> Array:
-    """Specific force at the body origin as an accelerometer tells it, bias included, shape (3,).
+    """Specific force at the body origin as an accelerometer measures it, bias included, shape (3,).
 
     dv/dt + omega x v - down_B, with gravity `down_B` in B; writes its Jacobian to H, shape (3, E).
     """
@@ -380,7 +374,7 @@ def specific_force(
         H[i, 9 + b] -= v[a]
         H[i, 3 + a] += down_B[b]
         H[i, 3 + b] -= down_B[a]
-        H[i, FELT + i] += 1.0
+        H[i, ACCELEROMETER + i] += 1.0
     return force
 
 
@@ -404,7 +398,7 @@ def advance(
     noise: Array,
     scale: float,
     spread: Array,
-    lasts_s: Array,
+    time_constants_s: Array,
 ) -> float:
     """Move mean, covariance and thrusts on in place from a time to another, command by command; returns when it is.
 
@@ -412,7 +406,8 @@ def advance(
     - `lag_s`, shape (n,): time constants of the thrusters, whose thrusts are `thrusts_N`, shape (n,).
     - `rest_q`, shape (4,): attitude that the unmodelled load is told for.
     - `since_s`, `commands_N`, shape (k,) and (k, n): from when which thrusts were commanded, one at least.
-    - `noise`, `spread`, `lasts_s`: as `predict` has them; the model's part of the noise, its first four, is `scale`
+    - `noise`, `spread`, `time_constants_s`: as `predict` has them; the model's part of the noise, its first four, is
+    `scale`
       times as large.
     """
     loud = noise.copy()
@@ -430,7 +425,7 @@ def advance(
             # Mean thrust over the step, exact for the first-order lag.
             push[k] = commands_N[now, k] + ahead * (lag_s[k] / dt_s) * (1.0 - kept)
             thrusts_N[k] = commands_N[now, k] + kept * ahead
-        predict(packed, allocation, mean, P, push, rest_q, dt_s, loud, spread, lasts_s)
+        predict(packed, allocation, mean, P, push, rest_q, dt_s, loud, spread, time_constants_s)
         time_s = end_s
     return time_s
 
@@ -446,25 +441,25 @@ def predict(
     dt_s: float,
     noise: Array,
     spread: Array,
-    lasts_s: Array,
+    time_constants_s: Array,
 ) -> None:
     """Advance mean and covariance in place by dt_s, some hundredths at most.
 
     `noise`, shape (6,), are spectral densities (amplitudes) of the errors of the modelled linear and angular
     acceleration and of the random walks of force, moment, gyro bias and accelerometer bias. What comes after the
-    accelerometer's bias is a first-order Gauss-Markov process each, of standard deviation `spread` and time `lasts_s`,
-    both of shape (E - 24,).
+    accelerometer's bias is a first-order Gauss-Markov process each, of standard deviation `spread` and time
+    `time_constants_s`, both of shape (E - 24,).
     """
     q = mean[3:7].copy()
     F = propagate_mean(packed, allocation, mean, thrusts_N, rest_q, dt_s, P.shape[0])
-    _carry(P, F)
+    _propagate_covariance(P, F)
     _add_noise(P, q, dt_s, noise)
-    _fade(mean, P, dt_s, spread, lasts_s)
+    _decay_markov_states(mean, P, dt_s, spread, time_constants_s)
 
 
 @njit
-def _carry(P: Array, F: Array) -> None:
-    """Carry the covariance on by the Jacobian F of what moves; the other errors stay."""
+def _propagate_covariance(P: Array, F: Array) -> None:
+    """P = F P F' in place, for the Jacobian F of the moving errors; the other errors are constant."""
     top = F @ P
     block = top @ F.T
     for i in range(MOVING):
@@ -476,14 +471,14 @@ def _carry(P: Array, F: Array) -> None:
 
 
 @njit
-def _fade(mean: Array, P: Array, dt_s: float, spread: Array, lasts_s: Array) -> None:
-    """Let the Markov processes forget, and new chance at them."""
+def _decay_markov_states(mean: Array, P: Array, dt_s: float, spread: Array, time_constants_s: Array) -> None:
+    """Decay of the first-order Gauss-Markov processes, and their driving noise."""
     kept = np.ones(P.shape[0])
     for k in range(spread.shape[0]):
         i = CURRENT + k
         # Neighbours mostly last as long as each other.
-        again = k > 0 and lasts_s[k] == lasts_s[k - 1]
-        kept[i] = kept[i - 1] if again else np.exp(-dt_s / lasts_s[k])
+        again = k > 0 and time_constants_s[k] == time_constants_s[k - 1]
+        kept[i] = kept[i - 1] if again else np.exp(-dt_s / time_constants_s[k])
         mean[1 + i] *= kept[i]
     for i in range(P.shape[0]):
         for j in range(P.shape[0]):

@@ -1,4 +1,4 @@
-"""What a user may say of the sensors' errors, and what the filter takes for granted."""
+"""Settings of the Kalman filter: sensor noise (`FilterSettings`) and prior standard deviations (`Priors`)."""
 
 from __future__ import annotations
 

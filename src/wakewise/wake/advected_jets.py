@@ -49,43 +49,43 @@ from wakewise.core.jit.njit import njit
 from wakewise.wake.kernels import ROUND_JET, Numbers, as_tuple, own_constants, section_of, speed_and_slope
 from wakewise.wake.wall_jet import HALF_THICKNESS, LEAST_SINE, ROUND_DECAY, WALL_SPEED
 
-FOLLOWED_S = 40.0
-"""How long a section is followed. Bent over, its speed falls as t^(-2/3) and its width grows as t^(1/3), so what a
-point sees of it falls to a hundredth of what it had after one second."""
+MAX_AGE_S = 40.0
+"""Greatest age of a section. Bent over, its speed falls as t^(-2/3) and its width grows as t^(1/3), so its
+contribution falls to a hundredth of that after one second."""
 SECTIONS = 40
 """Sections of a curve, at times as the squares of whole numbers: the first after .025 s, a centimetre; the last 2 s
 apart, when a plume is half a metre wide."""
-OPPOSED = float(np.sqrt(8.0) / 3.0)
-"""Share of an opposing current that counts in a section's speed: with more there are three roots."""
-PUFF = 2.0
-"""How much faster what is bent over widens, per way through the water."""
+OPPOSING_SHARE = float(np.sqrt(8.0) / 3.0)
+"""Share of an opposing current that counts in a section's speed; above it there are three roots."""
+LINE_PUFF_GROWTH = 2.0
+"""Growth of a bent-over jet over that of a straight one, per distance through the water."""
 LEAST_GUESS_N = 0.02
-"""Thrust below which no jet is guessed: it would be a guess about noise."""
+"""Least nominal thrust: below it thrusts are noise."""
 GUESS_SHARE = 0.5
-"""A thruster at rest is guessed to push with this share of the mean: half of what it would if all pushed alike."""
+"""Nominal thrust of an idle thruster, as a share of the mean thrust."""
 _TINY = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CrossFlow:
-    """The water that jets are sent into, and how hard they are sent."""
+    """Current and thrusts that advect the jets."""
 
     current_W_m_s: Array  # shape (3,)
-    unsure_m_s: float  # standard deviation of each component of the current
-    thrusts_N: Array  # shape (m,): guess of the thrusts, see `guessed`
+    current_std_m_s: float  # standard deviation of each component of the current
+    thrusts_N: Array  # shape (m,): thrusts of the last step, see `nominal_thrusts_N`
 
     def __post_init__(self) -> None:
         freeze(self, current_W_m_s=(3,), thrusts_N=(None,))
 
     @property
-    def guessed(self) -> Array:
-        """Size of both thrusts of each thruster, shape (2 m,), in N: as they are, but none far below the mean."""
-        return cast(Array, guessed_thrusts(self.thrusts_N))
+    def nominal_thrusts_N(self) -> Array:
+        """Magnitudes of T > 0 and T < 0 of each thruster, shape (2 m,), in N, none far below the mean."""
+        return cast(Array, nominal_thrusts(self.thrusts_N))
 
 
 @njit
-def guessed_thrusts(thrusts: Array) -> Array:
-    """`CrossFlow.guessed` of thrusts, shape (m,)."""
+def nominal_thrusts(thrusts: Array) -> Array:
+    """`CrossFlow.nominal_thrusts_N` of thrusts, shape (m,)."""
     m = thrusts.size
     mean = 0.0
     for i in range(m):
@@ -140,18 +140,18 @@ def _rates(
         forward += v[x] * e[x]
     cosine = min(max(forward / np.sqrt(size2), 0.0), 1.0) if size2 > 0.0 else 1.0
     rate = chi * U
-    return rate, rate * (cosine + PUFF * np.sqrt(1.0 - cosine * cosine)), U, still, width
+    return rate, rate * (cosine + LINE_PUFF_GROWTH * np.sqrt(1.0 - cosine * cosine)), U, still, width
 
 
 @njit(apart=True)
 def trace_plume(
-    kind: int, parameters: Array, own: Array, origin: Array, e: Array, thrust: float, current: Array, unsure: float,
-    curve: Array,
+    kind: int, parameters: Array, own: Array, origin: Array, e: Array, thrust: float, current: Array,
+    current_std: float, curve: Array,
 ) -> None:  # fmt: skip
     """Sections of one plume into `curve`, (SECTIONS + 1, 7): X, t, s, speed over still water's at s, and width so.
 
     - `kind`, `parameters`, `own`: the jet's law and its disk's constants (`kernels.own_constants`), shape (6,).
-    - `thrust`, `unsure`: in N, more than 0; in m/s.
+    - `thrust`, `current_std`: in N, more than 0; in m/s.
     - Shapes: `origin`, `e`, `current` (3,).
     """
     numbers = as_tuple(parameters)
@@ -161,7 +161,7 @@ def trace_plume(
         along += current[x] * e[x]
         current2 += current[x] * current[x]
     if along < 0.0:
-        along *= OPPOSED
+        along *= OPPOSING_SHARE
     # A cone has no speed at its tip.
     s = 1e-6 if kind == ROUND_JET else 0.05
     grown, t = s, 0.0
@@ -172,7 +172,7 @@ def trace_plume(
     for x in range(3):
         X[x] += s * e[x]
     for k in range(1, SECTIONS + 1):
-        then = FOLLOWED_S * (k / SECTIONS) ** 2
+        then = MAX_AGE_S * (k / SECTIONS) ** 2
         dt = then - t
         # The midpoint rule; the rates at a section's end are those at the next one's beginning.
         half_s, half_grown = s + 0.5 * dt * ds, grown + 0.5 * dt * dg
@@ -182,7 +182,7 @@ def trace_plume(
         s, grown, t = s + dt * ds, grown + dt * dg, then
         ds, dg, U, still, width = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, U, v)
         wider = max(grown / s, 1.0)
-        blurred = np.sqrt(1.0 + (2.0 * unsure * t / (wider * width)) ** 2)
+        blurred = np.sqrt(1.0 + (2.0 * current_std * t / (wider * width)) ** 2)
         curve[k, :3] = X
         curve[k, 3], curve[k, 4], curve[k, 5], curve[k, 6] = t, s, U / (still * blurred), wider * blurred
 
@@ -195,7 +195,7 @@ def fill_plume(
     """Raise `speed`, shape (n,), to the plume's speed per square root of newton at points, shape (3, n), in a ball.
 
     `end`, shape (2,): how far along itself the jet is whole, and what share of it goes on from there. `room`, shape
-    (2, n), and `hits`, shape (n + 1,), are room to work in.
+    (2, n), and `hits`, shape (n + 1,), are work arrays.
     """
     numbers = as_tuple(parameters)
     count, n = SECTIONS, points.shape[1]
@@ -212,11 +212,10 @@ def fill_plume(
         a, b, whole = curve[k], curve[k + 1], length[k]
         s, wide = b[4], max(a[6], b[6])
         reach2 = (own[3] + own[4] * s + (own[5] - 1.0) * s * s) * wide * wide
-        # Most of a plume is far from all of the points.
         px, py, pz = a[0] - ball[0], a[1] - ball[1], a[2] - ball[2]
         if px * px + py * py + pz * pz > (ball[3] + whole + np.sqrt(reach2)) ** 2:
             continue
-        # And most points are far from what is left of it: a pass without branches, in vector instructions, finds those.
+        # A pass without branches, in vector instructions, finds the points within reach.
         ax, ay, az, dx, dy, dz = a[0], a[1], a[2], d[k, 0], d[k, 1], d[k, 2]
         for j in range(n):
             px, py, pz = points[0, j] - ax, points[1, j] - ay, points[2, j] - az
@@ -255,7 +254,7 @@ def fill_plume(
 @njit
 def plume_speeds(
     points: Array, origins: Array, directions: Array, areas: Array, kind: int, parameters: Array, thrusts: Array,
-    current: Array, unsure: float, ends: Array,
+    current: Array, current_std: float, ends: Array,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Speed per square root of newton of m jets at n points, shape (m, n), and their curves, (m, SECTIONS + 1, 7).
 
@@ -277,7 +276,7 @@ def plume_speeds(
         ball[3] = max(ball[3], np.sqrt(r2))
     room, hits = np.empty((2, n)), np.empty(n + 1, np.int64)
     for i in range(m):
-        trace_plume(kind, parameters, own[i], origins[i], directions[i], thrusts[i], current, unsure, curves[i])
+        trace_plume(kind, parameters, own[i], origins[i], directions[i], thrusts[i], current, current_std, curves[i])
         fill_plume(across, ball, kind, parameters, own[i], curves[i], ends[i], room, hits, speeds[i])
     return speeds, curves
 
@@ -301,7 +300,7 @@ def plumes(
         *law,
         thrusts_N,
         flow.current_W_m_s,
-        flow.unsure_m_s,
+        flow.current_std_m_s,
         ends,
     )
     return cast("tuple[Array, Array]", found)
@@ -310,11 +309,11 @@ def plumes(
 CHI = float(np.sqrt(0.5))
 """Momentum flux over mass flux and greatest speed, of a half Gaussian."""
 SOFT = 0.1
-"""Thickness of a front over its distance where the current is known exactly: that of the layer."""
+"""Thickness of a front over its distance for a known current: that of the layer."""
 FADED = 32.0
-"""Exponent of layer and edge together beyond which nothing is counted: less than 1.3e-14 of the speed in the layer."""
+"""Exponent of layer and edge above which the speed is zero: less than 1.3e-14 of the speed in the layer."""
 TURNS = 3
-"""Times that the direction of a ray is set right by the time that its water was on its way."""
+"""Iterations of the direction of a ray for its travel time."""
 
 
 @njit
@@ -332,13 +331,14 @@ def bed_intersection(curve: Array, bed_z: float) -> tuple[bool, float, float, fl
 
 
 @njit(apart=True)
-def add_carried_walls(
+def add_advected_wall_jets(
     points: Array, curves: Array, directions: Array, areas: Array, floor: Array, thrusts: Array, current: Array,
-    unsure: float, ends: Array, velocity: Array,
+    current_std: float, ends: Array, velocity: Array,
 ) -> None:  # fmt: skip
-    """Add wall jets' velocity per square root of newton to `velocity`, shape (m, n, 3); `floor` as of `FloorJet`.
+    """Add wall jets' velocity per square root of newton to `velocity`, shape (m, n, 3); `floor` as of
+    `ImpingingJet.numbers`.
 
-    `ends`, shape (m, 2), as for `carried.fill_plume`: of what joins others on its way only a share strikes as itself.
+    `ends`, shape (m, 2), as for `fill_plume`: of a merged jet only a share strikes the bed as itself.
     """
     cx, cy = current[0], current[1]
     c2 = cx * cx + cy * cy
@@ -367,14 +367,13 @@ def add_carried_walls(
                 else:
                     tau, beyond = away / c, 0.5 * (away - half / c)
                 rx, ry = x - cx * tau, y - cy * tau
-            if tau + before > FOLLOWED_S:
+            if tau + before > MAX_AGE_S:
                 continue
-            blur = 2.0 * unsure * (before + tau)
+            blur = 2.0 * current_std * (before + tau)
             square = rx * rx + ry * ry + r0 * r0
             height = max(floor[0] - points[j, 2], 0.0)
             soft = max(blur, SOFT * away) + _TINY
             faded = np.log(2.0) * height * height / (HALF_THICKNESS**2 * square) + (beyond / soft) ** 2
-            # Most points are above the layer, and the speed there is long to find.
             if faded > FADED:
                 continue
             size = np.sqrt(square)
@@ -383,7 +382,9 @@ def add_carried_walls(
             speed = still * r * root
             if c > 0.0:
                 with_it = (rx * cx + ry * cy) / r
-                speed = excess_speed(CHI * speed * speed, CHI, with_it * (OPPOSED if with_it < 0.0 else 1.0), c2, speed)
+                speed = excess_speed(
+                    CHI * speed * speed, CHI, with_it * (OPPOSING_SHARE if with_it < 0.0 else 1.0), c2, speed
+                )
             share = left * speed / root * np.exp(-faded) * np.sqrt(square / (square + blur * blur)) / r
             velocity[i, j, 0] += share * rx
             velocity[i, j, 1] += share * ry

@@ -45,13 +45,13 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import WakeModel
 from wakewise.core.jit.njit import njit
-from wakewise.wake.advected_jets import CrossFlow, add_carried_walls, plumes
+from wakewise.wake.advected_jets import CrossFlow, add_advected_wall_jets, plumes
 from wakewise.wake.finite_difference import FiniteDifferenceWake
 from wakewise.wake.gram import dot, gram_slope_sum, gram_sum, stage_sum
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.kernels import FAST, as_tuple, own_constants, section_of
 from wakewise.wake.learned import free_jet
-from wakewise.wake.wall_jet import ImpingingJet, floor_gram_sum, floor_stage_sum
+from wakewise.wake.wall_jet import ImpingingJet, bed_gram_sum, bed_stage_sum
 
 
 def same_sizes(points: Array, weights: Array, origins: Array, axes: Array, areas: Array) -> None:
@@ -94,7 +94,7 @@ def explain(points: Array, weights: Array, origins: Array, axes: Array, areas: A
 
 Superposition = Literal["coherent", "incoherent"]
 SUPERPOSITIONS: tuple[Superposition, ...] = get_args(Superposition)
-"""How jets that meet may be added up."""
+"""Superpositions of jets."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,7 @@ def gram_with_derivatives(
     if isinstance(model, AxialJet):
         G, dG, check = gram_slope_sum(*place, *model.law)
     elif isinstance(model, ImpingingJet):
-        G, dG, check = floor_gram_sum(*place, *model.jet.law, model.numbers, True)
+        G, dG, check = bed_gram_sum(*place, *model.jet.law, model.numbers, True)
     else:
         (G, dG), check = _numeric(model, *place, 0.0, superposition).gram_slopes(X_WB), 0.0
     if check != 0.0:
@@ -239,7 +239,7 @@ def _stage(
     if isinstance(model, AxialJet):
         D, gradient, H, check = stage_sum(*place, *model.law, *how)
     elif isinstance(model, ImpingingJet):
-        D, gradient, H, check = floor_stage_sum(*place, *model.jet.law, model.numbers, *how)
+        D, gradient, H, check = bed_stage_sum(*place, *model.jet.law, model.numbers, *how)
     else:
         (D, gradient, H), check = _numeric(model, *place, smooth_N, superposition).stage(X_WB, thrusts), 0.0
     if check != 0.0:
@@ -274,9 +274,9 @@ def _numeric(
 
 
 SCATTER_RAD = float(np.radians(45.0))
-"""Root mean square of the angle between where a jet was sent and where it goes, taken small: kappa = 2 / angle^2."""
+"""Root mean square of the angle of dispersion, taken small: kappa = 2 / angle^2."""
 NEAREST_M = 0.1
-"""A jet is not scattered nearer to its disk: about a diameter, within which it has not begun to spread."""
+"""Least distance of the dispersion: about a diameter, within which a jet does not spread."""
 _ORIGIN, _LEVEL = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -294,9 +294,8 @@ def gram(
 
     - `origins_W`, `axes_W`, shape (m, 3): centres of the thrusters' disks and unit *force* axes (for T > 0), in the
       world.
-    - `superposition`: how jets that meet add up; incoherent leaves the diagonal alone.
-    - `flow`: what carries the jets, at the thrusts of its guess (see `carried`); still water where it is not given, and
-      for models from outside.
+    - `superposition`: incoherent keeps the diagonal only.
+    - `flow`: current that advects the jets (`advected_jets`); still water if not given, and for models of plug-ins.
     - Shapes: `region_points_W` (n, 3); `weights` (n,); `areas_m2` (m,).
 
     Returns shape (2 m, 2 m), in (m/s)^2/N: row i is thruster i with T > 0 (jet along -axis), row m + i the same
@@ -312,12 +311,12 @@ def gram(
         if check == 0.0:
             twice, directions = np.concatenate([origins_W, origins_W]), np.concatenate([-axes_W, axes_W])
             jets = (twice, directions, np.concatenate([areas_m2, areas_m2]))
-            G = velocity_gram(carried_velocity(model, region_points_W, *jets, flow.guessed, flow), weights)
+            G = velocity_gram(advected_velocity(model, region_points_W, *jets, flow.nominal_thrusts_N, flow), weights)
     elif isinstance(model, AxialJet):
         G, check = gram_sum(*place, *model.law)
     elif isinstance(model, ImpingingJet):
         in_world = (region_points_W, weights, _ORIGIN, _LEVEL, origins_W, axes_W, areas_m2)
-        G, _, check = floor_gram_sum(*in_world, *model.jet.law, model.numbers, False)
+        G, _, check = bed_gram_sum(*in_world, *model.jet.law, model.numbers, False)
     else:
         velocity = unit_velocity(
             model,
@@ -335,9 +334,9 @@ def gram(
 def unit_velocity(
     model: WakeModel, points_W_m: Array, origins_W_m: Array, directions_W: Array, areas_m2: Array
 ) -> Array:
-    """What a wake model answers, shape (m, n, 3), held against what it must be (see `WakeModel.unit_velocity`).
+    """Checked `WakeModel.unit_velocity`, shape (m, n, 3).
 
-    NaN passes: a controller whose Gram matrix is not finite does without, and a flight goes on.
+    NaN passes, because a controller ignores a Gram matrix that is not finite and the flight continues.
 
     Raises InputError if it is no array of numbers of that shape.
     """
@@ -377,7 +376,7 @@ def velocity_gram(velocity: Array, weights: Array) -> Array:
             for x in range(3):
                 rows[i, 3 * j + x] = root * velocity[i, j, x]
                 largest += abs(velocity[i, j, x])
-        # Most jets miss; what is not finite must show.
+        # Most jets miss; NaN must stay visible.
         here[i] = largest != 0.0
     for i in range(k):
         for c in range(i + 1):
@@ -399,7 +398,7 @@ def _along(speeds: Array, directions: Array) -> Array:
     return velocity
 
 
-def carried_velocity(
+def advected_velocity(
     model: WakeModel,
     points_W_m: Array,
     origins_W_m: Array,
@@ -411,13 +410,13 @@ def carried_velocity(
 ) -> Array:
     """Velocity per square root of newton, shape (m, n, 3), that jets of these thrusts have in excess of a current.
 
-    Arguments as for `WakeModel.unit_velocity`; `thrusts_N`, shape (m,), more than 0, sets how far each jet gets. Of
-    jets that join others `ends`, shape (m, 2), says after what way, and what share goes on as itself. The model must be
-    one of ours (an `AxialJet`, with a floor or without).
+    Arguments as for `WakeModel.unit_velocity`; `thrusts_N`, shape (m,), more than 0, sets how far each jet gets.
+    `ends`, shape (m, 2): distance at which a jet merges, and its share that continues. The model must be an `AxialJet`,
+    with or without a bed.
     """
     jet = free_jet(model)
     if not isinstance(jet, AxialJet):
-        raise InputError(f"wake model {model.name}: brings no law of a jet that a current could carry")
+        raise InputError(f"wake model {model.name}: has no jet law that a current could advect")
     if ends is None:
         ends = np.tile([np.inf, 1.0], (len(origins_W_m), 1))
     directions_W = np.ascontiguousarray(directions_W)
@@ -425,7 +424,7 @@ def carried_velocity(
     velocity = _along(speeds, directions_W)
     if isinstance(model, ImpingingJet):
         walls = (directions_W, areas_m2, model.numbers, thrusts_N)
-        add_carried_walls(points_W_m, curves, *walls, flow.current_W_m_s, flow.unsure_m_s, ends, velocity)
+        add_advected_wall_jets(points_W_m, curves, *walls, flow.current_W_m_s, flow.current_std_m_s, ends, velocity)
     return np.asarray(velocity)
 
 
@@ -433,7 +432,7 @@ def carried_velocity(
 def scattered_jet_gram(
     points: Array, weights: Array, origins: Array, axes: Array, areas: Array, kind: int, parameters: Array
 ) -> Array:
-    """Mean of D per newton of each jet if it goes astray, shape (2 m,), in (m/s)^2/N.
+    """Mean of D per newton of each jet of uncertain direction, shape (2 m,), in (m/s)^2/N.
 
     - `points`, `weights`, shape (n, 3) and (n,): of a region, in the world.
     - `origins`, `axes`, `areas`, shape (m, 3), (m, 3) and (m,): centres of the disks, unit force axes (for T > 0) and

@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
 
 class InfluenceMatrices(NamedTuple):
-    """Matrices of D, shape (2 n, 2 n) each: `gram` for the choice of thrusts, `sent` for D of the thrusts themselves.
+    """Matrices of D, shape (2 n, 2 n) each: `gram` for the choice of thrusts, `actual` for D of the thrusts themselves.
 
     They differ only if `gram` has extra costs: jets that may merge, jets of uncertain direction
     (`wakewise.control.null_space_allocation`).
     """
 
     gram: Array
-    sent: Array
+    actual: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,12 +85,12 @@ class InfluenceModel:
         _, origins_W, axes_W = place(X_WB.p_m, X_WB.q, self.positions_B_m, self.axes_B)
         return origins_W, axes_W
 
-    def seen(self, X_WB: Pose, flow: CrossFlow | None = None) -> InfluenceMatrices:
+    def matrices(self, X_WB: Pose, flow: CrossFlow | None = None) -> InfluenceMatrices:
         """Matrices of D for the choice of thrusts and for its value."""
         G = self.gram(X_WB, flow)
-        return InfluenceMatrices(gram=G, sent=G)
+        return InfluenceMatrices(gram=G, actual=G)
 
-    def astray(self, X_WB: Pose) -> Array | None:
+    def scattered_gram(self, X_WB: Pose) -> Array | None:
         """Mean of D per newton of each jet of uncertain direction, shape (2 n,) (`scattered_jet_gram`), or None."""
         if self._law is None:
             return None

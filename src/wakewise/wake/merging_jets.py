@@ -10,7 +10,8 @@ stays a quadratic form of s. With unequal thrusts this overestimates.
 
 In a current (`flow`), a pair of which one thrust is only a correction is charged as if both were in use: half of the
 merged jet's D on each diagonal entry. Otherwise thrusts that alternate between two such jets would look harmless,
-while both jets are in the water. This charge is in `InfluenceMatrices.gram` only; `sent` has what the thrusts do.
+while both jets are in the water. This charge is in `InfluenceMatrices.gram` only; `actual` has the D of the thrusts
+themselves.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from wakewise.core.geometry import Pose
 from wakewise.core.jit.njit import assign, njit
 from wakewise.wake import AxialJet, free_jet
 from wakewise.wake.advected_jets import CrossFlow
-from wakewise.wake.disturbance import carried_velocity, incoherent, velocity_gram
+from wakewise.wake.disturbance import advected_velocity, incoherent, velocity_gram
 from wakewise.wake.influence import InfluenceMatrices, InfluenceModel
 
 LEAST_COSINE = -0.5
@@ -41,12 +42,12 @@ _LEAST_SHARE, _WORTH_SHARE = 1e-3, 0.1
 
 
 class JoinedJets(NamedTuple):
-    """Jets made of two, of m pairs of slots (slot i is thruster i with T > 0, slot n + i the same with T < 0).
+    """Merged jets of m pairs of slots (slot i is thruster i with T > 0, slot n + i the same with T < 0).
 
-    `origins_m`, shape (m, 3), lie as far behind the place of meeting as the two jets came on average, so that the
-    joined jet is as wide there as they are; `directions`, shape (m, 3); `momentum`, shape (m,), over `strength_N`, the
-    geometric mean of the two; `share`, shape (m,), tells how squarely they meet: 1/2 where their axes pass one
-    half-width apart; `ways_m`, shape (m, 2), how far each comes until then.
+    `origins_m`, shape (m, 3), lie as far behind the crossing as the two jets came on average, so that the merged jet
+    is as wide there as they are; `directions`, shape (m, 3); `momentum`, shape (m,), over `strength_N`, the
+    geometric mean of the two; `share`, shape (m,), is the overlap: 1/2 where their axes pass one half-width
+    apart; `ways_m`, shape (m, 2), how far each comes until then.
     """
 
     first: IntArray
@@ -59,11 +60,11 @@ class JoinedJets(NamedTuple):
     ways_m: Array
 
 
-class _Sent(NamedTuple):
+class _TracedJets(NamedTuple):
     """Jets of a flow: those of all slots, then those that pairs become, then those that resting pairs would become.
 
     `origins_m` and `directions`, shape (m, 3), `areas_m2` and `thrusts_N`, shape (m,), `ends`, shape (m, 2), as for
-    `carried_velocity`; `joined` and `apart`, the numbers in `JoinedJets` of the pairs that do and that would.
+    `advected_velocity`; `joined` and `apart`, the numbers in `JoinedJets` of the pairs that do and that would.
     """
 
     origins_m: Array
@@ -77,49 +78,48 @@ class _Sent(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MergingJetsModel(InfluenceModel):
-    """An `InfluenceModel` whose Gram matrix also holds what pairs of jets become where they meet."""
+    """`InfluenceModel` whose Gram matrix includes the merged jets of pairs that cross."""
 
     pairs: tuple[tuple[int, int], ...] = field(default=())  # thrusters whose jets are looked at
 
     def gram(self, X_WB: Pose, flow: CrossFlow | None = None) -> Array:
-        """Matrix G of D = s' G s, shape (2 n, 2 n); in a flow what two jets become takes their own place."""
-        return self.seen(X_WB, flow).gram
+        """Matrix G of D = s' G s, shape (2 n, 2 n); in a flow the merged jet replaces its two."""
+        return self.matrices(X_WB, flow).gram
 
-    def seen(self, X_WB: Pose, flow: CrossFlow | None = None) -> InfluenceMatrices:
-        """Matrices of D: with the charge for a pair of which one rests, and with what it becomes where both push."""
+    def matrices(self, X_WB: Pose, flow: CrossFlow | None = None) -> InfluenceMatrices:
+        """Matrices of D: with the cost of a pair of which one is idle, and without it."""
         origins, axes = self.places(X_WB)
         if flow is not None and isinstance(free_jet(self.wake), AxialJet):
-            return self._seen_in(flow, origins, axes)
+            return self._matrices_in_current(flow, origins, axes)
         G = np.array(super().gram(X_WB))
-        met = _meet(origins, axes, *self._slots, np.ones(2 * len(origins)))
-        areas = self.areas_m2[met.first % len(origins)]
-        speed = self.wake.unit_velocity(self.points_W_m, met.origins_m, met.directions, areas)
-        D = met.momentum * met.share * np.einsum("n,inx,inx->i", self.weights, speed, speed)
-        np.add.at(G, (met.first, met.second), 0.5 * D)
-        np.add.at(G, (met.second, met.first), 0.5 * D)
-        return InfluenceMatrices(gram=G, sent=G)
+        merged = _merge_geometry(origins, axes, *self._slots, np.ones(2 * len(origins)))
+        areas = self.areas_m2[merged.first % len(origins)]
+        speed = self.wake.unit_velocity(self.points_W_m, merged.origins_m, merged.directions, areas)
+        D = merged.momentum * merged.share * np.einsum("n,inx,inx->i", self.weights, speed, speed)
+        np.add.at(G, (merged.first, merged.second), 0.5 * D)
+        np.add.at(G, (merged.second, merged.first), 0.5 * D)
+        return InfluenceMatrices(gram=G, actual=G)
 
-    def _seen_in(self, flow: CrossFlow, origins: Array, axes: Array) -> InfluenceMatrices:
+    def _matrices_in_current(self, flow: CrossFlow, origins: Array, axes: Array) -> InfluenceMatrices:
         """The same in a flow, of disks and force axes in the world, shape (n, 3) each.
 
-        Of a pair that pushes a share goes on as one, the rest as if alone. The velocity of the one is counted to its
-        two by their thrusts, so that it is right where the thrusts are those reckoned from, and D stays a sum of
-        squares. Pairs of which one pushes no more than corrections do are charged for what they would become: either
-        may push soon, and jets live for seconds, so that what one sends now meets what the other sends then.
+        Of an active pair a share continues as one jet and the rest as two. The merged velocity is divided between the
+        two by their thrusts, so that it is exact at the nominal thrusts and D stays a sum of squares. A pair of which
+        one thrust is only a correction has the cost of its merged jet, because jets live for seconds.
         """
         pushing = np.concatenate([flow.thrusts_N, -flow.thrusts_N])
-        guessed, weak_N = flow.guessed, WEAK_SHARE * float(np.abs(flow.thrusts_N).mean())
-        met = _meet(origins, axes, *self._slots, np.where(pushing > weak_N, pushing, guessed))
-        sent = _send(origins, axes, self.areas_m2, guessed, pushing, weak_N, met)
-        place = (sent.origins_m, sent.directions, sent.areas_m2, sent.thrusts_N)
-        velocity = carried_velocity(self.wake, self.points_W_m, *place, flow, sent.ends)
-        _join(velocity, met, sent.joined, pushing)
+        guessed, weak_N = flow.nominal_thrusts_N, WEAK_SHARE * float(np.abs(flow.thrusts_N).mean())
+        merged = _merge_geometry(origins, axes, *self._slots, np.where(pushing > weak_N, pushing, guessed))
+        traced = _jets_to_trace(origins, axes, self.areas_m2, guessed, pushing, weak_N, merged)
+        place = (traced.origins_m, traced.directions, traced.areas_m2, traced.thrusts_N)
+        velocity = advected_velocity(self.wake, self.points_W_m, *place, flow, traced.ends)
+        _add_merged(velocity, merged, traced.joined, pushing)
         G = velocity_gram(velocity[: len(pushing)], self.weights)
         if self.superposition == "incoherent":
             G = incoherent(G)
-            return InfluenceMatrices(gram=G, sent=G)
+            return InfluenceMatrices(gram=G, actual=G)
         return InfluenceMatrices(
-            *_charged(G, velocity[len(pushing) + len(sent.joined) :], self.weights, met, sent.apart)
+            *_with_merging_costs(G, velocity[len(pushing) + len(traced.joined) :], self.weights, merged, traced.apart)
         )
 
     @cached_property
@@ -130,13 +130,13 @@ class MergingJetsModel(InfluenceModel):
 def joined_jets(
     origins_m: Array, axes: Array, pairs: tuple[tuple[int, int], ...], thrusts_N: Array | None = None
 ) -> JoinedJets:
-    """Which jets meet and what they become, from disks, shape (n, 3), and force axes, shape (n, 3), in any frame.
+    """Pairs of jets that merge, from disks and force axes, shape (n, 3) each, in any frame.
 
-    `thrusts_N`, shape (2 n,), are sizes to reckon with, more than 0; without them all jets are alike.
+    `thrusts_N`, shape (2 n,): magnitudes, more than 0; 1 if not given.
     """
     n = len(origins_m)
     sizes = np.ones(2 * n) if thrusts_N is None else np.array(thrusts_N, dtype=np.float64)
-    return cast(JoinedJets, _meet(np.array(origins_m), np.array(axes), *_slots_of(pairs, n), sizes))
+    return cast(JoinedJets, _merge_geometry(np.array(origins_m), np.array(axes), *_slots_of(pairs, n), sizes))
 
 
 def _slots_of(pairs: tuple[tuple[int, int], ...], n: int) -> tuple[IntArray, IntArray]:
@@ -147,7 +147,7 @@ def _slots_of(pairs: tuple[tuple[int, int], ...], n: int) -> tuple[IntArray, Int
 
 
 @njit
-def _meet(origins: Array, axes: Array, first: IntArray, second: IntArray, sizes: Array) -> JoinedJets:
+def _merge_geometry(origins: Array, axes: Array, first: IntArray, second: IntArray, sizes: Array) -> JoinedJets:
     """`JoinedJets` of those of the pairs of slots, `first` with `second`, that meet; `sizes` as for `joined_jets`."""
     n, many, count = origins.shape[0], first.size, 0
     a, b = np.empty(many, np.int64), np.empty(many, np.int64)
@@ -200,11 +200,14 @@ def _meet(origins: Array, axes: Array, first: IntArray, second: IntArray, sizes:
 
 
 @njit
-def _send(
-    origins: Array, axes: Array, areas: Array, guessed: Array, pushing: Array, weak_N: float, met: JoinedJets
-) -> _Sent:
-    """Jets to follow, `_Sent`, of slots that push with `pushing` and are guessed to with `guessed`, shape (2 n,)."""
-    n, pairs = origins.shape[0], met.first.size
+def _jets_to_trace(
+    origins: Array, axes: Array, areas: Array, guessed: Array, pushing: Array, weak_N: float, merged: JoinedJets
+) -> _TracedJets:
+    """Jets to trace: of all slots, of merging pairs, of pairs that would merge.
+
+    Thrusts `pushing` and nominal thrusts `guessed`, shape (2 n,).
+    """
+    n, pairs = origins.shape[0], merged.first.size
     joined, apart, joins, rests = np.empty(pairs, np.int64), np.empty(pairs, np.int64), 0, 0
     taken, ends = np.zeros(2 * n, np.bool_), np.ones((2 * n + pairs, 2))
     ends[:, 0] = np.inf
@@ -212,20 +215,20 @@ def _send(
         # Each jet joins one other, the one it meets most squarely.
         best, square = -1, 0.0
         for k in range(pairs):
-            a, b = met.first[k], met.second[k]
+            a, b = merged.first[k], merged.second[k]
             free = not taken[a] and not taken[b] and min(pushing[a], pushing[b]) > weak_N
-            if free and met.share[k] > square:
-                best, square = k, met.share[k]
+            if free and merged.share[k] > square:
+                best, square = k, merged.share[k]
         if best < 0:
             break
         for side in range(2):
-            slot = met.first[best] if side == 0 else met.second[best]
+            slot = merged.first[best] if side == 0 else merged.second[best]
             taken[slot] = True
-            ends[slot, 0], ends[slot, 1] = met.ways_m[best, side], 1.0 - square
+            ends[slot, 0], ends[slot, 1] = merged.ways_m[best, side], 1.0 - square
         joined[joins] = best
         joins += 1
     for k in range(pairs):
-        if min(pushing[met.first[k]], pushing[met.second[k]]) <= weak_N and met.share[k] > _WORTH_SHARE:
+        if min(pushing[merged.first[k]], pushing[merged.second[k]]) <= weak_N and merged.share[k] > _WORTH_SHARE:
             apart[rests] = k
             rests += 1
     many = 2 * n + joins + rests
@@ -237,19 +240,19 @@ def _send(
         disks[i], thrusts[i] = areas[i % n], guessed[i]
     for c in range(joins + rests):
         k, i = joined[c] if c < joins else apart[c - joins], 2 * n + c
-        assign(places[i], met.origins_m[k])
-        assign(directions[i], met.directions[k])
-        disks[i], thrusts[i] = areas[met.first[k] % n], met.momentum[k] * met.strength_N[k]
-    return _Sent(places, directions, disks, thrusts, ends[:many], joined[:joins], apart[:rests])
+        assign(places[i], merged.origins_m[k])
+        assign(directions[i], merged.directions[k])
+        disks[i], thrusts[i] = areas[merged.first[k] % n], merged.momentum[k] * merged.strength_N[k]
+    return _TracedJets(places, directions, disks, thrusts, ends[:many], joined[:joins], apart[:rests])
 
 
 @njit
-def _join(velocity: Array, met: JoinedJets, joined: IntArray, pushing: Array) -> None:
-    """Add what pairs become, rows of `velocity`, (m, n, 3), after all slots, to the rows of their two, by thrust."""
+def _add_merged(velocity: Array, merged: JoinedJets, joined: IntArray, pushing: Array) -> None:
+    """Add the merged jets, rows of `velocity`, (m, n, 3), after all slots, to the rows of their two, by thrust."""
     for c in range(joined.size):
         k, one = joined[c], velocity[pushing.size + c]
-        a, b = met.first[k], met.second[k]
-        whole = met.share[k] * np.sqrt(met.momentum[k] * met.strength_N[k]) / (pushing[a] + pushing[b])
+        a, b = merged.first[k], merged.second[k]
+        whole = merged.share[k] * np.sqrt(merged.momentum[k] * merged.strength_N[k]) / (pushing[a] + pushing[b])
         for slot in (a, b):
             part = whole * np.sqrt(pushing[slot])
             for j in range(one.shape[0]):
@@ -258,24 +261,23 @@ def _join(velocity: Array, met: JoinedJets, joined: IntArray, pushing: Array) ->
 
 
 @njit
-def _charged(G: Array, velocity: Array, weights: Array, met: JoinedJets, apart: IntArray) -> tuple[Array, Array]:
-    """G with a charge on each of a pair that rests, and G with what the pair becomes, of velocities (m, n, 3).
-
-    D of what a pair becomes is per newton of its geometric mean.
-    """
-    charged, sent = G.copy(), G.copy()
+def _with_merging_costs(
+    G: Array, velocity: Array, weights: Array, merged: JoinedJets, apart: IntArray
+) -> tuple[Array, Array]:
+    """G with the cost of idle pairs on its diagonal, and G with their merged jets off it, of velocities (m, n, 3)."""
+    charged, actual = G.copy(), G.copy()
     for c in range(apart.size):
         k, total = apart[c], 0.0
-        a, b = met.first[k], met.second[k]
+        a, b = merged.first[k], merged.second[k]
         for j in range(weights.size):
             u, v, w = velocity[c, j, 0], velocity[c, j, 1], velocity[c, j, 2]
             total += weights[j] * (u * u + v * v + w * w)
-        half = 0.5 * met.momentum[k] * met.share[k] * total
+        half = 0.5 * merged.momentum[k] * merged.share[k] * total
         charged[a, a] += half
         charged[b, b] += half
-        sent[a, b] += half
-        sent[b, a] += half
-    return charged, sent
+        actual[a, b] += half
+        actual[b, a] += half
+    return charged, actual
 
 
 def merging_pairs(layout: Layout) -> tuple[tuple[int, int], ...]:
@@ -288,7 +290,7 @@ def merging_pairs(layout: Layout) -> tuple[tuple[int, int], ...]:
 
 
 def with_merging_jets(view: InfluenceModel, layout: Layout) -> MergingJetsModel:
-    """The same view with jets that meet."""
+    """The same influence model with merging jets."""
     return MergingJetsModel(
         wake=view.wake,
         points_W_m=view.points_W_m,

@@ -31,7 +31,7 @@ from wakewise.wake.kernels import (
     own_constants,
     speed_and_slope,
 )
-from wakewise.wake.wall_jet import ImpingingJet, floor_stage_sum
+from wakewise.wake.wall_jet import ImpingingJet, bed_stage_sum
 
 PLAIN_CONE = 10
 """Kind of the cone with the paper's powers and any gain and edge: no logarithm, no branch."""
@@ -232,7 +232,7 @@ def stage_disturbance(
     """
     if table.walls:
         kind = table.kind
-        D, first, second, _ = floor_stage_sum(
+        D, first, second, _ = bed_stage_sum(
             table.rows,
             table.weights,
             p,

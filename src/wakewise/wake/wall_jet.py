@@ -224,7 +224,7 @@ def fill_velocities(
 
 
 @njit(fastmath=FAST)
-def floor_gram_sum(
+def bed_gram_sum(
     points: Array, weights: Array, p: Array, q: Array, positions_B: Array, axes_B: Array, areas: Array, kind: int,
     parameters: Array, floor: Array, slopes: bool,
 ) -> tuple[Array, Array, float]:  # fmt: skip
@@ -263,7 +263,7 @@ def floor_gram_sum(
 
 
 @njit(apart=True, fastmath=FAST)
-def floor_stage_sum(
+def bed_stage_sum(
     points: Array, weights: Array, p: Array, q: Array, positions_B: Array, axes_B: Array, areas: Array, kind: int,
     parameters: Array, floor: Array, thrusts: Array, smooth: float, coherent: bool, hessian: bool,
 ) -> tuple[float, Array, Array, float]:  # fmt: skip

@@ -30,9 +30,9 @@ def test_body_and_tilt_put_the_camera_where_the_route_wants_it(time_s, vehicle, 
     aim = aim_of(vehicle, by)
     tilt, _ = ROUTE.tilt(time_s, aim)
     X_WC = ROUTE.body(time_s, aim).X_WB @ vehicle.X_BC_at(tilt)
-    wished, _, _ = ROUTE.camera(time_s)
-    assert X_WC.p_m == pytest.approx(wished.p_m, abs=1e-12)
-    assert pytest.approx(wished.R, abs=1e-12) == X_WC.R
+    reference, _, _ = ROUTE.camera(time_s)
+    assert X_WC.p_m == pytest.approx(reference.p_m, abs=1e-12)
+    assert pytest.approx(reference.R, abs=1e-12) == X_WC.R
 
 
 def away_from_corners(time_s: float, aim: CameraAim) -> bool:

@@ -35,7 +35,7 @@ def test_speed_and_acceleration_stay_within_their_limits() -> None:
 
 
 def test_the_shutter_opens_at_the_planned_places() -> None:
-    """At each exposure the wished camera pose is the planned one."""
+    """At each exposure the reference camera pose is the planned one."""
     for time_s, planned in zip(ROUTE.exposures_s, ROUTE.X_WC_planned, strict=True):
         X_WC, _, _ = ROUTE.camera(float(time_s))
         np.testing.assert_allclose(X_WC.p_m, planned.p_m, atol=1e-9)
@@ -56,9 +56,9 @@ def test_the_body_twist_is_the_derivative_of_the_body_pose() -> None:
 
 def test_before_the_first_leg_the_vehicle_is_asked_to_hover() -> None:
     """While settling, the goal is the start of the approach, at rest."""
-    wished = ROUTE.body(0.5, X_BC)
-    np.testing.assert_allclose(wished.nu_B, 0.0, atol=1e-12)
-    np.testing.assert_allclose(wished.X_WB.p_m, ROUTE.body(0.0, X_BC).X_WB.p_m)
+    reference = ROUTE.body(0.5, X_BC)
+    np.testing.assert_allclose(reference.nu_B, 0.0, atol=1e-12)
+    np.testing.assert_allclose(reference.X_WB.p_m, ROUTE.body(0.0, X_BC).X_WB.p_m)
 
 
 def test_a_flight_of_more_than_a_day_is_refused_with_its_length() -> None:

@@ -26,8 +26,7 @@ from wakewise.core.interfaces import Flow
 from wakewise.simulation.lattice import load_mean_field
 from wakewise.simulation.water import Water
 from wakewise.wake.calibration import DataSplit
-from wakewise.wake.samples import CORE, JetSamples
-from wakewise.wake.scores import score_speeds
+from wakewise.wake.samples import CORE, JetSamples, score_speeds
 
 DISK_DIAMETER_M = 0.06
 """Disk of the paper's vehicle."""

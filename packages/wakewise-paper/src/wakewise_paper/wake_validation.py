@@ -18,11 +18,17 @@ from wakewise.core.arrays import Array
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.wake.calibration import FAMILIES, DataSplit, WakeCalibration, WakeFamily, calibrate, split_samples
-from wakewise.wake.fit_file import fit_figures
+from wakewise.wake.calibration import (
+    FAMILIES,
+    DataSplit,
+    WakeCalibration,
+    WakeFamily,
+    calibrate,
+    fit_figures,
+    split_samples,
+)
 from wakewise.wake.jets import AxialJet
-from wakewise.wake.samples import CORE, WAKE, JetRegion, JetSamples, joined
-from wakewise.wake.scores import WakeScores, score
+from wakewise.wake.samples import CORE, WAKE, JetRegion, JetSamples, WakeScores, joined, score
 from wakewise_paper.flows import (
     BLAAUW_VAN_DE_KAA,
     FUEHRER_ROEMISCH,

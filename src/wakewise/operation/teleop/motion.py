@@ -75,7 +75,7 @@ class MotionReference:
         """Place of the camera in W, and its velocity against the body's place, shape (3,) each."""
         X_WB = self.X_WB
         lever_B = aim.mount(self.tilt_rad).p_m
-        slide_B, _ = aim.carried(self.tilt_rad, self.tilt_rad_s)
+        slide_B, _ = aim.camera_motion(self.tilt_rad, self.tilt_rad_s)
         return X_WB.apply(lever_B), X_WB.R @ (np.cross(self.omega_B_rad_s, lever_B) + slide_B)
 
 
@@ -89,20 +89,22 @@ class AttitudeReference:
     tilt_rad_s: float = 0.0
 
 
-def step_attitude(motion: MotionReference, wished: AttitudeReference, dt_s: float, aim: CameraAim) -> MotionReference:
-    """The motion with its attitude a step nearer to a wished one that moves; the tilt at its joint's rate."""
+def step_attitude(
+    motion: MotionReference, reference: AttitudeReference, dt_s: float, aim: CameraAim
+) -> MotionReference:
+    """The motion with its attitude a step nearer to a reference one that moves; the tilt at its joint's rate."""
     for k in range(3):
-        motion = step_angle(motion, k, wished, dt_s)
-    return step_tilt(motion, wished, dt_s, aim)
+        motion = step_angle(motion, k, reference, dt_s)
+    return step_tilt(motion, reference, dt_s, aim)
 
 
-def step_angle(motion: MotionReference, k: int, wished: AttitudeReference, dt_s: float) -> MotionReference:
-    """The motion with angle number k a step nearer to a wished one that moves."""
+def step_angle(motion: MotionReference, k: int, reference: AttitudeReference, dt_s: float) -> MotionReference:
+    """The motion with angle number k a step nearer to a reference one that moves."""
     angle, rate = profile_step_moving(
         float(motion.angles_rad[k]),
         float(motion.rates_rad_s[k]),
-        unwrap_near(float(wished.angles_rad[k]), float(motion.angles_rad[k])),
-        float(wished.rates_rad_s[k]),
+        unwrap_near(float(reference.angles_rad[k]), float(motion.angles_rad[k])),
+        float(reference.rates_rad_s[k]),
         dt_s,
         TURN_RAD_S,
         TURN_RAD_S2,
@@ -110,18 +112,24 @@ def step_angle(motion: MotionReference, k: int, wished: AttitudeReference, dt_s:
     return _with_angle(motion, k, angle, rate)
 
 
-def step_tilt(motion: MotionReference, wished: AttitudeReference, dt_s: float, aim: CameraAim) -> MotionReference:
-    """The motion with its camera's joint a step nearer to a wished tilt that moves."""
+def step_tilt(motion: MotionReference, reference: AttitudeReference, dt_s: float, aim: CameraAim) -> MotionReference:
+    """The motion with its camera's joint a step nearer to a reference tilt that moves."""
     if aim.joint is None:
         return motion
     tilt, rate = profile_step_moving(
-        motion.tilt_rad, motion.tilt_rad_s, wished.tilt_rad, wished.tilt_rad_s, dt_s, aim.joint.rate_rad_s, TILT_RAD_S2
+        motion.tilt_rad,
+        motion.tilt_rad_s,
+        reference.tilt_rad,
+        reference.tilt_rad_s,
+        dt_s,
+        aim.joint.rate_rad_s,
+        TILT_RAD_S2,
     )
     return replace(motion, tilt_rad=aim.joint.within(tilt), tilt_rad_s=rate)
 
 
 def turn_tilt_joint(motion: MotionReference, wished_rad_s: float, dt_s: float, aim: CameraAim) -> MotionReference:
-    """The motion with its camera's joint turned at a wished rate, as far as its stops."""
+    """The motion with its camera's joint turned at a reference rate, as far as its stops."""
     if aim.joint is None:
         return motion
     most = aim.joint.rate_rad_s
@@ -132,7 +140,7 @@ def turn_tilt_joint(motion: MotionReference, wished_rad_s: float, dt_s: float, a
 
 
 def step_rate(motion: MotionReference, k: int, wished_rad_s: float, dt_s: float) -> MotionReference:
-    """The motion with angle number k turned at a wished rate, which is reached at `TURN_RAD_S2`."""
+    """The motion with angle number k turned at a reference rate, which is reached at `TURN_RAD_S2`."""
     before = float(motion.rates_rad_s[k])
     rate = limit_slew(before, wished_rad_s, dt_s, TURN_RAD_S2)
     return _with_angle(motion, k, float(motion.angles_rad[k]) + 0.5 * (before + rate) * dt_s, rate)

@@ -105,16 +105,16 @@ class ResumableMission:
         tilt, tilt_rate = self.aim.tilt(-float(place[1]), -float(rate[1]))
         q_WB = quat_multiply(X_WC.q, quat_conjugate(self.aim.mount(tilt).q))
         angles = euler_from_quat(q_WB)
-        _, turned_B = self.aim.carried(tilt, tilt_rate)
+        _, turned_B = self.aim.camera_motion(tilt, tilt_rate)
         omega_B = Pose(X_WC.p_m, q_WB).R.T @ omega_W - turned_B
-        wished = AttitudeReference(
+        reference = AttitudeReference(
             angles_rad=angles, rates_rad_s=rates_of(angles, omega_B), tilt_rad=tilt, tilt_rad_s=tilt_rate
         )
         if dt_s > 0.0:
-            motion = step_attitude(motion, wished, dt_s, self.aim)
+            motion = step_attitude(motion, reference, dt_s, self.aim)
         else:
             motion = replace(
-                motion, angles_rad=angles, rates_rad_s=wished.rates_rad_s, tilt_rad=tilt, tilt_rad_s=tilt_rate
+                motion, angles_rad=angles, rates_rad_s=reference.rates_rad_s, tilt_rad=tilt, tilt_rad_s=tilt_rate
             )
         off = np.abs(np.remainder(motion.angles_rad - angles + math.pi, 2.0 * math.pi) - math.pi).max()
         eye, moves = motion.camera(self.aim)

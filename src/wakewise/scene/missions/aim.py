@@ -32,9 +32,9 @@ class CameraAim:
         """
         if self.joint is None:
             return 0.0, 0.0
-        wished = self.level_tilt(pitch_rad)
-        tilt = self.joint.within(wished)
-        return tilt, pitch_rate_rad_s if tilt == wished else 0.0
+        reference = self.level_tilt(pitch_rad)
+        tilt = self.joint.within(reference)
+        return tilt, pitch_rate_rad_s if tilt == reference else 0.0
 
     def level_tilt(self, pitch_rad: float) -> float:
         """Tilt with which the camera of a level body looks at a pitch above the horizon, stops or no stops."""
@@ -49,7 +49,7 @@ class CameraAim:
         """Camera mount at a tilt."""
         return self.X_BC if self.joint is None else self.joint.mount(self.X_BC, tilt_rad)
 
-    def carried(self, tilt_rad: float, tilt_rate_rad_s: float) -> tuple[Array, Array]:
+    def camera_motion(self, tilt_rad: float, tilt_rate_rad_s: float) -> tuple[Array, Array]:
         """Velocity and angular velocity of the camera within the body, in the axes of B, shape (3,) each."""
         if self.joint is None:
             return np.zeros(3), np.zeros(3)

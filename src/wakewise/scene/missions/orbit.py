@@ -1,27 +1,74 @@
-"""Orbits on a hemisphere about a target: the camera keeps its standoff and looks at the centre.
+"""Orbits on a hemisphere about a target, with their settings: the camera keeps its standoff and looks at the centre.
 
-A camera place is given by azimuth (from north towards east), elevation (above the horizontal) and range:
-p_WC = centre + range * (cos el cos az, cos el sin az, -sin el), NED. The view axis points at the centre without roll,
-so as Euler angles of a forward-right-down frame: roll 0, pitch -el, yaw az + pi.
+Camera position from azimuth (from north towards east), elevation (above the horizontal) and range:
+p_WC = centre + range * (cos el cos az, cos el sin az, -sin el), NED. The optical axis points at the centre without
+roll: Euler angles of a forward-right-down frame are roll 0, pitch -el, yaw az + pi.
 
-Where orbits are begun: as they are listed, or each at its view downstream of the target.
-
-A vehicle that waits, approaches or climbs upstream of the target has its wash carried on to it, and what was blown
-there is still felt a quarter of a minute later, on the far side of the orbit (docs/research-log/0040). Settling,
-approach, climbs and the first half of each orbit, which goes up against the current, then lie where the wash is carried
-away. Views are the same; only which of a circle's views is its first changes.
+Order `current`: each orbit starts at its view downstream of the target. Upstream, the current carries the wash of
+settling, approach and climbs to the target, and it is still measurable 15 s later (docs/research-log/0040). The views
+are the same in both orders.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.geometry import Pose, quat_from_euler, quat_from_matrix, quat_multiply
-from wakewise.scene.missions.settings import MissionSettings
+from wakewise.core.settings import Settings
+
+Elevation = Annotated[float, Field(gt=0.0, lt=85.0)]
+Views = Annotated[int, Field(ge=3, le=360)]
+
+
+class MissionSettings(Settings):
+    """Layered hemispherical orbits about the target's centre, flown without stopping between photographs."""
+
+    elevations_deg: tuple[Elevation, ...] = Field(
+        (20.0, 40.0, 60.0), min_length=1, max_length=8, description="elevation of each orbit above the target's centre"
+    )
+    views: tuple[Views, ...] = Field(
+        (20, 16, 12), min_length=1, max_length=8, description="photographs on each orbit, evenly spread"
+    )
+    order: Literal["plain", "current"] = Field(
+        "plain",
+        description="where orbits begin: plain, in the north; current, downstream of the target by the surveyed "
+        "current, where the vehicle's wash is carried away",
+    )
+    aim: Literal["auto", "pitch", "tilt", "both"] = Field(
+        "auto",
+        description="what aims the camera: the vehicle's pitch, the camera's tilt joint, or the joint to its stops and "
+        "pitch for the rest; auto is both where there is a joint, else pitch",
+    )
+    standoff_m: float = Field(0.5, gt=0.0, le=3.0, description="distance of the camera from the target's centre")
+    speed_m_s: float = Field(0.10, ge=1e-3, le=0.5, description="speed of the camera along its path")
+    acceleration_m_s2: float = Field(0.05, ge=1e-3, le=1.0, description="greatest acceleration along the path")
+    approach_m: float = Field(0.3, ge=0.0, le=2.0, description="the flight starts this much farther out")
+    settle_s: float = Field(
+        12.0, ge=0.0, le=120.0, description="hover before the first leg, until the integral knows trim and current"
+    )
+    max_tracking_deviation: float | None = Field(
+        0.02,
+        gt=0.0,
+        le=1.0,
+        description="largest share of the next half second's way that a method which plans may leave undone for the "
+        "water's sake; null: as much as control.plan.w_track lets it",
+    )
+    clearance_m: float = Field(0.05, ge=0.0, le=1.0, description="least distance of the hull to anything solid")
+
+    @model_validator(mode="after")
+    def _one_count_per_orbit(self) -> MissionSettings:
+        if len(self.views) != len(self.elevations_deg):
+            raise ValueError(
+                f"views has {len(self.views)} entries, elevations_deg {len(self.elevations_deg)}: one count per orbit"
+            )
+        return self
+
 
 # Axes of the camera C (right, down, forward) as seen from a forward-right-down frame at the same place.
 R_FC = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -13,8 +13,13 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_conjugate, quat_multiply
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.scene.missions.aim import CameraAim
-from wakewise.scene.missions.orbit import camera_pose, camera_twist, layered_orbits, order_downstream_first
-from wakewise.scene.missions.settings import MissionSettings
+from wakewise.scene.missions.orbit import (
+    MissionSettings,
+    camera_pose,
+    camera_twist,
+    layered_orbits,
+    order_downstream_first,
+)
 
 SETTLING = "settle"
 LONGEST_S = 24 * 3600.0
@@ -139,10 +144,10 @@ class Route:
 
     def body(self, time_s: float, aim: CameraAim | Pose) -> BodyState:
         """Wished pose and twist of a body that aims its camera so, or carries it at a fixed mount X_BC."""
-        X_WB, nu_B, _ = self.wished(time_s, CameraAim(X_BC=aim) if isinstance(aim, Pose) else aim)
+        X_WB, nu_B, _ = self.reference(time_s, CameraAim(X_BC=aim) if isinstance(aim, Pose) else aim)
         return BodyState(X_WB=X_WB, nu_B=nu_B)
 
-    def wished(self, time_s: float, aim: CameraAim) -> tuple[Pose, Array, float]:
+    def reference(self, time_s: float, aim: CameraAim) -> tuple[Pose, Array, float]:
         """Wished pose of a body, its twist, shape (6,), and the angle of the camera's joint.
 
         As `camera` and `tilt` say, which other routes may have their own of; in plain numbers, since control asks this
@@ -153,7 +158,7 @@ class Route:
         X_BC = aim.mount(tilt)
         q_WB = quat_multiply(X_WC.q, quat_conjugate(X_BC.q))
         R_WB = matrix_from_quat(q_WB)
-        v_BC, omega_BC = aim.carried(tilt, tilt_rate)
+        v_BC, omega_BC = aim.camera_motion(tilt, tilt_rate)
         p, q, r = omega_B = omega_W @ R_WB - omega_BC
         x, y, z = X_BC.p_m
         v_B = v_WC @ R_WB - v_BC - np.array([q * z - r * y, r * x - p * z, p * y - q * x])
@@ -257,7 +262,7 @@ class RoutePilot:
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:  # noqa: ARG002  (a clock needs no estimate)
         """Wished body pose and twist now, and angle of the camera's joint."""
-        X_WB, nu_B, tilt = self.route.wished(time_s, self._aim)
+        X_WB, nu_B, tilt = self.route.reference(time_s, self._aim)
         return Goal(X_WB=X_WB, nu_B=nu_B, tilt_rad=tilt, max_tracking_deviation=self.max_tracking_deviation)
 
     @cached_property

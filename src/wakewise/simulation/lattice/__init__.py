@@ -8,12 +8,11 @@ compared with it. The reference computations themselves are in `wakewise_paper.l
 - `streaming_stores.py`: store instructions that bypass the cache.
 - `forced_lattice.py`: the solver as the water of a flight, forced by the thrusters' actuator disks.
 - `cases.py`: records of the reference cases; `meanfield.py`: the stored time average of a case.
-- `flow.py`: steady velocity of several thrusters' jets from that average.
+- `meanfield.py`: steady velocity of several thrusters' jets from that average.
 """
 
 from wakewise.simulation.lattice.cases import CASES, DiskJet, LatticeCase, case_hash, find_case
-from wakewise.simulation.lattice.flow import LatticeFlow
-from wakewise.simulation.lattice.meanfield import MeanField, load_mean_field
+from wakewise.simulation.lattice.meanfield import LatticeFlow, MeanField, load_mean_field
 
 __all__ = [
     "CASES",

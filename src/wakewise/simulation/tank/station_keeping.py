@@ -26,8 +26,7 @@ _SOME_N, _SOME_N_m = 0.05, 0.005
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StationKeepingDemand:
-    """The hardest of the loads that a vehicle was asked to hold against: of water that passes, and of its own weight.
-    """
+    """The largest load that a vehicle has to hold against: of water that passes, and of its own weight."""
 
     passing_B_m_s: Array  # shape (3,): velocity of the water past the vehicle, in body axes
     drag_N: Array  # shape (3,): what it puts on the vehicle along each body axis

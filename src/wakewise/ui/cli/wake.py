@@ -68,8 +68,7 @@ def fit(
     import numpy as np
 
     from wakewise.core.errors import InputError
-    from wakewise.wake.calibration import calibrate, family, momentum_law, split_samples
-    from wakewise.wake.fit_file import fit_figures, write_fit
+    from wakewise.wake.calibration import calibrate, family, fit_figures, momentum_law, split_samples, write_fit
     from wakewise.wake.samples import read_samples
 
     chosen = family(model)

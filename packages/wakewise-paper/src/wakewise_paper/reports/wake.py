@@ -21,8 +21,7 @@ from wakewise.ui.reports.page import missing, plot, section, tile, whole_page
 from wakewise.ui.reports.svg_style import CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET, new_figure, style_axes
 from wakewise.ui.reports.text import NONE, fixed, number, shown
 from wakewise.wake.jets import AxialJet
-from wakewise.wake.samples import CORE, WAKE, JetSamples
-from wakewise.wake.scores import predicted_speed
+from wakewise.wake.samples import CORE, WAKE, JetSamples, predicted_speed
 from wakewise_paper.wake_validation import MeasuredFlow, WakeValidation, axial_decay, exit_speeds, find_flow, profile
 
 PROFILE_AT_M = 0.2

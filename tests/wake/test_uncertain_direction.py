@@ -1,4 +1,4 @@
-"""Jets that go astray: the mean over directions drawn one by one, and what its least shares do."""
+"""Jets of uncertain direction: the mean over directions drawn one by one, and what its least shares do."""
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def test_its_least_shares_keep_the_bow_rule_without_a_word_of_bows(name):
     view = InfluenceModel.of(vehicle, region, RoundJet())
     layout = compile_layout(vehicle.allocation_matrix, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
     ruled = bow_layout(vehicle)
-    d = view.astray(Pose(np.zeros(3)))
+    d = view.scattered_gram(Pose(np.zeros(3)))
     for wrench in ([-2.0, 0.0, 0.0], [-1.0, 0.5, 0.0], [-2.0, -0.6, 1.0]):
         found = min_wash_allocation(
             layout, np.array([*wrench, 0.0, 0.0, 0.0]), np.diag(d), Weights(disturbance=1e4, effort=1e-3)
