@@ -54,7 +54,7 @@ import wakewise.scene.missions, wakewise.planning, wakewise.simulation.tank, wak
 import wakewise.robot.thrusters
 import wakewise.api, wakewise.operation.parts, wakewise.operation.flying, wakewise.operation.recorder
 import wakewise_paper.wash_reduction.flight, wakewise_paper.wake_validation, wakewise_benchmarks
-import wakewise.ui.reports.vehicle, wakewise_nerf.field, wakewise.vision.reconstruction.lenses
+import wakewise.ui.reports.vehicle, wakewise_nerf.field, wakewise.vision.reconstruction.photos.lenses
 import wakewise.experiments.trials.export
 from wakewise.vision.evaluation import flight_figures, umeyama
 from wakewise.vision.imaging import ImagingSettings

@@ -24,12 +24,12 @@ from wakewise.core.interfaces import no_progress
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.vision.evaluation import umeyama
 from wakewise.vision.reconstruction import KnownCameras, Lens, ReconstructionSettings, read_photos
-from wakewise.vision.reconstruction.colmap import pycolmap
-from wakewise.vision.reconstruction.features import match_photos
-from wakewise.vision.reconstruction.lens_groups import group_photos, known_groups
-from wakewise.vision.reconstruction.mapping import map_photos
-from wakewise.vision.reconstruction.pairs import choose_pairs
-from wakewise.vision.reconstruction.photos import Image, unsupported_files, without_duplicates
+from wakewise.vision.reconstruction.photos.lens_groups import group_photos, known_groups
+from wakewise.vision.reconstruction.photos.photo_folder import Image, unsupported_files, without_duplicates
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.features import match_photos
+from wakewise.vision.reconstruction.sfm.mapping import map_photos
+from wakewise.vision.reconstruction.sfm.pairs import choose_pairs
 from wakewise_benchmarks import adversarial_scenes as scenes
 from wakewise_benchmarks.adversarial_scenes import SceneCamera
 

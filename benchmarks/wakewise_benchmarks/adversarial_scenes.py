@@ -18,7 +18,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.geometry import look_at
-from wakewise.vision.reconstruction.photos import Image
+from wakewise.vision.reconstruction.photos.photo_folder import Image
 
 R_BC = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 """Camera axes in those of a body that looks along x."""

@@ -34,7 +34,7 @@ def _cameras(path: Path) -> Any:
 
 def _known(path: Path) -> Any:
     pytest.importorskip("cv2")
-    from wakewise.vision.reconstruction.known_cameras import read_known_cameras
+    from wakewise.vision.reconstruction.photos.known_cameras import read_known_cameras
 
     return read_known_cameras(path)
 

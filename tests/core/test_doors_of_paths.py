@@ -169,7 +169,7 @@ def test_a_look_refuses_pictures_that_are_lines(tmp_path, shape):
     """By name and size, as a file that is no picture is."""
     cv2 = pytest.importorskip("cv2")
     pytest.importorskip("pycolmap")
-    from wakewise.vision.reconstruction.photo_preview import preview_photos
+    from wakewise.vision.reconstruction.quality.photo_preview import preview_photos
 
     for name, size in (("a.png", shape), ("b.png", (60, 80, 3)), ("c.png", (60, 80, 3))):
         cv2.imwrite(str(tmp_path / name), np.random.default_rng(0).integers(0, 255, size, dtype=np.uint8))
@@ -181,7 +181,7 @@ def test_a_look_at_narrow_pictures_is_finite(tmp_path, shape):
     """Those that are no lines are looked at."""
     cv2 = pytest.importorskip("cv2")
     pytest.importorskip("pycolmap")
-    from wakewise.vision.reconstruction.photo_preview import preview_photos
+    from wakewise.vision.reconstruction.quality.photo_preview import preview_photos
 
     for name, size in (("a.png", shape), ("b.png", (60, 80, 3)), ("c.png", (60, 80, 3))):
         cv2.imwrite(str(tmp_path / name), np.random.default_rng(0).integers(0, 255, size, dtype=np.uint8))

@@ -20,7 +20,7 @@ from wakewise.scene.targets.mesh import read_mesh
 from wakewise.vision.evaluation.depth_maps import read_depth_views
 from wakewise.vision.image_decoding import decode_picture, read_picture
 from wakewise.vision.reconstruction import read_cloud
-from wakewise.vision.reconstruction.photos import decode, read_photos
+from wakewise.vision.reconstruction.photos.photo_folder import decode, read_photos
 from wakewise.vision.texturing.photo_colours import correct_photos
 from wakewise.wake.learned import load_network
 

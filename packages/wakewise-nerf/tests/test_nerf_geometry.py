@@ -7,7 +7,7 @@ import pytest
 from analytic_sphere import DISTANCE, FOCAL, RADIUS, REGION, look, photograph, sphere_colours
 
 from wakewise.core.errors import StageError
-from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
+from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest
 from wakewise_nerf.field.geometry import depth_camera, depth_map, fuse_depth
 from wakewise_nerf.field.posed import read_model, read_posed
 

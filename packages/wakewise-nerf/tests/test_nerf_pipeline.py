@@ -11,7 +11,7 @@ from wakewise.core import optional_dependencies
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.main import run
 from wakewise.vision.reconstruction import read_cloud
-from wakewise.vision.reconstruction.meshing import FIGURES
+from wakewise.vision.reconstruction.outputs.meshing import FIGURES
 from wakewise_nerf.field import PROFILES, FieldSettings, build_field, pick_device, profile
 
 SHORT = FieldSettings(

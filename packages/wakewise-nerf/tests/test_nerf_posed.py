@@ -7,7 +7,7 @@ import pytest
 from analytic_sphere import FOCAL, REGION, SIZE, look, photograph
 
 from wakewise.core.errors import InputError, StageError
-from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
+from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest
 from wakewise_nerf.field.posed import pixel_rays, read_model, read_posed, sees, surroundings, window
 
 BALL = RegionOfInterest(centre_W_m=REGION[0], radius_m=REGION[1])

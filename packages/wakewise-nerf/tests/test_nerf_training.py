@@ -9,7 +9,7 @@ from analytic_sphere import REGION, look, photograph
 torch = pytest.importorskip("torch", reason="needs the extra `nerf` (PyTorch)")
 
 from wakewise.core.errors import StageError
-from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
+from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest
 from wakewise_nerf.field.field import OccupancyGrid, RadianceField
 from wakewise_nerf.field.held_out_views import draw, psnr_db, split, ssim
 from wakewise_nerf.field.posed import read_model, read_posed

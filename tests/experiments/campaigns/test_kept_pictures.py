@@ -10,7 +10,7 @@ import trimesh
 from wakewise.experiments.campaigns.pictures import MODEL, keep_pictures, photographs_of
 from wakewise.scene.targets import Mesh
 from wakewise.scene.targets.target import place_on_bed
-from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud
+from wakewise.vision.reconstruction.outputs.clouds import OrientedPointCloud, write_cloud
 
 BALL = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
 TARGET = place_on_bed("ball", Mesh(BALL.vertices + np.array([0.0, 0.0, 0.1]), BALL.faces), 2.0)

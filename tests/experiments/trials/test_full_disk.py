@@ -13,7 +13,8 @@ from wakewise.core.errors import EnvironmentFailure
 from wakewise.experiments.trials import trial as trials
 from wakewise.experiments.trials.stages import StageCosts
 from wakewise.operation import Parts, load_scenario
-from wakewise.vision.reconstruction import ReconstructionSettings, features
+from wakewise.vision.reconstruction import ReconstructionSettings
+from wakewise.vision.reconstruction.sfm import features
 from wakewise_paper import photo_robustness, photo_sets
 from wakewise_paper.photo_sets import PhotoSet
 
@@ -69,7 +70,7 @@ def test_a_vanished_photograph_is_no_measured_failure(
 ) -> None:
     """Photographs that were there and cannot be read any more say nothing about the model."""
     parts, folder = flown
-    monkeypatch.setattr("wakewise.vision.reconstruction.photos.PhotoStore.keep", lambda *_: None)
+    monkeypatch.setattr("wakewise.vision.reconstruction.photos.photo_folder.PhotoStore.keep", lambda *_: None)
     real = features.folder_features
 
     def later(*arguments: object) -> object:

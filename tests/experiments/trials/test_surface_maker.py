@@ -15,8 +15,8 @@ from wakewise.core.files import write_json
 from wakewise.experiments.trials import surface
 from wakewise.experiments.trials.surface import SurfaceMaker
 from wakewise.vision.reconstruction import ReconstructionSettings
-from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud
-from wakewise.vision.reconstruction.colmap import pycolmap
+from wakewise.vision.reconstruction.outputs.clouds import OrientedPointCloud, write_cloud
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
 
 COARSE = ReconstructionSettings(mesh_depth=6)
 

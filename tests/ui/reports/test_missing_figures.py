@@ -27,7 +27,7 @@ from wakewise.ui.reports.report import report_page
 from wakewise.ui.reports.text import NONE, fixed, number, shown
 from wakewise.ui.reports.trial import read_trial
 from wakewise.ui.reports.vehicle import page as vehicle
-from wakewise.vision.reconstruction.photo_preview import PhotoPreview, PhotoQuality
+from wakewise.vision.reconstruction.quality.photo_preview import PhotoPreview, PhotoQuality
 from wakewise_ardusub.reports.log import log_page
 from wakewise_paper.reports.operator_bench_plot import draw_operator, plot_degradation
 from wakewise_paper.reports.reproduction import write_results

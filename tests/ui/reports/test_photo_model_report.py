@@ -10,7 +10,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.ui.reports.photo_model import write_model_report
 from wakewise.ui.reports.photo_model.page import match_figure, model_page, model_scene, model_up
-from wakewise.vision.reconstruction.photo_facts import ModelStatistics, PhotoStatistics
+from wakewise.vision.reconstruction.quality.photo_statistics import ModelStatistics, PhotoStatistics
 
 
 def fact(name, placed=True):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
+from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto
 
 
 def straight(width, height, focal, centre=(0.0, 0.0, 0.0), R_CW=None):

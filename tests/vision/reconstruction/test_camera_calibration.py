@@ -11,7 +11,7 @@ import pytest
 from wakewise.core.errors import InputError, StageError
 from wakewise.ui.cli.main import run
 from wakewise.vision.reconstruction import CalibrationBoard, calibrate, read_lens
-from wakewise.vision.reconstruction.calibration import APRILTAG, board_detector
+from wakewise.vision.reconstruction.photos.calibration import APRILTAG, board_detector
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[4] / "shared" / "data"))
 BOARD = CalibrationBoard(columns=7, rows=5, square_m=0.03, marker_m=0.022)

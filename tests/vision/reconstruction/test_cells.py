@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wakewise.vision.reconstruction.fusion import CellMeans
+from wakewise.vision.reconstruction.dense.fusion import CellMeans
 
 
 def slow_means(rows, weights, cell_m):

@@ -7,7 +7,7 @@ import pytest
 
 from wakewise.core.errors import EnvironmentFailure, InputError, StageError
 from wakewise.vision.reconstruction import OrientedPointCloud, read_cloud, write_cloud, write_mesh
-from wakewise.vision.reconstruction.colmap import call, no_stderr
+from wakewise.vision.reconstruction.sfm.colmap import call, no_stderr
 from wakewise.vision.reconstruction.stages import fingerprint, need_room, run_stage
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from wakewise.core.errors import StageError
-from wakewise.vision.reconstruction import colmap
+from wakewise.vision.reconstruction.sfm import colmap
 
 
 @pytest.fixture(autouse=True)

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from wakewise.vision.reconstruction import ReconstructionSettings, dense, reconstruct
-from wakewise.vision.reconstruction.dense import DepthStore
-from wakewise.vision.reconstruction.stereo import DepthMap
+from wakewise.vision.reconstruction import ReconstructionSettings, reconstruct
+from wakewise.vision.reconstruction.dense import dense_points
+from wakewise.vision.reconstruction.dense.dense_points import DepthStore
+from wakewise.vision.reconstruction.dense.stereo import DepthMap
 
 
 def depth_map(rng, height, width):
@@ -56,7 +57,7 @@ def test_a_cloud_from_maps_on_disk_is_the_same_to_the_byte(relief_photos, tmp_pa
         check_shared_intrinsics=False,
     )
     for name, held in (("memory", 10**9), ("disk", 0)):
-        monkeypatch.setattr(dense.DepthStore.__init__, "__defaults__", (held,))
+        monkeypatch.setattr(dense_points.DepthStore.__init__, "__defaults__", (held,))
         reconstruct(folder, tmp_path / name, settings)
     assert (tmp_path / "memory" / "dense.ply").read_bytes() == (tmp_path / "disk" / "dense.ply").read_bytes()
     assert [p.name for p in (tmp_path / "disk").iterdir() if p.name.startswith(".")] == []

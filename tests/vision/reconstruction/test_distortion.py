@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from wakewise.core.interfaces import no_progress
 from wakewise.vision.evaluation import umeyama
 from wakewise.vision.reconstruction import Lens, ReconstructionSettings, read_cloud, reconstruct
-from wakewise.vision.reconstruction.lenses import WIDEST, distort, undistort
+from wakewise.vision.reconstruction.photos.lenses import WIDEST, distort, undistort
 
 FISHEYE = np.array([150.0, 150.0, 160.0, 120.0, 0.03, -0.01, 0.004, -0.001])
 

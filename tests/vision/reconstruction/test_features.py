@@ -1,7 +1,7 @@
 """Features of large photographs fit into the memory of an ordinary computer."""
 
 from wakewise.vision.reconstruction import ReconstructionSettings
-from wakewise.vision.reconstruction.features import BYTES_PER_PX, ROOM_BYTES, threads_for
+from wakewise.vision.reconstruction.sfm.features import BYTES_PER_PX, ROOM_BYTES, threads_for
 
 
 def test_large_photos_are_looked_at_by_fewer_threads():

@@ -5,9 +5,9 @@ import pytest
 from relief import CENTRE, FOCAL, HEIGHT, WIDTH, height, photo, poses, texture
 
 from wakewise.core.geometry import Pose, look_at
-from wakewise.vision.reconstruction.fusion import facing_normals, fuse, outlier_mask
-from wakewise.vision.reconstruction.registered_photos import RegionOfInterest, RegisteredPhoto, rank_partners
-from wakewise.vision.reconstruction.stereo import DepthMap, pair_depth, rectifiable, rectify_axes
+from wakewise.vision.reconstruction.dense.fusion import facing_normals, fuse, outlier_mask
+from wakewise.vision.reconstruction.dense.stereo import DepthMap, pair_depth, rectifiable, rectify_axes
+from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest, RegisteredPhoto, rank_partners
 
 BALL = RegionOfInterest(centre_W_m=CENTRE, radius_m=0.06)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import StageError
-from wakewise.vision.reconstruction.split_half_check import heights, level_of
+from wakewise.vision.reconstruction.quality.split_half_check import heights, level_of
 
 
 def test_the_plane_is_the_beds_and_up_is_towards_the_cameras():

@@ -8,8 +8,8 @@ from relief import FOCAL
 from wakewise.core.geometry import matrix_from_quat, quat_from_rotvec, skew
 from wakewise.core.interfaces import no_progress
 from wakewise.vision.reconstruction import ReconstructionSettings, read_photos
-from wakewise.vision.reconstruction.features import match_photos
-from wakewise.vision.reconstruction.guided import (
+from wakewise.vision.reconstruction.sfm.features import match_photos
+from wakewise.vision.reconstruction.sfm.guided_matching import (
     BAND_RAD,
     MAX_ANGLE_RAD,
     RATIO,
@@ -20,7 +20,7 @@ from wakewise.vision.reconstruction.guided import (
     pose_supported,
     verify,
 )
-from wakewise.vision.reconstruction.pairs import choose_pairs
+from wakewise.vision.reconstruction.sfm.pairs import choose_pairs
 
 SETTINGS = ReconstructionSettings(detector="opencv", max_features=1000, first_octave=0)
 

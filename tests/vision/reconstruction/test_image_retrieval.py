@@ -5,9 +5,9 @@ from relief import FOCAL
 
 from wakewise.core.interfaces import no_progress
 from wakewise.vision.reconstruction import ReconstructionSettings, read_photos
-from wakewise.vision.reconstruction.features import match_photos
-from wakewise.vision.reconstruction.mapping import map_photos
-from wakewise.vision.reconstruction.pairs import ImageDescriptors, describe, learn_words, retrieve_pairs
+from wakewise.vision.reconstruction.sfm.features import match_photos
+from wakewise.vision.reconstruction.sfm.mapping import map_photos
+from wakewise.vision.reconstruction.sfm.pairs import ImageDescriptors, describe, learn_words, retrieve_pairs
 
 
 def test_photos_of_one_thing_are_nearer_than_of_another():

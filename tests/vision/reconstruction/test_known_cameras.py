@@ -12,7 +12,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import matrix_from_quat, quat_from_matrix
 from wakewise.vision.reconstruction import Photo, read_known_cameras
-from wakewise.vision.reconstruction.known_cameras import match_known
+from wakewise.vision.reconstruction.photos.known_cameras import match_known
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[4] / "shared" / "data"))
 RNG = np.random.default_rng(0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wakewise.vision.reconstruction import OrientedPointCloud
-from wakewise.vision.reconstruction.clouds import write_las
+from wakewise.vision.reconstruction.outputs.clouds import write_las
 
 
 def test_points_and_colours_come_back(tmp_path):

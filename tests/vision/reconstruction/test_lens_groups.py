@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from wakewise.core.errors import InputError
-from wakewise.vision.reconstruction.lens_groups import group_photos
-from wakewise.vision.reconstruction.lenses import Lens
-from wakewise.vision.reconstruction.photos import Photo, exif_words, read_photos, unsupported_files
+from wakewise.vision.reconstruction.photos.lens_groups import group_photos
+from wakewise.vision.reconstruction.photos.lenses import Lens
+from wakewise.vision.reconstruction.photos.photo_folder import Photo, exif_words, read_photos, unsupported_files
 
 
 def photo(name, camera="", size=(640, 480)):

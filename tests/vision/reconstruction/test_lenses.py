@@ -7,8 +7,8 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.vision.imaging import ImagingSettings, calibrate
 from wakewise.vision.reconstruction import read_lens
-from wakewise.vision.reconstruction.lenses import LAYOUTS, lens_of
-from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
+from wakewise.vision.reconstruction.photos.lenses import LAYOUTS, lens_of
+from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto
 
 OPENCV = np.array([700.0, 690.0, 480.0, 361.0, -0.21, 0.04, 0.002, -0.001])
 

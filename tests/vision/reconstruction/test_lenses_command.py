@@ -9,7 +9,7 @@ import relief
 
 from wakewise.ui.cli.main import run
 from wakewise.vision.evaluation import umeyama
-from wakewise.vision.reconstruction.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
 
 FAST = ["--no-mesh", "--set", "detector=opencv", "--set", "max_features=1500", "--set", "stereo_partners=1"]
 CAMERA = "1 SIMPLE_PINHOLE 320 240 {focal:g} 160 120\n"

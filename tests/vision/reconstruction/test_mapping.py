@@ -10,11 +10,12 @@ from relief import FOCAL
 
 from wakewise.core.errors import EnvironmentFailure, InputError, StageError
 from wakewise.core.interfaces import no_progress
-from wakewise.vision.reconstruction import Lens, ReconstructionSettings, colmap, read_photos, reconstruct
-from wakewise.vision.reconstruction.dense import require_cuda
-from wakewise.vision.reconstruction.features import match_photos
-from wakewise.vision.reconstruction.mapping import map_photos
-from wakewise.vision.reconstruction.pairs import choose_pairs
+from wakewise.vision.reconstruction import Lens, ReconstructionSettings, read_photos, reconstruct
+from wakewise.vision.reconstruction.dense.dense_points import require_cuda
+from wakewise.vision.reconstruction.sfm import colmap
+from wakewise.vision.reconstruction.sfm.features import match_photos
+from wakewise.vision.reconstruction.sfm.mapping import map_photos
+from wakewise.vision.reconstruction.sfm.pairs import choose_pairs
 
 SETTINGS = ReconstructionSettings(detector="opencv", max_features=1500, first_octave=0)
 

@@ -8,10 +8,10 @@ import pytest
 from relief import take_photos
 
 from wakewise.core.errors import InputError
-from wakewise.vision.reconstruction.features import Features, within
-from wakewise.vision.reconstruction.masks import masked, read_masks, write_for_colmap
-from wakewise.vision.reconstruction.photos import read_photos
-from wakewise.vision.reconstruction.stereo import DepthMap
+from wakewise.vision.reconstruction.dense.stereo import DepthMap, masked
+from wakewise.vision.reconstruction.photos.masks import read_masks, write_for_colmap
+from wakewise.vision.reconstruction.photos.photo_folder import read_photos
+from wakewise.vision.reconstruction.sfm.features import Features, within
 
 
 @pytest.fixture

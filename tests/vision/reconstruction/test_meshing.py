@@ -6,8 +6,13 @@ import trimesh
 
 from wakewise.core.errors import EnvironmentFailure
 from wakewise.vision.reconstruction import ReconstructionSettings, stages
-from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud
-from wakewise.vision.reconstruction.meshing import drop_small_components, mesh_points, near_subject, octree_depth
+from wakewise.vision.reconstruction.outputs.clouds import OrientedPointCloud, write_cloud
+from wakewise.vision.reconstruction.outputs.meshing import (
+    drop_small_components,
+    mesh_points,
+    near_subject,
+    octree_depth,
+)
 
 
 def test_crumbs_go_and_everything_worth_showing_stays():

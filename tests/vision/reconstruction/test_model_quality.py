@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from wakewise.vision.reconstruction.model_quality import (
+from wakewise.vision.reconstruction.quality.model_quality import (
     ModelEvidence,
     known_pose_warnings,
     quality_warnings,

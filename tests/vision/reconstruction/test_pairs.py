@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
 from wakewise.vision.reconstruction import ReconstructionSettings
-from wakewise.vision.reconstruction.pairs import choose_pairs, pose_pairs, sequence_pairs
+from wakewise.vision.reconstruction.sfm.pairs import choose_pairs, pose_pairs, sequence_pairs
 
 
 def names(n):

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from wakewise.core.interfaces import no_progress
 from wakewise.vision.evaluation import umeyama
 from wakewise.vision.reconstruction import ReconstructionSettings, read_photos
-from wakewise.vision.reconstruction.colmap import pycolmap
-from wakewise.vision.reconstruction.features import match_photos
-from wakewise.vision.reconstruction.mapping import map_photos
-from wakewise.vision.reconstruction.pairs import choose_pairs
-from wakewise.vision.reconstruction.per_photo_intrinsics import PhotoIntrinsics, focal_clusters
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.features import match_photos
+from wakewise.vision.reconstruction.sfm.mapping import map_photos
+from wakewise.vision.reconstruction.sfm.pairs import choose_pairs
+from wakewise.vision.reconstruction.sfm.per_photo_intrinsics import PhotoIntrinsics, focal_clusters
 
 SETTINGS = ReconstructionSettings(detector="opencv", max_features=1500)
 

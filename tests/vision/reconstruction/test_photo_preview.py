@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from wakewise.ui.reports.photo_preview import look_page
-from wakewise.vision.reconstruction.features import photo_features
-from wakewise.vision.reconstruction.photo_preview import matches, preview_photos, which_pairs
+from wakewise.vision.reconstruction.quality.photo_preview import matches, preview_photos, which_pairs
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.features import photo_features
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.vision.reconstruction import match_references, read_photos, read_reference_cameras
-from wakewise.vision.reconstruction.photos import PhotoStore, decode, jpeg_is_whole, png_is_whole, without_duplicates
+from wakewise.vision.reconstruction.photos.photo_folder import (
+    PhotoStore,
+    decode,
+    jpeg_is_whole,
+    png_is_whole,
+    without_duplicates,
+)
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[4] / "shared" / "data"))
 

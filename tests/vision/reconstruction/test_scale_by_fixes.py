@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.vision.reconstruction.registered_photos import camera_centres
 from wakewise.vision.reconstruction.scale.position_fixes import (
     MOST_UNSURE_PCT,
     PositionFix,
@@ -18,6 +17,7 @@ from wakewise.vision.reconstruction.scale.position_fixes import (
     why_unused,
 )
 from wakewise.vision.reconstruction.scale.stage import place_model
+from wakewise.vision.reconstruction.sfm.registered_photos import camera_centres
 
 SCALE = 0.137
 TURN = Rotation.from_rotvec([0.4, -1.1, 2.0]).as_matrix()

@@ -9,11 +9,11 @@ import tagged_relief as scene
 
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import no_progress
-from wakewise.vision.reconstruction.photos import PhotoStore
-from wakewise.vision.reconstruction.registered_photos import camera_centres
+from wakewise.vision.reconstruction.photos.photo_folder import PhotoStore
 from wakewise.vision.reconstruction.scale import ScaleBar, ScaleBars
 from wakewise.vision.reconstruction.scale.marks import find_board
 from wakewise.vision.reconstruction.scale.stage import scale_model
+from wakewise.vision.reconstruction.sfm.registered_photos import camera_centres
 
 UNIT_M = 0.137
 

@@ -6,7 +6,7 @@ import pytest
 from relief import photo, poses, texture
 
 from wakewise.vision.reconstruction import ReconstructionSettings
-from wakewise.vision.reconstruction.features import photo_features, stretched
+from wakewise.vision.reconstruction.sfm.features import photo_features, stretched
 
 
 def blob(x, y, sigma, shape=(160, 200)):

@@ -2,7 +2,7 @@
 
 import pycolmap
 
-from wakewise.vision.reconstruction.solving import largest_first
+from wakewise.vision.reconstruction.sfm.colmap_mappers import largest_first
 
 
 def made(photos, points):

@@ -5,8 +5,8 @@ import pytest
 from tagged_relief import poses, true_model
 
 from wakewise.core.errors import InputError, StageError
-from wakewise.vision.reconstruction.clouds import OrientedPointCloud, write_cloud, write_mesh
-from wakewise.vision.reconstruction.split_half_check import GroundPlane, cells_of, extent_over, measure_halves
+from wakewise.vision.reconstruction.outputs.clouds import OrientedPointCloud, write_cloud, write_mesh
+from wakewise.vision.reconstruction.quality.split_half_check import GroundPlane, cells_of, extent_over, measure_halves
 
 FLAT = GroundPlane(origin=np.zeros(3), axes=np.eye(3))
 

@@ -6,7 +6,13 @@ import pytest
 from relief import texture
 
 from wakewise.core.errors import InputError
-from wakewise.vision.reconstruction.video_frames import choose_frames, is_film, movement, sharpness_of, take_frames
+from wakewise.vision.reconstruction.photos.video_frames import (
+    choose_frames,
+    is_film,
+    movement,
+    sharpness_of,
+    take_frames,
+)
 
 
 def film(path, shifts, blurred=(), size=(960, 720)):

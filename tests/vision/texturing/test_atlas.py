@@ -9,7 +9,7 @@ import trimesh
 
 from wakewise.core.errors import StageError
 from wakewise.core.geometry import look_at
-from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
+from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto
 from wakewise.vision.texturing import atlas
 from wakewise.vision.texturing.atlas import lay_out, paint, write_atlas
 

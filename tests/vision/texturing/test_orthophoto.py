@@ -9,7 +9,7 @@ import pytest
 
 from wakewise.core.geometry import look_at
 from wakewise.vision.reconstruction import OrientedPointCloud, write_cloud
-from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
+from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto
 from wakewise.vision.texturing import orthophoto
 from wakewise.vision.texturing.orthophoto import closed, grid_faces, without_strays, write_orthophoto
 

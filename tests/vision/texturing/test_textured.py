@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from wakewise.core.geometry import look_at
-from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
+from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto
 from wakewise.vision.texturing import textured
 from wakewise.vision.texturing.colour import srgb_decode
 from wakewise.vision.texturing.photo_colours import RangeMaps, correct_photos, project, rays

@@ -30,14 +30,14 @@ def asked(bottle: Bottle):
 def test_a_camera_is_asked_over_mavlink(way, command, numbers, tmp_path):
     """One image, of every component of the vehicle, without an interval, whether the companion drives or not."""
     bottle = Bottle()
-    camera = parse_camera(way)(bottle.warden, tmp_path, SessionLog(tmp_path / "j"))
+    camera = parse_camera(way)(bottle.gate, tmp_path, SessionLog(tmp_path / "j"))
     camera.take(7)
     camera.close()
     (fields,) = asked(bottle)
     assert (fields["command"], fields["target_system"], fields["target_component"]) == (command, 1, 0)
     assert {name: fields[name] for name in numbers} == numbers
     assert fields["param2"] == 0.0
-    bottle.warden.end("over")
+    bottle.gate.end("over")
     camera.take(8)
     assert len(asked(bottle)) == 1
 
@@ -47,17 +47,17 @@ def test_what_the_camera_answers_is_known_and_kept(tmp_path):
     journal = SessionLog(tmp_path / "j")
     bottle = Bottle(journal=journal)
     bottle.say("COMMAND_ACK", command=2000, result=3, target_component=191)
-    assert bottle.warden.known.camera == "component 1 takes none: unsupported"
+    assert bottle.gate.known.camera == "component 1 takes none: unsupported"
     bottle.now_s += 1.0
     bottle.say("COMMAND_ACK", component=100, command=2000, result=0, target_component=190)
     bottle.say("COMMAND_ACK", command=400, result=0, target_component=191)
-    assert "unsupported" in bottle.warden.known.camera
+    assert "unsupported" in bottle.gate.known.camera
     bottle.say("CAMERA_IMAGE_CAPTURED", component=100, capture_result=1, image_index=4, file_url=b"http://c/4.jpg\0")
-    assert bottle.warden.known.camera == "component 100 took image 4, http://c/4.jpg"
+    assert bottle.gate.known.camera == "component 100 took image 4, http://c/4.jpg"
     bottle.say("CAMERA_IMAGE_CAPTURED", component=100, capture_result=0, image_index=5, file_url="")
     bottle.say("CAMERA_IMAGE_CAPTURED", component=100, capture_result="?", image_index=5, file_url="")
-    assert bottle.warden.known.photographs == 1
-    assert bottle.warden.known.garbage == 1
+    assert bottle.gate.known.photographs == 1
+    assert bottle.gate.known.garbage == 1
     journal.close()
     told = [line["words"] for line in read_journal(tmp_path / "j")[0] if line["event"] == "camera"]
     assert told[:2] == ["component 1 takes none: unsupported", "component 100 took image 4, http://c/4.jpg"]
@@ -66,7 +66,7 @@ def test_what_the_camera_answers_is_known_and_kept(tmp_path):
 def test_a_program_takes_the_photographs_beside_the_flight(tmp_path):
     """Nobody waits for it; each photograph is a file with its number, and the journal says how each went."""
     journal = SessionLog(tmp_path / "j")
-    camera = parse_camera(WRITES)(Bottle().warden, tmp_path, journal)
+    camera = parse_camera(WRITES)(Bottle().gate, tmp_path, journal)
     began_s = time.monotonic()
     for number in (1, 2):
         camera.take(number)
@@ -81,7 +81,7 @@ def test_a_program_takes_the_photographs_beside_the_flight(tmp_path):
 def test_a_program_that_fails_is_told_of_and_ends_nothing(tmp_path):
     """Its last words are in the journal."""
     journal = SessionLog(tmp_path / "j")
-    camera = parse_camera("run:ls /no-such-place")(Bottle().warden, tmp_path, journal)
+    camera = parse_camera("run:ls /no-such-place")(Bottle().gate, tmp_path, journal)
     camera.take(1)
     camera.close()
     journal.close()

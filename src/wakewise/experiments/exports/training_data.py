@@ -64,7 +64,7 @@ def undistorted(
 
     from wakewise.core.optional_dependencies import need
     from wakewise.vision.image_decoding import AS_STORED, read_picture
-    from wakewise.vision.reconstruction.lenses import undistort
+    from wakewise.vision.reconstruction.photos.lenses import undistort
 
     need("undistorted photographs", "photos", only=("cv2",))
     fx, fy, cx, cy, *bend = photographs.params
@@ -93,7 +93,7 @@ def undistorted(
 
 def write_dense(dense: Path, target: Path, *, z_up: bool) -> int:
     """Write dense points with normals and colours as `target`, NED or z up (x north, y west); how many they are."""
-    from wakewise.vision.reconstruction.clouds import read_cloud, write_cloud
+    from wakewise.vision.reconstruction.outputs.clouds import read_cloud, write_cloud
 
     cloud = read_cloud(dense)
     if z_up:

@@ -352,7 +352,7 @@ def _true_camera(folder: Path) -> tuple[int, int, Array]:
 
 
 def _known_camera(folder: Path) -> tuple[int, int, Array]:
-    from wakewise.vision.reconstruction.lenses import read_lens
+    from wakewise.vision.reconstruction.photos.lenses import read_lens
 
     lens = read_lens(folder / "cameras.txt")
     return lens.width, lens.height, lens.params

@@ -378,7 +378,7 @@ def _rmse_mean_shape_mm(parts: Parts, folder: Path, cloud: Array) -> float | Non
 
 def _size(parts: Parts, folder: Path, photos: pl.DataFrame, cloud: Array, distance: MeshDistance) -> dict[str, float]:
     """Figures of the model's size; that they could not be computed takes no other figure away."""
-    from wakewise.vision.reconstruction.registered_photos import camera_centres
+    from wakewise.vision.reconstruction.sfm.registered_photos import camera_centres
 
     true = dict(zip(photos["name"], photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(), strict=True))
     crop = Crop(bed_z_m=parts.target.bed_z_m)

@@ -41,7 +41,7 @@ def calibrate(
     from wakewise.core.files import write_json, write_text
     from wakewise.vision.reconstruction import CalibrationBoard
     from wakewise.vision.reconstruction import calibrate as solve
-    from wakewise.vision.reconstruction.calibration import cameras_txt
+    from wakewise.vision.reconstruction.photos.calibration import cameras_txt
 
     if out is not None and out.is_dir():
         raise InputError(f"--out {out}: a folder is there, a file is needed (.json, or .txt for COLMAP's cameras.txt)")

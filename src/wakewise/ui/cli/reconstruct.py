@@ -256,7 +256,7 @@ def verdict(model: Model) -> str:
 
 def output_folder(photos: Path) -> list[str]:
     """What lies among the photographs and is not read, said before the long work."""
-    from wakewise.vision.reconstruction.photos import unsupported_files
+    from wakewise.vision.reconstruction.photos.photo_folder import unsupported_files
 
     found = unsupported_files(photos) if photos.is_dir() else {}
     kinds = ", ".join(f"{count} of {kind}" for kind, count in found.items())

@@ -90,7 +90,7 @@ def wishes_of(
 def frames_of(photos: Path, out: Path) -> Path:
     """The folder of photographs: what was given, or frames of the film that was given, which are counted."""
     from wakewise.ui.cli.console import ProgressBars as Progress
-    from wakewise.vision.reconstruction.video_frames import is_film, take_frames
+    from wakewise.vision.reconstruction.photos.video_frames import is_film, take_frames
 
     if not is_film(photos):
         return photos
@@ -108,7 +108,7 @@ def look_first(photos: Path, out: Path, threads: int, json: bool) -> None:
     from wakewise.ui.cli.console import ProgressBars as Progress
     from wakewise.ui.cli.console import print_json, write_page
     from wakewise.ui.reports.photo_preview import write_look
-    from wakewise.vision.reconstruction.photo_preview import preview_photos
+    from wakewise.vision.reconstruction.quality.photo_preview import preview_photos
 
     need("wakewise reconstruct --look", "reports")
     if out.resolve() == photos.resolve():
@@ -234,7 +234,7 @@ def write_outputs(kinds: list[str] | None, out: Path, photos: Path, model: Model
                 )
             elif kind == "las":
                 from wakewise.vision.reconstruction import read_cloud
-                from wakewise.vision.reconstruction.clouds import write_las
+                from wakewise.vision.reconstruction.outputs.clouds import write_las
 
                 write_las(out / "dense.las", read_cloud(out / "dense.ply"))
                 lines.append(f"points: {model.dense_points} in dense.las")
@@ -252,8 +252,8 @@ def _extent(out: Path, photos: Path, model: Model, remake: Remake, progress: Any
     import shutil
     import tempfile
 
-    from wakewise.vision.reconstruction.registered_photos import camera_centres
-    from wakewise.vision.reconstruction.split_half_check import FIGURES, measure_halves
+    from wakewise.vision.reconstruction.quality.split_half_check import FIGURES, measure_halves
+    from wakewise.vision.reconstruction.sfm.registered_photos import camera_centres
 
     names = sorted(camera_centres(out / "sparse"))
 

@@ -10,7 +10,7 @@ from wakewise.core.files import write_text
 from wakewise.ui.reports.page import collapsible_section, section, tile, whole_page
 from wakewise.ui.reports.svg_style import data_uri
 from wakewise.ui.reports.text import fixed, shown
-from wakewise.vision.reconstruction.photo_preview import PhotoPreview, PhotoQuality
+from wakewise.vision.reconstruction.quality.photo_preview import PhotoPreview, PhotoQuality
 
 MOST_BAD = 0.1
 """Share of the photographs to look at again up to which a dive is fair, and not bad."""

@@ -22,17 +22,17 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
-    from wakewise.vision.reconstruction.calibration import CalibrationBoard, CameraCalibration, calibrate
-    from wakewise.vision.reconstruction.clouds import OrientedPointCloud, read_cloud, write_cloud, write_mesh
-    from wakewise.vision.reconstruction.known_cameras import (
+    from wakewise.vision.reconstruction.outputs.clouds import OrientedPointCloud, read_cloud, write_cloud, write_mesh
+    from wakewise.vision.reconstruction.outputs.meshing import mesh_model
+    from wakewise.vision.reconstruction.photos.calibration import CalibrationBoard, CameraCalibration, calibrate
+    from wakewise.vision.reconstruction.photos.known_cameras import (
         KnownCameras,
         match_references,
         read_known_cameras,
         read_reference_cameras,
     )
-    from wakewise.vision.reconstruction.lenses import Lens, read_lens
-    from wakewise.vision.reconstruction.meshing import mesh_model
-    from wakewise.vision.reconstruction.photos import Photo, read_photos
+    from wakewise.vision.reconstruction.photos.lenses import Lens, read_lens
+    from wakewise.vision.reconstruction.photos.photo_folder import Photo, read_photos
     from wakewise.vision.reconstruction.pipeline import CropBox, Model, ReconstructionRequest, reconstruct
     from wakewise.vision.reconstruction.settings import ReconstructionSettings
 

@@ -20,20 +20,31 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import write_json
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.run_lock import exclusive_run
-from wakewise.vision.reconstruction.clouds import read_cloud, write_cloud
-from wakewise.vision.reconstruction.colmap import pycolmap
-from wakewise.vision.reconstruction.dense import densify, patch_match, require_cuda
-from wakewise.vision.reconstruction.features import database_bytes, match_photos
-from wakewise.vision.reconstruction.guided import Poses
-from wakewise.vision.reconstruction.known_cameras import KnownCameras, match_known, match_references
-from wakewise.vision.reconstruction.known_pose_triangulation import common_region
-from wakewise.vision.reconstruction.lens_groups import LensGroup, group_photos, known_groups, named_lenses
-from wakewise.vision.reconstruction.lenses import Lens
-from wakewise.vision.reconstruction.mapping import MAPPINGS, map_photos
-from wakewise.vision.reconstruction.masks import read_masks
-from wakewise.vision.reconstruction.meshing import FIGURES as MESH_FIGURES
-from wakewise.vision.reconstruction.meshing import mesh_model
-from wakewise.vision.reconstruction.pairs import (
+from wakewise.vision.reconstruction.dense.dense_points import densify, patch_match, require_cuda
+from wakewise.vision.reconstruction.outputs.clouds import read_cloud, write_cloud
+from wakewise.vision.reconstruction.outputs.meshing import FIGURES as MESH_FIGURES
+from wakewise.vision.reconstruction.outputs.meshing import mesh_model
+from wakewise.vision.reconstruction.photos.known_cameras import KnownCameras, match_known, match_references
+from wakewise.vision.reconstruction.photos.lens_groups import LensGroup, group_photos, known_groups, named_lenses
+from wakewise.vision.reconstruction.photos.lenses import Lens
+from wakewise.vision.reconstruction.photos.masks import read_masks
+from wakewise.vision.reconstruction.photos.photo_folder import (
+    Photo,
+    PhotoStore,
+    read_photos,
+    unsupported_files,
+    without_duplicates,
+)
+from wakewise.vision.reconstruction.scale.bars import ScaleBars
+from wakewise.vision.reconstruction.scale.position_fixes import PositionFixes
+from wakewise.vision.reconstruction.scale.stage import place_model, scale_model
+from wakewise.vision.reconstruction.settings import ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.features import database_bytes, match_photos
+from wakewise.vision.reconstruction.sfm.guided_matching import Poses
+from wakewise.vision.reconstruction.sfm.known_pose_triangulation import common_region
+from wakewise.vision.reconstruction.sfm.mapping import MAPPINGS, map_photos
+from wakewise.vision.reconstruction.sfm.pairs import (
     BAND_NEIGHBOURS,
     LOOK_ALIKES,
     POSE_NEIGHBOURS,
@@ -41,12 +52,7 @@ from wakewise.vision.reconstruction.pairs import (
     choose_pairs,
     uses_retrieval,
 )
-from wakewise.vision.reconstruction.photos import Photo, PhotoStore, read_photos, unsupported_files, without_duplicates
-from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
-from wakewise.vision.reconstruction.scale.bars import ScaleBars
-from wakewise.vision.reconstruction.scale.position_fixes import PositionFixes
-from wakewise.vision.reconstruction.scale.stage import place_model, scale_model
-from wakewise.vision.reconstruction.settings import ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest
 from wakewise.vision.reconstruction.stages import (
     StageResult,
     invalidate_stage,

@@ -16,8 +16,8 @@ from typing import Any
 
 from wakewise.core.errors import EnvironmentFailure, InputError, WakewiseError, is_full
 from wakewise.core.files import write_json
-from wakewise.vision.reconstruction.colmap import RESERVE_MB, pycolmap
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.colmap import RESERVE_MB, pycolmap
 
 LOW_DISK_MB = 5.0
 

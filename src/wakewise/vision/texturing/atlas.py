@@ -23,7 +23,7 @@ from wakewise.core.errors import StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.vision.image_decoding import read_picture
-from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto, read_views
+from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto, read_views
 from wakewise.vision.texturing.photo_colours import project
 
 SIDES_PX = (512, 1024, 2048, 4096, 8192)

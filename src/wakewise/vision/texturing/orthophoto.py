@@ -17,8 +17,8 @@ from wakewise.core.files import whole_file, write_text
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.vision.imaging.sensor import srgb_encode
 from wakewise.vision.reconstruction import read_cloud
-from wakewise.vision.reconstruction.registered_photos import read_views
-from wakewise.vision.reconstruction.split_half_check import heights, level_of
+from wakewise.vision.reconstruction.quality.split_half_check import heights, level_of
+from wakewise.vision.reconstruction.sfm.registered_photos import read_views
 from wakewise.vision.texturing.colour import srgb_bytes
 from wakewise.vision.texturing.textured import vertex_colours
 

@@ -25,7 +25,7 @@ from wakewise.core.interfaces import no_progress
 from wakewise.core.size_limits import picture_depth
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import read_photos
-from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto, read_views
+from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto, read_views
 from wakewise.vision.texturing.colour import WaterFit, fit_water, remove_water, white_balanced
 
 FIT_PHOTOS = 16

@@ -22,7 +22,7 @@ from wakewise.core.errors import StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import no_progress
 from wakewise.vision.image_decoding import read_picture
-from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto, read_views
+from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto, read_views
 from wakewise.vision.texturing.colour import srgb_decode
 from wakewise.vision.texturing.photo_colours import project
 

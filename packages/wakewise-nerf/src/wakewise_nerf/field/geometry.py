@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import StageError
 from wakewise.core.interfaces import Progress
-from wakewise.vision.reconstruction.clouds import OrientedPointCloud
-from wakewise.vision.reconstruction.fusion import CellMeans, facing_normals, fuse, outlier_mask
-from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
-from wakewise.vision.reconstruction.stereo import DepthMap
+from wakewise.vision.reconstruction.dense.fusion import CellMeans, facing_normals, fuse, outlier_mask
+from wakewise.vision.reconstruction.dense.stereo import DepthMap
+from wakewise.vision.reconstruction.outputs.clouds import OrientedPointCloud
+from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest
 from wakewise_nerf.field.posed import PosedPhoto
 
 # Depth maps of at most this many other views vote on a point.

@@ -13,7 +13,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.files import write_bytes
 from wakewise.core.interfaces import Progress
 from wakewise.vision.evaluation.rendered_views import psnr_db, ssim
-from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
+from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest
 from wakewise_nerf.field.posed import PosedPhoto
 from wakewise_nerf.field.rendering import origin_in, render
 from wakewise_nerf.field.training import TrainingState

@@ -12,11 +12,11 @@ import numpy as np
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import write_json
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.vision.reconstruction.clouds import write_cloud
-from wakewise.vision.reconstruction.meshing import FIGURES as MESH_FIGURES
-from wakewise.vision.reconstruction.meshing import mesh_points
-from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
+from wakewise.vision.reconstruction.outputs.clouds import write_cloud
+from wakewise.vision.reconstruction.outputs.meshing import FIGURES as MESH_FIGURES
+from wakewise.vision.reconstruction.outputs.meshing import mesh_points
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest
 from wakewise.vision.reconstruction.stages import StageResult, fingerprint, make_folder, run_stage
 from wakewise_nerf.field.geometry import depth_camera, depth_map, fuse_depth
 from wakewise_nerf.field.posed import PosedPhoto, read_model, read_posed, sees, surroundings

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.errors import InputError, StageError
-from wakewise.vision.reconstruction.colmap import pycolmap
-from wakewise.vision.reconstruction.photos import decode
-from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
+from wakewise.vision.reconstruction.photos.photo_folder import decode
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest
 
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]

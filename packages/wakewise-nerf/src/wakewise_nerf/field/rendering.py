@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from wakewise.vision.reconstruction.registered_photos import RegionOfInterest
+from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest
 from wakewise_nerf.field.posed import PosedPhoto
 
 # Nothing nearer to a camera is drawn, in radii: a field likes to hide what it cannot explain before the lens.

@@ -43,7 +43,7 @@ from wakewise.ui.reports.text import NONE, fixed, number, shown
 from wakewise.ui.reports.trial import TrialMesh
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import read_cloud
-from wakewise.vision.reconstruction.photo_facts import ModelStatistics, PhotoStatistics, model_facts
+from wakewise.vision.reconstruction.quality.photo_statistics import ModelStatistics, PhotoStatistics, model_facts
 from wakewise.vision.texturing.textured import read_textured
 
 

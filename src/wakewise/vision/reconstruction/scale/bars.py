@@ -16,7 +16,7 @@ from pydantic import Field, ValidationError
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import yaml_file
 from wakewise.core.settings import Settings, describe_faults
-from wakewise.vision.reconstruction.calibration import CalibrationBoard
+from wakewise.vision.reconstruction.photos.calibration import CalibrationBoard
 
 SIGMA_SHARE = 1e-3
 """Standard deviation of a length whose uncertainty nobody says, as a share of it: a steel rule read to half a mm."""

@@ -21,11 +21,11 @@ import numpy as np
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress
-from wakewise.vision.reconstruction.calibration import CalibrationBoard, board_detector
-from wakewise.vision.reconstruction.dense import in_order
-from wakewise.vision.reconstruction.photos import Image, PhotoStore
-from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
+from wakewise.core.threads import in_order
+from wakewise.vision.reconstruction.photos.calibration import CalibrationBoard, board_detector
+from wakewise.vision.reconstruction.photos.photo_folder import Image, PhotoStore
 from wakewise.vision.reconstruction.scale.bars import FAMILIES
+from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto
 
 Sightings = dict[int, dict[str, Array]]
 """By target and photograph, its corners in pixels, shape (4, 2), clockwise from its first, centres at +0.5."""

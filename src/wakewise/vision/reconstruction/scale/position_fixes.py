@@ -29,7 +29,7 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.csv_separators import other_separator
 from wakewise.core.errors import InputError
 from wakewise.vision.evaluation import umeyama
-from wakewise.vision.reconstruction.photos import UNREADABLE, photo_files
+from wakewise.vision.reconstruction.photos.photo_folder import UNREADABLE, photo_files
 
 GPS_SIGMA_M, GPS_HEIGHT_SIGMA_M = 8.0 / 2.448, 13.0 / 1.96
 """Of each of two horizontal axes, and of the height: 8 m and 13 m at 95 %, in the mean over the globe (GPS Standard

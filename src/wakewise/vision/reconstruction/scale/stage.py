@@ -16,13 +16,13 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import whole_folder
 from wakewise.core.interfaces import Progress
 from wakewise.vision.evaluation import umeyama
-from wakewise.vision.reconstruction.calibration import CalibrationBoard
-from wakewise.vision.reconstruction.colmap import pycolmap
-from wakewise.vision.reconstruction.photos import PhotoStore
-from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto, read_views
+from wakewise.vision.reconstruction.photos.calibration import CalibrationBoard
+from wakewise.vision.reconstruction.photos.photo_folder import PhotoStore
 from wakewise.vision.reconstruction.scale.bars import BarMeasurement, ScaleBars, fit_scale
 from wakewise.vision.reconstruction.scale.marks import Sightings, TriangulatedPoint, find_board, find_marks, place
 from wakewise.vision.reconstruction.scale.position_fixes import PositionFixes, figures, place_by_fixes, why_unused
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto, read_views
 
 MOST_SIDE_PCT = 2.0
 """A printed square's side may differ from what was meant by this much, and three times what is unsure about it."""

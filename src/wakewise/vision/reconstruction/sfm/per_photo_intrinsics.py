@@ -16,9 +16,9 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import Progress
-from wakewise.vision.reconstruction.colmap import pycolmap, settle
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
-from wakewise.vision.reconstruction.solving import solve
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap, settle
+from wakewise.vision.reconstruction.sfm.colmap_mappers import solve
 
 LEAST_POINTS, LEAST_PHOTOS = 40, 3
 """Sparse points from which on a photo's own focal length counts, and photos that make a lens of their own."""

@@ -9,8 +9,8 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from wakewise.core.errors import InputError
-from wakewise.vision.reconstruction.lenses import Lens
-from wakewise.vision.reconstruction.photos import Photo
+from wakewise.vision.reconstruction.photos.lenses import Lens
+from wakewise.vision.reconstruction.photos.photo_folder import Photo
 
 _Key = tuple[str, str, str, str]
 """What the user says, folder, what EXIF says, size."""

@@ -7,7 +7,7 @@ doi 10.1109/TPAMI.2007.1166, as OpenCV's StereoSGBM has it (block costs instead 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.jit.njit import njit
-from wakewise.vision.reconstruction.photos import Image
-from wakewise.vision.reconstruction.registered_photos import RegionOfInterest, RegisteredPhoto
+from wakewise.vision.reconstruction.photos.photo_folder import Image
+from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest, RegisteredPhoto
 
 DepthImage = NDArray[np.float32]
 BLOCK = 5
@@ -229,3 +229,18 @@ def resample(
         photo = cv2.GaussianBlur(photo, (0, 0), 0.4 * shrink)
     out: Image = cv2.remap(photo, map_x, map_y, cv2.INTER_CUBIC if shrink < 1.0 else cv2.INTER_LINEAR)
     return out
+
+
+def masked(depth_map: DepthMap, view: RegisteredPhoto, mask: BoolArray | None) -> DepthMap:
+    """A depth map without what the mask of its photo hides: no depth there, neither to become points nor to vote."""
+    if mask is None:
+        return depth_map
+    height, width = depth_map.depth_m.shape
+    small = cv2.resize(mask.astype(np.float32), (view.width, view.height), interpolation=cv2.INTER_AREA)
+    seen = resample(small, view, depth_map.R_CW, depth_map.focal_px, depth_map.centre_px, (width, height))
+    kept = np.asarray(seen) > 0.5  # most of what the pixel came from
+    return replace(
+        depth_map,
+        depth_m=np.where(kept, depth_map.depth_m, np.float32(0.0)).astype(np.float32),
+        wanted=depth_map.wanted & kept,
+    )

@@ -8,13 +8,10 @@ Dense points by COLMAP's patch-match stereo, where pycolmap was built with CUDA:
 from __future__ import annotations
 
 import tempfile
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import cv2
 import numpy as np
@@ -24,20 +21,20 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.interfaces import Progress
 from wakewise.core.run_lock import temporary_prefix
-from wakewise.vision.reconstruction.clouds import OrientedPointCloud, read_cloud, write_cloud
-from wakewise.vision.reconstruction.colmap import call, pycolmap
-from wakewise.vision.reconstruction.fusion import CellMeans, facing_normals, fuse, outlier_mask
-from wakewise.vision.reconstruction.masks import masked
-from wakewise.vision.reconstruction.photos import Image, PhotoStore
-from wakewise.vision.reconstruction.registered_photos import (
+from wakewise.core.threads import in_order
+from wakewise.vision.reconstruction.dense.fusion import CellMeans, facing_normals, fuse, outlier_mask
+from wakewise.vision.reconstruction.dense.stereo import DepthMap, masked, pair_depth, rectifiable
+from wakewise.vision.reconstruction.outputs.clouds import OrientedPointCloud, read_cloud, write_cloud
+from wakewise.vision.reconstruction.photos.photo_folder import Image, PhotoStore
+from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.colmap import call, pycolmap
+from wakewise.vision.reconstruction.sfm.registered_photos import (
     RegionOfInterest,
     RegisteredPhoto,
     rank_partners,
     read_views,
 )
-from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 from wakewise.vision.reconstruction.stages import need_room
-from wakewise.vision.reconstruction.stereo import DepthMap, pair_depth, rectifiable
 
 HELD_BYTES = 250_000_000
 """Of depth maps that stay in memory: about 25 photographs' at 640 px."""
@@ -116,8 +113,6 @@ class DepthStore:
 AGREEMENT_PX = 1.0
 """Largest disparity difference of depths that agree."""
 VOTING_PHOTOS = 8
-T = TypeVar("T")
-S = TypeVar("S")
 
 
 def densify(
@@ -259,22 +254,6 @@ def _fuse_all(
     cloud, _ = gathered.means()
     del gathered  # as large as the cloud and half as large again
     return cloud[~outlier_mask(cloud[:, :3], threads=settings.threads)]
-
-
-def in_order(work: Callable[[T], S], items: Iterable[T], threads: int) -> Iterator[S]:
-    """Results of work on each item, in order, from threads that are never more than a few items ahead of who asks."""
-    with ThreadPoolExecutor(threads) as pool:
-        waiting: deque[Future[S]] = deque()
-        try:
-            for item in items:
-                waiting.append(pool.submit(work, item))
-                if len(waiting) > 2 * threads:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
 
 
 def require_cuda() -> None:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -26,14 +25,15 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import Progress
 from wakewise.core.run_lock import temporary_prefix
-from wakewise.vision.reconstruction.colmap import call, database_folder, pycolmap, settle
-from wakewise.vision.reconstruction.guided import Poses, match_by_poses
-from wakewise.vision.reconstruction.lens_groups import LensGroup, group_photos
-from wakewise.vision.reconstruction.lenses import Lens
-from wakewise.vision.reconstruction.masks import write_for_colmap
-from wakewise.vision.reconstruction.pairs import Pairs, read_descriptors, retrieve_pairs
-from wakewise.vision.reconstruction.photos import Image, Photo, PhotoStore
+from wakewise.core.threads import in_order
+from wakewise.vision.reconstruction.photos.lens_groups import LensGroup, group_photos
+from wakewise.vision.reconstruction.photos.lenses import Lens
+from wakewise.vision.reconstruction.photos.masks import write_for_colmap
+from wakewise.vision.reconstruction.photos.photo_folder import Image, Photo, PhotoStore
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.colmap import call, database_folder, pycolmap, settle
+from wakewise.vision.reconstruction.sfm.guided_matching import Poses, match_by_poses
+from wakewise.vision.reconstruction.sfm.pairs import Pairs, read_descriptors, retrieve_pairs
 
 # OpenCV always doubles a photo first; the doubled one is kept to what COLMAP takes at most (its max_image_size).
 PEAK_THRESHOLD = 0.02
@@ -109,12 +109,7 @@ def folder_features(store: PhotoStore, names: list[str], settings: Reconstructio
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
-        with ThreadPoolExecutor(settings.threads) as pool:
-            try:
-                yield from pool.map(one, names)
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
+        yield from in_order(one, names, settings.threads)
     finally:
         cv2.setNumThreads(before)
 

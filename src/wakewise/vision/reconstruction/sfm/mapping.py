@@ -17,26 +17,26 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_folder
 from wakewise.core.interfaces import Progress
 from wakewise.vision.evaluation import robust_similarity
-from wakewise.vision.reconstruction.colmap import call, database_folder, no_stderr, pycolmap, settle
-from wakewise.vision.reconstruction.guided import Poses
-from wakewise.vision.reconstruction.known_pose_triangulation import map_at_poses
-from wakewise.vision.reconstruction.model_quality import (
+from wakewise.vision.reconstruction.photos.photo_folder import PhotoStore
+from wakewise.vision.reconstruction.quality.model_quality import (
     evidence,
     known_pose_warnings,
     quality_warnings,
     registration_warnings,
 )
-from wakewise.vision.reconstruction.per_photo_intrinsics import (
+from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.colmap import call, database_folder, no_stderr, pycolmap, settle
+from wakewise.vision.reconstruction.sfm.colmap_mappers import BUNDLE_ITERATIONS, NEVER, solve, solve_again
+from wakewise.vision.reconstruction.sfm.guided_matching import Poses
+from wakewise.vision.reconstruction.sfm.known_pose_triangulation import map_at_poses
+from wakewise.vision.reconstruction.sfm.per_photo_intrinsics import (
     LEAST_POINTS,
     PerPhotoIntrinsics,
     fit_per_photo_intrinsics,
     focal_clusters,
     set_cameras,
 )
-from wakewise.vision.reconstruction.photos import PhotoStore
-from wakewise.vision.reconstruction.prior_pose_mapping import SeededModel, map_from_poses
-from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
-from wakewise.vision.reconstruction.solving import BUNDLE_ITERATIONS, NEVER, solve, solve_again
+from wakewise.vision.reconstruction.sfm.prior_pose_mapping import SeededModel, map_from_poses
 
 # Fewer registered photos are a failure; of fewer, lenses are not looked into.
 MIN_REGISTERED, LEAST_FOR_CHECK = 3, 5

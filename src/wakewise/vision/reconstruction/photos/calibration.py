@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.errors import InputError, StageError
-from wakewise.vision.reconstruction.photos import SUFFIXES, decode
+from wakewise.vision.reconstruction.photos.photo_folder import SUFFIXES, decode
 
 Points = NDArray[np.float32]
 Fit = tuple[NDArray[np.float64], NDArray[np.float64], dict[str, NDArray[np.float64]]]

@@ -9,8 +9,8 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.errors import StageError
-from wakewise.vision.reconstruction.colmap import pycolmap
-from wakewise.vision.reconstruction.lenses import distort, lens_of, undistort
+from wakewise.vision.reconstruction.photos.lenses import distort, lens_of, undistort
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
 
 # Stereo is best near this angle between two views: less is imprecise, more looks too different. The band is what was
 # measured to work on corals; photos of a flat wall would bear more.

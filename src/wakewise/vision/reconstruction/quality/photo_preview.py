@@ -20,11 +20,11 @@ from scipy.sparse.csgraph import connected_components
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.vision.reconstruction.dense import in_order
-from wakewise.vision.reconstruction.features import Features, photo_features
-from wakewise.vision.reconstruction.photos import Image, PhotoStore, read_photos, unsupported_files
+from wakewise.core.threads import in_order
+from wakewise.vision.reconstruction.photos.photo_folder import Image, PhotoStore, read_photos, unsupported_files
+from wakewise.vision.reconstruction.photos.video_frames import sharpness_of
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
-from wakewise.vision.reconstruction.video_frames import sharpness_of
+from wakewise.vision.reconstruction.sfm.features import Features, photo_features
 
 LOOKED_PX, MATCHED_PX, FEATURES = 1600, 640, 700
 """Longest side for sharpness and exposure, for matching, and features matched of each photo."""

@@ -19,8 +19,8 @@ import trimesh
 from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import write_json
-from wakewise.vision.reconstruction.clouds import read_cloud
-from wakewise.vision.reconstruction.registered_photos import camera_centres
+from wakewise.vision.reconstruction.outputs.clouds import read_cloud
+from wakewise.vision.reconstruction.sfm.registered_photos import camera_centres
 
 ROUNDS, FAR = 12, 2.0
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.errors import InputError, StageError
-from wakewise.vision.reconstruction.colmap import pycolmap
-from wakewise.vision.reconstruction.lenses import lens_of
+from wakewise.vision.reconstruction.photos.lenses import lens_of
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,9 +20,9 @@ from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.core.geometry import matrix_from_quat, quat_from_rotvec, skew
 from wakewise.core.interfaces import Progress
 from wakewise.core.jit.njit import njit
-from wakewise.vision.reconstruction.colmap import pycolmap
-from wakewise.vision.reconstruction.dense import in_order
-from wakewise.vision.reconstruction.pairs import Pairs
+from wakewise.core.threads import in_order
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.pairs import Pairs
 
 BAND_RAD = 0.04
 """Half width of the band about an epipolar line, in units of depth: room for poses off by 6 mm at 0.5 m, or 5 mrad."""

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.vision.reconstruction.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
 
 GRID = (8, 6)
 """Cells across and down that a photograph is divided into for its coverage."""

@@ -10,7 +10,6 @@ import io
 import struct
 import threading
 import zlib
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.errors import EnvironmentFailure, InputError
+from wakewise.core.threads import in_order
 from wakewise.vision.image_decoding import AS_STORED, decode_picture
 
 if TYPE_CHECKING:
-    from wakewise.vision.reconstruction.masks import Masks
+    from wakewise.vision.reconstruction.photos.masks import Masks
 
 
 # Tags of Exif 3.0 (CIPA DC-008-2023), tables 4 and 8: what tells one lens, or one state of a zoom, from another.
@@ -155,12 +155,7 @@ def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2)
         elif inside:
             found = f"holds only folders ({', '.join(inside[:3])}) without photos"
         raise InputError(f"{folder}: {found}; at least {MIN_PHOTOS} photos ({allowed}) are needed")
-    with ThreadPoolExecutor(threads) as pool:
-        try:
-            photos = tuple(pool.map(lambda path: _read_photo(folder, path, store), images))
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+    photos = tuple(in_order(lambda path: _read_photo(folder, path, store), images, threads))
     if len(photos) < MIN_PHOTOS:
         raise InputError(f"{folder}: holds {len(photos)} photos, at least {MIN_PHOTOS} are needed")
     return photos

@@ -20,7 +20,7 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError, StageError
 
 if TYPE_CHECKING:
-    from wakewise.vision.reconstruction.colmap import pycolmap
+    from wakewise.vision.reconstruction.sfm.colmap import pycolmap
 
 
 # Which parameters of COLMAP's models are fx, fy, cx, cy, k1, k2, p1, p2, or of a fisheye's fx, fy, cx, cy, k1, k2, k3,

@@ -23,8 +23,8 @@ from wakewise.core.arrays import Array
 from wakewise.core.csv_separators import other_separator
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import matrix_from_quat
-from wakewise.vision.reconstruction.lenses import COUNTS, LAYOUTS, Lens, lens_from
-from wakewise.vision.reconstruction.photos import Photo
+from wakewise.vision.reconstruction.photos.lenses import COUNTS, LAYOUTS, Lens, lens_from
+from wakewise.vision.reconstruction.photos.photo_folder import Photo
 
 _MODELS = (
     *("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV", "FOV"),

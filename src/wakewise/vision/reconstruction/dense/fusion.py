@@ -14,8 +14,8 @@ from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.jit.njit import njit
-from wakewise.vision.reconstruction.photos import Image
-from wakewise.vision.reconstruction.stereo import DepthImage, DepthMap
+from wakewise.vision.reconstruction.dense.stereo import DepthImage, DepthMap
+from wakewise.vision.reconstruction.photos.photo_folder import Image
 
 AT_ONCE = 250_000
 """Points whose neighbours are looked for at once."""

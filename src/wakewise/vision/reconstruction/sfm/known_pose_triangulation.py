@@ -15,10 +15,10 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import StageError
 from wakewise.core.interfaces import Progress
-from wakewise.vision.reconstruction.colmap import pycolmap, silence_logging
-from wakewise.vision.reconstruction.guided import Poses
-from wakewise.vision.reconstruction.registered_photos import MIN_SHARED, RegionOfInterest
 from wakewise.vision.reconstruction.settings import RANDOM_SEED
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap, silence_logging
+from wakewise.vision.reconstruction.sfm.guided_matching import Poses
+from wakewise.vision.reconstruction.sfm.registered_photos import MIN_SHARED, RegionOfInterest
 
 FILTER_PX, MIN_ANGLE_DEG = 4.0, 1.5
 """Largest reprojection error of an observation that stays, COLMAP's own, and least angle between rays."""

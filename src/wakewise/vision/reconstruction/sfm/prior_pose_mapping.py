@@ -15,9 +15,9 @@ from functools import partial
 from pathlib import Path
 
 from wakewise.core.interfaces import Progress
-from wakewise.vision.reconstruction.colmap import call, no_stderr, pycolmap, silence_logging
-from wakewise.vision.reconstruction.guided import Poses
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.colmap import call, no_stderr, pycolmap, silence_logging
+from wakewise.vision.reconstruction.sfm.guided_matching import Poses
 
 ROUGH_ANGLE_DEG, ROUGH_PX = 3.0, 40.0
 """How nearly rays must meet at first: at 0.5 m, poses off by 5 mm and 5 mrad leave 1 deg."""

@@ -21,8 +21,8 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_folder
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.run_lock import exclusive_run
-from wakewise.vision.reconstruction.colmap import no_stderr
-from wakewise.vision.reconstruction.photos import Image
+from wakewise.vision.reconstruction.photos.photo_folder import Image
+from wakewise.vision.reconstruction.sfm.colmap import no_stderr
 from wakewise.vision.reconstruction.stages import fingerprint, make_folder, run_stage
 
 VERSION = 1

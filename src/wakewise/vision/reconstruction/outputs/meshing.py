@@ -17,9 +17,9 @@ from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.run_lock import exclusive_run, temporary_prefix
-from wakewise.vision.reconstruction.clouds import read_cloud, write_cloud, write_mesh
-from wakewise.vision.reconstruction.colmap import call_apart, pycolmap
+from wakewise.vision.reconstruction.outputs.clouds import read_cloud, write_cloud, write_mesh
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.colmap import call_apart, pycolmap
 from wakewise.vision.reconstruction.stages import StageResult, need_room, read_stamp, run_stage, stage_key
 
 FIGURES = ("mesh_vertices", "mesh_faces", "mesh_points_left_out")

@@ -20,8 +20,8 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.errors import InputError
-from wakewise.vision.reconstruction.colmap import pycolmap
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.colmap import pycolmap
 
 Pairs = list[tuple[str, str]]
 # Views whose axes differ by more hardly share a SIFT match (Mikolajczyk & Schmid 2005, doi 10.1109/TPAMI.2005.188).

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.interfaces import Progress
-from wakewise.vision.reconstruction.colmap import call, call_apart, pycolmap
-from wakewise.vision.reconstruction.features import match_pairs
-from wakewise.vision.reconstruction.pairs import Pairs, read_descriptors
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
+from wakewise.vision.reconstruction.sfm.colmap import call, call_apart, pycolmap
+from wakewise.vision.reconstruction.sfm.features import match_pairs
+from wakewise.vision.reconstruction.sfm.pairs import Pairs, read_descriptors
 
 # Most iterations of a bundle adjustment.
 BUNDLE_ITERATIONS = 100

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 import cv2
@@ -17,16 +17,13 @@ import numpy as np
 from wakewise.core.arrays import BoolArray
 from wakewise.core.errors import InputError
 from wakewise.vision.image_decoding import read_picture
-from wakewise.vision.reconstruction.photos import PNG, Image, Photo
-from wakewise.vision.reconstruction.registered_photos import RegisteredPhoto
-from wakewise.vision.reconstruction.stereo import DepthMap, resample
+from wakewise.vision.reconstruction.photos.photo_folder import PNG, Image, Photo
 
 NAMES = ("{name}.png", "{stem}.png", "{stem}_mask.png", "{stem}.tif", "{stem}.jpg", "{stem}.jpeg", "{stem}.bmp")
 """Names of the mask of photo `stem.suffix`: as COLMAP, as most, and as Metashape has them."""
 LEAST_SHARE = 0.01
 """Less than this left of a photograph is a mask the wrong way round, or an empty one."""
 _ALPHA = (4, 6)
-# Interpolated masks: a pixel counts where most of what it came from does.
 _MOST_GREY = 0.5
 
 
@@ -92,21 +89,6 @@ def write_for_colmap(masks: Masks, names: list[str], folder: Path) -> None:
             path = folder / f"{name}.png"
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(cv2.imencode(".png", np.where(mask, 255, 0).astype(np.uint8))[1].tobytes())
-
-
-def masked(depth_map: DepthMap, view: RegisteredPhoto, mask: BoolArray | None) -> DepthMap:
-    """A depth map without what the mask of its photo hides: no depth there, neither to become points nor to vote."""
-    if mask is None:
-        return depth_map
-    height, width = depth_map.depth_m.shape
-    small = cv2.resize(mask.astype(np.float32), (view.width, view.height), interpolation=cv2.INTER_AREA)
-    seen = resample(small, view, depth_map.R_CW, depth_map.focal_px, depth_map.centre_px, (width, height))
-    kept = np.asarray(seen) > _MOST_GREY
-    return replace(
-        depth_map,
-        depth_m=np.where(kept, depth_map.depth_m, np.float32(0.0)).astype(np.float32),
-        wanted=depth_map.wanted & kept,
-    )
 
 
 def _beside(folder: Path, name: str) -> Path | None:
