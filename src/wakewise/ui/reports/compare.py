@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from html import escape
 from pathlib import Path
+from typing import Any
 
 import cv2
+from markupsafe import Markup, escape
 
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
@@ -17,13 +18,15 @@ from wakewise.ui.reports.media import coloured_model, embed
 from wakewise.ui.reports.page import (
     collapsible_section,
     error_scale,
+    framed_page,
     missing,
     missing_text,
     panel,
+    parts,
     pictures,
     plot,
     section,
-    whole_page,
+    template,
 )
 from wakewise.ui.reports.references import limits_section
 from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, data_uri, error_colours
@@ -46,7 +49,7 @@ MAIN = (
     ("model's error (RMSE)", "rmse_mm", "mm", 1.0),
     ("surface covered within 3 mm", "completeness_pct", "%", 1.0),
     ("photographs placed", "registered_images", "", 1.0),
-    ("distance from the wished place, rms", "position_rmse_mm", "mm", 1.0),
+    ("position error, rms", "position_rmse_mm", "mm", 1.0),
     ("energy of the thrusters", "energy_kJ", "kJ", 1.0),
     ("disturbance_flown: D at the target, the wake model's estimate", "disturbance_flown", "m²/s²", 1.0),
 )
@@ -55,14 +58,9 @@ _NO_RATIO = ("seed", "rmse_cap_mm", "disturbance")
 
 
 def write_comparison(trials: Mapping[str, Path], out: Path) -> Path:
-    """Write one page that lays trials side by side, and give its path.
+    """Write the page that compares trials, method name to trial folder, and return its path.
 
-    Parameters
-    ----------
-    trials : mapping
-        Name of the method to its trial folder; ratios are to the first.
-    out : Path
-        The file to write; in a folder, it is called comparison.html.
+    Ratios are relative to the first trial. `out` is the file, or a folder for comparison.html.
 
     Raises
     ------
@@ -80,7 +78,7 @@ def write_comparison(trials: Mapping[str, Path], out: Path) -> Path:
 def comparison_page(trials: Mapping[str, Trial], rows: Path | None = None) -> str:
     """HTML of the comparison; `rows` is a picture with a row per method, as `wakewise film --rows` makes it."""
     errors = {name: model_errors(trial) for name, trial in trials.items()}
-    parts = (
+    links = (
         ("main", "Main figures"),
         ("model", "Models"),
         ("seen", "Seen"),
@@ -88,32 +86,33 @@ def comparison_page(trials: Mapping[str, Trial], rows: Path | None = None) -> st
         ("limits", "Limits"),
         ("figures", "All figures"),
     )
-    links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in parts)
-    body = (
-        f'<header class="top">{_headline(trials)}</header>'
-        f'<nav class="parts" aria-label="parts"><div>{links}</div></nav>'
-        f"<main>{_main(trials)}{_models(trials, errors)}{_rows(rows)}{_seen(trials)}{_water(trials)}"
-        f"{limits_section(trials)}{_figures(trials)}</main>"
-        "<footer>Ratios are to the first method. Made by Wakewise.</footer>"
+    sections = (
+        _main(trials),
+        _models(trials, errors),
+        _rows(rows),
+        _seen(trials),
+        _water(trials),
+        limits_section(trials),
+        _figures(trials),
     )
-    return whole_page(f"{' and '.join(trials)} · Wakewise", body)
+    footer = "Ratios are to the first method. Made by Wakewise."
+    return framed_page(f"{' and '.join(trials)} · Wakewise", _header(trials), links, sections, footer)
 
 
-def _headline(trials: Mapping[str, Trial]) -> str:
+def _header(trials: Mapping[str, Trial]) -> str:
     first, *others = trials
     seeds = {trial.seed for trial in trials.values()}
-    same = f"seed <b>{escape(next(iter(seeds)))}</b>" if len(seeds) == 1 else "<b>different seeds</b>"
     title = f"{first} against {' and '.join(others)}" if others else first
     lines = [line for name in others if (line := _water_in_words(trials, name))]
     top = lines.pop(0) if lines else title
     lines += [line for name in others if (line := _odd_disturbance(trials, name))]
     lines += [f"{name}: {verdict(trial).headline}" for name, trial in trials.items()]
     lines += [f"{name}, {trial.outside}." for name, trial in trials.items() if trial.outside]
-    said = "".join(f'<p class="why">{escape(line)}</p>' for line in lines)
-    return (
-        f'<p class="eyebrow"><span>comparison</span><span>{escape(title)}</span><span>{same}</span></p>'
-        f"<h1>{escape(top)}</h1>{_one_draw(trials, seeds)}{said}"
-    )
+    macros, seed = template("comparison.html"), next(iter(seeds)) if len(seeds) == 1 else ""
+    # One flight per method says nothing of how much the next ones would differ.
+    cautions = [macros.one_draw(f"from seed {seed}" if seed else "from different seeds")] if len(trials) > 1 else []
+    eyebrow = ("comparison", title, macros.seeds(seed))
+    return str(parts().header((), top, notes=lines, mark=False, cautions=cautions, eyebrow=eyebrow))
 
 
 def _water_in_words(trials: Mapping[str, Trial], name: str) -> str:
@@ -123,18 +122,6 @@ def _water_in_words(trials: Mapping[str, Trial], name: str) -> str:
     if abs(ratio - 1.0) <= _PLAIN:
         return f"With {name} the water at the target moved as fast as with {first}."
     return f"With {name} the water at the target moved at {number(ratio)} times its speed with {first}."
-
-
-def _one_draw(trials: Mapping[str, Trial], seeds: set[str]) -> str:
-    """One flight per method says nothing of how much the next ones would differ; the page says so before any figure."""
-    if len(trials) < 2:
-        return ""
-    where = f"from seed {next(iter(seeds))}" if len(seeds) == 1 else "from different seeds"
-    return (
-        f'<p class="caution"><b>One draw.</b> Each method flew once, {escape(where)}. Trim, noise and turbulence are '
-        "drawn anew with every seed, so a ratio here has no interval and claims nothing of other flights: only many "
-        "seeds say how large a difference is.</p>"
-    )
 
 
 def _odd_disturbance(trials: Mapping[str, Trial], name: str) -> str:
@@ -155,27 +142,15 @@ def _main(trials: Mapping[str, Trial]) -> str:
     if not rows:
         return section("main", "Main figures", "", missing("the main figures", "none recorded"))
     lead = "The better value of a row is bold where it is better by more than 1 %."
-    table = (
-        f'<table class="main"><thead><tr><th></th>{_heads(trials)}</tr></thead><tbody>{"".join(rows)}</tbody></table>'
-    )
-    return section("main", "Main figures", lead, f'<div class="wide">{table}</div>')
+    return section("main", "Main figures", lead, template("comparison.html").main(list(trials), rows))
 
 
-def _main_row(trials: Mapping[str, Trial], label: str, key: str, unit_name: str, scale: float) -> str:
+def _main_row(trials: Mapping[str, Trial], label: str, key: str, unit_name: str, scale: float) -> dict[str, Any] | None:
     known = {name: trial.metrics.number(key) for name, trial in trials.items()}
     if all(value is None for value in known.values()):
-        return ""
+        return None
     texts = {name: None if value is None else number(scale * value) for name, value in known.items()}
-    name = f'{escape(label)} <span class="null">{escape(unit_name)}</span>'
-    return f"<tr><td>{name}</td>{_cells(trials, key, texts)}</tr>"
-
-
-def _heads(trials: Mapping[str, Trial]) -> str:
-    first = next(iter(trials))
-    return "".join(
-        f'<th class="num">{escape(name)}</th>' + ("" if name == first else '<th class="num">ratio</th>')
-        for name in trials
-    )
+    return {"name": label, "unit": unit_name, "cells": _cells(trials, key, texts)}
 
 
 def _ratio(trials: Mapping[str, Trial], name: str, key: str) -> float | None:
@@ -185,7 +160,6 @@ def _ratio(trials: Mapping[str, Trial], name: str, key: str) -> float | None:
 
 
 def _figures(trials: Mapping[str, Trial]) -> str:
-    first = next(iter(trials))
     tables = []
     keys: dict[str, list[str]] = {}
     for trial in trials.values():
@@ -193,42 +167,34 @@ def _figures(trials: Mapping[str, Trial]) -> str:
             known = keys.setdefault(group, [])
             known += [key for key in found if key not in known]
     for group, found in keys.items():
-        rows = "".join(_row(trials, key) for key in found)
-        table = (
-            '<table class="compare"><colgroup><col class="key"><col class="unit"></colgroup>'
-            f"<thead><tr><th>key</th><th>unit</th>{_heads(trials)}</tr></thead><tbody>{rows}</tbody></table>"
-        )
-        tables.append(collapsible_section(group, f'<div class="wide">{table}</div>', f"{len(found)} figures"))
+        table = template("comparison.html").figures(list(trials), [_row(trials, key) for key in found])
+        tables.append(collapsible_section(group, table, f"{len(found)} figures"))
     content = "".join(tables) or missing("the figures", "none recorded")
-    lead = f"Everything in metrics.json. Ratios are to {escape(first)}; bold is better by more than 1 %."
+    lead = f"Everything in metrics.json. Ratios are to {escape(next(iter(trials)))}; bold is better by more than 1 %."
     return section("figures", "All figures", lead, content)
 
 
-def _row(trials: Mapping[str, Trial], key: str) -> str:
+def _row(trials: Mapping[str, Trial], key: str) -> dict[str, Any]:
     texts = {
         name: None if (value := trial.metrics.values.get(key)) is None else shown(value)
         for name, trial in trials.items()
     }
     units = next((u for trial in trials.values() if (u := unit(trial.metrics, key))), "")
-    cells = _cells(trials, key, texts)
-    return f'<tr><td class="key">{escape(key)}</td><td class="unit">{escape(units)}</td>{cells}</tr>'
+    return {"name": key, "unit": units, "cells": _cells(trials, key, texts)}
 
 
-def _cells(trials: Mapping[str, Trial], key: str, texts: Mapping[str, str | None]) -> str:
-    """Value of each trial, given as text, and its ratio to the first's."""
+def _cells(trials: Mapping[str, Trial], key: str, texts: Mapping[str, str | None]) -> list[dict[str, Any]]:
+    """Value of each trial as text, why there is none, and its ratio to the first trial."""
     best = _best(trials, key)
-    cells = []
-    for i, (name, trial) in enumerate(trials.items()):
-        told = texts[name]
-        text = "" if told is None else escape(told)
-        if told is None:
-            why = escape(str(trial.metrics.why.get(key, "not recorded")), quote=True)
-            text = f'<span class="null" title="{why}">–</span>'
-        cells.append(f'<td class="{"num better" if name in best else "num"}">{text}</td>')
-        if i:
-            ratio = None if key in _NO_RATIO else _ratio(trials, name, key)
-            cells.append(f'<td class="num unit">{"" if ratio is None else "× " + number(ratio)}</td>')
-    return "".join(cells)
+    return [
+        {
+            "text": texts[name],
+            "why": str(trial.metrics.why.get(key, "not recorded")),
+            "best": name in best,
+            "ratio": None if key in _NO_RATIO else _ratio(trials, name, key),
+        }
+        for name, trial in trials.items()
+    ]
 
 
 def _best(trials: Mapping[str, Trial], key: str) -> set[str]:
@@ -268,13 +234,12 @@ def _rows(picture: Path | None) -> str:
     if image is None:
         return ""
     jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 86])[1]
-    said = "each method at three times, by the camera and from outside"
+    caption = "each method at three times, by the camera and from outside"
     return section(
         "rows",
         "At the same times",
         "Each method at the same times after its first photograph: what its camera saw, and the vehicle and its wash.",
-        f'<button type="button" class="photo" data-facts="{said}"><img alt="{said}" '
-        f'src="{data_uri(jpeg.tobytes(), "image/jpeg")}"></button>',
+        parts().photo(data_uri(jpeg.tobytes(), "image/jpeg"), caption, caption),
     )
 
 
@@ -287,25 +252,17 @@ def _seen(trials: Mapping[str, Trial]) -> str:
     picks = sorted({round((i + 0.5) / VIEWPOINTS * (len(common) - 1)) for i in range(VIEWPOINTS)})
     rows = []
     for i in picks:
-        cells = []
+        figures = []
         for name in trials:
             shot = by_name[name][common[i]]
-            source = embed(shot, PHOTO_WIDTH)
             sharpness = "" if shot.sharpness is None else f", sharpness {number(shot.sharpness)}"
             turbidity = "" if shot.turbidity_per_m is None else f", turbidity {number(shot.turbidity_per_m, 2)} /m"
-            said = f"{name}: {shot.time_s:.1f} s{sharpness}{turbidity}"
-            picture = '<div class="empty">no image file</div>'
-            if source is not None:
-                picture = f'<img alt="{escape(shot.name, quote=True)}" src="{source}">'
-            kind = "photo" if source is not None else "photo gone"
-            cells.append(
-                f'<figure><button type="button" class="{kind}" data-facts="{escape(said, quote=True)}">'
-                f"{picture}</button>"
-                f"<figcaption>{escape(said)}</figcaption></figure>"
-            )
-        rows.append(f'<p class="sheet-leg">{escape(common[i])}</p><div class="columns">{"".join(cells)}</div>')
+            caption = f"{name}: {shot.time_s:.1f} s{sharpness}{turbidity}"
+            photo = parts().photo(embed(shot, PHOTO_WIDTH), shot.name, caption)
+            figures.append(parts().captioned(photo, caption))
+        rows.append(parts().row_title(common[i]) + parts().columns(figures))
     lead = "The same viewpoint, photographed with every method; a click enlarges."
-    return section("seen", "What was seen", lead, "".join(rows))
+    return section("seen", "What was seen", lead, Markup("").join(rows))
 
 
 def _models(trials: Mapping[str, Trial], errors: Mapping[str, ModelErrors | None]) -> str:
@@ -326,7 +283,7 @@ def _models(trials: Mapping[str, Trial], errors: Mapping[str, ModelErrors | None
             drawn = draw_cloud(found.points_m, error_colours(found.accuracy_m), SIDES, frame, VIEW_PIXELS)
         seen = coverage_colours(found.coverage_m, found.counts)
         covered = draw_surface(trial.truth, seen, SIDES, frame, VIEW_PIXELS)
-        title = f'<p class="sheet-leg">{escape(name)}</p>'
+        title = str(parts().row_title(name))
         accuracy.append(title + pictures(drawn, SIDES, f"model of {name}"))
         coverage.append(title + pictures(covered, SIDES, f"true surface, {name}"))
     return section(
@@ -347,7 +304,5 @@ def _in_colour(trials: Mapping[str, Trial]) -> str:
         if found is not None:
             surface, colours = found
             drawn = draw_surface(surface, colours, SIDES, ViewBounds.around(surface.vertices_m), VIEW_PIXELS)
-            rows.append(
-                f'<p class="sheet-leg">{escape(name)}</p>' + pictures(drawn, SIDES, f"model of {name} in colour")
-            )
+            rows.append(str(parts().row_title(name)) + pictures(drawn, SIDES, f"model of {name} in colour"))
     return panel("Likeness", "The models in the colours of their photographs.", "", "".join(rows)) if rows else ""

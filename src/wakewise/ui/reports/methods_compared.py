@@ -8,7 +8,6 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Mapping, Sequence
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from wakewise.experiments.campaigns.pictures import MODEL, photographs_of
 from wakewise.experiments.campaigns.statistics import performance_profile, stratified_bootstrap
 from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place, worst_trials
 from wakewise.ui.reports.figures import NARROW_IN, WIDTH_IN
-from wakewise.ui.reports.page import error_scale, panel
+from wakewise.ui.reports.page import error_scale, panel, parts, pictures, template
 from wakewise.ui.reports.svg_style import (
     CORAL,
     INK,
@@ -211,7 +210,7 @@ _ROW_IN, _WIDE_IN, _DPI, _QUALITY = 1.75, 9.0, 100, 82
 
 def worst_panels(measure: ComparisonMetric, places: Sequence[Place], store: Path) -> str:
     """The worst trial of each method in each world: what its camera saw, and its model; empty where none was kept."""
-    parts = []
+    panels = []
     for world in dict.fromkeys(place["world"] for place in places):
         worst = worst_trials(measure, world, places)
         if not any(
@@ -221,32 +220,27 @@ def worst_panels(measure: ComparisonMetric, places: Sequence[Place], store: Path
             continue
         seen = before_after(worst, store)
         if seen:
-            parts.append(panel(f"Before and after, {world}", "Each method's worst trial.", "", seen))
+            panels.append(panel(f"Before and after, {world}", "Each method's worst trial.", "", seen))
         scale = error_scale("error (mm)")
         title = f"Worst models, {world}"
-        parts.append(panel(title, "Coloured by distance to the true surface.", scale, models(worst, store)))
-    return "".join(parts)
+        panels.append(panel(title, "Coloured by distance to the true surface.", scale, models(worst, store)))
+    return "".join(panels)
 
 
 def before_after(worst: Mapping[str, Mapping[str, Any]], store: Path) -> str:
     """A row of photographs per method of its worst trial; empty where none was taken."""
     rows = []
     for method, place in worst.items():
-        cells = []
+        figures = []
         for after_s, path in photographs_of(store / place["folder"]):
             try:
                 source = data_uri(path.read_bytes(), "image/jpeg")
             except OSError:
                 continue
-            said = f"{method}, {after_s:.1f} s after the first photograph"
-            cells.append(
-                f'<figure><button type="button" class="photo" data-facts="{escape(said, quote=True)}">'
-                f'<img alt="{escape(said, quote=True)}" src="{source}"></button>'
-                f"<figcaption>{after_s:.1f} s</figcaption></figure>"
-            )
-        if cells:
-            rows.append(f'<p class="sheet-leg">{escape(method)}<span>{escape(_trial(place))}</span></p>')
-            rows.append(f'<div class="columns">{"".join(cells)}</div>')
+            facts = f"{method}, {after_s:.1f} s after the first photograph"
+            figures.append(parts().captioned(parts().photo(source, facts, facts), f"{after_s:.1f} s"))
+        if figures:
+            rows.append(str(parts().row_title(method, _trial(place)) + parts().columns(figures)))
     return "".join(rows)
 
 
@@ -254,17 +248,12 @@ def models(worst: Mapping[str, Mapping[str, Any]], store: Path) -> str:
     """The model of each method's worst trial from five sides, coloured by error; or why there is none."""
     rows = []
     for method, place in worst.items():
-        rows.append(f'<p class="sheet-leg">{escape(method)}<span>{escape(_trial(place))}</span></p>')
+        rows.append(str(parts().row_title(method, _trial(place))))
         drawn = _views(store / place["folder"] / MODEL)
         if drawn is None:
-            rows.append(f'<p class="missing"><b>No model</b>: {escape(str(place["reason"] or "none was kept"))}.</p>')
-            continue
-        cells = "".join(
-            f'<figure><img alt="{escape(method)} {view.name}" src="{source}">'
-            f"<figcaption>{view.name}</figcaption></figure>"
-            for source, view in zip(drawn, SIDES, strict=True)
-        )
-        rows.append(f'<div class="views">{cells}</div>')
+            rows.append(str(template("campaign.html").no_model(str(place["reason"] or "none was kept"))))
+        else:
+            rows.append(pictures(drawn, SIDES, method))
     return "".join(rows)
 
 
