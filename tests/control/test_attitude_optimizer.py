@@ -18,8 +18,8 @@ from wakewise.operation import Scenario, fly
 from wakewise.planning import Surroundings
 from wakewise.planning.problem import CLEARANCE_M
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_paper.wash_reduction.flight import camera_errors
-from wakewise_paper.wash_reduction.routes import gentle_route
+from wakewise_paper.flights import camera_errors
+from wakewise_paper.routes import gentle_route
 
 DT = 0.02
 

@@ -3,8 +3,10 @@
 import pytest
 
 from wakewise.core.errors import InputError
+from wakewise.core.interfaces import no_progress
+from wakewise.experiments.campaigns.flights import fly_stage
 from wakewise.operation import Scenario
-from wakewise_paper.wash_reduction.flight import WashTrial, fly_trial
+from wakewise_paper.wash_reduction.flight import wash_trial
 
 
 @pytest.mark.parametrize("stray", [0.02, 0.1, None])
@@ -22,7 +24,10 @@ def test_a_promise_of_nothing_or_of_all_is_refused():
 
 
 @pytest.mark.slow
-def test_a_plan_keeps_the_mission_s_places_above_a_target():
+def test_a_plan_keeps_the_mission_s_places_above_a_target(tmp_path):
     """A heavy vehicle straight above its target is where `dp` would be; by weights alone it is 5 cm off."""
-    dp, ours = (fly_trial(WashTrial(scenario="nadir/paper", method=m, seed=1)) for m in ("dp", "wake-aware"))
+    dp, ours = (
+        fly_stage(wash_trial("nadir/paper", method, 1).task.settings, tmp_path, no_progress)
+        for method in ("dp", "wake-aware")
+    )
     assert ours["camera_rmse_mm"] < 1.05 * dp["camera_rmse_mm"] + 0.2

@@ -17,7 +17,7 @@ def made(monkeypatch, tmp_path):
 
     def campaign(tasks, folder, engine, **options):
         wash = {"manual": 0.03, "dp": 0.02, "mpc": 0.02, "mpc-smooth": 0.018, "wake-aware": 0.005}
-        fields = [task.settings["fields"] for task in tasks]
+        fields = [task.settings["scenario"] for task in tasks]
         return [
             TrialOutcome(
                 task=task,

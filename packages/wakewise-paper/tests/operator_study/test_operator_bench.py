@@ -4,52 +4,57 @@ import json
 
 import pytest
 
-from pools import Here
+from pools import MadeUp
 from wakewise.core.errors import InputError, StageError
 from wakewise.experiments.trials import BenchOptions
 from wakewise_paper.cli.bench_operator import show_operator
-from wakewise_paper.operator_study import bench, paper
+from wakewise_paper.operator_study import bench
 from wakewise_paper.operator_study.bench import planned_trials, selected_w_tracks, selected_worlds
-from wakewise_paper.operator_study.flight import FIGURES, OperatorTrial
+from wakewise_paper.operator_study.flight import FIGURES
 
 SPEED, DEVIATION = "target_speed_mean_m_s", "velocity_deviation_pct"
 
 
-def flight(trial):
+def flight(name, settings):
     """A tenth of direct's wash at w_track 5, more with more; the control is calm; `close` seed 2 of ours is lost."""
-    if (trial.world, trial.method, trial.seed) == ("close", "wake-aware", 2):
+    method = settings["scenario"]["method"]
+    if name.startswith("paper, "):
+        return paper_flight(method)
+    told = settings["setup"]["wakewise_paper.operator_study.flight:operated"]
+    if (told["world"], method, told["seed"]) == ("close", "wake-aware", 2):
         raise StageError("the vehicle was lost")
-    share = {"dp": 1.0, "wake-aware": 0.02 * trial.w_track, "no-forward-jets": 0.5}.get(trial.method, 0.9)
-    base = 0.004 if trial.world == "still-tank" else 0.04
+    share = {"dp": 1.0, "wake-aware": 0.02 * told["w_track"], "no-forward-jets": 0.5}.get(method, 0.9)
+    base = 0.004 if told["world"] == "still-tank" else 0.04
     row = dict.fromkeys(FIGURES, 1.0)
     return row | {SPEED: share * base, "disturbance": share * 1e-3, DEVIATION: 10.0, "sway_rms_mm": None, "cpu_s": 1.0}
 
 
-def paper_flight(trial):
+def paper_flight(method):
     """Water a tenth of the careless one's."""
-    share = 0.1 if trial.method == "wake-aware" else 1.0
+    share = 0.1 if method == "wake-aware" else 1.0
     keys = (DEVIATION, "velocity_deviation_planned_pct", "velocity_deviation_behind_plan_pct")
     return dict.fromkeys(keys, 6.0) | {"disturbance": share, SPEED: share, "cpu_s": 1.0}
 
 
 @pytest.fixture
-def made_up(monkeypatch, tmp_path):
-    monkeypatch.setattr(bench, "_engine", lambda _: Here())
-    monkeypatch.setattr("wakewise_paper.operator_study.flight.fly_trial", flight)
-    monkeypatch.setattr(paper, "fly_trial", paper_flight)
-    monkeypatch.setattr("wakewise_paper.flight_batches.warm", lambda **_: None)
+def here(monkeypatch):
+    return MadeUp(monkeypatch, bench, flight)
+
+
+@pytest.fixture
+def made_up(here, tmp_path):
     return tmp_path
 
 
 def test_direct_flights_are_shared_by_all_w_tracks_and_the_claim_is_flown_first():
     """`dp` and the bow rule once a seed and pilot; other w_tracks for the first seeds alone, by the script."""
     trials = planned_trials(("payload", "mud"), (1.0, 5.0), seeds=2, grid_seeds=1)
-    flown = list(trials.values())
+    flown = list(trials)
     for method in ("dp", "no-forward-jets"):
-        assert sum(t.method == method for t in flown) == 2 * 2 * 2
-    grid = [t for t in flown if t.w_track != 5.0]
-    assert len(grid) == 2 * 2 and {(t.pilot, t.seed) for t in grid} == {("script", 1)}
-    assert {t.method for t in flown[:8]} == {"dp", "wake-aware"} and {t.seed for t in flown[:8]} == {1}
+        assert sum(name == method for _, _, name, _ in flown) == 2 * 2 * 2
+    grid = [key for key in flown if key[2].endswith(" 1")]
+    assert len(grid) == 2 * 2 and {(pilot, seed) for _, pilot, _, seed in grid} == {("script", 1)}
+    assert {name for _, _, name, _ in flown[:8]} == {"dp", "wake-aware 5"} and {key[3] for key in flown[:8]} == {1}
 
 
 def test_the_answer_has_the_keys_of_the_figures_and_names_what_it_lacks(made_up, capsys):
@@ -86,17 +91,14 @@ def test_a_flight_of_ours_that_failed_is_no_gain_and_is_named(made_up):
     assert found["w_track"] is None and "left out" in found["why"]["w_track"]
 
 
-def test_a_run_that_was_stopped_goes_on(made_up, monkeypatch):
+def test_a_run_that_was_stopped_goes_on(here, made_up):
     """What was flown is kept; another w_track adds its own flights and no direct ones."""
     options = BenchOptions(seeds=1, worlds=("mud",), w_tracks=(5.0,), store=made_up)
     bench.run(options)
-    again = []
-    monkeypatch.setattr(
-        "wakewise_paper.operator_study.flight.fly_trial", lambda trial: (again.append(trial), flight(trial))[1]
-    )
-    assert bench.run(options)["flown"] == 0 and not again
+    here.flown.clear()
+    assert bench.run(options)["flown"] == 0 and not here.flown
     bench.run(BenchOptions(seeds=1, worlds=("mud",), w_tracks=(5.0, 20.0), store=made_up))
-    assert {(t.method, t.w_track) for t in again} == {("wake-aware", 20.0), ("mpc", 20.0)}
+    assert {name.split("/")[1] for name in here.flown if "paper" not in name} == {"wake-aware 20", "mpc 20"}
 
 
 def test_worlds_and_w_tracks_that_cannot_be_are_refused():
@@ -107,8 +109,3 @@ def test_worlds_and_w_tracks_that_cannot_be_are_refused():
         with pytest.raises(InputError, match=r"w_tracks: .*must be from 0.5 to 50"):
             selected_w_tracks((value,))
     assert selected_w_tracks((20.0, 5.0, 5.0)) == (5.0, 20.0)
-
-
-def test_a_trial_is_plain():
-    """It can be handed to a worker and be the key of what is kept."""
-    assert hash(OperatorTrial(world="payload", pilot="human", method="dp", seed=1))

@@ -16,7 +16,7 @@ from wakewise_paper.operator_study.flight import (
     operator_route,
     start_pose,
 )
-from wakewise_paper.wash_reduction.routes import SETTLE_S
+from wakewise_paper.routes import SETTLE_S
 
 TARGET = find_target("soft-coral", 1.5)
 

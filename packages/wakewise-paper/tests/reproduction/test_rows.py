@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from wakewise.experiments.campaigns.definition import PlannedTrial
 from wakewise.experiments.campaigns.task import Task, TrialOutcome
 from wakewise_paper.reproduction.claim import ORDER, PublishedFigure
-from wakewise_paper.reproduction.rows import CompletedCase, TableTrials, once_rows, table_rows
-from wakewise_paper.reproduction.table_trials import TableCase
+from wakewise_paper.reproduction.rows import CompletedTrial, TableTrials, once_rows, table_rows
 
 KEYS = ["method", "target", "figure", "paper", "ours", "low", "high", "n", "met"]
 
@@ -14,8 +14,8 @@ KEYS = ["method", "target", "figure", "paper", "ours", "low", "high", "n", "met"
 def made(method, seed, figures, *, target="brain", world="pump-tank", reason=None, attempts=1):
     """A trial that became these figures."""
     task = Task(name=f"{method}/{target}/{seed}", work="m:f", settings={"seed": seed}, sources=())
-    plan = TableCase(table="dynamic", world=world, method=method, target=target, seed=seed, task=task)
-    return CompletedCase(plan, TrialOutcome(task=task, figures=figures, reason=reason, attempts=attempts, took_s=1.0))
+    plan = PlannedTrial(task=task, factors={"world": world, "method": method, "target": target, "seed": seed})
+    return CompletedTrial(plan, TrialOutcome(task=task, figures=figures, reason=reason, attempts=attempts, took_s=1.0))
 
 
 def claim(reading="mean", **told):

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from wakewise.core.errors import InputError
+from wakewise.experiments.campaigns.flights import scenario_of
 from wakewise.experiments.campaigns.task import function_named
-from wakewise.operation import Scenario
 from wakewise_paper.reproduction.claim import TABLES
 from wakewise_paper.reproduction.table_trials import (
     APPROACHES,
@@ -37,8 +37,8 @@ def test_the_work_of_a_trial_is_there_and_its_settings_are_a_scenario(name):
     for block in blocks_of(name, TableRequest(trials=1)):
         for plan in block:
             assert callable(function_named(plan.task.work))
-            if "fields" in plan.task.settings:
-                Scenario.preset("quick", **plan.task.settings["fields"])
+            if "scenario" in plan.task.settings:
+                scenario_of(plan.task.settings)
 
 
 def test_more_trials_add_to_what_was_there():
@@ -87,7 +87,7 @@ def test_the_varied_missions_of_success_are_drawn_by_the_seed_alone():
     """Both methods fly the same mission, and another seed another one."""
     first, _, second, _ = blocks_of("success", TableRequest(trials=2))
     missions = [
-        [{k: v for k, v in plan.task.settings["fields"].items() if k.startswith("mission.")} for plan in block]
+        [{k: v for k, v in plan.task.settings["scenario"].items() if k.startswith("mission.")} for plan in block]
         for block in (first, second)
     ]
     assert missions[0][0] == missions[0][1] != missions[1][0]

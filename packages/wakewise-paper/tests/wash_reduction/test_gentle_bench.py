@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from pools import Here
+from pools import MadeUp
 from wakewise.control import METHODS as MADE
 from wakewise.control import ControlSettings
 from wakewise.core.errors import InputError, StageError
@@ -12,49 +12,40 @@ from wakewise.experiments.trials import BenchOptions
 from wakewise_paper.cli.bench_wash import show_gentle
 from wakewise_paper.reports.wash_bench_plot import draw_gentle
 from wakewise_paper.wash_reduction import bench as gentle
-from wakewise_paper.wash_reduction.figures import SPEED
-from wakewise_paper.wash_reduction.flight import FIGURES, parts_of
-from wakewise_paper.wash_reduction.paper import FIGURES as PAPER_FIGURES
-from wakewise_paper.wash_reduction.plan import (
+from wakewise_paper.wash_reduction.bench import (
     MECHANISMS,
     METHODS,
     NONE,
     flown_methods,
     mechanism_settings,
-    mechanism_trial,
     only_name,
     planned_trials,
     selected_mechanisms,
     without_name,
 )
-from wakewise_paper.wash_reduction.summary_table import WRONG
+from wakewise_paper.wash_reduction.flight import FIGURES, parts_of
+from wakewise_paper.wash_reduction.headline import SPEED, WRONG
+from wakewise_paper.wash_reduction.paper import FIGURES as PAPER_FIGURES
 
 ROW = dict.fromkeys(FIGURES, 1.0)
 SHARE = {"dp": 1.0, "no-forward-jets": 0.4, "wake-aware": 0.1}
 
 
-def made_up(trial):
+def made_up(name, settings):
     """Figures that depend on the trial alone: less without a mechanism."""
-    worse = 1.0 + len(trial.control) + trial.wrong_current
-    return ROW | {SPEED: 0.02 * trial.seed * SHARE.get(trial.method, 0.8) * worse}
+    *_, method, seed = name.split("/")
+    if name.startswith("paper/"):
+        return dict.fromkeys(PAPER_FIGURES, float(seed))
+    fields = settings["scenario"]
+    worse = 1.0 + sum(key.startswith("control.") for key in fields) + (WRONG in method)
+    share = SHARE.get(fields["method"] if method not in METHODS else method, 0.8)
+    return ROW | {SPEED: 0.02 * int(seed) * share * worse}
 
 
 @pytest.fixture
 def here(monkeypatch):
-    """No process and no flight; gives the trials that were flown."""
-    flown = []
-
-    def flight(trial):
-        flown.append(trial)
-        return made_up(trial)
-
-    monkeypatch.setattr(gentle, "_engine", lambda _: Here())
-    monkeypatch.setattr("wakewise_paper.flight_batches.warm", lambda **_: None)
-    monkeypatch.setattr("wakewise_paper.wash_reduction.flight.fly_trial", flight)
-    monkeypatch.setattr(
-        "wakewise_paper.wash_reduction.paper.fly_paper", lambda trial: dict.fromkeys(PAPER_FIGURES, float(trial.seed))
-    )
-    return flown
+    """No process and no flight; knows the trials that were flown."""
+    return MadeUp(monkeypatch, gentle, made_up)
 
 
 def test_the_answer_has_the_keys_that_were_promised(here, tmp_path, capsys):
@@ -88,17 +79,16 @@ def test_the_answer_has_the_keys_that_were_promised(here, tmp_path, capsys):
         draw_gentle(found, tmp_path / "gentle.doc")
 
 
-def test_a_bench_that_was_stopped_goes_on_and_failures_count(here, monkeypatch, tmp_path):
+def test_a_bench_that_was_stopped_goes_on_and_failures_count(here, tmp_path):
     """A second run flies what the first could not; a failed flight is named, is no gain, and is not kept."""
     lost = True
 
-    def flight(trial):
-        here.append(trial)
-        if lost and trial.method == "wake-aware" and trial.seed == 2 and not trial.wrong_current:
+    def flight(name, settings):
+        if lost and name == "orbit/paper/wake-aware/2":
             raise StageError("the vehicle was lost")
-        return made_up(trial)
+        return made_up(name, settings)
 
-    monkeypatch.setattr("wakewise_paper.wash_reduction.flight.fly_trial", flight)
+    here.figures = flight
     said = []
     options = BenchOptions(
         seeds=2,
@@ -118,7 +108,7 @@ def test_a_bench_that_was_stopped_goes_on_and_failures_count(here, monkeypatch, 
     assert "s left" in said[-1][2]
     lost = False
     again = gentle.run(options)
-    assert again["flown"] == 1 and again["failed"] == 0 and len(here) == 7
+    assert again["flown"] == 1 and again["failed"] == 0 and len(here.flown) == 7
     assert again["why"]["mpc-smooth"] == "this method was left out" and "paper" in again["why"]
 
 
@@ -136,8 +126,7 @@ def test_each_lever_is_left_out_once_and_flown_alone_once():
     assert set(table) == {NONE, *(without_name(n) for n in MECHANISMS), *(only_name(n) for n in MECHANISMS)}
     usual = ControlSettings()
     for settings in table.values():
-        control = parts_of(mechanism_trial("calm/paper", settings, 1)).scenario.control
-        assert control != usual
+        assert parts_of("calm/paper", "wake-aware", 1, control=settings).scenario.control != usual
     assert (
         selected_mechanisms(None) == ()
         and selected_mechanisms(("all",)) == tuple(MECHANISMS)

@@ -11,6 +11,7 @@ from wakewise.allocation import compile_layout
 from wakewise.control.forward_jet_exclusion import bow_layout
 from wakewise.control.null_space_allocation import vehicle_layout
 from wakewise.core.errors import InputError
+from wakewise.core.interfaces import no_progress
 from wakewise.experiments.trials import BenchOptions
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_paper.cli.bench_wash import show_gentle
@@ -20,7 +21,6 @@ from wakewise_paper.wash_reduction.energy_optimum import (
     ENERGIES,
     FRESH_GUSTS,
     AllocationJudge,
-    BoundTrial,
     attained_reductions,
     candidate_allocations,
     candidates,
@@ -31,8 +31,8 @@ from wakewise_paper.wash_reduction.energy_optimum import (
     split,
     sum_of,
 )
-from wakewise_paper.wash_reduction.figures import NAMED, bound_figures, reductions
 from wakewise_paper.wash_reduction.flight import FIGURES
+from wakewise_paper.wash_reduction.optimum_figures import NAMED, bound_figures, reductions
 
 VEHICLE = load_vehicle("paper")
 LAYOUT = vehicle_layout(VEHICLE)
@@ -145,12 +145,11 @@ def test_where_no_jet_reaches_the_target_nothing_is_to_be_gained():
     assert judge.energy(0) == 1.0
 
 
-def test_a_flight_of_dp_is_judged_with_the_rule_and_the_belief_among_the_choices(monkeypatch):
+def test_a_flight_of_dp_is_judged_with_the_rule_and_the_belief_among_the_choices(monkeypatch, tmp_path):
     """Its first seconds: all choices make its wrench, the rule's bow thrusters never blow ahead, and all keys are told;
     the belief spares the target by what it knows, for power.
     """
-    trial = BoundTrial(scenario="orbit/paper", seed=1, duration_s=12.0)
-    flown = fly_dp(trial)
+    flown = fly_dp("orbit/paper", 1, 12.0)
     monkeypatch.setattr(
         energy_optimum, "candidate_allocations", lambda layout, least_N: candidate_allocations(layout, least_N)[:3]
     )
@@ -159,9 +158,9 @@ def test_a_flight_of_dp_is_judged_with_the_rule_and_the_belief_among_the_choices
     rule = bow_layout(flown.vehicle)
     assert (grid[named["rule"]] >= rule.lower_N - 1e-6).all() and (grid[named["rule"]] <= rule.upper_N + 1e-6).all()
     assert not (grid[0] >= rule.lower_N - 1e-6).all() or not (grid[0] <= rule.upper_N + 1e-6).all()
-    monkeypatch.setattr(energy_optimum, "fly_dp", lambda _: flown)
+    monkeypatch.setattr(energy_optimum, "fly_dp", lambda *_: flown)
     monkeypatch.setattr(energy_optimum, "candidates", lambda _: (grid, named))
-    row = fly_bound(trial)
+    row = fly_bound({"scenario": "orbit/paper", "seed": 1}, tmp_path, no_progress)
     assert None not in row.values() and row["sharings"] == 6.0
     assert row["belief_any_m_s"] < 0.8 * row["least_m_s"] and row["belief_any_energy"] > 1.05
     assert row["bound_any_m_s"] <= row["bound_1.05_m_s"] <= 1.5 * row["least_m_s"]
@@ -206,13 +205,13 @@ def test_the_bench_tells_the_bound_where_it_is_wished(monkeypatch, tmp_path, cap
         row |= {f"{kind}_{name}_m_s": 0.006 for name in ENERGIES} | {f"{kind}_{name}_energy": 1.05 for name in ENERGIES}
     worked = []
 
-    def made_up(trial):
-        worked.append(trial)
+    def made_up(settings, folder, progress):
+        worked.append(settings)
         return row
 
     monkeypatch.setattr(gentle, "_engine", lambda _: Here())
-    monkeypatch.setattr("wakewise_paper.flight_batches.warm", lambda **_: None)
-    monkeypatch.setattr("wakewise_paper.wash_reduction.flight.fly_trial", lambda _: dict.fromkeys(FIGURES, 0.02))
+    monkeypatch.setattr("wakewise.experiments.campaigns.study.compile_kernels", lambda **_: None)
+    monkeypatch.setattr("wakewise.experiments.campaigns.flights.fly_stage", lambda *_: dict.fromkeys(FIGURES, 0.02))
     monkeypatch.setattr("wakewise_paper.wash_reduction.energy_optimum.fly_bound", made_up)
     options = BenchOptions(seeds=1, bound=2, scenarios=("orbit/paper",), methods=("dp",), store=tmp_path)
     found = gentle.run(options)

@@ -5,8 +5,7 @@ import pytest
 
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.missions import CameraAim, check_clearance
-from wakewise_paper.wash_reduction.flight import WashTrial, parts_of
-from wakewise_paper.wash_reduction.routes import (
+from wakewise_paper.routes import (
     BRAKE_SPEED_M_S,
     CLEARANCE_M,
     gentle_route,
@@ -14,6 +13,7 @@ from wakewise_paper.wash_reduction.routes import (
     looking_down,
     top_above_centre_m,
 )
+from wakewise_paper.wash_reduction.flight import parts_of
 from wakewise_paper.wash_reduction.scenario_files import SCENARIOS, VEHICLES
 
 VEHICLE = load_vehicle("paper")
@@ -23,7 +23,7 @@ VEHICLE = load_vehicle("paper")
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_course_clears_floor_target_and_surface(name, vehicle):
     """By the clearance of a mission, on one seed of each."""
-    parts = parts_of(WashTrial(scenario=f"{name}/{vehicle}", method="dp", seed=1))
+    parts = parts_of(f"{name}/{vehicle}", "dp", 1)
     mesh = parts.found_target.mesh.vertices_m
     assert check_clearance(parts.route, parts.aim, parts.vehicle.size_m, parts.bounds, mesh, CLEARANCE_M) >= CLEARANCE_M
 
@@ -40,7 +40,7 @@ def test_the_orbit_hovers_then_flies_an_arc_and_stays_at_its_standoff():
 
 def test_a_station_is_held_for_three_minutes_above_the_target():
     """The camera is 0.2 m above the target's top and looks at its centre."""
-    parts = parts_of(WashTrial(scenario="station/paper", method="dp", seed=1))
+    parts = parts_of("station/paper", "dp", 1)
     X_WC, velocity, _ = parts.route.camera(100.0)
     top = parts.found_target.mesh.vertices_m[:, 2].min()
     assert top - X_WC.p_m[2] == pytest.approx(0.2) and not velocity.any()
@@ -53,7 +53,7 @@ def test_a_station_is_held_for_three_minutes_above_the_target():
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_a_transect_goes_straight_over_the_target_with_the_camera_down(vehicle):
     """Level body, camera down, over the centre half way, at the altitude drawn; its twist is that of the way."""
-    parts = parts_of(WashTrial(scenario=f"nadir/{vehicle}", method="dp", seed=1))
+    parts = parts_of(f"nadir/{vehicle}", "dp", 1)
     route, target = parts.route, parts.found_target
     middle = float(route.starts_s[0] + 0.5 * route.legs[0].duration_s)
     X_WC, velocity, omega = route.camera(middle)
@@ -70,7 +70,7 @@ def test_a_transect_goes_straight_over_the_target_with_the_camera_down(vehicle):
 
 def test_braking_ends_at_rest_before_the_target():
     """It arrives at 0.3 m/s and rests 0.4 m from the centre within 2 s."""
-    parts = parts_of(WashTrial(scenario="brake/paper", method="dp", seed=1))
+    parts = parts_of("brake/paper", "dp", 1)
     leg = parts.route.legs[0]
     assert leg.speed_m_s == BRAKE_SPEED_M_S
     at = [
@@ -103,7 +103,7 @@ def test_a_cable_pulls_down_the_current_as_hard_as_drawn():
     from wakewise.simulation.water import SteadyCurrent
     from wakewise_paper.wash_reduction.scenario_files import sample_conditions
 
-    parts, what = parts_of(WashTrial(scenario="tether/paper", method="dp", seed=2)), sample_conditions("tether", 2)
+    parts, what = parts_of("tether/paper", "dp", 2), sample_conditions("tether", 2)
     current = np.array(what.current_W_m_s)
     force = Tether.of(parts.scenario.tank).force_W_N(
         parts.start.X_WB, np.zeros(6), SteadyCurrent(velocity_W_m_s=current), 0.0

@@ -5,8 +5,8 @@ import pytest
 
 from wakewise.operation import Scenario, fly
 from wakewise.vision.evaluation import flight_figures
-from wakewise_paper.wash_reduction.flight import camera_errors
-from wakewise_paper.wash_reduction.routes import STANDOFF_M, gentle_route
+from wakewise_paper.flights import camera_errors
+from wakewise_paper.routes import STANDOFF_M, gentle_route
 
 DURATION_S, FROM_S = 14.0, 6.0
 """By then the integral carries the weight, and the jets have reached the target."""

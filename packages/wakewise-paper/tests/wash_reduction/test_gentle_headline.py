@@ -4,8 +4,7 @@ import json
 
 import pytest
 
-from wakewise_paper.wash_reduction.figures import SPEED
-from wakewise_paper.wash_reduction.summary_table import ENERGY, PLACE, SILT, SWAY, WRONG, headline
+from wakewise_paper.wash_reduction.headline import ENERGY, PLACE, SILT, SPEED, SWAY, WRONG, headline
 
 
 def row(speed_mm_s, silt=1.0, sway=1.0, place=5.0, energy=1.0):

@@ -3,8 +3,8 @@
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise_paper.wash_reduction.flight import TRIM, WashTrial, parts_of, wrong_current
-from wakewise_paper.wash_reduction.plan import METHODS
+from wakewise_paper.wash_reduction.bench import METHODS
+from wakewise_paper.wash_reduction.flight import TRIM, parts_of, wrong_current_m_s
 from wakewise_paper.wash_reduction.scenario_files import (
     SCENARIOS,
     VEHICLES,
@@ -41,14 +41,14 @@ def test_what_a_seed_draws_lies_within_its_stratum(name):
 def test_methods_and_levers_of_one_seed_meet_the_same_world():
     """Trials of one seed differ in method and control alone, in scenarios and in worlds."""
     for scenario in ("close/bluerov2-heavy", "world/mud"):
-        plain = parts_of(WashTrial(scenario=scenario, method="dp", seed=2))
-        for trial in (
-            WashTrial(scenario=scenario, method="wake-aware", seed=2),
-            WashTrial(scenario=scenario, method="wake-aware" + TRIM, seed=2),
-            WashTrial(scenario=scenario, method="wake-aware", seed=2, control=(("allocation.advection", False),)),
-            WashTrial(scenario=scenario, method="wake-aware", seed=2, wrong_current=True),
+        plain = parts_of(scenario, "dp", 2)
+        for method, more in (
+            ("wake-aware", {}),
+            ("wake-aware" + TRIM, {}),
+            ("wake-aware", {"control": {"allocation.advection": False}}),
+            ("wake-aware", {"wrong_current": True}),
         ):
-            other = parts_of(trial)
+            other = parts_of(scenario, method, 2, **more)
             same = other.scenario.model_copy(update={"control": plain.scenario.control, "method": "dp"})
             assert same == plain.scenario
             assert other.route.duration_s == plain.route.duration_s
@@ -59,7 +59,7 @@ def test_a_wrong_current_is_wrong_by_what_it_says():
     """A third too fast or too slow, and turned by 30 deg to either side; the seeds draw all four."""
     ways = set()
     for seed in range(30):
-        north, east, down = wrong_current((0.1, 0.0, 0.0), seed)["allocation.current_m_s"]
+        north, east, down = wrong_current_m_s((0.1, 0.0, 0.0), seed)
         assert down == 0.0 and abs(east / north) == pytest.approx(3**-0.5, rel=1e-3)
         ways.add((round((north**2 + east**2) ** 0.5, 3), east > 0.0))
     assert ways == {(0.13, True), (0.13, False), (0.07, True), (0.07, False)}

@@ -4,19 +4,20 @@ import numpy as np
 
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
+from wakewise.experiments.campaigns.flights import scenario_of
 from wakewise.operation.worlds.quasi_steady_world import QuasiSteadyWater, paper_jets
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import coral, place_on_bed
 from wakewise.simulation.tank import TankSettings
 from wakewise.wake import wake_model
-from wakewise_paper.wash_reduction.paper import OFF, PAPER_WAKE, PaperWashTrial, paper_scenario
+from wakewise_paper.wash_reduction.paper import OFF, PAPER_WAKE, paper_trial
 
 VEHICLE = load_vehicle("paper")
 
 
 def test_its_methods_believe_in_the_papers_model_without_levers():
     """The paper's cost and its model, smoothed at the edge."""
-    control = paper_scenario(PaperWashTrial(method="wake-aware", seed=1)).control
+    control = scenario_of(paper_trial("wake-aware", 1).task.settings).control
     assert control.wake.model == PAPER_WAKE["model"] and not any(getattr(control.allocation, name) for name in OFF)
 
 

@@ -28,7 +28,7 @@ from wakewise.core.plugins import find
 from wakewise.core.safe_yaml import yaml_file
 from wakewise.core.settings import Seed, Settings
 from wakewise.experiments.campaigns.flights import FLY, MODEL
-from wakewise.experiments.campaigns.store import read_store
+from wakewise.experiments.campaigns.store import open_store, read_store
 from wakewise.experiments.campaigns.task import FLIES, PHOTOGRAPHS, Task, function_named, source_version
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
 from wakewise.scene.targets import coral_kinds
@@ -198,6 +198,26 @@ class PlannedTrial:
 
     task: Task
     factors: Mapping[str, str | int]
+
+    @property
+    def world(self) -> str:
+        """Where it is flown."""
+        return str(self.factors["world"])
+
+    @property
+    def method(self) -> str:
+        """Method, or whatever else it is compared by."""
+        return str(self.factors["method"])
+
+    @property
+    def target(self) -> str:
+        """What is looked at; "" where that does not differ."""
+        return str(self.factors.get("target", ""))
+
+    @property
+    def seed(self) -> int:
+        """Trials of one seed are compared in pairs."""
+        return int(self.factors["seed"])
 
 
 def load_campaign(path: Path) -> Campaign:
@@ -392,7 +412,14 @@ def keep_campaign(folder: Path, campaign: Campaign, trials: Sequence[PlannedTria
 
 
 def keep_plan(folder: Path, name: str, trials: Sequence[PlannedTrial], campaign: Mapping[str, Any]) -> None:
-    """Write what a folder was made for: `wakewise campaign status|table|page` read it."""
+    """Write what a folder was made for: `wakewise campaign status|table|page` read it.
+
+    Raises
+    ------
+    InputError
+        If the folder holds something that is no campaign.
+    """
+    open_store(folder)
     told = {
         "name": name,
         "campaign": dict(campaign),

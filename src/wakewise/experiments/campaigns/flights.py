@@ -65,15 +65,8 @@ def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress)
     route is not checked against bed and target: whoever makes a route keeps it clear.
     """
     began, worked = time.monotonic(), time.process_time()
-    gathered: dict[str, Any] = {}
-    parts = scenario_of(settings).parts()
+    parts, gathered = flight_parts(settings)
     setup = settings.get("setup") or {}
-    for name, arguments in setup.items():
-        changed = function_named(name)(parts, **arguments)
-        parts, more = changed if isinstance(changed, tuple) else (changed, {})
-        if not isinstance(parts, Parts):
-            raise InputError(f"setup {name}: gave {type(parts).__name__}, must give the parts of a flight")
-        gathered |= more
     probes = [function_named(name)(parts, folder, **own) for name, own in (settings.get("probes") or {}).items()]
 
     def watch(step: Step, witness: TruthProvider | None) -> None:
@@ -106,6 +99,19 @@ def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress)
         with whole_file(folder / "steps.parquet") as path:
             flight.steps.write_parquet(path, compression="zstd")
     return _plain(gathering.figures) | gathered
+
+
+def flight_parts(settings: Mapping[str, Any]) -> tuple[Parts, dict[str, Any]]:
+    """Parts of the flight that settings of `fly_stage` describe, and figures that its setup functions gave."""
+    gathered: dict[str, Any] = {}
+    parts = scenario_of(settings).parts()
+    for name, arguments in (settings.get("setup") or {}).items():
+        changed = function_named(name)(parts, **arguments)
+        parts, more = changed if isinstance(changed, tuple) else (changed, {})
+        if not isinstance(parts, Parts):
+            raise InputError(f"setup {name}: gave {type(parts).__name__}, must give the parts of a flight")
+        gathered |= more
+    return parts, gathered
 
 
 def settled(steps: pl.DataFrame) -> pl.DataFrame:

@@ -2,16 +2,16 @@
 
 A study is three things: planned trials, each a task with its key; `run_study`, which makes what is missing of them in a
 campaign's folder; and a table of its own from the rows that come back. The folder is one of `wakewise campaign`, whose
-`status` and `table` read it. Flights are tasks of `fly_stage` with setup functions and probes (`flight_task`).
+`status` and `table` read it. Flights are tasks of `fly_stage` with setup functions and probes (`flight_trial`).
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from wakewise.core.errors import InputError
 from wakewise.core.jit.precompile import compile_kernels
@@ -20,11 +20,12 @@ from wakewise.experiments.campaigns.engines import ProcessExecutor, TrialExecuto
 from wakewise.experiments.campaigns.flights import FLY
 from wakewise.experiments.campaigns.run import run
 from wakewise.experiments.campaigns.store import open_store
-from wakewise.experiments.campaigns.task import Figures, Task
+from wakewise.experiments.campaigns.task import Figures, Task, TrialOutcome
 from wakewise.experiments.trials.timing import BenchOptions
 
+K = TypeVar("K", bound=Hashable)
 Key = tuple[str, str, int]
-"""World or scenario, method or other name, seed."""
+"""World or scenario, method or other name, seed: what a study knows its trials by unless it needs more."""
 Row = Mapping[str, float | None]
 WATER_EVERY_S = 0.25
 """How often the water is measured in the flights of studies."""
@@ -36,8 +37,16 @@ def store_folder(study: str) -> Path:
     return (Path(base) if base else Path.home() / ".cache") / "wakewise" / "campaigns" / study
 
 
-def flight_task(
-    name: str,
+def study_trial(world: str, method: str, seed: int, task: Task, variation: str = "") -> PlannedTrial:
+    """A trial of a study with its place in the campaign."""
+    factors: dict[str, str | int] = {"method": method, "world": world, "variation": variation, "seed": seed}
+    return PlannedTrial(task=task, factors=factors)
+
+
+def flight_trial(
+    world: str,
+    method: str,
+    seed: int,
     scenario: Mapping[str, Any],
     *,
     preset: str | None = "quick",
@@ -45,8 +54,12 @@ def flight_task(
     probes: Mapping[str, Mapping[str, Any]] | None = None,
     duration_s: float | None = None,
     sources: tuple[str, ...] = (),
-) -> Task:
-    """A flight of a study, of which only figures are kept; `sources` are those of the study itself."""
+    variation: str = "",
+) -> PlannedTrial:
+    """A flight of a study, of which only figures are kept: its place in the campaign, and what `fly_stage` is given.
+
+    `sources` are those of the study itself, beside all that can change a flight.
+    """
     settings = {
         "scenario": dict(scenario),
         "preset": preset,
@@ -56,7 +69,9 @@ def flight_task(
         "water_every_s": WATER_EVERY_S,
         "keep": "none",
     }
-    return Task(name=name, work=FLY, settings=settings, sources=(*FLIGHT_SOURCES, *sources))
+    name = "/".join(str(part) for part in (variation, world, method, seed) if part)
+    task = Task(name=name, work=FLY, settings=settings, sources=(*FLIGHT_SOURCES, *sources))
+    return study_trial(world, method, seed, task, variation)
 
 
 @dataclass(frozen=True)
@@ -70,57 +85,69 @@ class FlightFailure:
 
 
 @dataclass(frozen=True)
-class StudyResult:
-    """Figures of the trials that are finished, those that failed, and how many were known before."""
+class StudyResult(Generic[K]):
+    """Figures of the trials that are finished, those that failed, and which were known before; by the study's keys."""
 
-    rows: dict[Key, Row] = field(default_factory=dict)
-    failures: list[FlightFailure] = field(default_factory=list)
-    known: int = 0
+    rows: dict[K, Row]
+    failures: dict[K, FlightFailure]
+    known: frozenset[K]
+
+    def part(self, keys: Collection[K]) -> StudyResult[K]:
+        """Of some trials alone."""
+        return StudyResult(
+            {key: row for key, row in self.rows.items() if key in keys},
+            {key: failure for key, failure in self.failures.items() if key in keys},
+            self.known & frozenset(keys),
+        )
+
+    @property
+    def counts(self) -> dict[str, Any]:
+        """How many trials there are, were flown now and failed; and those that failed."""
+        return {
+            "flights": len(self.rows) + len(self.failures),
+            "flown": len(self.rows) - len(self.known),
+            "failed": len(self.failures),
+            "failures": [vars(failure) for failure in self.failures.values()],
+        }
 
 
-def planned(tasks: Mapping[Key, Task]) -> list[PlannedTrial]:
-    """Tasks by key as trials of a campaign."""
-    return [
-        PlannedTrial(task=task, factors={"method": method, "world": world, "seed": seed})
-        for (world, method, seed), task in tasks.items()
-    ]
-
-
-def missing(tasks: Mapping[Key, Task], folder: Path, options: BenchOptions) -> list[Key]:
+def missing(trials: Mapping[K, PlannedTrial], folder: Path, options: BenchOptions) -> list[K]:
     """Keys of the trials that are still to be made."""
     if options.fresh or not folder.exists():
-        return list(tasks)
+        return list(trials)
     store = open_store(folder)
-    return [key for key, task in tasks.items() if store.figures(task.key) is None]
+    return [key for key, one in trials.items() if store.figures(one.task.key) is None]
 
 
 def run_study(
     name: str,
-    tasks: Mapping[Key, Task],
+    trials: Mapping[K, PlannedTrial],
     folder: Path,
     options: BenchOptions,
     engine: Callable[[int], TrialExecutor] = ProcessExecutor,
-) -> StudyResult:
+) -> StudyResult[K]:
     """Make the trials that are missing, and those again that failed in an earlier run; `fresh` forgets all of them."""
     store = open_store(folder)
-    if not tasks:
-        return StudyResult()
+    if not trials:
+        return StudyResult({}, {}, frozenset())
     if options.fresh:
-        for task in tasks.values():
-            store.forget(task.key)
-    trials = planned(tasks)
-    keep_plan(folder, name, trials, {"name": name})
-    if missing(tasks, folder, options):
+        for one in trials.values():
+            store.forget(one.task.key)
+    keep_plan(folder, name, list(trials.values()), {"name": name})
+    if missing(trials, folder, options):
         compile_kernels(progress=options.progress)  # else each of the processes would
-    outcomes = run([one.task for one in trials], folder, engine(options.workers), progress=options.progress, again=True)
-    rows: dict[Key, Row] = {}
-    failures: list[FlightFailure] = []
-    for key, outcome in zip(tasks, outcomes, strict=True):
-        if outcome.figures is None:
-            failures.append(FlightFailure(*key, reason=outcome.reason or "not flown"))
-        else:
-            rows[key] = numbers(outcome.figures)
-    return StudyResult(rows, failures, sum(one.known and one.figures is not None for one in outcomes))
+    tasks = [one.task for one in trials.values()]
+    outcomes = run(tasks, folder, engine(options.workers), progress=options.progress, again=True)
+    found = dict(zip(trials, outcomes, strict=True))
+    return StudyResult(
+        {key: numbers(one.figures) for key, one in found.items() if one.figures is not None},
+        {key: _failure(trials[key], one) for key, one in found.items() if one.figures is None},
+        frozenset(key for key, one in found.items() if one.known and one.figures is not None),
+    )
+
+
+def _failure(trial: PlannedTrial, outcome: TrialOutcome) -> FlightFailure:
+    return FlightFailure(trial.world, trial.method, trial.seed, outcome.reason or "not flown")
 
 
 def numbers(figures: Figures) -> dict[str, float | None]:

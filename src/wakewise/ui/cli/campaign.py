@@ -110,7 +110,7 @@ def run_campaign(
     from wakewise.experiments.campaigns import load_campaign, planned_trials, run
     from wakewise.experiments.campaigns.definition import keep_campaign
     from wakewise.experiments.campaigns.run import check_bounds
-    from wakewise.experiments.campaigns.store import RESUME_HINT, open_store
+    from wakewise.experiments.campaigns.store import RESUME_HINT
     from wakewise.experiments.campaigns.table import group_table, results, status
     from wakewise.operation.flying import FLIGHT_JOBS
 
@@ -131,7 +131,6 @@ def run_campaign(
         progress(0, 1, "checking every combination")
         trials = planned_trials(campaign, str(file))
     folder = out or child_path(Path("runs"), campaign.name, f"{file}: name")
-    open_store(folder)
     keep_campaign(folder, campaign, trials)
     with bars.stage("compile") as progress:  # else each of the workers would
         compile_kernels(jobs, progress)

@@ -55,11 +55,11 @@ def _latency(options: BenchOptions) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def _coverage(options: BenchOptions) -> tuple[dict[str, Any], dict[str, Any]]:
-    from wakewise.experiments.campaigns.task import source_version
+    from wakewise.experiments.campaigns.study import store_folder
+    from wakewise.experiments.campaigns.task import PHOTOGRAPHS, source_version
     from wakewise.experiments.trials import run_trial
     from wakewise.experiments.trials.coverage import measure_coverage
     from wakewise.operation import load_scenario
-    from wakewise_paper.flight_batches import PHOTOGRAPHS, store_folder
 
     folder = (options.store or store_folder("operator")) / "scans" / source_version(PHOTOGRAPHS)
     found: dict[str, Any] = {}

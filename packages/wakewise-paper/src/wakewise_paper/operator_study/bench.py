@@ -1,14 +1,10 @@
-"""`wakewise bench operator`: the paper's claim in the tank's worlds, and the sweep of w_track in the paper's own.
+"""The study of operators: the paper's claim in the tank's worlds and the sweep of w_track; `wakewise bench operator`.
 
 For each world and w_track, `wake-aware` against direct allocation (`dp`) on the same seeds, by a script and by the
 human model; `mpc` at the same w_track and `no-forward-jets` beside them. What is flown and how it is judged was written
-down before the first flight (docs/research-log/0047). Flights are kept: a run that was stopped goes on.
-
-From flights to the operator's table: deviation, D, the target's water, and what it costs, by world and w_track.
-
-Everything is over pairs of one seed and pilot, ours and direct; logarithms and intervals as in the gentle bench.
-
-Which flights the bench makes, and how long they take.
+down before the first flight (docs/research-log/0047). A campaign makes and keeps the flights: a run that was stopped
+goes on. Tables are over pairs of one seed and pilot, ours and direct; logarithms and intervals are those of the study
+of wash.
 """
 
 from __future__ import annotations
@@ -22,17 +18,17 @@ import numpy as np
 from wakewise.control.velocity_reference import PAPER_W_TRACK
 from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns import ProcessExecutor
+from wakewise.experiments.campaigns.definition import PlannedTrial
+from wakewise.experiments.campaigns.statistics import LEAST_M_S, log_reduction_pct, mean_figures, pairs_of, ratio
+from wakewise.experiments.campaigns.study import Row, StudyResult, missing, run_study, store_folder
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import load_scenario
 from wakewise.operation.teleop.operator_state import RANGES
 from wakewise.operation.worlds.library import load_world, world_names
-from wakewise_paper import flight_batches
-from wakewise_paper.flight_batches import FLIES, FlightFailure, FlightStore, Key, store_folder
 from wakewise_paper.operator_study import paper
-from wakewise_paper.operator_study.flight import DEVIATIONS, FIGURES, PILOTS, OperatorTrial, course_of
+from wakewise_paper.operator_study.flight import DEVIATIONS, FIGURES, PILOTS, course_of, operator_trial
 from wakewise_paper.operator_study.worlds import CONTROL, TROUBLE, water_of
-from wakewise_paper.wash_reduction.figures import LEAST_M_S, SPEED, Row, log_reduction_pct, means, pairs_of, ratio
-from wakewise_paper.wash_reduction.summary_table import TROUBLE_M_S
+from wakewise_paper.wash_reduction.headline import SPEED, TROUBLE_M_S
 
 LEAST_D = 0.25e-6
 """D below counts as this in logarithms, (m/s)^2: the square of the least speed that counts."""
@@ -49,6 +45,8 @@ COSTS = (
 )
 """Sums of ours over sums of direct's, gains and losses alike."""
 
+OperatorKey = tuple[str, str, str, int]
+"""World, pilot, name of the flight and seed."""
 Known = tuple[str, str, int]
 """World, pilot and seed of a flight."""
 Flights = Mapping[Known, Row]
@@ -69,7 +67,7 @@ def table(
     """
     paired = {key: direct[key] for key in ours if key in direct}
     answer: dict[str, Any] = {"flights": len(ours), "failed": len(lost)}
-    own = means(ours.values(), (*DEVIATIONS, *TOLD))
+    own = mean_figures(ours.values(), (*DEVIATIONS, *TOLD), worst=("solve_ms_p99",))
     own.pop("flights")
     answer[DEVIATION] = own[DEVIATION]
     answer["velocity_deviation_interval_pct"] = own[f"{DEVIATION}_interval"]
@@ -77,7 +75,7 @@ def table(
     answer["velocity_deviation_over_15_flights"] = sum(
         float(row.get(DEVIATION) or 0.0) >= 15.0 for row in ours.values()
     )
-    answer["velocity_deviation_floor_pct"] = means(paired.values(), (DEVIATION,))[DEVIATION]
+    answer["velocity_deviation_floor_pct"] = mean_figures(paired.values(), (DEVIATION,))[DEVIATION]
     for key in DEVIATIONS[1:]:
         answer[key] = own[key]
     answer |= _less("disturbance_reduction", _d_pairs(paired, ours, trims), len(lost & set(direct)))
@@ -86,7 +84,7 @@ def table(
     answer |= _less("target_speed_reduction", pairs_of(trouble, ours, SPEED, trims), len(lost & set(trouble)))
     everywhere = _less("target_speed_reduction_all", pairs_of(direct, ours, SPEED, trims), len(lost & set(direct)))
     answer |= everywhere
-    answer["direct_target_speed_mean_m_s"] = means(paired.values(), (SPEED,))[SPEED]
+    answer["direct_target_speed_mean_m_s"] = mean_figures(paired.values(), (SPEED,))[SPEED]
     for key in TOLD:
         answer[key] = own[key]
     for figure, name in COSTS:
@@ -177,13 +175,13 @@ def selected_w_tracks(wished: tuple[float, ...] | None) -> tuple[float, ...]:
 
 def planned_trials(
     worlds: tuple[str, ...], w_tracks: tuple[float, ...], seeds: int, grid_seeds: int
-) -> dict[Key, OperatorTrial]:
+) -> dict[OperatorKey, PlannedTrial]:
     """Flights to make, seed by seed, what the claim needs first; direct flights are shared by all w_tracks."""
-    trials: dict[Key, OperatorTrial] = {}
+    trials: dict[OperatorKey, PlannedTrial] = {}
 
     def add(world: str, pilot: str, method: str, seed: int, w_track: float = PAPER_W_TRACK) -> None:
-        trial = OperatorTrial(world=world, pilot=pilot, method=method, seed=seed, w_track=w_track)
-        trials[key_of(trial)] = trial
+        name = flight_name(method, w_track)
+        trials[world, pilot, name, seed] = operator_trial(world, pilot, method, seed, w_track, name=name)
 
     for seed in range(1, seeds + 1):
         for world in worlds:
@@ -203,23 +201,16 @@ def planned_trials(
     return trials
 
 
-def key_of(trial: OperatorTrial) -> Key:
-    """How a flight is called: world and pilot, method with its w_track, seed."""
-    tag = f" {trial.w_track:g}" if trial.method in PLANS else ""
-    return f"{trial.world}, {trial.pilot}", f"{trial.method}{tag}", trial.seed
+def flight_name(method: str, w_track: float) -> str:
+    """What a flight is called: its method, with the w_track of one that has it."""
+    return f"{method} {w_track:g}" if method in PLANS else method
 
 
-def flight_s(trial: OperatorTrial) -> float:
+def flight_s(name: str) -> float:
     """About how much CPU time a flight takes, in seconds, for saying how long a run is."""
-    return 8.0 if trial.method in PLANS else 6.0
+    return 8.0 if name.startswith(PLANS) else 6.0
 
 
-SOURCES = (
-    *FLIES,
-    "pilot",
-    *(f"studies/operator/{name}.py" for name in ("waters", "courses", "heard", "flight", "paper")),
-)
-"""Parts of the package that can change a flight of this bench."""
 ELSEWHERE = {
     "latency_ms_p99": "from stick to thrust: measured in the cockpit's loop, not in a flight without one",
     "coverage_agreement_pct": "the coverage guide is not flown by this bench",
@@ -227,7 +218,6 @@ ELSEWHERE = {
 }
 
 _engine = ProcessExecutor
-_FLY, _FLY_PAPER = "wakewise_paper.operator_study.flight:fly_trial", "wakewise_paper.operator_study.paper:fly_trial"
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
@@ -241,14 +231,15 @@ def run(options: BenchOptions) -> dict[str, Any]:
     began = time.monotonic()
     worlds, w_tracks = selected_worlds(options.worlds), selected_w_tracks(options.w_tracks)
     trials = planned_trials(worlds, w_tracks, options.seeds, min(options.seeds, GRID_SEEDS))
-    store = FlightStore(options.store or store_folder("operator"), options.fresh, SOURCES)
-    left_s = sum(flight_s(trial) for trial in trials.values() if store.load(trial, _FLY) is None)
+    own = paper.paper_trials(w_tracks, min(options.seeds, paper.SEEDS))
+    folder = options.store or store_folder("operator")
+    left_s = sum(flight_s(key[2]) for key in missing(trials, folder, options))
     words = f"{len(trials)} flights, some {left_s / 60.0 / options.workers:.0f} min of {options.workers} free cores"
     options.progress(0, max(len(trials), 1), words)
-    rows, failures, kept = flight_batches.fly_all(trials, _FLY, store, options, _engine)
-    own = paper.paper_trials(w_tracks, min(options.seeds, paper.SEEDS))
-    papers, lost, known = flight_batches.fly_all(own, _FLY_PAPER, store, options, _engine)
-    told = OperatorBenchResults(trials, rows, failures)
+    every: dict[Any, PlannedTrial] = {**trials, **own}
+    made = run_study("operator", every, folder, options, _engine)
+    flown = made.part(trials)
+    told = OperatorBenchResults(flown)
     default = load_scenario("quick", None, {}).world
     tables = {name: world_figures(name, w_tracks, told) for name in worlds}
     answer: dict[str, Any] = {
@@ -256,17 +247,14 @@ def run(options: BenchOptions) -> dict[str, Any]:
         "worlds": tables,
         "default_world": default,
         "w_track": tables[default]["w_track"] if default in tables else None,
-        "paper": paper.paper_figures(papers, w_tracks),
+        "paper": paper.paper_figures(made.part(own).rows, w_tracks),
     }
     answer |= dict.fromkeys(ELSEWHERE)
     answer |= {
-        "solve_ms_p99": _worst(rows, "solve_ms_p99"),
+        "solve_ms_p99": _worst(flown.rows, "solve_ms_p99"),
         "seeds": options.seeds,
-        "flights": len(trials) + len(own),
-        "flown": len(rows) + len(papers) - kept - known,
-        "failed": len(failures) + len(lost),
-        "failures": [vars(failure) for failure in (*failures, *lost)],
-        "flight_cpu_s": _mean(rows, "cpu_s"),
+        **made.counts,
+        "flight_cpu_s": _mean(flown.rows, "cpu_s"),
         "wall_s": time.monotonic() - began,
     }
     answer["why"] = ELSEWHERE | ({} if default in tables else {"w_track": f"{default} was left out"})
@@ -274,32 +262,30 @@ def run(options: BenchOptions) -> dict[str, Any]:
 
 
 class OperatorBenchResults:
-    """Rows of the bench by method, w_track and flight."""
+    """Rows of the study by method, w_track and flight."""
 
-    def __init__(
-        self, trials: Mapping[Key, OperatorTrial], rows: Mapping[Key, Row], failures: list[FlightFailure]
-    ) -> None:
+    def __init__(self, flown: StudyResult[OperatorKey]) -> None:
         self._rows: dict[str, dict[Known, Row]] = {}
         self._lost: dict[str, set[Known]] = {}
-        gone = {(failure.flow, failure.name, failure.seed) for failure in failures}
         self.trims: dict[Known, str] = {}
         self.courses: dict[Known, str] = {}
-        for key, trial in trials.items():
-            known = (trial.world, trial.pilot, trial.seed)
-            self.trims[known] = water_of(trial.world, trial.seed).trim
-            self.courses[known] = course_of(trial)
-            if key in rows:
-                self._rows.setdefault(key[1], {})[known] = rows[key]
-            elif key in gone:
-                self._lost.setdefault(key[1], set()).add(known)
+        for world, pilot, name, seed in (*flown.rows, *flown.failures):
+            known = (world, pilot, seed)
+            self.trims[known] = water_of(world, seed).trim
+            self.courses[known] = course_of(world, pilot, seed)
+            key = (world, pilot, name, seed)
+            if key in flown.rows:
+                self._rows.setdefault(name, {})[known] = flown.rows[key]
+            else:
+                self._lost.setdefault(name, set()).add(known)
 
     def of(self, method: str, w_track: float = PAPER_W_TRACK) -> dict[Known, Row]:
         """Flights of a method."""
-        return self._rows.get(_name(method, w_track), {})
+        return self._rows.get(flight_name(method, w_track), {})
 
     def lost(self, method: str, w_track: float = PAPER_W_TRACK) -> frozenset[Known]:
         """Flights of a method that failed."""
-        return frozenset(self._lost.get(_name(method, w_track), ()))
+        return frozenset(self._lost.get(flight_name(method, w_track), ()))
 
     def table(self, method: str, w_track: float, world: str | None = None, pilot: str | None = None) -> dict[str, Any]:
         """Figures of a method against direct allocation, of all worlds and pilots or of one."""
@@ -362,15 +348,11 @@ def claim(worlds: tuple[str, ...], told: OperatorBenchResults) -> dict[str, Any]
     }
 
 
-def _name(method: str, w_track: float) -> str:
-    return key_of(OperatorTrial(world="", pilot="", method=method, seed=1, w_track=w_track))[1]
-
-
-def _mean(rows: Mapping[Key, Row], key: str) -> float | None:
+def _mean(rows: Mapping[Any, Row], key: str) -> float | None:
     known = [row[key] for row in rows.values() if row.get(key) is not None]
     return float(np.mean(np.array(known, dtype=np.float64))) if known else None
 
 
-def _worst(rows: Mapping[Key, Row], key: str) -> float | None:
+def _worst(rows: Mapping[Any, Row], key: str) -> float | None:
     known = [value for row in rows.values() if (value := row.get(key)) is not None]
     return max(known) if known else None

@@ -1,20 +1,19 @@
-"""One flight of the operator's bench: a world, a pilot, a method, a w_track, a seed.
+"""One flight of the study of operators: a world, a pilot, a method, a w_track, a seed.
 
-Listens to a controller: what the plan within it expects now, however deep it lies.
-
-What a pilot asks for: three courses of a script, and a route that the human model flies by eye.
-
-Velocities are asked in the vehicle's level frame, as sticks do: forward along its heading, right, down. Every course
-begins with `SETTLE_S` of rest, like the gentle bench's, so that what holds the vehicle has come to the target by then.
+The pilot asks for velocities in the vehicle's level frame, as sticks do: forward along its heading, right, down. A
+script flies three courses; the human model flies a route by eye. Every course begins with `SETTLE_S` of rest, like the
+flights of the study of wash, so that what holds the vehicle has come to the target by then. A `ControllerProbe` about
+the controller keeps what was asked and what its plan expects.
 """
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 
 from wakewise.allocation import disturbance_of
 from wakewise.control import Pipeline
@@ -23,20 +22,22 @@ from wakewise.control.velocity_reference import FULL_M_S, PAPER_W_TRACK
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.core.interfaces import BodyState, Command, Controller, Goal, TruthProvider
-from wakewise.operation import Parts, Scenario, fly
+from wakewise.experiments.campaigns.definition import PlannedTrial
+from wakewise.experiments.campaigns.flights import FlightProbe
+from wakewise.experiments.campaigns.study import flight_trial
+from wakewise.operation import Parts
 from wakewise.operation.loop import Step
 from wakewise.operation.teleop.arbitration import level_frame
 from wakewise.operation.teleop.assisted import AssistedPilot, assisted_pilot
 from wakewise.operation.teleop.human_pilot import SimulatedOperatorInput
 from wakewise.operation.teleop.input import Controls, ControlSource
 from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
-from wakewise.scene.missions import SETTLING, Leg, Route, RoutePilot
+from wakewise.scene.missions import Leg, Route, RoutePilot
 from wakewise.scene.missions.route import rest_to_rest
 from wakewise.scene.targets import Target
-from wakewise.vision.evaluation import flight_figures
+from wakewise_paper import flights
 from wakewise_paper.operator_study.worlds import water_of
-from wakewise_paper.wash_reduction.paper import WATER_EVERY_S
-from wakewise_paper.wash_reduction.routes import SETTLE_S, joined, resting, top_above_centre_m
+from wakewise_paper.routes import SETTLE_S, joined, resting, top_above_centre_m
 
 
 @dataclass(eq=False)
@@ -174,6 +175,7 @@ def start_pose(course: Course, target: Target, azimuth_rad: float, standoff_m: f
     return joined(centre, (resting("start", place, 0.0),), ()).body(0.0, X_BC).X_WB
 
 
+SOURCES = (*flights.SOURCES, "wakewise_paper:operator_study", "wakewise_paper:wash_reduction")
 PILOTS = ("script", "human")
 LOOK = "look"
 """Course of the human."""
@@ -209,42 +211,47 @@ FIGURES = (
 """Of each flight, from the end of rest on. `position_rmse_mm` is off the place that the sticks led to."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class OperatorTrial:
-    """One flight to make; hashable and plain, so that it can be handed to a worker.
+def operator_trial(
+    world: str,
+    pilot: str,
+    method: str,
+    seed: int,
+    w_track: float = PAPER_W_TRACK,
+    *,
+    name: str = "",
+    duration_s: float | None = None,
+) -> PlannedTrial:
+    """One flight to make: `pilot` is one of `PILOTS`, seeds count from 1, `w_track` is on the paper's scale.
 
-    Parameters
-    ----------
-    world, pilot, method : str
-    seed : int
-        From 1.
-    w_track : float
-        On the paper's scale; no matter to a method that does not plan.
-    duration_s : float or None
-        Only the first part of the flight.
+    A method that does not plan has no use for `w_track`. `name` is what the flight is called if not by its method;
+    `duration_s` flies the first part only.
     """
+    return flight_trial(
+        f"{world}, {pilot}",
+        name or method,
+        seed,
+        water_of(world, seed).fields | {"method": method},
+        setup={f"{__name__}:operated": {"world": world, "pilot": pilot, "seed": seed, "w_track": w_track}},
+        probes={f"{__name__}:OperatorFigures": {}},
+        duration_s=duration_s,
+        sources=SOURCES,
+    )
 
-    world: str
-    pilot: str
-    method: str
-    seed: int
-    w_track: float = PAPER_W_TRACK
-    duration_s: float | None = None
 
-
-def course_of(trial: OperatorTrial) -> str:
+def course_of(world: str, pilot: str, seed: int) -> str:
     """Which course is flown: the human's own, or the script's by stratum."""
-    return LOOK if trial.pilot == "human" else SQUARE[water_of(trial.world, trial.seed).course_number]
+    return LOOK if pilot == "human" else SQUARE[water_of(world, seed).course_number]
 
 
-def parts_of(trial: OperatorTrial) -> Parts:
-    """Parts of the flight: the assisted pilot under script or person, and the method itself, `ControllerProbe`."""
-    water = water_of(trial.world, trial.seed)
-    parts = Scenario.preset("quick", method=trial.method, **water.fields).parts()
-    course, target = COURSES[course_of(trial)], parts.found_target
+def operated(parts: Parts, world: str, pilot: str, seed: int, w_track: float) -> Parts:
+    """The flight under the assisted pilot, with script or person at the sticks, and the method in a
+    `ControllerProbe`.
+    """
+    water = water_of(world, seed)
+    course, target = COURSES[course_of(world, pilot, seed)], parts.found_target
     standoff_m = parts.scenario.mission.standoff_m
     dt_s, hands = 1.0 / parts.control.rate_hz, None
-    if trial.pilot == "human":
+    if pilot == "human":
         parts = parts.replace(route=look_route(target.centre_W_m, water.azimuth_rad, standoff_m))
         hands = SimulatedOperatorInput(
             wish=RoutePilot(route=parts.route, aim=parts.aim),
@@ -253,50 +260,55 @@ def parts_of(trial: OperatorTrial) -> Parts:
             dt_s=dt_s,
             seed=parts.control.operator_seed or 0,
         )
-    else:
+    else:  # the courses lie where the mission's own orbits are, which its check has seen, or above the target
         X_WB = start_pose(course, target, water.azimuth_rad, standoff_m, parts.vehicle.X_BC)
         route = operator_route(target.centre_W_m, course.duration_s)
         parts = parts.replace(start=BodyState(X_WB=X_WB), route=route)
-    begin = OperatorSettings(mode="operator", w_track=trial.w_track, watch_target=course.watches)
+    begin = OperatorSettings(mode="operator", w_track=w_track, watch_target=course.watches)
     source: ControlSource = hands or CourseInput(course, begin.share)
     parts = parts.replace(pilot=assisted_pilot(parts, source, OperatorState(begin), begin))
     return parts.replace(controller=ControllerProbe(parts.controller))
 
 
-def fly_trial(trial: OperatorTrial) -> dict[str, float | None]:
-    """Figures of one flight."""
-    began = time.process_time()
-    parts = parts_of(trial)
-    heard, pilot = parts.controller, parts.pilot
-    assert isinstance(heard, ControllerProbe)
-    assert isinstance(pilot, AssistedPilot)
-    # One yardstick for all methods: what the mechanisms know, in the current that the estimator finds.
-    watch = allocation_context(parts.vehicle, parts.region, parts.wake, parts.control)
-    rows: list[tuple[Array, ...]] = []
-    D: list[float] = []
-    solve_ms: list[float] = []
-    every = round(DISTURBANCE_EVERY_S * parts.control.rate_hz)
+class OperatorFigures(FlightProbe):
+    """Deviations from the velocity asked for, and D, from the end of rest on.
 
-    def listen(step: Step, witness: TruthProvider | None) -> None:  # noqa: ARG001
-        if step.time_s < SETTLE_S or step.truth is None or heard.asked_W_m_s is None:
+    D has one yardstick for all methods: what the allocator knows, in the current that the estimator finds.
+    """
+
+    def __init__(self, parts: Parts, folder: Path) -> None:
+        super().__init__(parts, folder)
+        controller, pilot = parts.controller, parts.pilot
+        assert isinstance(controller, ControllerProbe)
+        assert isinstance(pilot, AssistedPilot)
+        self._heard, self._pilot = controller, pilot
+        self._context = allocation_context(parts.vehicle, parts.region, parts.wake, parts.control)
+        self._every = round(DISTURBANCE_EVERY_S * parts.control.rate_hz)
+        self._rows: list[tuple[Array, ...]] = []
+        self._D: list[float] = []
+        self._solve_ms: list[float] = []
+
+    def step(self, step: Step, witness: TruthProvider | None) -> None:
+        """Keep what was asked, flown and planned; D five times a second."""
+        del witness
+        asked = self._heard.asked_W_m_s
+        if step.time_s < SETTLE_S or step.truth is None or asked is None:
             return
-        state = step.truth.state
-        asked = heard.asked_W_m_s
-        planned = asked if heard.planned_W_m_s is None else heard.planned_W_m_s
-        rows.append((asked, state.X_WB.R @ state.nu_B[:3], planned, by_sticks(pilot)))
-        solve_ms.append(1e3 * step.solve_s)
-        if len(rows) % every == 1:
+        state, planned = step.truth.state, self._heard.planned_W_m_s
+        true = state.X_WB.R @ state.nu_B[:3]
+        self._rows.append((asked, true, asked if planned is None else planned, by_sticks(self._pilot)))
+        self._solve_ms.append(1e3 * step.solve_s)
+        if len(self._rows) % self._every == 1:
             thrusts = step.truth.thrusts_N
-            D.append(float(disturbance_of(watch.gram(step.estimate, thrusts), thrusts)))
+            self._D.append(float(disturbance_of(self._context.gram(step.estimate, thrusts), thrusts)))
 
-    # The courses lie where the mission's own orbits are, which its check has seen, or above the target.
-    flown = fly(parts, checked=False, water_every_s=WATER_EVERY_S, duration_s=trial.duration_s, watch=listen).steps
-    figures: dict[str, Any] = flight_figures(flown.filter(flown["leg"] != SETTLING))
-    figures |= deviations(*(np.array(column) for column in zip(*rows, strict=True)))
-    figures["disturbance"] = float(np.mean(D))
-    figures["solve_ms_p99"] = float(np.percentile(solve_ms, 99))
-    figures["cpu_s"] = time.process_time() - began
-    return {key: figures.get(key) for key in FIGURES}
+    def figures(self, steps: pl.DataFrame) -> dict[str, float | None]:
+        """`DEVIATIONS`, `disturbance` and `solve_ms_p99`."""
+        del steps
+        return deviations(*(np.array(column) for column in zip(*self._rows, strict=True))) | {
+            "disturbance": float(np.mean(self._D)),
+            "solve_ms_p99": float(np.percentile(self._solve_ms, 99)),
+        }
 
 
 def by_sticks(pilot: AssistedPilot) -> Array:

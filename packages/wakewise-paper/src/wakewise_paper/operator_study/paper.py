@@ -10,12 +10,13 @@ disobedience is left.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 
 from wakewise.control import AllocationSettings, ControlSettings, make_controller
 from wakewise.control.velocity_reference import (
@@ -28,16 +29,16 @@ from wakewise.control.velocity_reference import (
 )
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Goal, TruthProvider
-from wakewise.operation import Scenario, fly
+from wakewise.experiments.campaigns.definition import PlannedTrial
+from wakewise.experiments.campaigns.flights import FlightProbe
+from wakewise.experiments.campaigns.study import Key, Row, flight_trial
+from wakewise.operation import Parts
 from wakewise.operation.loop import Step
 from wakewise.operation.worlds.quasi_steady_world import QuasiSteadyWorld, paper_jets
 from wakewise.robot.vehicles import load_vehicle, perturbed
 from wakewise.scene.missions import open_route
-from wakewise.simulation.tank import TankSettings
 from wakewise.wake import InfluenceModel, WakeSettings, disturbance, wake_model
-from wakewise_paper.flight_batches import Key
-from wakewise_paper.operator_study.flight import ControllerProbe, deviations
-from wakewise_paper.wash_reduction.figures import Row
+from wakewise_paper.operator_study.flight import SOURCES, ControllerProbe, deviations
 from wakewise_paper.wash_reduction.paper import OFF, PAPER_WAKE, paper_place
 
 SEEDS = 1
@@ -77,16 +78,6 @@ PAPER_COURSES = {
 """Climbing and sinking at half speed. 0.42 m above the target's centre leaves 0.2 m between hull and coral."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class PaperOperatorTrial:
-    """One flight there; hashable, so that it can be handed to a worker."""
-
-    course: str
-    method: str
-    seed: int
-    w_track: float = PAPER_W_TRACK
-
-
 @dataclass
 class ScriptedOperator:
     """A `Pilot` that asks for one velocity after the other; holds its place for the first seconds."""
@@ -111,16 +102,31 @@ class ScriptedOperator:
         return goal_of(VelocityCommand(velocity_W_m_s=self.velocity_W, watch_W_m=self.watch_W_m), self.place_W)
 
 
-def paper_trials(w_tracks: tuple[float, ...], seeds: int) -> dict[Key, PaperOperatorTrial]:
+def paper_trial(course: str, method: str, seed: int, w_track: float = PAPER_W_TRACK) -> PlannedTrial:
+    """One flight there."""
+    base = ControlSettings(wake=WakeSettings(**PAPER_WAKE), allocation=AllocationSettings(**OFF))
+    control = base.model_copy(update={"plan": scaled_tracking(base.plan, w_track)})
+    return flight_trial(
+        f"paper, {course}",
+        f"{method} {w_track:g}",
+        seed,
+        {"method": method, "seed": seed, "control": control.model_dump(mode="json")},
+        preset=None,
+        setup={f"{__name__}:paper_course": {"course": course}},
+        probes={f"{__name__}:PaperOperatorFigures": {}},
+        sources=SOURCES,
+    )
+
+
+def paper_trials(w_tracks: tuple[float, ...], seeds: int) -> dict[Key, PlannedTrial]:
     """Flights to make, seed by seed; `dp`, which has no w_track, once a seed."""
-    trials = [
-        PaperOperatorTrial(course=course, method=method, seed=seed, w_track=w_track)
+    return {
+        (f"paper, {course}", f"{method} {w_track:g}", seed): paper_trial(course, method, seed, w_track)
         for seed in range(1, seeds + 1)
         for course in PAPER_COURSES
         for method, weights in ((DIRECT, (PAPER_W_TRACK,)), (OURS, w_tracks), (UNAWARE, w_tracks))
         for w_track in weights
-    ]
-    return {(f"paper, {t.course}", f"{t.method} {t.w_track:g}", t.seed): t for t in trials}
+    }
 
 
 def paper_figures(rows: Mapping[Key, Row], w_tracks: tuple[float, ...]) -> dict[str, Any]:
@@ -156,14 +162,12 @@ def _mean(rows: list[Row], key: str) -> float | None:
     return float(np.mean(known)) if known else None
 
 
-def fly_trial(trial: PaperOperatorTrial) -> dict[str, float | None]:
-    """Figures of one flight, from the end of rest on."""
-    began = time.process_time()
-    course, seed = PAPER_COURSES[trial.course], trial.seed
-    vehicle, tank = load_vehicle("paper"), TankSettings()
+def paper_course(parts: Parts, course: str) -> Parts:
+    """The flight of a course: vehicles believed and true, target, start, pilot and the paper's water."""
+    asked, seed = PAPER_COURSES[course], parts.scenario.seed
+    tank, control = parts.scenario.tank, parts.control
+    vehicle = load_vehicle("paper")
     target, region = paper_place(tank.size_m[2])
-    base = ControlSettings(wake=WakeSettings(**PAPER_WAKE), allocation=AllocationSettings(**OFF))
-    control = base.model_copy(update={"plan": scaled_tracking(base.plan, trial.w_track)})
     plant_rng, _ = np.random.default_rng([seed, 13]).spawn(2)
     trim_N = float(plant_rng.uniform(-tank.mismatch.trim_range_N, tank.mismatch.trim_range_N))
     true = perturbed(
@@ -173,52 +177,61 @@ def fly_trial(trial: PaperOperatorTrial) -> dict[str, float | None]:
         damping_pct=30.0,
         added_mass_pct=20.0,
         thrust_pct=5.0,
-        trim_N=-tank.mismatch.trim_range_N if course.sinks else trim_N,
+        trim_N=-tank.mismatch.trim_range_N if asked.sinks else trim_N,
     )
-    watch = target.centre_W_m if course.watches else None
+    watch = target.centre_W_m if asked.watches else None
     rest = VelocityCommand(velocity_W_m_s=np.zeros(3), watch_W_m=watch)
-    here = goal_of(rest, target.centre_W_m + np.array(course.from_target_m))
+    here = goal_of(rest, target.centre_W_m + np.array(asked.from_target_m))
     start = BodyState(X_WB=here.X_WB)
-    world = QuasiSteadyWorld(
-        name="paper",
-        jets=paper_jets(),
-        vehicle=true,
-        target=target,
-        settings=tank,
-        start=start,
-        draw=lambda: np.random.default_rng([seed, 13]).spawn(2)[1],
-    )
-    pilot = ScriptedOperator(course, watch, here, 1.0 / control.rate_hz)
-    controller = ControllerProbe(make_controller(trial.method, vehicle, region, wake_model(control.wake), control))
-    view = InfluenceModel.of(vehicle, region, wake_model(WakeSettings(**PAPER_WAKE)))
-    velocities: list[tuple[Array, Array, Array]] = []
-    D: list[float] = []
-    speed: list[float] = []
-
-    def record(step: Step, witness: TruthProvider | None) -> None:
-        if step.time_s < HOLD_S or step.truth is None or witness is None:
-            return
-        state, asked, planned = step.truth.state, pilot.velocity_W, controller.planned_W_m_s
-        velocities.append((asked, state.X_WB.R @ state.nu_B[:3], asked if planned is None else planned))
-        if len(velocities) % 5 == 0:
-            D.append(disturbance(view.gram(state.X_WB), step.truth.thrusts_N))
-            speed.append(witness.water().target_speed_mean_m_s)
-
-    parts = Scenario(method=trial.method, seed=seed, control=control, tank=tank).parts()
-    flown = parts.replace(
+    method = make_controller(parts.scenario.method, vehicle, region, wake_model(control.wake), control)
+    return parts.replace(
         vehicle=vehicle,
         target=target,
         region=region,
-        route=open_route(target.centre_W_m, HOLD_S + course.leg_s * len(course.legs_W)),
+        route=open_route(target.centre_W_m, HOLD_S + asked.leg_s * len(asked.legs_W)),
         start=start,
-        pilot=pilot,
-        controller=controller,
-        world=world,
+        pilot=ScriptedOperator(asked, watch, here, 1.0 / control.rate_hz),
+        controller=ControllerProbe(method),
+        world=QuasiSteadyWorld(
+            name="paper",
+            jets=paper_jets(),
+            vehicle=true,
+            target=target,
+            settings=tank,
+            start=start,
+            draw=lambda: np.random.default_rng([seed, 13]).spawn(2)[1],
+        ),
     )
-    fly(flown, checked=False, watch=record)
-    figures = deviations(*(np.array(column) for column in zip(*velocities, strict=True)))
-    return figures | {
-        "disturbance": float(np.mean(D)),
-        "target_speed_mean_m_s": float(np.mean(speed)),
-        "cpu_s": time.process_time() - began,
-    }
+
+
+class PaperOperatorFigures(FlightProbe):
+    """Deviations, D by the paper's model and the water at the target, from the end of rest on."""
+
+    def __init__(self, parts: Parts, folder: Path) -> None:
+        super().__init__(parts, folder)
+        controller, pilot = parts.controller, parts.pilot
+        assert isinstance(controller, ControllerProbe)
+        assert isinstance(pilot, ScriptedOperator)
+        self._controller, self._pilot = controller, pilot
+        self._view = InfluenceModel.of(parts.vehicle, parts.region, wake_model(WakeSettings(**PAPER_WAKE)))
+        self._velocities: list[tuple[Array, Array, Array]] = []
+        self._D: list[float] = []
+        self._speed: list[float] = []
+
+    def step(self, step: Step, witness: TruthProvider | None) -> None:
+        """Keep what was asked, flown and planned; D and the water every fifth step."""
+        if step.time_s < HOLD_S or step.truth is None or witness is None:
+            return
+        state, asked, planned = step.truth.state, self._pilot.velocity_W, self._controller.planned_W_m_s
+        self._velocities.append((asked, state.X_WB.R @ state.nu_B[:3], asked if planned is None else planned))
+        if len(self._velocities) % 5 == 0:
+            self._D.append(disturbance(self._view.gram(state.X_WB), step.truth.thrusts_N))
+            self._speed.append(witness.water().target_speed_mean_m_s)
+
+    def figures(self, steps: pl.DataFrame) -> dict[str, float | None]:
+        """`DEVIATIONS`, `disturbance` and `target_speed_mean_m_s`."""
+        del steps
+        return deviations(*(np.array(column) for column in zip(*self._velocities, strict=True))) | {
+            "disturbance": float(np.mean(self._D)),
+            "target_speed_mean_m_s": float(np.mean(self._speed)),
+        }

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.operation.randomization import FieldDistribution
+from wakewise.operation.scenario.randomization import FieldDistribution
 from wakewise.operation.worlds.library import load_world, world_names
 from wakewise_paper.wash_reduction.scenario_files import Side, current_W_m_s, stratum
 

@@ -9,22 +9,27 @@ slower wash than that no such measurement sees.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.interfaces import Flow, TruthProvider
+from wakewise.experiments.campaigns.flights import FlightProbe
 from wakewise.operation import Parts
+from wakewise.operation.loop import Step
 from wakewise.scene.targets import Target
 from wakewise.vision.piv.correlation import displacements
 from wakewise.vision.piv.images import CameraSettings, LightSheet, TracerSettings, photograph_pair
-from wakewise_paper.wash_reduction.routes import SETTLE_S
+from wakewise_paper.routes import SETTLE_S
 
 NEAR_M, CLEAR_M = 0.05, 0.004
 """Vectors count within this of the target's surface, and no nearer, where a window is half full of coral."""
 CAMERA = CameraSettings(width_px=320, height_px=288, m_per_px=0.6e-3)
+PIV = f"{__name__}:PivProbe"
 FIGURES = ("piv_speed_m_s", "piv_floor_m_s", "piv_error_m_s", "piv_true_speed_m_s", "piv_valid_pct")
 
 
@@ -46,31 +51,45 @@ def _ambient(water: Any, points_W_m: Array) -> Array:
     return np.zeros_like(points_W_m) if ask is None else np.asarray(ask(points_W_m))
 
 
+class PivProbe(FlightProbe):
+    """Photographs the water of a flight at `instants` spread evenly over it after its settling."""
+
+    def __init__(self, parts: Parts, folder: Path, instants: int, duration_s: float | None = None) -> None:
+        super().__init__(parts, folder)
+        lasts_s = duration_s or parts.route.duration_s
+        out = parts.start.X_WB.p_m - parts.target.centre_W_m
+        along = np.array([out[0], out[1], 0.0])
+        self._recorder = PivRecorder(
+            target=parts.target,
+            sheet=LightSheet(
+                centre_W_m=parts.target.centre_W_m - [0.0, 0.0, 0.02],
+                right_W=along / np.linalg.norm(along),
+                down_W=np.array([0.0, 0.0, 1.0]),
+                half_thickness_m=4e-3,
+            ),
+            times_s=list(SETTLE_S + (lasts_s - SETTLE_S) * (np.arange(instants) + 0.5) / max(instants, 1)),
+            rng=np.random.default_rng([parts.scenario.seed, 37]),
+        )
+
+    def step(self, step: Step, witness: TruthProvider | None) -> None:
+        """Photograph the water if it is time."""
+        self._recorder.look(step.time_s, witness)
+
+    def figures(self, steps: pl.DataFrame) -> dict[str, float]:
+        """Those of the recorder."""
+        del steps
+        return self._recorder.figures()
+
+
 @dataclass(eq=False)
 class PivRecorder:
-    """Photographs the water of a flight at given times; make one with `over`."""
+    """Photographs the water at given times."""
 
     target: Target
     sheet: LightSheet
     times_s: list[float]
     rng: np.random.Generator
     rows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
-
-    @classmethod
-    def over(cls, parts: Parts, duration_s: float, instants: int) -> PivRecorder:
-        """At instants spread evenly over a flight after its settling; none of them, and nothing is looked at."""
-        target = parts.target
-        out = parts.start.X_WB.p_m - target.centre_W_m
-        along = np.array([out[0], out[1], 0.0])
-        sheet = LightSheet(
-            centre_W_m=target.centre_W_m - [0.0, 0.0, 0.02],
-            right_W=along / np.linalg.norm(along),
-            down_W=np.array([0.0, 0.0, 1.0]),
-            half_thickness_m=4e-3,
-        )
-        times = SETTLE_S + (duration_s - SETTLE_S) * (np.arange(instants) + 0.5) / max(instants, 1)
-        rng = np.random.default_rng([parts.scenario.seed, 37])
-        return cls(target=target, sheet=sheet, times_s=list(times), rng=rng)
 
     def look(self, time_s: float, witness: TruthProvider | None) -> None:
         """Photograph the water if it is time."""
@@ -79,10 +98,12 @@ class PivRecorder:
         self.times_s.pop(0)
         self.rows.append(self._measured(getattr(witness, "tank", witness)))
 
-    def figures(self) -> dict[str, float | None]:
-        """Means over the instants: speed of the difference near the target, the same of two pictures of the water
-        without the vehicle (what the method reads where there is nothing), the median error of a vector, the true
-        speed at the same places, and the share of vectors that passed PIV's own tests.
+    def figures(self) -> dict[str, float]:
+        """Means over the instants; none of no instant.
+
+        They are: speed of the difference near the target, the same of two pictures of the water without the vehicle
+        (what the method reads where there is nothing), the median error of a vector, the true speed at the same places,
+        and the share of vectors that passed PIV's own tests.
         """
         if not self.rows:
             return {}

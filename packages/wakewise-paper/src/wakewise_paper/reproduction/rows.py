@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.experiments.campaigns.definition import PlannedTrial
 from wakewise.experiments.campaigns.statistics import (
     RESAMPLES,
     WORST,
@@ -25,18 +26,22 @@ from wakewise.experiments.campaigns.statistics import (
 from wakewise.experiments.campaigns.summary import by_target
 from wakewise.experiments.campaigns.task import TrialOutcome
 from wakewise_paper.reproduction.claim import ORDER, PublishedFigure
-from wakewise_paper.reproduction.table_trials import NOWHERE, TableCase
+from wakewise_paper.reproduction.table_trials import NOWHERE
 
 Row = dict[str, Any]
 Known = tuple[str, int]
 """Target and seed: what pairs are known by."""
 
 
-@dataclass(frozen=True)
-class CompletedCase:
-    """A trial and what became of it."""
+NOT_MADE = "not finished"
+"""What a campaign says of a trial that it has not come to, or was stopped at."""
 
-    plan: TableCase
+
+@dataclass(frozen=True)
+class CompletedTrial:
+    """A trial of a table and what became of it."""
+
+    plan: PlannedTrial
     outcome: TrialOutcome
 
     @property
@@ -45,19 +50,14 @@ class CompletedCase:
         return self.outcome.figures is not None or (self.outcome.attempts > 0 and self.outcome.reason != NOT_MADE)
 
 
-NOT_MADE = "not finished"
-"""What a campaign says of a trial that it has not come to, or was stopped at."""
-
-
 class TableTrials:
     """The trials of one table in one world, by method."""
 
-    def __init__(self, made: Iterable[CompletedCase]) -> None:
+    def __init__(self, made: Iterable[CompletedTrial]) -> None:
         self._rows: dict[str, dict[Known, Mapping[str, Any] | None]] = {}
         for one in made:
             if one.flown:
-                known = (one.plan.target, one.plan.seed)
-                self._rows.setdefault(one.plan.method, {})[known] = one.outcome.figures
+                self._rows.setdefault(one.plan.method, {})[one.plan.target, one.plan.seed] = one.outcome.figures
 
     @property
     def methods(self) -> list[str]:

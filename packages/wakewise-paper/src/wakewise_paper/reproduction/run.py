@@ -24,10 +24,11 @@ from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.jit.precompile import compile_kernels
 from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.campaigns import run as run_campaign
+from wakewise.experiments.campaigns.definition import keep_plan
 from wakewise.experiments.campaigns.store import CampaignStore, open_store
 from wakewise_paper.reproduction.claim import TABLES, UNQUOTED, PublishedFigure
 from wakewise_paper.reproduction.published_tables import CLAIMS
-from wakewise_paper.reproduction.rows import CompletedCase, Row, TableTrials, once_rows, table_rows
+from wakewise_paper.reproduction.rows import CompletedTrial, Row, TableTrials, once_rows, table_rows
 from wakewise_paper.reproduction.table_trials import (
     APPROACHES,
     COMPARED,
@@ -93,20 +94,9 @@ LAST = 1.25
 class ReproduceOptions:
     """How tables are made.
 
-    Parameters
-    ----------
-    trials : int or None
-        Seeds for each target in each world; with a budget, at most so many.
-    budget_s : float or None
-        Wall time for all tables together.
-    worlds, methods, targets : tuple of str or None
-        In place of the tables' own.
-    duration_s : float or None
-        Only the first part of each flight.
-    workers : int
-        Trials at a time.
-    again : bool
-        Try trials anew that failed in an earlier run.
+    `trials` counts seeds for each target in each world; with a budget (`budget_s`, wall time for all tables together)
+    it is the most of them. `worlds`, `methods` and `targets` are in place of the tables' own; `duration_s` flies only
+    the first part of each flight; `workers` trials are made at a time; `again` tries trials anew that failed before.
     """
 
     trials: int | None = None
@@ -145,7 +135,7 @@ class _Growing:
     name: str
     coming: Iterator[Block]
     taken: list[Block] = field(default_factory=list)
-    made: list[CompletedCase] = field(default_factory=list)
+    made: list[CompletedTrial] = field(default_factory=list)
     block_s: float = 0.0
     spent_s: float = 0.0
     why: str | None = None
@@ -172,12 +162,7 @@ class _Growing:
 def reproduce(names: Sequence[str], folder: Path, options: ReproduceOptions) -> dict[str, dict[str, Any]]:
     """Tables by name: `rows` of paper and ours, `trials` (most seeds of a target), `seeds`, `config_hash` and more.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of `claim.TABLES`.
-    folder : Path
-        A campaign's, made if it is not there.
+    `names` are of `claim.TABLES`; `folder` is a campaign's, made if it is not there.
 
     Raises
     ------
@@ -265,8 +250,10 @@ def _make(tables: list[_Growing], folder: Path, options: ReproduceOptions, until
     plans = [(table, plan) for table in tables for block in table.taken for plan in block]
     if not plans:
         return
+    trials = [plan for _, plan in plans]
+    keep_plan(folder, "reproduce", trials, {"name": "reproduce"})
     outcomes = run_campaign(
-        [plan.task for _, plan in plans],
+        [trial.task for trial in trials],
         folder,
         ProcessExecutor(options.workers),
         timeout_s=TRIAL_LIMIT_S,
@@ -276,7 +263,7 @@ def _make(tables: list[_Growing], folder: Path, options: ReproduceOptions, until
     )
     for table in tables:
         table.made = [
-            CompletedCase(plan, out) for (own, plan), out in zip(plans, outcomes, strict=True) if own is table
+            CompletedTrial(plan, out) for (own, plan), out in zip(plans, outcomes, strict=True) if own is table
         ]
         took = [one.outcome.took_s for one in table.made if one.outcome.took_s > 0.0]
         if took and table.taken:
@@ -308,7 +295,7 @@ def _figures(table: _Growing) -> dict[str, Any]:
     }
 
 
-def rows_of(name: str, made: Sequence[CompletedCase]) -> list[Row]:
+def rows_of(name: str, made: Sequence[CompletedTrial]) -> list[Row]:
     """Rows of a table from its trials."""
     claims = comparison_claims() if name == "comparison" else CLAIMS[name]
     if TABLE[name].once:
@@ -318,19 +305,19 @@ def rows_of(name: str, made: Sequence[CompletedCase]) -> list[Row]:
             if one.outcome.figures is not None
             for row in once_rows(claims, one.outcome.figures, one.plan.world)
         ]
-    worlds: dict[str, list[CompletedCase]] = {}
+    worlds: dict[str, list[CompletedTrial]] = {}
     for one in made:
         worlds.setdefault(one.plan.world, []).append(one)
     return table_rows(claims, {world: TableTrials(own) for world, own in worlds.items()})
 
 
-def config_hash(made: Sequence[CompletedCase]) -> str:
+def config_hash(made: Sequence[CompletedTrial]) -> str:
     """Hash of all trials of a table: what was flown, by which source."""
     keys = "\n".join(sorted(one.plan.task.key for one in made))
     return hashlib.sha256(keys.encode()).hexdigest()[:16]
 
 
-def place_of(one: CompletedCase) -> dict[str, Any]:
+def place_of(one: CompletedTrial) -> dict[str, Any]:
     """Where a page finds what a trial left, below the campaign's folder."""
     figures: Mapping[str, Any] = one.outcome.figures or {}
     return {
@@ -344,7 +331,7 @@ def place_of(one: CompletedCase) -> dict[str, Any]:
     }
 
 
-def _trials(flown: Sequence[CompletedCase]) -> int:
+def _trials(flown: Sequence[CompletedTrial]) -> int:
     counts: dict[tuple[str, str, str], int] = {}
     for one in flown:
         key = (one.plan.world, one.plan.method, one.plan.target)

@@ -3,9 +3,7 @@
 What stays in the trial's folder is `metrics.json` and what a page shows (see
 `wakewise.experiments.campaigns.pictures`); the rest, some fifty megabytes, goes.
 
-Work of a campaign that is no flight of a table's own: the operator's flights, wake models against flows.
-
-(The planner's is `wakewise_benchmarks.solver`.)
+Work of a campaign that is no flight: wake models against flows. (The planner's is `wakewise_benchmarks.solver`.)
 """
 
 from __future__ import annotations
@@ -20,14 +18,13 @@ import numpy as np
 
 from wakewise.core.files import write_json
 from wakewise.core.interfaces import Progress
+from wakewise.experiments.campaigns.flights import scenario_of
 from wakewise.experiments.campaigns.pictures import keep_pictures
 from wakewise.experiments.trials import run_trial
-from wakewise.operation import Parts, Scenario
+from wakewise.operation import Parts
 from wakewise.scene.targets import read_mesh
 from wakewise.vision.evaluation import Crop
 from wakewise.vision.evaluation.cloud_to_surface import area_and_volume
-from wakewise_paper.operator_study import paper
-from wakewise_paper.operator_study.flight import OperatorTrial, fly_trial
 from wakewise_paper.wake_validation import DEFINITIONS, ValidationOptions, figures, validate
 
 FIGURES = (
@@ -59,18 +56,13 @@ FIGURES = (
 def scan_one(settings: Mapping[str, Any], folder: Path, progress: Progress) -> dict[str, Any]:
     """Figures of one scan.
 
-    Parameters
-    ----------
-    settings : mapping
-        `fields` of a scenario by dotted names, over the preset `quick`; `extent`, whether area and volume of the model
-        are measured, which takes a mesh.
+    `settings` hold the scenario, and `extent`: whether area and volume of the model are measured, which takes a mesh.
 
     A model that did not come about is no fault: its figures are missing, `success` is 0 and `failure` says why.
     """
     began = time.process_time()
     extent = bool(settings.get("extent", True))
-    fields = dict(settings["fields"]) | {"reconstruction.mesh": extent}
-    parts = Scenario.preset("quick", **fields).parts()
+    parts = scenario_of(settings).replace(**{"reconstruction.mesh": extent}).parts()
     place = folder / "scan"
     told = run_trial(parts, place)
     progress(0.9, 1.0, "figures")
@@ -99,21 +91,6 @@ def _extent(parts: Parts, place: Path) -> dict[str, float | None]:
 
 def _plain(value: Any) -> float | None:
     return None if value is None or not np.isfinite(value) else float(value)
-
-
-_TOLD = ("velocity_deviation_pct", "disturbance", "target_speed_mean_m_s", "energy_kJ", "position_rmse_mm")
-
-
-def operator_one(settings: Mapping[str, Any], folder: Path, progress: Progress) -> dict[str, float | None]:  # noqa: ARG001
-    """Figures of one flight by an operator: `world` (of the library, or `paper`), `pilot`, `method`, `seed`,
-    `w_track`; in the paper's world `course` in place of `pilot`.
-    """
-    told = dict(settings)
-    if told.pop("world") == "paper":
-        found = paper.fly_trial(paper.PaperOperatorTrial(**told))
-    else:
-        found = fly_trial(OperatorTrial(world=settings["world"], **told))
-    return {key: found.get(key) for key in (*_TOLD, "cpu_s")}
 
 
 def wake_one(settings: Mapping[str, Any], folder: Path, progress: Progress) -> dict[str, float | None]:

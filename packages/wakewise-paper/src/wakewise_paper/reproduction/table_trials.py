@@ -6,21 +6,27 @@ A block is what a comparison in pairs needs, so tables grow by whole blocks and 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from wakewise.control.velocity_reference import PAPER_W_TRACK
 from wakewise.core.errors import InputError
-from wakewise.experiments.campaigns.task import FLIES, PHOTOGRAPHS, Task
+from wakewise.experiments.campaigns.definition import PlannedTrial
+from wakewise.experiments.campaigns.study import flight_trial
+from wakewise.experiments.campaigns.task import PHOTOGRAPHS, Task
 from wakewise.scene.targets import coral_kinds
+from wakewise_paper import flights
+from wakewise_paper.operator_study.flight import operator_trial
+from wakewise_paper.operator_study.paper import paper_trial
 from wakewise_paper.reproduction.claim import ORDER, TABLES
+from wakewise_paper.reproduction.piv_flights import PIV
 from wakewise_paper.reproduction.published_tables import VARIANTS, W_TRACKS
 from wakewise_paper.reproduction.worlds import (
     CACO3,
     FIELD,
     PAPER,
     PUMP_TANK,
-    TableWorld,
     varied_mission,
     water,
     water_names,
@@ -35,40 +41,29 @@ NOWHERE = "-"
 TROUBLE = "payload"
 """Where users have the trouble: the world that presets fly in (docs/research-log/0032)."""
 
-_FLIGHT = (*FLIES, "studies/reproduce/flights.py", "studies/reproduce/piv_flights.py", "studies/gentle", "studies/piv")
-_SCAN = (*PHOTOGRAPHS, "studies/reproduce/scans.py")
-_OPERATOR = (*FLIES, "studies/operator", "studies/gentle", "studies/reproduce/measured.py")
-_BENCH = ("benches/planner.py", "benches/paper_planner.py", "benches/solver.py")
-_SOLVER = ("planning", "wake", "vehicles", "thrusters", *_BENCH)
-_WAKE = ("wake", "water", "lattice", "studies/wake_validation.py", "studies/flows.py", "studies/oracle.py")
+_OWN = ("wakewise_paper:reproduction",)
+_FLIGHT = (*flights.SOURCES, *_OWN)
+_SCAN = (*PHOTOGRAPHS, *_OWN)
+_BENCH = "wakewise_benchmarks"
+_SOLVER = (
+    *("planning", "wake", "robot/vehicles", "robot/thrusters"),
+    *(f"{_BENCH}:{name}.py" for name in ("planner", "paper_planner", "solver")),
+)
+_WAKE = (
+    *("wake", "simulation/water", "simulation/lattice"),
+    *("wakewise_paper:wake_validation.py", "wakewise_paper:flows.py"),
+)
 
-
-@dataclass(frozen=True, kw_only=True)
-class TableCase:
-    """One trial of a table, and what it is called in it."""
-
-    table: str
-    world: str
-    method: str
-    target: str
-    seed: int
-    task: Task
-
-
-Block = tuple[TableCase, ...]
+Block = tuple[PlannedTrial, ...]
+"""Trials of all methods on one seed, in one world, at one target; their factors name the table as `variation`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TableRequest:
-    """What is wished of a table; None takes the table's own.
+    """What is wanted of a table; None takes the table's own.
 
-    Parameters
-    ----------
-    trials : int
-        Seeds, from 1, for each target in each world.
-    worlds, methods, targets : tuple of str or None
-    duration_s : float or None
-        Only the first part of each flight; scans are flown whole.
+    `trials` counts seeds, from 1, for each target in each world. `duration_s` flies only the first part of each flight;
+    scans are flown whole.
     """
 
     trials: int
@@ -79,31 +74,39 @@ class TableRequest:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TableDefinition:
-    """How a table is made.
+class TrialCell:
+    """One combination of a table and what is wanted of it."""
 
-    Parameters
-    ----------
-    methods, worlds : tuple of str
-        What it has unless told otherwise.
-    targets : callable
-        From a world's name to the targets that it has there.
-    plan : callable
-        `(water, method, target, seed, wish) -> Task`.
-    block_s : float
-        About how much CPU time a block takes, in seconds: for choosing the first of a budget.
-    weight : float
-        Its share of a budget, over that of others.
-    once : bool
-        Nothing in it is drawn: one trial says all.
-    has_targets : bool
-        Its targets are things, and others can be put in their place.
+    world: str
+    method: str
+    target: str
+    seed: int
+    wish: TableRequest
+
+    def fields(self) -> dict[str, Any]:
+        """Fields of the scenario, by dotted name."""
+        target: dict[str, Any] = {} if self.target == OWN else {"target.kind": self.target}
+        return water(self.world).told | target | {"method": self.method, "seed": self.seed}
+
+    def name(self, what: str) -> str:
+        """Name of its trial."""
+        parts = (what, self.world, self.target, self.method, self.seed)
+        return "/".join(str(part) for part in parts if part != OWN)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableDefinition:
+    """How a table is made: what it has unless told otherwise, and the task of each of its cells.
+
+    `block_s` is about how much CPU time a block takes, in seconds, for choosing the first of a budget; `weight` the
+    table's share of a budget, over that of others. `once`: nothing in it is drawn, one trial says all. `has_targets`:
+    its targets are things, and others can be put in their place.
     """
 
     methods: tuple[str, ...]
     worlds: tuple[str, ...]
     targets: Callable[[str], tuple[str, ...]]
-    plan: Callable[[str, str, str, int, TableRequest], Task]
+    task: Callable[[TrialCell], Task]
     block_s: float
     weight: float = 1.0
     once: bool = False
@@ -137,17 +140,19 @@ def _blocks(
         for number in range(max(len(own) for own in targets.values())):
             for world in (world for world in worlds if number < len(targets[world])):
                 target = targets[world][number]
-                yield tuple(
-                    TableCase(
-                        table=name,
-                        world=world,
-                        method=method,
-                        target=target,
-                        seed=seed,
-                        task=table.plan(world, method, target, seed, wish),
-                    )
-                    for method in methods
-                )
+                yield tuple(_planned(name, world, method, target, seed, wish) for method in methods)
+
+
+def _planned(table: str, world: str, method: str, target: str, seed: int, wish: TableRequest) -> PlannedTrial:
+    task = TABLE[table].task(TrialCell(world=world, method=method, target=target, seed=seed, wish=wish))
+    factors: dict[str, str | int] = {
+        "method": method,
+        "target": target,
+        "world": world,
+        "variation": table,
+        "seed": seed,
+    }
+    return PlannedTrial(task=task, factors=factors)
 
 
 def _target(name: str) -> str:
@@ -176,104 +181,85 @@ def _known(
     return tuple(dict.fromkeys(wished))
 
 
-def _name(*parts: object) -> str:
-    return "/".join(str(part) for part in parts if part != OWN)
+def _scan(cell: TrialCell) -> Task:
+    return _scanned(cell.name("scan"), cell.fields(), extent=True)
 
 
-def _fields(where: TableWorld, method: str, target: str, seed: int) -> dict[str, Any]:
-    own: dict[str, Any] = {} if target == OWN else {"target.kind": target}
-    return where.told | own | {"method": method, "seed": seed}
+def _plain_scan(cell: TrialCell) -> Task:
+    return _scanned(cell.name("scan"), cell.fields(), extent=False)
 
 
-def _scan(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:  # noqa: ARG001
-    fields = _fields(water(world), method, target, seed)
-    return Task(
-        name=_name("scan", world, target, method, seed),
-        work="wakewise_paper.reproduction.scans:scan_one",
-        settings={"fields": fields, "extent": True},
-        sources=_SCAN,
+def _varied(cell: TrialCell) -> Task:
+    kind = CORALS[(cell.seed - 1) % len(CORALS)] if cell.target == OWN and cell.world == PUMP_TANK else cell.target
+    mission = varied_mission(cell.world, None if kind == OWN else kind, cell.seed)
+    return _scanned(cell.name("varied"), replace(cell, target=kind).fields() | dict(mission), extent=False)
+
+
+def _scanned(name: str, fields: Mapping[str, Any], *, extent: bool) -> Task:
+    settings = {"scenario": dict(fields), "preset": "quick", "extent": extent}
+    return Task(name=name, work="wakewise_paper.reproduction.scans:scan_one", settings=settings, sources=_SCAN)
+
+
+def _station(cell: TrialCell) -> Task:
+    return _flown(cell, "station", {flights.STATION: {}})
+
+
+def _flow(cell: TrialCell) -> Task:
+    return _flown(cell, "round", _ROUND, {PIV: {"instants": 3, "duration_s": cell.wish.duration_s}})
+
+
+def _ablated(cell: TrialCell) -> Task:
+    six = {"method": "wake-aware", "vehicle": "paper-six-thrusters"} if cell.method == "six thrusters" else {}
+    return _flown(cell, "ablation", _ROUND, own=six)
+
+
+def _compared(cell: TrialCell) -> Task:
+    told = dict(APPROACHES.get(cell.method, {"method": cell.method}))
+    ballast: dict[str, dict[str, Any]] = {flights.BALLASTED: {}} if told.pop("ballast", False) else {}
+    return _flown(cell, "comparison", _ROUND | ballast, own=told)
+
+
+def _flown(
+    cell: TrialCell,
+    what: str,
+    setup: Mapping[str, Mapping[str, Any]],
+    probes: Mapping[str, Mapping[str, Any]] | None = None,
+    own: Mapping[str, Any] | None = None,
+) -> Task:
+    trial = flight_trial(
+        cell.world,
+        cell.method,
+        cell.seed,
+        cell.fields() | dict(own or {}),
+        setup=setup,
+        probes={flights.DISTURBANCE_SERIES: {}} | dict(probes or {}),
+        duration_s=cell.wish.duration_s,
+        sources=_FLIGHT,
     )
+    return replace(trial.task, name=cell.name(what))
 
 
-def _varied(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:  # noqa: ARG001
-    kind = CORALS[(seed - 1) % len(CORALS)] if target == OWN and world == PUMP_TANK else target
-    mission = varied_mission(world, None if kind == OWN else kind, seed)
-    fields = _fields(water(world), method, kind, seed) | dict(mission)
-    return Task(
-        name=_name("varied", world, target, method, seed),
-        work="wakewise_paper.reproduction.scans:scan_one",
-        settings={"fields": fields, "extent": False},
-        sources=_SCAN,
-    )
-
-
-def _plain_scan(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:  # noqa: ARG001
-    fields = _fields(water(world), method, target, seed)
-    return Task(
-        name=_name("scan", world, target, method, seed),
-        work="wakewise_paper.reproduction.scans:scan_one",
-        settings={"fields": fields, "extent": False},
-        sources=_SCAN,
-    )
-
-
-def _flight(course: str, piv_instants: int = 0) -> Callable[[str, str, str, int, TableRequest], Task]:
-    def plan(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:
-        settings: dict[str, Any] = {
-            "fields": _fields(water(world), method, target, seed),
-            "course": course,
-            "duration_s": wish.duration_s,
-        }
-        if piv_instants:
-            settings["piv_instants"] = piv_instants
-        return _fly(_name(course, world, target, method, seed), settings)
-
-    return plan
-
-
-def _fly(name: str, settings: Mapping[str, Any]) -> Task:
-    return Task(name=name, work="wakewise_paper.reproduction.flights:fly_one", settings=settings, sources=_FLIGHT)
-
-
-def _ablated(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:
-    six = method == "six thrusters"
-    task = _flight("round")(world, "wake-aware" if six else method, target, seed, wish)
-    settings = dict(task.settings)
-    if six:
-        settings["fields"] = settings["fields"] | {"vehicle": "paper-six-thrusters"}
-    return _fly(_name("ablation", world, target, method, seed), settings)
-
-
+_ROUND: dict[str, dict[str, Any]] = {flights.HOVER_AND_ARC: {"about": "found"}}
 _SCRIPT = "script"
 
 
-def _operated(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:
-    who, _, w_track = method.partition(", w_track ")
-    told: dict[str, Any] = {"world": world, "method": who, "seed": seed}
-    told["course" if world == PAPER else "pilot"] = target
-    if w_track:
-        told["w_track"] = float(w_track)
-    if world != PAPER and wish.duration_s is not None:
-        told["duration_s"] = wish.duration_s
-    return Task(
-        name=_name("operator", world, target, method, seed),
-        work="wakewise_paper.reproduction.scans:operator_one",
-        settings=told,
-        sources=_OPERATOR,
-    )
+def _operated(cell: TrialCell) -> Task:
+    who, _, word = cell.method.partition(", w_track ")
+    w_track = float(word) if word else PAPER_W_TRACK
+    if cell.world == PAPER:
+        trial = paper_trial(cell.target, who, cell.seed, w_track)
+    else:
+        trial = operator_trial(cell.world, cell.target, who, cell.seed, w_track, duration_s=cell.wish.duration_s)
+    return replace(trial.task, name=cell.name("operator"))
 
 
-def _solved(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:  # noqa: ARG001
-    return Task(name="solver", work="wakewise_benchmarks.solver:solve_one", settings={"instants": 100}, sources=_SOLVER)
+def _solved(_: TrialCell) -> Task:
+    return Task(name="solver", work=f"{_BENCH}.solver:solve_one", settings={"instants": 100}, sources=_SOLVER)
 
 
-def _validated(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:  # noqa: ARG001
-    return Task(
-        name="wake",
-        work="wakewise_paper.reproduction.scans:wake_one",
-        settings={"quick": True},
-        sources=_WAKE,
-    )
+def _validated(_: TrialCell) -> Task:
+    work = "wakewise_paper.reproduction.scans:wake_one"
+    return Task(name="wake", work=work, settings={"quick": True}, sources=_WAKE)
 
 
 APPROACHES: dict[str, dict[str, Any]] = {
@@ -303,25 +289,15 @@ COMPARED = (
 """Methods of the comparison."""
 
 
-def _compared(world: str, method: str, target: str, seed: int, wish: TableRequest) -> Task:
-    told = dict(APPROACHES.get(method, {"method": method}))
-    ballast = bool(told.pop("ballast", False))
-    fields = _fields(water(world), told.pop("method"), target, seed) | told
-    settings: dict[str, Any] = {"fields": fields, "course": "round", "duration_s": wish.duration_s}
-    if ballast:
-        settings["ballast"] = True
-    return _fly(_name("comparison", world, target, method, seed), settings)
-
-
 def _corals(world: str) -> tuple[str, ...]:
     return CORALS if world in (PUMP_TANK, "still-tank", PAPER, "lattice") else (OWN,)
 
 
-def _own(world: str) -> tuple[str, ...]:  # noqa: ARG001
+def _own(_: str) -> tuple[str, ...]:
     return (OWN,)
 
 
-def _nothing(world: str) -> tuple[str, ...]:  # noqa: ARG001
+def _nothing(_: str) -> tuple[str, ...]:
     return (NOWHERE,)
 
 
@@ -330,37 +306,35 @@ def _asked(world: str) -> tuple[str, ...]:
 
 
 _FLOWN = (PUMP_TANK, TROUBLE, PAPER)
-_STATION = ("manual", "dp", "mpc", "mpc-smooth", "wake-aware")
+_STATION_METHODS = ("manual", "dp", "mpc", "mpc-smooth", "wake-aware")
 
 TABLE: dict[str, TableDefinition] = {
     "dynamic": TableDefinition(
-        methods=ORDER, worlds=(PUMP_TANK, TROUBLE), targets=_corals, plan=_scan, block_s=400.0, weight=4.0
+        methods=ORDER, worlds=(PUMP_TANK, TROUBLE), targets=_corals, task=_scan, block_s=400.0, weight=4.0
     ),
     "success": TableDefinition(
         methods=("mpc", "wake-aware"),
         worlds=(PUMP_TANK, TROUBLE),
         targets=_own,
-        plan=_varied,
+        task=_varied,
         block_s=200.0,
         weight=2.0,
     ),
     "station": TableDefinition(
-        methods=_STATION, worlds=_FLOWN, targets=_own, plan=_flight("station"), block_s=150.0, weight=3.0
+        methods=_STATION_METHODS, worlds=_FLOWN, targets=_own, task=_station, block_s=150.0, weight=3.0
     ),
     "ablation": TableDefinition(
-        methods=("wake-aware", *VARIANTS), worlds=_FLOWN, targets=_own, plan=_ablated, block_s=45.0
+        methods=("wake-aware", *VARIANTS), worlds=_FLOWN, targets=_own, task=_ablated, block_s=45.0
     ),
     "sediment": TableDefinition(
-        methods=("mpc", "wake-aware"), worlds=(CACO3, "fluff"), targets=_own, plan=_plain_scan, block_s=220.0
+        methods=("mpc", "wake-aware"), worlds=(CACO3, "fluff"), targets=_own, task=_plain_scan, block_s=220.0
     ),
-    "flow": TableDefinition(
-        methods=("dp", "mpc", "wake-aware"), worlds=_FLOWN, targets=_own, plan=_flight("round", 3), block_s=50.0
-    ),
+    "flow": TableDefinition(methods=("dp", "mpc", "wake-aware"), worlds=_FLOWN, targets=_own, task=_flow, block_s=50.0),
     "solver": TableDefinition(
         methods=(NOWHERE,),
         worlds=(NOWHERE,),
         targets=_nothing,
-        plan=_solved,
+        task=_solved,
         block_s=60.0,
         once=True,
         has_targets=False,
@@ -369,24 +343,24 @@ TABLE: dict[str, TableDefinition] = {
         methods=(NOWHERE,),
         worlds=(NOWHERE,),
         targets=_nothing,
-        plan=_validated,
+        task=_validated,
         block_s=60.0,
         once=True,
         has_targets=False,
     ),
     "field": TableDefinition(
-        methods=("dp", "wake-aware"), worlds=(FIELD,), targets=_own, plan=_plain_scan, block_s=220.0
+        methods=("dp", "wake-aware"), worlds=(FIELD,), targets=_own, task=_plain_scan, block_s=220.0
     ),
     "operator": TableDefinition(
         methods=("dp", *(f"wake-aware, w_track {w:g}" for w in W_TRACKS)),
         worlds=(TROUBLE, PAPER),
         targets=_asked,
-        plan=_operated,
+        task=_operated,
         block_s=45.0,
         has_targets=False,
     ),
     "comparison": TableDefinition(
-        methods=(*COMPARED, *APPROACHES), worlds=(TROUBLE,), targets=_own, plan=_compared, block_s=170.0
+        methods=(*COMPARED, *APPROACHES), worlds=(TROUBLE,), targets=_own, task=_compared, block_s=170.0
     ),
 }
 assert set(TABLE) == set(TABLES)

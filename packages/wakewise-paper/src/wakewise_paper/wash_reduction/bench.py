@@ -1,11 +1,11 @@
 """The study of wash: what each method does to the target's water where users have the trouble; `wakewise bench gentle`.
 
-Scenarios are files (`scenarios/`), stratified over trim and the side of the current (`scenario_files.py`); the library's
-worlds count as scenarios, too. Seed k of a scenario is one world for all methods, so flights are compared in pairs.
-The headline was chosen beforehand (`headline.py`, docs/research-log/0033). The paper's own world is circular and says so
-(`paper.py`). What no controller can pass by sharing thrusts is worked out where that is wanted (`energy_optimum.py`).
-Mechanisms of `wake-aware` are switched one by one: each is compared with the method without it, all others on (left
-out), and with the method without any (alone).
+Scenarios are files (`scenarios/`), stratified over trim and the side of the current (`scenario_files.py`); the
+library's worlds count as scenarios, too. Seed k of a scenario is one world for all methods, so flights are compared in
+pairs. The headline was chosen beforehand (`headline.py`, docs/research-log/0033). The paper's own world is circular and
+says so (`paper.py`). What no controller can pass by sharing thrusts is worked out where that is wanted
+(`energy_optimum.py`). Mechanisms of `wake-aware` are switched one by one: each is compared with the method without it,
+all others on (left out), and with the method without any (alone).
 
 A campaign makes and keeps the flights: a run that was stopped goes on, and a second one flies what is new.
 """

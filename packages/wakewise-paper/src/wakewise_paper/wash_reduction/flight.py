@@ -1,4 +1,6 @@
-"""One flight of the study of wash: a scenario of its own or a world of the library, one vehicle, one method, one seed."""
+"""One flight of the study of wash: a scenario of its own or a world of the library, one vehicle, one method, one
+seed.
+"""
 
 from __future__ import annotations
 
@@ -87,9 +89,9 @@ def wash_trial(
 ) -> PlannedTrial:
     """One flight to make.
 
-    `scenario` is a full name such as orbit/paper or world/mud; `method` may end with `TRIM`; `name` is what the flight is
-    called if not by its method; `control` are dotted fields of `ControlSettings`; `wrong_current` states a wrong current
-    to the controller; `duration_s` flies the first part only.
+    `scenario` is a full name such as orbit/paper or world/mud; `method` may end with `TRIM`; `name` is what the flight
+    is called if not by its method; `control` are dotted fields of `ControlSettings`; `wrong_current` states a wrong
+    current to the controller; `duration_s` flies the first part only.
     """
     own = method.removesuffix(TRIM)
     setup: dict[str, dict[str, Any]] = {}
@@ -130,7 +132,7 @@ def scenario_fields(name: str, seed: int) -> dict[str, Any]:
         "seed": what.seed,
         "tank.mismatch.trim_N": what.trim_N,
         "tank.current.velocity_m_s": what.current_W_m_s,
-        "draws": {key: draw.model_dump(exclude_none=True) for key, draw in draws.items()},
+        "randomize": {key: draw.model_dump(exclude_none=True) for key, draw in draws.items()},
     }
 
 

@@ -1,4 +1,6 @@
-"""The paper's own world, circular: the planner's wake model is the water (`wakewise.operation.worlds.quasi_steady_world`)."""
+"""The paper's own world, circular: the planner's wake model is the water
+(`wakewise.operation.worlds.quasi_steady_world`).
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,7 @@ from wakewise.experiments.campaigns.definition import PlannedTrial
 from wakewise.experiments.campaigns.flights import FlightProbe, settled
 from wakewise.experiments.campaigns.study import flight_trial
 from wakewise.operation import Parts
-from wakewise.operation.randomization import Seeds
+from wakewise.operation.scenario.randomization import Seeds
 from wakewise.operation.scenario import Scenario
 from wakewise.scene.targets import find_target, sample_region
 from wakewise.wake import InfluenceModel, WakeSettings, disturbance, wake_model
@@ -42,7 +44,9 @@ FIGURES = (
 
 
 def paper_trial(method: str, seed: int) -> PlannedTrial:
-    """One flight there: all at its default but for the mechanisms, which are off, the belief, the method and the seed."""
+    """One flight there: all at its default but for the mechanisms, which are off, the belief, the method and the
+    seed.
+    """
     return flight_trial(
         PAPER,
         method,
@@ -64,7 +68,9 @@ def paper_place(bed_z_m: float) -> tuple[Any, Any]:
 
 
 def paper_setup(parts: Parts) -> Parts:
-    """Target, region and route there; the arc passes at the mission's own standoff, which the mission's check has seen."""
+    """Target, region and route there; the arc passes at the mission's own standoff, which the mission's check has
+    seen.
+    """
     target, region = paper_place(parts.scenario.tank.size_m[2])
     parts = parts.replace(target=target)
     found = parts.found_target.centre_W_m
@@ -73,7 +79,8 @@ def paper_setup(parts: Parts) -> Parts:
 
 
 class TrueDisturbance(FlightProbe):
-    """Mean of D of the true thrusts at the true poses about the target, by the model believed there, five times a second.
+    """Mean of D of the true thrusts at the true poses about the target, by the model believed there, five times a
+    second.
 
     The same yardstick for all methods, whatever each of them weighs itself.
     """

@@ -22,7 +22,7 @@ from pydantic import Field, ValidationError
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import read_yaml
 from wakewise.core.settings import Settings, describe_faults
-from wakewise.operation.randomization import FieldDistribution
+from wakewise.operation.scenario.randomization import FieldDistribution
 from wakewise.operation.worlds.library import NamedWorld, WorldField, WorldFile, every_world, load_world, world_names
 
 Side = Literal["towards", "abeam", "away"]

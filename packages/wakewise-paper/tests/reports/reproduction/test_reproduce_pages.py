@@ -13,12 +13,12 @@ import pytest
 from wakewise.experiments.campaigns.pictures import MODEL
 from wakewise.experiments.campaigns.task import Task, TrialOutcome
 from wakewise.ui.reports.methods_compared import methods_compared, profiles
+from wakewise_paper.flights import SERIES
 from wakewise_paper.reports.reproduction import plots, write_pages, write_results
 from wakewise_paper.reports.reproduction.results import standalone_svg
 from wakewise_paper.reports.reproduction.sentences import computer_description, reproduced
 from wakewise_paper.reproduction.claim import JUDGED
-from wakewise_paper.reproduction.flights import SERIES
-from wakewise_paper.reproduction.rows import CompletedCase
+from wakewise_paper.reproduction.rows import CompletedTrial
 from wakewise_paper.reproduction.run import _figures, _Growing
 from wakewise_paper.reproduction.table_trials import TABLE, TableRequest, blocks_of
 
@@ -32,7 +32,7 @@ def table(name, figures, trials=4, worlds=None):
             found = figures(plan)
             reason = None if found is not None else "it <fell> over"
             growing.made.append(
-                CompletedCase(plan, TrialOutcome(task=plan.task, figures=found, reason=reason, attempts=1, took_s=9.0))
+                CompletedTrial(plan, TrialOutcome(task=plan.task, figures=found, reason=reason, attempts=1, took_s=9.0))
             )
     return _figures(growing)
 

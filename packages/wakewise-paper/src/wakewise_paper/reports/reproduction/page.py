@@ -12,9 +12,9 @@ from wakewise.core.files import write_text
 from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, winner_text, worst_panels
 from wakewise.ui.reports.page import collapsible_section, missing, plot, prose, section, whole_page
 from wakewise.ui.reports.text import NONE, duration, number, shown
+from wakewise_paper.flights import read_series
 from wakewise_paper.reports.reproduction import plots, sentences
 from wakewise_paper.reproduction.claim import CIRCULAR, JUDGED, count_met, glances
-from wakewise_paper.reproduction.flights import read_series
 from wakewise_paper.reproduction.published_tables import UNKNOWN
 from wakewise_paper.reproduction.worlds import water
 

@@ -22,9 +22,9 @@ from wakewise.experiments.campaigns.summary import worst_trials
 from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, sheet, winner_text
 from wakewise.ui.reports.svg_style import CARD, CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET
 from wakewise.ui.reports.text import duration, number, shown
+from wakewise_paper.flights import read_series
 from wakewise_paper.reports.reproduction import plots, sentences
 from wakewise_paper.reproduction.claim import CIRCULAR, JUDGED, glances
-from wakewise_paper.reproduction.flights import read_series
 from wakewise_paper.reproduction.published_tables import UNKNOWN
 from wakewise_paper.reproduction.run import COLUMNS, command_of
 from wakewise_paper.reproduction.run import tables as compared_tables

@@ -1,17 +1,18 @@
-"""Statistics of the gentle bench: reductions by logarithms and by sums, intervals within strata."""
+"""Reductions over pairs of trials: by logarithms and by sums, intervals within strata."""
 
 import numpy as np
 import pytest
 
-from wakewise_paper.wash_reduction.figures import (
+from wakewise.experiments.campaigns.statistics import (
     LEAST_M_S,
-    SPEED,
     log_reduction_pct,
-    means,
+    mean_figures,
     pairs_of,
     ratio,
     reduction_pct,
 )
+
+SPEED = "target_speed_mean_m_s"
 
 
 def rows(values):
@@ -62,9 +63,15 @@ def test_a_ratio_of_sums_and_only_what_both_flew():
     assert pairs_of(rows([1.0]), {0: {SPEED: None}}, SPEED, {}) == []
 
 
-def test_means_have_intervals_and_solve_times_are_the_worst():
+def test_means_have_intervals_and_some_figures_are_the_worst():
     """A figure that no flight has is null; one flight has no interval."""
-    found = means([{"a": 1.0, "solve_ms_p99": 3.0}, {"a": 3.0, "solve_ms_p99": 9.0}], ("a", "b", "solve_ms_p99"))
-    assert found["a"] == 2.0 and found["b"] is None and found["solve_ms_p99"] == 9.0 and found["flights"] == 2
+    found = mean_figures([{"a": 1.0, "ms": 3.0}, {"a": 3.0, "ms": 9.0}], ("a", "b", "ms"), worst=("ms",))
+    assert (
+        found["a"] == 2.0
+        and found["b"] is None
+        and found["ms"] == 9.0
+        and found["ms_interval"] is None
+        and found["flights"] == 2
+    )
     assert found["a_interval"][0] < 2.0 < found["a_interval"][1] and found["b_interval"] is None
-    assert means([{"a": 1.0}], ("a",))["a_interval"] is None
+    assert mean_figures([{"a": 1.0}], ("a",))["a_interval"] is None
