@@ -32,8 +32,8 @@ def test_a_wrong_model_without_a_word_is_silent(monkeypatch: pytest.MonkeyPatch)
     bent = {
         n: adversarial_scenes.SceneCamera(R_WC=c.R_WC, p_WC_m=c.p_WC_m * [1.0, 1.0, 2.0]) for n, c in placed.items()
     }
-    for stands, doubts, verdict in ((placed, [], "right"), (bent, [], "silent"), (bent, ["bent"], "said")):
-        monkeypatch.setattr(adversarial_photos, "_model", lambda *_, s=stands, d=doubts: (d, s))
+    for stands, warnings, verdict in ((placed, [], "right"), (bent, [], "silent"), (bent, ["bent"], "said")):
+        monkeypatch.setattr(adversarial_photos, "_model", lambda *_, s=stands, d=warnings: (d, s))
         assert (
             adversarial_photos.spring(adversarial_photos.AdversarialCase(why="", shots=lambda: shots)).verdict
             == verdict

@@ -164,7 +164,7 @@ def _model(
         if image.has_pose:
             R_CW = image.cam_from_world().rotation.matrix()
             found[image.name] = SceneCamera(R_WC=R_CW.T, p_WC_m=np.asarray(image.projection_center()))
-    return figures["doubts"], found
+    return figures["warnings"], found
 
 
 def _error(placed: Mapping[str, SceneCamera], truth: Mapping[str, SceneCamera]) -> tuple[float | None, float | None]:

@@ -52,7 +52,7 @@ def test_points_of_a_trial_are_measured_against_the_truth(tmp_path, monkeypatch)
     assert neural.is_trial(tmp_path)
     out = tmp_path / "nerf"
     figures = neural.field_of_trial(tmp_path, tmp_path / "images", out, PROFILES["cpu"], **ALIKE)
-    np.testing.assert_allclose(asked["region"][0], parts.found_target.centre_W_m)
+    np.testing.assert_allclose(asked["region"][0], parts.surveyed_target.centre_W_m)
     assert asked["region"][1] > parts.target.radius_m
     assert figures["rmse_mm"] == pytest.approx(1.0, abs=0.35)
     assert figures["completeness_pct"] > 95.0 and figures["success"] is True

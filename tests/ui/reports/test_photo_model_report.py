@@ -38,7 +38,7 @@ BAR = {"name": "3-7", "length_m": 0.5, "sigma_m": 0.0005, "found_m": 0.501, "off
 TARGET = {"target": 3, "photos": 5, "error_px": 0.2, "sides_mm": [40, 40, 40, 40], "corner_sigma_mm": 0.1,
           "middle_m": [0, 0, 1]}  # fmt: skip
 FIGURES = {
-    "images": 3, "registered_images": 2, "doubts": [], "reprojection_px": 0.41, "reprojection_uncut_px": 0.55,
+    "images": 3, "registered_images": 2, "warnings": [], "reprojection_px": 0.41, "reprojection_uncut_px": 0.55,
     "cut_pct": 4.0, "points": 12_345, "track_length": 3.2, "dense_points": None, "mesh_faces": None, "mapping": "x",
     "point_spacing_mm": None, "scale": None, "duplicates": 0, "sub_models": [2], "passed_over": {"video": 1},
     "left_out": [{"name": "<c>.jpg", "partner": "bb.jpg", "matches": 7}], "stages_s": {"map": 3.0},
@@ -58,7 +58,7 @@ def test_the_page_says_what_the_files_say():
     assert "&lt;c&gt;.jpg" in page
     assert "<c>" not in page
     assert "no reference cameras" in page
-    doubtful = model_page("reef", FIGURES | {"doubts": ["a mirror"], "scale_bars": None}, FACTS, None)
+    doubtful = model_page("reef", FIGURES | {"warnings": ["a mirror"], "scale_bars": None}, FACTS, None)
     assert "The model is doubtful" in doubtful
     assert "a mirror" in doubtful
     assert "The model has no scale" in doubtful

@@ -69,12 +69,12 @@ def test_a_second_interrupt_does_not_leave_the_work_running():
 def test_what_cannot_be_cancelled_runs_apart_and_says_why_it_fails(tmp_path):
     """A function of pycolmap in a process of its own: its fault is one line; an interrupt ends it at once."""
     with pytest.raises(StageError, match=r"mesh: COLMAP stopped: .*nothing"):
-        colmap.call_apart("mesh", "poisson_meshing", tmp_path / "nothing.ply", tmp_path / "out.ply")
+        colmap.call_in_process("mesh", "poisson_meshing", tmp_path / "nothing.ply", tmp_path / "out.ply")
     press(0.3)
     start = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
         while time.perf_counter() < start + 20.0:
-            colmap.call_apart("mesh", "set_random_seed", 1)
+            colmap.call_in_process("mesh", "set_random_seed", 1)
 
 
 def test_ctrl_c_at_random_moments_of_the_command_is_exit_130_and_one_line(relief_photos, tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import StageError
-from wakewise.vision.reconstruction.quality.split_half_check import heights, level_of
+from wakewise.vision.reconstruction.quality.split_half_check import fit_ground_plane, heights
 
 
 def test_the_plane_is_the_beds_and_up_is_towards_the_cameras():
@@ -17,15 +17,15 @@ def test_the_plane_is_the_beds_and_up_is_towards_the_cameras():
     flat = rng.uniform(-1.0, 1.0, (4000, 2)) * [1.5, 1.0]
     points = flat @ np.stack([across, np.cross(up, across)]) + rng.normal(0, 0.003, (4000, 1)) * up
     coral = rng.uniform(0.3, 0.5, (600, 3)) @ np.stack([across, np.cross(up, across), up])
-    level = level_of(np.concatenate([points, coral]), np.array([2.0 * up]))
+    level = fit_ground_plane(np.concatenate([points, coral]), np.array([2.0 * up]))
     assert level.axes[2] @ up > np.cos(np.radians(0.3))
-    assert np.abs(level.told(points)[:, 2]).max() < 0.03
-    assert level.told(coral)[:, 2].min() > 0.25
-    assert np.allclose(level.back(level.told(coral)), coral)
+    assert np.abs(level.to_plane(points)[:, 2]).max() < 0.03
+    assert level.to_plane(coral)[:, 2].min() > 0.25
+    assert np.allclose(level.to_model(level.to_plane(coral)), coral)
     assert np.linalg.det(level.axes) == pytest.approx(1.0)
-    assert level_of(points, np.array([-2.0 * up])).axes[2] @ up < -0.99
+    assert fit_ground_plane(points, np.array([-2.0 * up])).axes[2] @ up < -0.99
     with pytest.raises(StageError, match="on a line"):
-        level_of(np.outer(np.arange(9.0), up), np.array([2.0 * up]))
+        fit_ground_plane(np.outer(np.arange(9.0), up), np.array([2.0 * up]))
 
 
 def test_heights_are_means_of_cells():

@@ -32,13 +32,13 @@ def test_a_photo_without_features_is_like_none():
     assert not describe(np.zeros((0, 128), dtype=np.uint8), words).any()
 
 
-def mapped(folder, out, pairs, look_alikes=0):
+def mapped(folder, out, pairs, retrieved=0):
     settings = ReconstructionSettings(
         detector="opencv", max_features=1000, first_octave=0, check_shared_intrinsics=False
     )
     photos, database = read_photos(folder), out / "database.db"
     matched = match_photos(
-        folder, photos, database, settings, focal_px=FOCAL, pairs=pairs, progress=no_progress, look_alikes=look_alikes
+        folder, photos, database, settings, focal_px=FOCAL, pairs=pairs, progress=no_progress, retrieved=retrieved
     )
     found = map_photos(folder, database, out / "sparse", settings, photos=6, references=None, progress=no_progress)
     return matched, found
@@ -46,7 +46,7 @@ def mapped(folder, out, pairs, look_alikes=0):
 
 def test_photos_that_no_list_of_pairs_ties_are_tied_by_their_looks(relief_photos, tmp_path):
     """Of six photos one pair was asked for: with three look-alikes each, all register."""
-    matched, found = mapped(relief_photos[0], tmp_path, [("00.png", "01.png")], look_alikes=3)
+    matched, found = mapped(relief_photos[0], tmp_path, [("00.png", "01.png")], retrieved=3)
     assert 9 <= matched["pairs"] < 15
     assert found["registered_images"] == 6
 

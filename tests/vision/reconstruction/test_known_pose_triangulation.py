@@ -42,7 +42,7 @@ def test_a_ring_of_twelve_thirty_degrees_apart_becomes_a_model(tmp_path):
         poses[name] = (camera.R_WC, camera.p_WC_m)
     model = reconstruct(tmp_path / "photos", tmp_path / "model", SETTINGS, known=known(poses))
     assert model.registered_images == 12 and model.mapping == "at the known cameras"
-    assert model.doubts == [] and model.reprojection_met
+    assert model.warnings == [] and model.reprojection_met
     assert model.scale == 1.0 and model.point_spacing_mm is not None
     points = read_cloud(tmp_path / "model" / "dense.ply").points_m
     length = np.linalg.norm(points, axis=1)
@@ -56,13 +56,13 @@ def test_cameras_in_other_axes_are_doubted_and_strangers_named(relief_photos, tm
     poses = {name: (X.R, X.p_m) for name, X in truth.items()}
     fewer = dict(list(poses.items())[:-1])
     model = reconstruct(folder, tmp_path / "right", SETTINGS, known=known(fewer))
-    assert model.doubts == [] and (model.images, model.registered_images) == (6, 5)
+    assert model.warnings == [] and (model.images, model.registered_images) == (6, 5)
     assert [(one["name"], one["why"]) for one in model.left_out] == [("05.png", "no known camera")]
     assert model.summary()["why"]["cameras_rmse_mm"] == "the cameras are as they were given"
     rng = np.random.default_rng(0)
     shaken = {name: (R, p + rng.normal(0.0, 0.02, 3)) for name, (R, p) in poses.items()}
     found = reconstruct(folder, tmp_path / "wrong", SETTINGS, known=known(shaken))
-    assert not found.reprojection_met and "cameras that were given" in found.doubts[0]
+    assert not found.reprojection_met and "cameras that were given" in found.warnings[0]
 
 
 def test_as_priors_the_photos_correct_them(relief_photos, tmp_path):

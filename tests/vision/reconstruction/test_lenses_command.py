@@ -59,7 +59,7 @@ def test_each_lens_gets_its_camera_and_is_told_with_its_photos(rig, tmp_path, ca
     assert all({photo.split("/")[0] for photo in one["photos"]} == {one["name"]} for one in figures["lenses"])
     assert figures["lenses"][1]["focal_px"] / figures["lenses"][0]["focal_px"] == pytest.approx(1.5, rel=0.01)
     assert figures["registered_images"] == 12 and not figures["lenses_split"]
-    assert figures["doubts"] == [] and figures["reprojection_met"]
+    assert figures["warnings"] == [] and figures["reprojection_met"]
     assert off_pct("model/sparse", rig) < 1.0
     assert said.err.startswith("wakewise: files that are not read: 1 of video, 1 of HEIC;")
     assert figures["passed_over"] == {"video": 1, "HEIC": 1}

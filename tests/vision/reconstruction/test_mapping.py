@@ -49,7 +49,7 @@ def test_every_way_puts_the_cameras_where_they_were(matched, tmp_path, changes, 
     figures = mapped(matched, tmp_path, **changes)
     assert figures["registered_images"] == 6
     assert figures["cameras_rmse_mm"] < 2.0
-    assert figures["reprojection_px"] < 0.5 and figures["reprojection_met"], figures["doubts"]
+    assert figures["reprojection_px"] < 0.5 and figures["reprojection_met"], figures["warnings"]
     assert figures["suspicion"] is None and 0.3 < figures["surface_distance_m"] < 0.5
     assert capfd.readouterr().err == ""
 

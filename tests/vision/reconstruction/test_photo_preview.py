@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wakewise.ui.reports.photo_preview import look_page
-from wakewise.vision.reconstruction.quality.photo_preview import matches, preview_photos, which_pairs
+from wakewise.vision.reconstruction.quality.photo_preview import matches, preview_pairs, preview_photos
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.sfm.features import photo_features
 
@@ -68,7 +68,7 @@ def test_matches_are_of_one_geometry(relief_photos):
     noise = np.random.default_rng(0).integers(0, 255, (240, 320, 3), dtype=np.uint8)
     assert len(matches(one, photo_features(noise, settings))) == 0
     tiny = np.random.default_rng(0).normal(size=(300, 20))
-    pairs = which_pairs(tiny / np.linalg.norm(tiny, axis=1, keepdims=True))
+    pairs = preview_pairs(tiny / np.linalg.norm(tiny, axis=1, keepdims=True))
     assert len(pairs) == 1600
     assert {(0, 1), (0, 4), (298, 299)} <= set(pairs)
-    assert which_pairs(tiny[:4]) == [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
+    assert preview_pairs(tiny[:4]) == [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]

@@ -59,7 +59,7 @@ def field_of_trial(
     Nothing true goes into the field: poses are the model's, the region is the plan's. Writes metrics.json in `out`.
     """
     parts = read_scenario(folder / "scenario.yaml").parts()
-    planned = (parts.found_target.centre_W_m, REGION_SHARE * parts.found_target.radius_m)
+    planned = (parts.surveyed_target.centre_W_m, REGION_SHARE * parts.surveyed_target.radius_m)
     figures = build_field(
         folder, photos, out, settings, region=region or planned, device=device, mesh=mesh, progress=progress
     )

@@ -240,13 +240,13 @@ def _print_views(views: Path, photos: Path, split: Path | None, json: bool) -> N
 
 def _remark(figures: dict[str, Any]) -> None:
     """Faults of the meshes, and thresholds that say nothing of so small a thing, on standard error."""
-    from wakewise.vision.evaluation.cloud_to_surface import TELLING_PCT, MeshFaults
+    from wakewise.vision.evaluation.cloud_to_surface import USEFUL_PCT, MeshFaults
 
     for key, name in (("reference_faults", "reference"), ("model_faults", "model")):
         for words in MeshFaults(**figures[key]).words() if figures.get(key) else ():
             typer.echo(f"wakewise: {name}: {words}", err=True)
     extent = figures.get("extent_mm")
-    if extent is not None and "completeness_pct" in figures and 0.01 * TELLING_PCT * extent < 3.0:
+    if extent is not None and "completeness_pct" in figures and 0.01 * USEFUL_PCT * extent < 3.0:
         typer.echo(
             f"wakewise: 3 mm are {300.0 / extent:.0f} % of this object's {extent:.0f} mm: completeness_pct, f_score "
             "and success say little, see the shares (--thresholds)",

@@ -31,7 +31,7 @@ from wakewise.ui.cli.reconstruct_options import (
     frames_of,
     look_first,
     scale_lines,
-    wishes_of,
+    request_of,
     write_outputs,
     write_report_of,
 )
@@ -172,7 +172,7 @@ def reconstruct_photos(
     changes = ({"mesh": False} if no_mesh else {}) | parse_overrides(sets or [])
     settings = check_scenario({"reconstruction": changes}, "--set").reconstruction
     check_kinds(write, "dense" if no_mesh and until is None else until)
-    wishes = wishes_of(bar, bars, masks, crop, until, fixes, photos)
+    request = request_of(bar, bars, masks, crop, until, fixes, photos)
     # Whatever was given is read before anything is made, whether this run needs it or not.
     lenses, patterns = _lenses(camera), _named("--lens", "left='L_*'", lens) or None
     references = read_reference_cameras(reference_cameras) if reference_cameras else None
@@ -194,7 +194,7 @@ def reconstruct_photos(
             reference_positions=references,
             known=known,
             region=(np.array(region[:3]), region[3]) if region else None,
-            wishes=wishes,
+            request=request,
             progress=log.watching(progress),
         )
     figures = model.summary()
@@ -219,7 +219,7 @@ def reconstruct_photos(
             lens=lenses,
             lens_patterns=patterns,
             reference_positions=places,
-            wishes=ReconstructionRequest(masks=masks, crop=wishes.crop),
+            request=ReconstructionRequest(masks=masks, crop=request.crop),
             progress=tell,
         )
 
@@ -246,8 +246,8 @@ def reconstruct_photos(
 
 def verdict(model: Model) -> str:
     """Whether the model deserves trust, in a sentence."""
-    if model.doubts:
-        return "verdict: doubtful, " + "; ".join(model.doubts)
+    if model.warnings:
+        return "verdict: doubtful, " + "; ".join(model.warnings)
     return (
         f"verdict: sound, {model.registered_images} of {model.images} photos at {model.reprojection_px:.2f} px "
         f"({model.reprojection_uncut_px:.2f} px before {model.cut_pct:.0f} % of the observations were cut)"

@@ -54,7 +54,7 @@ LookOption = Annotated[
 ]
 
 
-def wishes_of(
+def request_of(
     bar: list[str] | None,
     bars: Path | None,
     masks: Path | None,

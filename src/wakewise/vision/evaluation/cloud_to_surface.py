@@ -29,7 +29,7 @@ from wakewise.vision.evaluation.alignment import IcpRefinement, refine_icp
 
 RELATIVE_PCT = (0.25, 0.5, 1.0)
 """Thresholds in percent of the diagonal of the truth's box where none are given: 1 to 4 mm of a thing of 0.4 m."""
-TELLING_PCT = 2.0
+USEFUL_PCT = 2.0
 """A threshold above this share of the object says little: nearly everything about it is within."""
 
 

@@ -1,8 +1,6 @@
-"""The whole way from a folder of photos to a model, stage by stage; each can be rerun from its files.
+"""Photogrammetry pipeline: a folder of photographs to a 3D model in stages that take files and leave files.
 
-What may be asked of a reconstruction besides its photographs: lengths, masks, a box to cut to, where to stop.
-
-The stages as the pipeline calls them: room on the disk is looked for first, and what is fixed is passed on.
+match -> map -> scale -> dense -> mesh. Each stage is skipped if its files were made from the same input.
 """
 
 from __future__ import annotations
@@ -46,8 +44,8 @@ from wakewise.vision.reconstruction.sfm.known_pose_triangulation import common_r
 from wakewise.vision.reconstruction.sfm.mapping import MAPPINGS, map_photos
 from wakewise.vision.reconstruction.sfm.pairs import (
     BAND_NEIGHBOURS,
-    LOOK_ALIKES,
     POSE_NEIGHBOURS,
+    RETRIEVED_NEIGHBOURS,
     Pairs,
     choose_pairs,
     uses_retrieval,
@@ -67,7 +65,7 @@ LEAST_POINTS = 100
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CropBox:
-    """What is kept of a model: from one corner to the other along its axes, in its units (m where it has a scale)."""
+    """Axis-aligned box of the model that is kept: two corners in its units (m if it has a scale)."""
 
     low: Array
     high: Array
@@ -91,8 +89,8 @@ class CropBox:
 
 @dataclass(frozen=True, kw_only=True)
 class ReconstructionRequest:
-    """bars: lengths that give scale; fixes: weak knowledge of places, which gives it without bars; masks: a folder of
-    them; crop: what dense points and mesh are kept of; until: the last stage.
+    """Options of a reconstruction. bars, fixes: lengths and camera positions that give the scale; masks: a folder of
+    them; crop: box of the dense points and the mesh; until: the last stage.
     """
 
     bars: ScaleBars | None = None
@@ -102,8 +100,8 @@ class ReconstructionRequest:
     until: Literal["sparse", "dense", "mesh"] = "mesh"
 
 
-def cut_cloud(path: Path, box: CropBox) -> int:
-    """Keep of a cloud on disk what lies in a box; how many points that is.
+def crop_cloud(path: Path, box: CropBox) -> int:
+    """Crop a cloud on disk to a box; the number of points left.
 
     Raises StageError if too little is left; the message says where the points are.
     """
@@ -120,97 +118,83 @@ def cut_cloud(path: Path, box: CropBox) -> int:
     return int(kept.sum())
 
 
-def match_step(
-    store: PhotoStore,
-    photos: tuple[Photo, ...],
-    database: Path,
-    settings: ReconstructionSettings,
-    focal_px: float | None,
-    groups: tuple[LensGroup, ...],
-    pairs: Pairs,
-    poses: Poses | None,
-    fixed: bool,
-    look_alikes: int,
-    progress: Progress,
-) -> dict[str, Any]:
-    """Photos to database.db; see `features.match_photos`. `fixed`: the poses are known and stay."""
-    need_room(database.parent, database_bytes(len(photos), len(pairs) + look_alikes * len(photos), settings), "match")
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Inputs:
+    """What the stages work on. `fixed`: the poses are known and stay; `retrieved`: neighbours by image retrieval."""
+
+    settings: ReconstructionSettings
+    request: ReconstructionRequest
+    store: PhotoStore
+    photos: tuple[Photo, ...]
+    groups: tuple[LensGroup, ...]
+    focal_px: float | None
+    pairs: Pairs
+    retrieved: int
+    references: dict[str, Array] | None
+    poses: Poses | None
+    fixed: bool
+    region: RegionOfInterest | None
+
+
+def _match(job: _Inputs, database: Path, progress: Progress) -> dict[str, Any]:
+    """Photos to database.db."""
+    count = len(job.photos)
+    need_room(database.parent, database_bytes(count, len(job.pairs) + job.retrieved * count, job.settings), "match")
     return match_photos(
-        store.folder,
-        photos,
+        job.store.folder,
+        job.photos,
         database,
-        settings,
-        focal_px=focal_px,
-        pairs=pairs,
+        job.settings,
+        focal_px=job.focal_px,
+        pairs=job.pairs,
         progress=progress,
-        store=store,
-        groups=groups,
-        poses=poses,
-        may_be_none=fixed,
-        look_alikes=look_alikes,
+        store=job.store,
+        groups=job.groups,
+        poses=job.poses,
+        may_be_none=job.fixed,
+        retrieved=job.retrieved,
     )
 
 
-def map_step(
-    store: PhotoStore,
-    database: Path,
-    sparse: Path,
-    settings: ReconstructionSettings,
-    photos: int,
-    references: dict[str, Array] | None,
-    poses: Poses | None,
-    fixed: bool,
-    progress: Progress,
-) -> dict[str, Any]:
-    """database.db to sparse/; see `mapping.map_photos`. `fixed`: the poses are known and stay."""
+def _map(job: _Inputs, database: Path, sparse: Path, poses_fit: bool, progress: Progress) -> dict[str, Any]:
+    """database.db to sparse/. `poses_fit`: enough pairs were verified along the epipolar lines of the poses."""
     # Points and tracks are a part of what the database holds; it is copied.
     need_room(sparse.parent, 2.0 * database.stat().st_size, "map")
     return map_photos(
-        store.folder,
+        job.store.folder,
         database,
         sparse,
-        settings,
-        photos=photos,
-        references=references,
+        job.settings,
+        photos=len(job.photos),
+        references=job.references,
         progress=progress,
-        store=store,
-        poses=None if fixed else poses,
-        fixed=poses if fixed else None,
+        store=job.store,
+        poses=job.poses if poses_fit and not job.fixed else None,
+        fixed=job.poses if job.fixed else None,
     )
 
 
-def scale_step(
-    store: PhotoStore, sparse: Path, wishes: ReconstructionRequest, threads: int, referred: bool, progress: Progress
-) -> dict[str, Any]:
-    """sparse/ in metres; see `scale.stage`. The surest gives the scale: references (`referred`), then bars, then fixes;
-    the others check it.
-    """
+def _scale(job: _Inputs, sparse: Path, progress: Progress) -> dict[str, Any]:
+    """sparse/ in metres. References give the scale, else bars, else fixes; the others check it."""
     figures: dict[str, Any] = {}
-    if wishes.bars is not None:
-        figures |= scale_model(store, sparse, wishes.bars, threads, progress, keep=referred)
-    if wishes.fixes is not None:
-        figures |= place_model(sparse, wishes.fixes, keep=referred or wishes.bars is not None)
+    bars, fixes, referred = job.request.bars, job.request.fixes, job.references is not None
+    if bars is not None:
+        figures |= scale_model(job.store, sparse, bars, job.settings.threads, progress, keep=referred)
+    if fixes is not None:
+        figures |= place_model(sparse, fixes, keep=referred or bars is not None)
     return figures
 
 
-def dense_step(
-    store: PhotoStore,
-    sparse: Path,
-    dense: Path,
-    settings: ReconstructionSettings,
-    region: RegionOfInterest | None,
-    fixed: bool,
-    crop: CropBox | None,
-    progress: Progress,
-) -> dict[str, Any]:
-    """sparse/ to dense.ply, cut to a box; see `dense.densify`. `fixed`: the poses are known and stay."""
-    if fixed and region is None:
+def _densify(job: _Inputs, sparse: Path, dense: Path, progress: Progress) -> dict[str, Any]:
+    """sparse/ to dense.ply, cut to the box that was asked for."""
+    region, folder, crop = job.region, job.store.folder, job.request.crop
+    if job.fixed and region is None:
         region = common_region(pycolmap.Reconstruction(sparse))
-    if settings.dense == "patch-match":
-        figures = patch_match(store.folder, sparse, dense, settings, region=region, progress=progress)
+    if job.settings.dense == "patch-match":
+        figures = patch_match(folder, sparse, dense, job.settings, region=region, progress=progress)
     else:
-        figures = densify(store.folder, sparse, dense, settings, region=region, progress=progress, store=store)
-    return figures if crop is None else figures | {"dense_points": cut_cloud(dense, crop)}
+        figures = densify(folder, sparse, dense, job.settings, region=region, progress=progress, store=job.store)
+    return figures if crop is None else figures | {"dense_points": crop_cloud(dense, crop)}
 
 
 LATER = ("scale_bars", "scale_fixes", "dense_points", "depth_maps", "point_spacing_mm", *MESH_FIGURES)
@@ -219,22 +203,19 @@ LATER = ("scale_bars", "scale_fixes", "dense_points", "depth_maps", "point_spaci
 
 @dataclass(frozen=True, kw_only=True)
 class Model:
-    """What a reconstruction is; written as `reconstruction.json`.
+    """Figures of a reconstruction, written as `reconstruction.json`.
 
-    pairs, verified_pairs, posed_pairs: of photos that were matched, that show the same, and those of them that were
-    matched along epipolar lines of known poses. mapping: how the sparse model came about; poses_refused: why not from
-    known poses where that was tried. reprojection_px: mean over all observations that were kept; reprojection_uncut_px:
-    before the last cuts, which took cut_pct of them. cameras_rmse_mm: distance of registered cameras from their
-    references after the similarity, None without references. reprojection_met: whether the mean is below what the
-    settings wish and nothing speaks against the model; doubts: what does, in words. The figures that this rests on:
-    `verdict.Evidence`, and second_opinion_pct, how far cameras move, of their spread, when each photo has a lens of its
-    own. lenses: name, focal length, size and photos of each; lenses_split: whether photos that seemed to share one
-    turned out not to. left_out: each photo without a place, its best partner and their matches. sub_models: photos in
-    each model that came about; the first is kept. duplicates: photos left out because another has the same bytes.
-    passed_over: films and other files that are not read. suspicion: a word where lengths cannot be metres. stages_s:
-    what each stage took when it ran; `skipped` were done before.
-    wall_s: this call. scale_bars, scale_fixes: what bars and fixes say of the scale, see `scale.stage`.
-    A model without references has no scale, so its lengths are None.
+    pairs, verified_pairs, posed_pairs: image pairs matched, verified, and verified along epipolar lines of known poses.
+    mapping: one of `MAPPINGS`; poses_refused: why known poses were not used. reprojection_px: mean over the
+    observations kept; reprojection_uncut_px: before the last cuts, which took cut_pct of them. reprojection_met: the
+    mean is below the settings' bound and there are no warnings; warnings: reasons against the model, by the figures
+    of `ModelEvidence`. second_opinion_pct: displacement of the cameras, of their spread, if each photo has intrinsics
+    of its own. lenses: name, focal length, size and photos of each; lenses_split: photos that seemed to share one did
+    not. left_out: each unregistered photo, its best partner and their matches. sub_models: registered photos of each
+    model; the first is kept. duplicates: photos with the bytes of another. passed_over: files that are not read, by
+    kind. cameras_rmse_mm: distance of registered cameras from their references after the similarity. suspicion: set if
+    lengths cannot be metres. scale_bars, scale_fixes: see `scale.stage`. stages_s: duration of each stage when it ran;
+    `skipped`: finished before. wall_s: this call. Lengths are None for a model without scale.
     """
 
     images: int
@@ -245,7 +226,7 @@ class Model:
     reprojection_met: bool
     reprojection_uncut_px: float
     cut_pct: float
-    doubts: list[str]
+    warnings: list[str]
     observations_per_photo: float
     coverage_pct: float
     angle_deg: float
@@ -325,26 +306,22 @@ def reconstruct(
     reference_rotations: dict[str, Array] | None = None,
     region: tuple[Array, float] | None = None,
     known: KnownCameras | None = None,
-    wishes: ReconstructionRequest | None = None,
+    request: ReconstructionRequest | None = None,
     progress: Progress = no_progress,
 ) -> Model:
     """Photos to a model in `out`: database.db, sparse/, dense.ply, mesh.ply, reconstruction.json.
 
-    A stage whose files are there, made from the same photos with the same settings, is skipped.
+    A stage whose files were made from the same photos with the same settings is skipped. `focal_px`: initial focal
+    length, refined. `lens`: intrinsics of all photos, or by name of a group; refined unless the settings say no.
+    `lens_patterns`: names of lenses and shell patterns of their photos' names. `pairs`: names of the photos to match;
+    the settings choose if not given. `reference_positions`: camera centres in m, shape (3,), by photo name; they fix
+    scale and frame. `reference_rotations`: R_WC, shape (3, 3), by photo name, in the same frame: pairs are then chosen,
+    matched and mapped from the poses, if the settings allow it and the poses fit. `region`: centre, shape (3,), and
+    radius, in m in the frame of the references, of the dense model. `known`: poses and intrinsics instead of references
+    and lenses, fixed or initial as the settings say. `progress` is called with (done, total, note) of each stage.
 
-    `photos`: folder of photographs. `focal_px`: focal length in pixels to start from; it is refined. `lens`: camera
-    that took all the photos, such as a trial's in its cameras.txt, or one by name of a group; refined unless the
-    settings say no. `lens_patterns`: names of lenses and shell patterns of their photos' names; see
-    `lens_groups.group_photos`. `pairs`: which photos to match; else the settings choose. `reference_positions`: camera
-    centres in m, shape (3,), by photo name; they fix scale and frame. `reference_rotations`: R_WC, shape (3, 3), by
-    photo name, in the frame of the references (optical axis last): with them pairs are chosen, matched and mapped from
-    the poses, unless the settings say no or the photos say that they do not fit. `region`, (centre, radius): what the
-    dense model is wanted of, in the frame of the references: shape (3,) in m, and m. `known`: poses and lenses of
-    photos, in place of references and lenses: kept as they are, or where mapping begins, as the settings say. `wishes`:
-    bars or fixes that give scale, masks, a box to cut to, the last stage. `progress`: called with (done, total, note)
-    in units of a stage's own work. Raises InputError if the photos, references, pairs or region cannot be used;
-    StageError if too little of it fits together; EnvironmentFailure if the disk is full, or a file cannot be read or
-    written.
+    Raises InputError if the photos, references, pairs or region cannot be used; StageError if too little of it fits
+    together; EnvironmentFailure if the disk is full, or a file cannot be read or written.
     """
     start = time.perf_counter()
     if out.resolve() == photos.resolve():
@@ -352,9 +329,8 @@ def reconstruct(
     settings = settings or ReconstructionSettings()
     if settings.dense == "patch-match":
         require_cuda()
-    wishes, store = wishes or ReconstructionRequest(), PhotoStore(photos)
-    found, duplicates = without_duplicates(read_photos(photos, store, settings.threads))
-    strangers: tuple[Photo, ...] = ()
+    found, duplicates = without_duplicates(read_photos(photos, store := PhotoStore(photos), settings.threads))
+    without_pose: tuple[Photo, ...] = ()
     fixed = known is not None and settings.known_cameras == "fixed"
     if known is not None:
         if reference_positions is not None or reference_rotations is not None or focal_px is not None:
@@ -362,111 +338,58 @@ def reconstruct(
         known = match_known(known, found)
         reference_positions, reference_rotations = known.positions, known.rotations
         if fixed:
-            strangers = tuple(photo for photo in found if photo.name not in known.positions)
+            without_pose = tuple(photo for photo in found if photo.name not in known.positions)
             found = tuple(photo for photo in found if photo.name in known.positions)
     names = [photo.name for photo in found]
-    store.masks = read_masks(photos, found, wishes.masks)
+    request = request or ReconstructionRequest()
+    store.masks = read_masks(photos, found, request.masks)
     if focal_px is not None and not (np.isfinite(focal_px) and focal_px > 0):
         raise InputError(f"focal length: {focal_px:g} px, must be above 0")
     if lens is not None and focal_px is not None:
         raise InputError("camera: give either a focal length or a calibrated camera, not both")
     groups = group_photos(found, lens_patterns, lens)
     if known is not None and (fixed or known.lenses):
-        told = {photo: group.lens for group in groups for photo in group.photos if group.lens is not None}
-        groups = known_groups(found, told | known.lenses)
+        given = {photo: group.lens for group in groups for photo in group.photos if group.lens is not None}
+        groups = known_groups(found, given | known.lenses)
     references = reference_positions
     if references is not None and not fixed:
         references = match_references(references, names)
     if settings.position_priors and references is None:
         raise InputError("position priors: need known camera positions")
-    ball = _ball(region, references)
     axes = None if reference_rotations is None else {name: R[:, 2] for name, R in reference_rotations.items()}
     poses = _poses(settings, references, reference_rotations)
     if fixed and known is not None:
         poses = {name: (known.rotations[name], known.positions[name]) for name in names}
-    begun = None if poses is None else {n: [*R.ravel().tolist(), *p.tolist()] for n, (R, p) in poses.items()}
     near = POSE_NEIGHBOURS if poses is None else BAND_NEIGHBOURS
     listed = choose_pairs(names, settings, references, axes, near) if pairs is None else [(a, b) for a, b in pairs]
-    alike = LOOK_ALIKES if pairs is None and poses is None and uses_retrieval(len(names), settings) else 0
-    make_folder(out)
-    database, sparse, dense = out / "database.db", out / "sparse", out / "dense.ply"
-
-    results: dict[str, StageResult] = {}
-    with exclusive_run(out):
-        results["match"] = run_stage(
-            out,
-            "match",
-            stage_key(
-                settings,
-                "match",
-                "",
-                [asdict(photo) for photo in found],
-                focal_px,
-                [[g.name, g.photos, g.lens and g.lens.numbers()] for g in groups],
-                listed,
-                begun,
-                alike,
-                *([] if store.masks is None else [store.masks.digests]),
-            ),
-            (database,),
-            lambda: match_step(
-                store, found, database, settings, focal_px, groups, listed, poses, fixed, alike, progress
-            ),
-        )
-        fit = 2 * results["match"].figures["posed_pairs"] >= results["match"].figures["pairs"]
-        placed = None if references is None else {name: position.tolist() for name, position in references.items()}
-        results["map"] = run_stage(
-            out,
-            "map",
-            stage_key(settings, "map", results["match"].key, placed, fixed),
-            (sparse / "images.bin",),
-            lambda: map_step(
-                store,
-                database,
-                sparse,
-                settings,
-                len(found),
-                references,
-                poses if fit or fixed else None,
-                fixed,
-                progress,
-            ),
-        )
-        bars, fixes = wishes.bars, wishes.fixes
-        if bars is None and fixes is None:
-            invalidate_stage(out, "scale", "map")
-        else:
-            results["scale"] = run_stage(
-                out,
-                "scale",
-                stage_key(settings, "scale", results["map"].key, bars and bars.key(), fixes and fixes.key()),
-                (sparse / "images.bin",),
-                lambda: scale_step(store, sparse, wishes, settings.threads, references is not None, progress),
-            )
-        place = None if ball is None else [ball.centre_W_m.tolist(), ball.radius_m]
-        cut = [] if wishes.crop is None else [wishes.crop.key()]
-        if wishes.until != "sparse":
-            results["dense"] = run_stage(
-                out,
-                "dense",
-                stage_key(settings, "dense", results.get("scale", results["map"]).key, place, *cut),
-                (dense,),
-                lambda: dense_step(store, sparse, dense, settings, ball, fixed, wishes.crop, progress),
-            )
-        if settings.mesh and wishes.until == "mesh":
-            results["mesh"] = mesh_model(out, settings, progress)
+    retrieval = pairs is None and poses is None and uses_retrieval(len(names), settings)
+    job = _Inputs(
+        settings=settings,
+        request=request,
+        store=store,
+        photos=found,
+        groups=groups,
+        focal_px=focal_px,
+        pairs=listed,
+        retrieved=RETRIEVED_NEIGHBOURS if retrieval else 0,
+        references=references,
+        poses=poses,
+        fixed=fixed,
+        region=_region(region, references),
+    )
+    results = _run_stages(job, out, progress)
     figures: dict[str, Any] = dict.fromkeys(LATER)
     for result in results.values():
         figures |= result.figures
     figures["lenses"] = named_lenses(figures["lenses"], groups)
     figures["left_out"] = figures["left_out"] + [
-        {"name": photo.name, "partner": None, "matches": 0, "why": "no known camera"} for photo in strangers
+        {"name": photo.name, "partner": None, "matches": 0, "why": "no known camera"} for photo in without_pose
     ]
     by_fixes = figures["scale_fixes"] is not None and figures["scale_fixes"]["used"]
-    if references is None and bars is None and not by_fixes:
+    if references is None and request.bars is None and not by_fixes:
         figures["point_spacing_mm"] = None
     model = Model(
-        images=len(found) + len(strangers),
+        images=len(found) + len(without_pose),
         duplicates=duplicates,
         passed_over=unsupported_files(photos),
         wall_s=time.perf_counter() - start,
@@ -476,6 +399,48 @@ def reconstruct(
     )
     write_json(out / "reconstruction.json", model.summary())
     return model
+
+
+def _run_stages(job: _Inputs, out: Path, progress: Progress) -> dict[str, StageResult]:
+    """Run the stages that were asked for, each unless it was done with the same input."""
+    make_folder(out)
+    settings, request, region = job.settings, job.request, job.region
+    database, sparse, dense = out / "database.db", out / "sparse", out / "dense.ply"
+    begun = None if job.poses is None else {n: [*R.ravel().tolist(), *p.tolist()] for n, (R, p) in job.poses.items()}
+    placed = None if job.references is None else {name: place.tolist() for name, place in job.references.items()}
+    results: dict[str, StageResult] = {}
+    with exclusive_run(out):
+        key = stage_key(
+            settings,
+            "match",
+            "",
+            [asdict(photo) for photo in job.photos],
+            job.focal_px,
+            [[g.name, g.photos, g.lens and g.lens.numbers()] for g in job.groups],
+            job.pairs,
+            begun,
+            job.retrieved,
+            *([] if job.store.masks is None else [job.store.masks.digests]),
+        )
+        results["match"] = run_stage(out, "match", key, (database,), lambda: _match(job, database, progress))
+        matched = results["match"].figures
+        fit = 2 * matched["posed_pairs"] >= matched["pairs"]
+        key = stage_key(settings, "map", key, placed, job.fixed)
+        model = (sparse / "images.bin",)
+        results["map"] = run_stage(out, "map", key, model, lambda: _map(job, database, sparse, fit, progress))
+        if request.bars is None and request.fixes is None:
+            invalidate_stage(out, "scale", "map")
+        else:
+            bars, fixes = request.bars and request.bars.key(), request.fixes and request.fixes.key()
+            key = stage_key(settings, "scale", key, bars, fixes)
+            results["scale"] = run_stage(out, "scale", key, model, lambda: _scale(job, sparse, progress))
+        if request.until != "sparse":
+            place = None if region is None else [region.centre_W_m.tolist(), region.radius_m]
+            key = stage_key(settings, "dense", key, place, *([] if request.crop is None else [request.crop.key()]))
+            results["dense"] = run_stage(out, "dense", key, (dense,), lambda: _densify(job, sparse, dense, progress))
+        if settings.mesh and request.until == "mesh":
+            results["mesh"] = mesh_model(out, settings, progress)
+    return results
 
 
 def _poses(
@@ -489,7 +454,7 @@ def _poses(
     return {name: (np.asarray(rotations[name]), p) for name, p in positions.items() if name in rotations}
 
 
-def _ball(region: tuple[Array, float] | None, references: dict[str, Array] | None) -> RegionOfInterest | None:
+def _region(region: tuple[Array, float] | None, references: dict[str, Array] | None) -> RegionOfInterest | None:
     if region is None:
         return None
     if references is None:

@@ -17,7 +17,7 @@ from wakewise.core.files import whole_file, write_text
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.vision.imaging.sensor import srgb_encode
 from wakewise.vision.reconstruction import read_cloud
-from wakewise.vision.reconstruction.quality.split_half_check import heights, level_of
+from wakewise.vision.reconstruction.quality.split_half_check import fit_ground_plane, heights
 from wakewise.vision.reconstruction.sfm.registered_photos import read_views
 from wakewise.vision.texturing.colour import srgb_bytes
 from wakewise.vision.texturing.textured import vertex_colours
@@ -34,7 +34,7 @@ def write_orthophoto(
 ) -> dict[str, Any]:
     """Write `out/orthophoto.png` (transparent where nothing is known), `heights.png` (16 bits), world files and a JSON.
 
-    The plane is the subject's own (see `level_of`); pictures have its across to the right and its along upwards.
+    The plane is the subject's own (see `fit_ground_plane`); pictures have its across to the right and its along upwards.
 
     `cell`: side of a pixel in units of the model; one and a half point spacings if not given. Returns what
     orthophoto.json holds: cell, columns, rows, corner and axes in the model, step and lowest of the heights. Raises
@@ -42,8 +42,8 @@ def write_orthophoto(
     """
     cloud = read_cloud(model / "dense.ply")
     views, _ = read_views(model / "sparse", None)
-    level = level_of(cloud.points_m, np.array([view.p_WC_m for view in views]))
-    told = without_strays(level.told(cloud.points_m))
+    level = fit_ground_plane(cloud.points_m, np.array([view.p_WC_m for view in views]))
+    told = without_strays(level.to_plane(cloud.points_m))
     extent = np.ptp(told[:, :2], axis=0)
     if cell is None:
         cell = CELL_SPACINGS * float(np.sqrt(extent.prod() / len(told)))
@@ -54,7 +54,7 @@ def write_orthophoto(
     rows, columns = grid.shape
     across = low[0] + (np.arange(columns) + 0.5) * cell
     along = low[1] + (np.arange(rows) + 0.5) * cell
-    vertices = level.back(
+    vertices = level.to_model(
         np.stack([np.tile(across, rows), np.repeat(along, columns), np.where(known, grid, 0.0).ravel()], axis=1)
     )
     colours, seen = vertex_colours(vertices, grid_faces(known), views, photos, progress)

@@ -1,11 +1,4 @@
-"""The report of a model from photographs: whether it can be trusted, the model, its scale, every photograph.
-
-Rows of the page: facts one below the other, and of tables.
-
-The page's words on scale: where metres come from, how sure they are, what disagrees.
-
-A model from photographs in 3D: surface or points, and the cameras with their pictures, as one HTML page.
-"""
+"""Report of a model from photographs: verdict, 3D scene, scale, matches, photographs, removed observations, figures."""
 
 from __future__ import annotations
 
@@ -13,7 +6,6 @@ import contextlib
 import io
 import json
 from collections.abc import Sequence
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +13,7 @@ import cv2
 import numpy as np
 import trimesh
 import viser
+from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from wakewise.core.arrays import Array, IntArray
@@ -29,13 +22,15 @@ from wakewise.core.files import write_text
 from wakewise.core.geometry import quat_from_matrix
 from wakewise.ui.reports.page import (
     collapsible_section,
+    framed_page,
     legend_entry,
     missing,
+    parts,
     plot,
     scene_box,
     section,
+    template,
     tile,
-    whole_page,
 )
 from wakewise.ui.reports.scene3d import CAMERA_RGB, MAX_POINTS, decimated, without_server
 from wakewise.ui.reports.svg_style import TEAL, new_figure, style_axes
@@ -49,20 +44,7 @@ from wakewise.vision.texturing.textured import read_textured
 
 def facts_list(rows: Sequence[tuple[str, str]]) -> str:
     """Names and values, one below the other."""
-    return f'<dl class="facts">{"".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in rows)}</dl>'
-
-
-def table_row(cells: tuple[str, ...], tag: str, kinds: str) -> str:
-    """A row of a table: cells of a tag, each text (t), a list (l) or a number set right (r)."""
-    classes = {"t": "", "l": "", "r": ' class="num"'}
-    inner = [f"<{tag}{classes[k]}>{escape(cell)}</{tag}>" for cell, k in zip(cells, kinds, strict=True)]
-    return f"<tr>{''.join(inner)}</tr>"
-
-
-_HOW = (
-    "<p>Lay two or more bars between coded targets into the scene (<code>--bar A,B,LENGTH</code>), give the places of "
-    "the cameras (<code>--reference-cameras</code>), or at least their depths or GPS fixes (<code>--fixes</code>).</p>"
-)
+    return str(parts().facts(rows))
 
 
 def scale_tile(figures: dict[str, Any]) -> str:
@@ -86,19 +68,22 @@ def scale_tile(figures: dict[str, Any]) -> str:
 def scale_section(figures: dict[str, Any]) -> str:
     """The section: bars, references or fixes, whichever gave the scale first, then what checks it."""
     bars, fixes = figures.get("scale_bars"), figures.get("scale_fixes")
-    lead, content = "The model has no scale: its lengths mean nothing by themselves.", _HOW
+    lead, content = (
+        "The model has no scale: its lengths mean nothing by themselves.",
+        str(template("photos.html").scale_hint()),
+    )
     if bars is not None:
         lead, content = _by_bars(bars)
     elif figures.get("scale") is not None:
         lead, content = "From the places of the cameras that were given.", facts_list(_references(figures))
     elif fixes is not None and fixes["used"]:
-        lead, content = f"From where {shown(fixes['photos'])} photos were taken, as their fixes tell it.", ""
+        lead, content = f"From where {shown(fixes['photos'])} photos were taken, by their fixes.", ""
     return section("scale", "Scale", lead, content + ("" if fixes is None else facts_list(_by_fixes(fixes))))
 
 
 def _by_fixes(fixes: dict[str, Any]) -> list[tuple[str, str]]:
     unsure = fixes.get("uncertainty_pct")
-    rows = [("scale by fixes", "cannot be told" if unsure is None else f"uncertain by {number(unsure, 2)} %")]
+    rows = [("scale by fixes", "unknown" if unsure is None else f"uncertain by {number(unsure, 2)} %")]
     if fixes["why"] is not None:
         rows.append(("not used", fixes["why"]))
     if fixes["model_off_pct"] is not None and fixes["why"] is None:
@@ -121,42 +106,33 @@ def _by_bars(bars: dict[str, Any]) -> tuple[str, str]:
         if bars["used"]
         else f"From reference cameras; by the bars, lengths are {fixed(bars['model_off_pct'], 3, sign=True)} % off."
     )
-    head = table_row(("bar", "stated", "in the model", "off", "by the other bars", "photos"), "th", "tlrrrr")
-    rows = "".join(
-        table_row(
-            (
-                bar["name"],
-                f"{fixed(bar['length_m'], 2, scale=1e3)} ± {fixed(bar['sigma_m'], 2, scale=1e3)} mm",
-                f"{fixed(bar['found_m'], 2, scale=1e3)} mm",
-                f"{fixed(bar['off_mm'], 2, sign=True)} mm",
-                "only one" if bar["check_pct"] is None else f"{fixed(bar['check_pct'], 3, sign=True)} %",
-                shown(bar["photos"]),
-            ),
-            "td",
-            "tlrrrr",
+    rows = [
+        (
+            bar["name"],
+            f"{fixed(bar['length_m'], 2, scale=1e3)} ± {fixed(bar['sigma_m'], 2, scale=1e3)} mm",
+            f"{fixed(bar['found_m'], 2, scale=1e3)} mm",
+            f"{fixed(bar['off_mm'], 2, sign=True)} mm",
+            "only one" if bar["check_pct"] is None else f"{fixed(bar['check_pct'], 3, sign=True)} %",
+            shown(bar["photos"]),
         )
         for bar in bars["bars"]
-    )
-    table = f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
-    targets = "".join(
-        table_row(
-            (
-                shown(one["target"]),
-                shown(one["photos"]),
-                f"{fixed(one['error_px'], 2)} px",
-                f"{fixed(_mean(one['sides_mm']), 2)} mm",
-                ", ".join(fixed(value, 4) for value in one["middle_m"] or []),
-            ),
-            "td",
-            "trrrl",
+    ]
+    heads = ("bar", "stated", "in the model", "off", "by the other bars", "photos")
+    content = str(parts().table("ttnnnn", heads, rows))
+    targets = [
+        (
+            shown(one["target"]),
+            shown(one["photos"]),
+            f"{fixed(one['error_px'], 2)} px",
+            f"{fixed(_mean(one['sides_mm']), 2)} mm",
+            ", ".join(fixed(value, 4) for value in one["middle_m"] or []),
         )
         for one in bars["targets"]
-    )
+    ]
     if targets:
-        head = table_row(("target", "photos", "error", "side", "middle, m"), "th", "trrrl")
-        inner = f"<table><thead>{head}</thead><tbody>{targets}</tbody></table>"
-        table += collapsible_section(f"Targets ({bars['family']})", inner, f"{len(bars['targets'])}")
-    return lead, table
+        table = parts().table("tnnnt", ("target", "photos", "error", "side", "middle, m"), targets)
+        content += collapsible_section(f"Targets ({bars['family']})", table, f"{len(targets)}")
+    return lead, content
 
 
 def _mean(values: Sequence[float | None] | None) -> float | None:
@@ -294,7 +270,7 @@ def _aim(server: viser.ViserServer, seen: Array, eyes: Array, up: Array) -> None
     server.initial_camera.near = 0.005 * distance
 
 
-PARTS = (
+LINKS = (
     ("model", "Model"),
     ("scale", "Scale"),
     ("matches", "Matches"),
@@ -325,30 +301,27 @@ def write_model_report(model: Path, photos: Path) -> Path:
 
 def model_page(name: str, figures: dict[str, Any], facts: ModelStatistics, scene: str | None) -> str:
     """HTML of the report."""
-    links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in PARTS)
-    body = (
-        f'<header class="top">{_headline(name, figures)}</header>'
-        f'<nav class="parts" aria-label="parts"><div>{links}</div></nav><main>{_model(figures, facts, scene)}'
-        f"{scale_section(figures)}{_matches(facts)}{_photos(figures, facts)}{_cut(figures)}{_figures(figures)}</main>"
-        "<footer><p>The model's files are beside this page: sparse/ (COLMAP), dense.ply, mesh.ply, mesh.glb.</p>"
-        "</footer>"
+    sections = (
+        _model(figures, facts, scene),
+        scale_section(figures),
+        _matches(facts),
+        _photos(figures, facts),
+        _cut(figures),
+        _figures(figures),
     )
-    return whole_page(f"{name} · model", body)
+    footer = template("photos.html").model_footer()
+    return framed_page(f"{name} · model", _header(name, figures), LINKS, sections, footer)
 
 
-def _headline(name: str, figures: dict[str, Any]) -> str:
-    doubts = figures.get("doubts") or []
+def _header(name: str, figures: dict[str, Any]) -> str:
+    warnings = figures.get("warnings") or []
     images, placed = _count(figures.get("images")), _count(figures.get("registered_images"))
-    said = "The model is doubtful" if doubts else f"A sound model of {placed} of {images} photographs"
-    reasons = "".join(f'<p class="why">{escape(line)}</p>' for line in doubts)
-    return (
-        f'<p class="eyebrow"><span>model <b>{escape(name)}</b></span></p>'
-        f'<h1 class="{"bad" if doubts else "good"}"><span class="mark"></span>{escape(said)}</h1>{reasons}'
-        f'<dl class="tiles">{_tiles(figures)}</dl>'
-    )
+    headline = "The model is doubtful" if warnings else f"A sound model of {placed} of {images} photographs"
+    tiles = [Markup(one) for one in _tiles(figures)]
+    return str(parts().header([("model", name)], headline, "bad" if warnings else "good", warnings, tiles))
 
 
-def _tiles(figures: dict[str, Any]) -> str:
+def _tiles(figures: dict[str, Any]) -> list[str]:
     placed, images = figures.get("registered_images"), figures.get("images")
     spacing = figures.get("point_spacing_mm")
     dense = figures.get("dense_points")
@@ -357,15 +330,15 @@ def _tiles(figures: dict[str, Any]) -> str:
     surface = "not asked for" if faces is None else "triangles"
     uncut, cut = fixed(figures.get("reprojection_uncut_px"), 2), fixed(figures.get("cut_pct"), 0)
     state = "" if placed is None or images is None else "ok" if placed == images else "off"
-    return (
-        tile("photographs placed", _count(placed), f"of {_count(images)}", "have a place in the model", state)
-        + tile("error", fixed(figures.get("reprojection_px"), 2), "px", f"mean; {uncut} before {cut} % was cut")
-        + scale_tile(figures)
-        + tile("sparse points", _count(figures.get("points")), "",
-               f"in {fixed(figures.get('track_length'), 1)} photos each")
-        + tile("dense points", _count(dense), "", "not asked for" if dense is None else note)
-        + tile("surface", _count(faces), "", surface)
-    )  # fmt: skip
+    features = f"in {fixed(figures.get('track_length'), 1)} photos each"
+    return [
+        tile("photographs placed", _count(placed), f"of {_count(images)}", "have a place in the model", state),
+        tile("error", fixed(figures.get("reprojection_px"), 2), "px", f"mean; {uncut} before {cut} % was cut"),
+        scale_tile(figures),
+        tile("sparse points", _count(figures.get("points")), "", features),
+        tile("dense points", _count(dense), "", "not asked for" if dense is None else note),
+        tile("surface", _count(faces), "", surface),
+    ]
 
 
 def _count(value: int | None) -> str:
@@ -422,9 +395,6 @@ def match_figure(matches: IntArray) -> Figure | None:
 
 def _photos(figures: dict[str, Any], facts: ModelStatistics) -> str:
     left = {one["name"]: one for one in figures.get("left_out") or []}
-    head = table_row(
-        ("photograph", "place", "features", "points seen", "error", "partners", "focal length"), "th", "tlrrrrr"
-    )
     rows = []
     for k, photo in enumerate(facts.photos):
         partners = int((facts.matches[k] > 0).sum())
@@ -436,11 +406,12 @@ def _photos(figures: dict[str, Any], facts: ModelStatistics) -> str:
         error = f"{fixed(photo.error_px, 2)} px"
         cells = (photo.name, place, _count(photo.features), _count(photo.observations), error, str(partners),
                  f"{fixed(photo.focal_px, 0)} px")  # fmt: skip
-        rows.append(table_row(cells, "td", "tlrrrrr"))
-    table = f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>"
+        rows.append(cells)
+    heads = ("photograph", "place", "features", "points seen", "error", "partners", "focal length")
+    table = parts().table("ttnnnnn", heads, rows)
     lead = "Errors are means over the sparse points that a photograph sees, each point's over all that see it."
     content = collapsible_section("Every photograph", table, f"{len(rows)}") if len(rows) > _LONG else table
-    return section("photos", "Photographs", lead, content)
+    return section("photos", "Photographs", lead, str(content))
 
 
 def _cut(figures: dict[str, Any]) -> str:
@@ -463,17 +434,16 @@ def _cut(figures: dict[str, Any]) -> str:
 
 def _figures(figures: dict[str, Any]) -> str:
     why = figures.get("why") or {}
-    rows = ""
+    rows = []
     for key, value in figures.items():
         if isinstance(value, (dict, list)) or key == "why":
             continue
-        said = str(why.get(key) or "no reason was given") if value is None else _plain(value)
-        kind = "" if value is None else ' class="num"'
-        rows += f'<tr><td class="key">{escape(key)}</td><td{kind}>{escape(said)}</td></tr>'
+        reason = str(why.get(key) or "no reason was given")
+        rows.append((key, reason if value is None else template("photos.html").number_cell(_plain(value))))
     stages = ", ".join(f"{name} {fixed(took, 0)} s" for name, took in (figures.get("stages_s") or {}).items())
-    table = f'<table class="main"><tbody>{rows}</tbody></table>'
+    table = parts().table("kt", (), rows, "main", wide=False)
     lead = f"As in reconstruction.json. Stages took: {stages}."
-    return section("figures", "All figures", escape(lead), collapsible_section("All figures", table))
+    return section("figures", "All figures", str(escape(lead)), collapsible_section("All figures", table))
 
 
 def _plain(value: Any) -> str:

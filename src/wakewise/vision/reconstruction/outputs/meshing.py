@@ -19,7 +19,7 @@ from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.run_lock import exclusive_run, temporary_prefix
 from wakewise.vision.reconstruction.outputs.clouds import read_cloud, write_cloud, write_mesh
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
-from wakewise.vision.reconstruction.sfm.colmap import call_apart, pycolmap
+from wakewise.vision.reconstruction.sfm.colmap import call_in_process, pycolmap
 from wakewise.vision.reconstruction.stages import StageResult, need_room, read_stamp, run_stage, stage_key
 
 FIGURES = ("mesh_vertices", "mesh_faces", "mesh_points_left_out")
@@ -58,7 +58,7 @@ def mesh_points(
         if len(cloud.points_m) < len(whole.points_m):
             points = Path(scratch) / "points.ply"
             write_cloud(points, cloud)
-        call_apart("mesh", "poisson_meshing", points, raw, options, watch=lambda: progress(0, 1, "mesh"))
+        call_in_process("mesh", "poisson_meshing", points, raw, options, watch=lambda: progress(0, 1, "mesh"))
         need_room(out.parent, 0.0, "mesh")  # on a full disk the surface is cut short without a word
         if not raw.is_file() or raw.stat().st_size == 0:
             raise StageError("mesh: no surface came out of the dense points")

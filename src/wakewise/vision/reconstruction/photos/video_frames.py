@@ -30,8 +30,8 @@ SUFFIXES = (".mp4", ".mov", ".avi", ".mkv", ".mts", ".m4v", ".webm", ".mpg", ".m
 STEP_SHARE = 0.1
 """Picture's movement between two frames that are taken, as a share of its longer side: 90 % of it overlap."""
 MOST_FRAMES, LEAST_FRAMES = 400, 3
-LOOKED_PER_S, LOOKED_PX = 12.0, 640
-"""Frames a second that are looked at, and the longest side they are looked at with."""
+ANALYSED_PER_S, ANALYSED_PX = 12.0, 640
+"""Frames a second that are analysed at, and the longest side they are analysed at with."""
 BLURRED_SHARE = 0.5
 """A frame less sharp than this share of those within two seconds (their 80th percentile) is called blurred."""
 NEAR_S = 2.0
@@ -43,7 +43,7 @@ _POINTS, _LEAST_POINTS, _QUALITY = 300, 20, 96
 
 @dataclass(frozen=True, kw_only=True)
 class VideoFrames:
-    """What was taken of a film. blurred: frames looked at that are; blurred_taken: of those taken, as a stretch had no
+    """What was taken of a film. blurred: frames analysed at that are; blurred_taken: of those taken, as a stretch had no
     better; moved_widths: how far the picture went in all, in widths; motion_px_s: how fast where frames were taken,
     median; skew_px: what a rolling shutter of READOUT_S makes of that.
     """
@@ -67,7 +67,7 @@ class VideoFrames:
         """In words."""
         return [
             f"{self.film}: {self.taken} of {self.frames} frames taken ({self.width} x {self.height} px), "
-            f"{self.looked_at} looked at, {self.blurred} of those blurred"
+            f"{self.looked_at} analysed, {self.blurred} of those blurred"
             + (f"; {self.blurred_taken} blurred ones taken, as nothing near was sharp" if self.blurred_taken else ""),
             f"rolling shutter: is not undone; at {self.motion_px_s:.0f} px/s a sensor that is read out in "
             f"{1e3 * READOUT_S:.0f} ms shears the picture by {self.skew_px:.1f} px (the film does not say its own)",
@@ -97,8 +97,8 @@ def take_frames(film: Path, out: Path, progress: Progress = no_progress) -> tupl
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Looked:
-    """Frames looked at: number, sharpness, way of the picture since the first, in longer sides."""
+class _FrameStatistics:
+    """Frames analysed at: number, sharpness, way of the picture since the first, in longer sides."""
 
     numbers: IntArray
     sharpness: Array
@@ -114,33 +114,33 @@ def _take(film: Path, folder: Path, progress: Progress) -> VideoFrames:
         rate = float(reader.get(cv2.CAP_PROP_FPS))
         rate = rate if np.isfinite(rate) and 0.1 < rate < 1000.0 else 30.0
         told = max(int(reader.get(cv2.CAP_PROP_FRAME_COUNT)), 1)
-        stride = max(1, round(rate / LOOKED_PER_S))
-        looked, frames = _look_through(reader, stride, told, progress)
-    if len(looked.numbers) == 0:
+        stride = max(1, round(rate / ANALYSED_PER_S))
+        analysed, frames = _analyse_frames(reader, stride, told, progress)
+    if len(analysed.numbers) == 0:
         raise InputError(f"{film}: none of its frames can be decoded; convert it, for example to H.264 in MP4")
-    step = max(STEP_SHARE, float(looked.way[-1]) / MOST_FRAMES)
-    blurred = _blurred(looked, rate)
-    chosen = choose_frames(looked.way, looked.sharpness, step)
+    step = max(STEP_SHARE, float(analysed.way[-1]) / MOST_FRAMES)
+    blurred = _blurred(analysed, rate)
+    chosen = choose_frames(analysed.way, analysed.sharpness, step)
     if len(chosen) < LEAST_FRAMES:
         raise InputError(
-            f"{film}: the picture moves by {float(looked.way[-1]):.2f} of its width in {frames} frames, too little for "
+            f"{film}: the picture moves by {float(analysed.way[-1]):.2f} of its width in {frames} frames, too little for "
             f"{LEAST_FRAMES} photographs {100 * step:.0f} % apart; a model needs a camera that moves"
         )
-    numbers = looked.numbers[chosen]
+    numbers = analysed.numbers[chosen]
     with whole_folder(folder) as temporary:
         _write(film, temporary, {int(n) for n in numbers}, progress, frames)
-    pace = np.gradient(looked.way, looked.numbers / rate) if len(looked.way) > 1 else np.zeros(1)
+    pace = np.gradient(analysed.way, analysed.numbers / rate) if len(analysed.way) > 1 else np.zeros(1)
     motion = float(np.median(pace[chosen])) * max(facts.values())
     return VideoFrames(
         film=film.name,
         **facts,
         frames_per_s=rate,
         frames=frames,
-        looked_at=len(looked.numbers),
+        looked_at=len(analysed.numbers),
         taken=len(chosen),
         blurred=int(blurred.sum()),
         blurred_taken=int(blurred[chosen].sum()),
-        moved_widths=float(looked.way[-1]),
+        moved_widths=float(analysed.way[-1]),
         motion_px_s=motion,
         skew_px=motion * READOUT_S,
         step_share=step,
@@ -152,7 +152,7 @@ def choose_frames(way: Array, sharpness: Array, step: float) -> IntArray:
     """Indices of the sharpest frame of each stretch of movement.
 
     `way`, shape (n,): how far the picture has moved since the first frame; never falls. `sharpness` has shape (n,).
-    `step`: length of a stretch and its pause together, in units of `way`: a frame is looked for within its first half.
+    `step`: length of a stretch and its pause together, in units of `way`: a frame is analysed for within its first half.
     """
     place = (np.asarray(way) - way[0]) / step
     cell = np.floor(place).astype(np.int64)
@@ -197,7 +197,9 @@ def movement(before: Image, after: Image) -> float | None:
     return float(np.median(np.linalg.norm((moved - points).reshape(-1, 2)[good], axis=1)))
 
 
-def _look_through(reader: cv2.VideoCapture, stride: int, told: int, progress: Progress) -> tuple[_Looked, int]:
+def _analyse_frames(
+    reader: cv2.VideoCapture, stride: int, told: int, progress: Progress
+) -> tuple[_FrameStatistics, int]:
     """Every `stride`th frame, and how many frames there are."""
     numbers, sharp, way = [], [], []
     before: Image | None = None
@@ -218,14 +220,16 @@ def _look_through(reader: cv2.VideoCapture, stride: int, told: int, progress: Pr
                 way.append(total)
                 before = grey
         frame += 1
-    return _Looked(numbers=np.array(numbers, dtype=np.int64), sharpness=np.array(sharp), way=np.array(way)), frame
+    return _FrameStatistics(
+        numbers=np.array(numbers, dtype=np.int64), sharpness=np.array(sharp), way=np.array(way)
+    ), frame
 
 
-def _blurred(looked: _Looked, rate: float) -> Any:
+def _blurred(analysed: _FrameStatistics, rate: float) -> Any:
     """Which frames are much less sharp than the sharp ones about them."""
-    time_s = looked.numbers / rate
-    usual = [np.quantile(looked.sharpness[np.abs(time_s - t) <= NEAR_S], 0.8) for t in time_s]
-    return np.asarray(looked.sharpness < BLURRED_SHARE * np.array(usual))
+    time_s = analysed.numbers / rate
+    usual = [np.quantile(analysed.sharpness[np.abs(time_s - t) <= NEAR_S], 0.8) for t in time_s]
+    return np.asarray(analysed.sharpness < BLURRED_SHARE * np.array(usual))
 
 
 def _write(film: Path, folder: Path, numbers: set[int], progress: Progress, frames: int) -> None:
@@ -245,7 +249,7 @@ def _write(film: Path, folder: Path, numbers: set[int], progress: Progress, fram
 
 def _small(image: Image) -> Image:
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    shrink = LOOKED_PX / max(grey.shape)
+    shrink = ANALYSED_PX / max(grey.shape)
     return np.asarray(
         grey if shrink >= 1.0 else cv2.resize(grey, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA),
         dtype=np.uint8,

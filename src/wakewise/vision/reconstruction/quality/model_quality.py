@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.vision.reconstruction.sfm.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.colmap import open_database, pycolmap
 
 GRID = (8, 6)
 """Cells across and down that a photograph is divided into for its coverage."""
@@ -233,11 +233,8 @@ def _agreeing_pct(images: list[pycolmap.Image], database: Path) -> float | None:
     numbers = {image.image_id: image for image in images}
     spots = {image.image_id: np.array([p.xy for p in image.points2D]).reshape(-1, 2) for image in images}
     agree = []
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         pair_ids, geometries = link.read_two_view_geometries()
-    finally:
-        link.close()
     for pair_id, geometry in zip(pair_ids, geometries, strict=True):
         one, two = pycolmap.pair_id_to_image_pair(pair_id)
         matches = np.asarray(geometry.inlier_matches)

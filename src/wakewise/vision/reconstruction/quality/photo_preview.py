@@ -1,7 +1,7 @@
 """A look at photographs before anything long is done with them: sharpness, light, overlap, what to shoot again.
 
 Small copies are matched quickly and roughly (SIFT, epipolar geometry by random samples), which tells neighbours apart
-from strangers; whether a model comes of them, only the model says.
+from without_pose; whether a model comes of them, only the model says.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from wakewise.vision.reconstruction.photos.video_frames import sharpness_of
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.sfm.features import Features, photo_features
 
-LOOKED_PX, MATCHED_PX, FEATURES = 1600, 640, 700
+ANALYSED_PX, MATCHED_PX, FEATURES = 1600, 640, 700
 """Longest side for sharpness and exposure, for matching, and features matched of each photo."""
 MOST_PAIRS, ORDER_NEIGHBOURS = 1600, 4
 """Pairs that are matched: all of them where they are no more, else neighbours in order and those that look alike."""
@@ -116,7 +116,7 @@ def preview_photos(
         for done, one in enumerate(in_order(lambda name: _measured(store.image(name), thumb_px), names, threads)):
             progress(done, 2 * len(names), "photos")
             seen.append(one)
-        pairs = which_pairs(np.array([one.tiny for one in seen]))
+        pairs = preview_pairs(np.array([one.tiny for one in seen]))
         matched: dict[tuple[int, int], IntArray] = {}
         work = in_order(lambda pair: matches(seen[pair[0]].features, seen[pair[1]].features), pairs, threads)
         for done, (pair, rows) in enumerate(zip(pairs, work, strict=True)):
@@ -129,7 +129,7 @@ def preview_photos(
     return look, {name: one.thumb for name, one in zip(names, seen, strict=True)}
 
 
-def which_pairs(tiny: Array) -> list[tuple[int, int]]:
+def preview_pairs(tiny: Array) -> list[tuple[int, int]]:
     """Pairs to match of photos whose tiny copies, shape (n, d), each of unit length, are given."""
     count = len(tiny)
     if count * (count - 1) // 2 <= MOST_PAIRS:
@@ -176,7 +176,7 @@ def matches(one: Features, two: Features) -> IntArray:
 
 
 def _measured(image: Image, thumb_px: int) -> _Seen:
-    grey = np.asarray(cv2.cvtColor(_within(image, LOOKED_PX), cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+    grey = np.asarray(cv2.cvtColor(_within(image, ANALYSED_PX), cv2.COLOR_BGR2GRAY), dtype=np.uint8)
     small = _within(image, MATCHED_PX)
     settings = ReconstructionSettings(max_features=FEATURES, first_octave=0)
     tiny = cv2.resize(small, (12, 9), interpolation=cv2.INTER_AREA).astype(np.float64).ravel()

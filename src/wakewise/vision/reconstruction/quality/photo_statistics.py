@@ -12,7 +12,7 @@ import numpy as np
 from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.errors import InputError, StageError
 from wakewise.vision.reconstruction.photos.lenses import lens_of
-from wakewise.vision.reconstruction.sfm.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.colmap import open_database, pycolmap
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,14 +55,11 @@ def model_facts(model: Path) -> ModelStatistics:
     sparse = pycolmap.Reconstruction(model / "sparse")
     with tempfile.TemporaryDirectory() as scratch:
         # A copy, as even reading makes COLMAP write into it.
-        link = pycolmap.Database.open(shutil.copyfile(model / "database.db", Path(scratch) / "database.db"))
-        try:
+        with open_database(shutil.copyfile(model / "database.db", Path(scratch) / "database.db")) as link:
             listed = sorted(link.read_all_images(), key=lambda image: image.name)
             features = {image.name: link.num_keypoints_for_image(image.image_id) for image in listed}
             cameras = {camera.camera_id: camera for camera in link.read_all_cameras()}
             pair_ids, counts = link.read_two_view_geometry_num_inliers()
-        finally:
-            link.close()
     row = {image.image_id: k for k, image in enumerate(listed)}
     matches = np.zeros((len(listed), len(listed)), dtype=np.int64)
     for pair_id, count in zip(pair_ids, counts, strict=True):

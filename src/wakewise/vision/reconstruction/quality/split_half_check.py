@@ -35,16 +35,16 @@ class GroundPlane:
     def __post_init__(self) -> None:
         freeze(self, origin=(3,), axes=(3, 3))
 
-    def told(self, points: Array) -> Array:
+    def to_plane(self, points: Array) -> Array:
         """Across, along and above, shape (n, 3)."""
         return np.asarray((np.asarray(points) - self.origin) @ self.axes.T)
 
-    def back(self, told: Array) -> Array:
+    def to_model(self, told: Array) -> Array:
         """Points of the model, shape (n, 3)."""
         return np.asarray(np.asarray(told) @ self.axes + self.origin)
 
 
-def level_of(points: Array, eyes: Array) -> GroundPlane:
+def fit_ground_plane(points: Array, eyes: Array) -> GroundPlane:
     """Plane of least squares of points, less those far above or below it, which are the subject's relief.
 
     `points` has shape (n, 3). `eyes`, shape (k, 3): cameras: they are above. Raises StageError if the points lie on a
@@ -111,7 +111,7 @@ def surface_of(path: Path) -> tuple[Array, IntArray]:
 
 def cells_of(vertices: Array, faces: IntArray, level: GroundPlane, cell: float) -> set[tuple[int, int]]:
     """Cells of the plane that middles of triangles lie over."""
-    place = np.floor(level.told(vertices[faces].mean(axis=1))[:, :2] / cell).astype(np.int64)
+    place = np.floor(level.to_plane(vertices[faces].mean(axis=1))[:, :2] / cell).astype(np.int64)
     return {(int(i), int(j)) for i, j in np.unique(place, axis=0)}
 
 
@@ -123,7 +123,7 @@ def extent_over(
     Volume is the flux of (0, 0, height) through what looks up or down of it: what lies above the plane less what lies
     below it, as for a hill on a field.
     """
-    corners = level.told(vertices)[faces]
+    corners = level.to_plane(vertices)[faces]
     place = np.floor(corners.mean(axis=1)[:, :2] / cell).astype(np.int64)
     kept = np.array([(int(i), int(j)) in wanted for i, j in place], dtype=np.bool_)
     corners = corners[kept]
@@ -159,8 +159,8 @@ def measure_halves(
         make(names[k::2], folder, {name: centres[name] for name in names[k::2]})
         surfaces.append(surface_of(folder / "mesh.ply"))
     cloud = read_cloud(model / "dense.ply").points_m
-    level = level_of(cloud, np.array(list(centres.values())))
-    plan = level.told(cloud)[:, :2]
+    level = fit_ground_plane(cloud, np.array(list(centres.values())))
+    plan = level.to_plane(cloud)[:, :2]
     extent = np.subtract(*np.quantile(plan, (0.99, 0.01), axis=0))  # strays aside
     cell = CELL_SPACINGS * float(np.sqrt(extent.prod() / len(plan)))
     covered = [cells_of(*surface, level, cell) for surface in surfaces]

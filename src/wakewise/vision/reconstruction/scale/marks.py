@@ -34,7 +34,7 @@ TRIED, TRIED_PX = 12, 1600
 with: ten families are tried on each."""
 
 
-def find_marks(
+def find_targets(
     store: PhotoStore, names: list[str], wanted: tuple[int, ...], family: str | None, threads: int, progress: Progress
 ) -> tuple[str, Sightings]:
     """The targets' family and where each target of it is seen.

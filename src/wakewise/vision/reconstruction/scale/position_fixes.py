@@ -88,7 +88,7 @@ def _stem(name: str) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Told:
+class _RawFix:
     """What is told of one photo: degrees or metres, and metres down; None where nothing is."""
 
     flat: tuple[float, float] | None = None
@@ -106,7 +106,7 @@ def read_fixes(path: Path) -> PositionFixes:
     say nothing. Raises InputError if it cannot be read, or a row says what cannot be.
     """
     columns = "name, depth_m, lat_deg, lon_deg (or north_m, east_m), sigma_m, depth_sigma_m"
-    told: dict[str, _Told] = {}
+    told: dict[str, _RawFix] = {}
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
@@ -138,7 +138,7 @@ def exif_fixes(folder: Path) -> PositionFixes:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: is no folder of photos, only theirs hold fixes")
-    told: dict[str, _Told] = {}
+    told: dict[str, _RawFix] = {}
     files = photo_files(folder)
     for path in files:
         try:
@@ -155,7 +155,7 @@ def exif_fixes(folder: Path) -> PositionFixes:
     return _flattened(told, str(folder))
 
 
-def exif_place(data: bytes) -> _Told | None:
+def exif_place(data: bytes) -> _RawFix | None:
     """Latitude, longitude and height that an encoded image holds; None where one of them is missing or damaged."""
     from PIL import Image
 
@@ -172,7 +172,7 @@ def exif_place(data: bytes) -> _Told | None:
         return None
     if not (all(map(math.isfinite, (*angles, depth, sigma))) and abs(angles[0]) <= 90.0 and abs(angles[1]) <= 180.0):
         return None
-    return _Told(
+    return _RawFix(
         angles=angles,
         depth_m=depth,
         sigma_m=sigma if sigma > 0.0 else GPS_SIGMA_M,
@@ -187,7 +187,7 @@ def _angle(parts: Any, ref: Any, negative: str) -> float:
     return -size if str(ref).strip("\0 ").upper() == negative else size
 
 
-def _row(where: str, row: Mapping[str, str | None]) -> _Told:
+def _row(where: str, row: Mapping[str, str | None]) -> _RawFix:
     numbers: dict[str, float] = {}
     for column in _NUMBERS:
         words = (row.get(column) or "").strip()
@@ -207,7 +207,7 @@ def _row(where: str, row: Mapping[str, str | None]) -> _Told:
             raise InputError(f"{where}: {column} is {numbers[column]:g}, must be above 0")
     if abs(numbers.get("lat_deg", 0.0)) > 90.0 or abs(numbers.get("lon_deg", 0.0)) > 180.0:
         raise InputError(f"{where}: lat_deg must be within 90 and lon_deg within 180")
-    return _Told(
+    return _RawFix(
         flat=(numbers["north_m"], numbers["east_m"]) if "north_m" in numbers else None,
         angles=(numbers["lat_deg"], numbers["lon_deg"]) if "lat_deg" in numbers else None,
         depth_m=numbers.get("depth_m"),
@@ -216,7 +216,7 @@ def _row(where: str, row: Mapping[str, str | None]) -> _Told:
     )
 
 
-def _flattened(told: Mapping[str, _Told], source: str) -> PositionFixes:
+def _flattened(told: Mapping[str, _RawFix], source: str) -> PositionFixes:
     """All in metres, about the first that has degrees.
 
     Raises InputError if some are in degrees and some in metres, or they lie too far apart.

@@ -19,7 +19,7 @@ from wakewise.vision.evaluation import umeyama
 from wakewise.vision.reconstruction.photos.calibration import CalibrationBoard
 from wakewise.vision.reconstruction.photos.photo_folder import PhotoStore
 from wakewise.vision.reconstruction.scale.bars import BarMeasurement, ScaleBars, fit_scale
-from wakewise.vision.reconstruction.scale.marks import Sightings, TriangulatedPoint, find_board, find_marks, place
+from wakewise.vision.reconstruction.scale.marks import Sightings, TriangulatedPoint, find_board, find_targets, place
 from wakewise.vision.reconstruction.scale.position_fixes import PositionFixes, figures, place_by_fixes, why_unused
 from wakewise.vision.reconstruction.sfm.colmap import pycolmap
 from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto, read_views
@@ -45,7 +45,7 @@ def scale_model(
     measured: list[BarMeasurement] = []
     family, targets = None, {}
     if bars.bars:
-        family, sightings = find_marks(store, names, bars.wanted, bars.family, threads, progress)
+        family, sightings = find_targets(store, names, bars.wanted, bars.family, threads, progress)
         found = {number: _square(views, sightings.get(number, {})) for number in bars.wanted}
         for number in bars.wanted:
             if found[number] is None:

@@ -27,12 +27,13 @@ from wakewise.core.subprocesses import end_process, start_python
 __all__ = [
     "RESERVE_MB",
     "call",
-    "call_apart",
+    "call_in_process",
+    "checkpoint_database",
     "database_folder",
     "keep_sigterm",
     "no_stderr",
+    "open_database",
     "pycolmap",
-    "settle",
     "silence_logging",
 ]
 
@@ -95,7 +96,7 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
                 )
     finally:
         token.cancel()
-        _see_out(thread, ended)
+        _wait_for_end(thread, ended)
     if failure:
         if isinstance(failure[0], OSError):
             raise failure[0]
@@ -104,7 +105,7 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
     return result[0]
 
 
-def call_apart(what: str, function: str, *arguments: Any, watch: Callable[[], None] = lambda: None) -> None:
+def call_in_process(what: str, function: str, *arguments: Any, watch: Callable[[], None] = lambda: None) -> None:
     """Run a function of pycolmap that cannot be cancelled in a process of its own, which an interrupt ends at once.
 
     `what`: name of the stage, for messages. `function`: its name; it takes and leaves files. `arguments`: paths, and
@@ -112,7 +113,7 @@ def call_apart(what: str, function: str, *arguments: Any, watch: Callable[[], No
     """
     order: bytes | None = pickle.dumps((function, arguments))
     # Its own session: a terminal's Ctrl-C goes to whoever waits for it, and that ends it.
-    child = start_python("-c", _APART, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, new_session=True)
+    child = start_python("-c", _CALL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, new_session=True)
     told = b""
     try:
         while True:
@@ -129,7 +130,7 @@ def call_apart(what: str, function: str, *arguments: Any, watch: Callable[[], No
         raise StageError(f"{what}: COLMAP stopped: {' '.join(last[0].split())[:200]}")
 
 
-_APART = """
+_CALL = """
 import pickle, sys
 import pycolmap
 pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
@@ -138,7 +139,17 @@ getattr(pycolmap, function)(*arguments)
 """
 
 
-def _see_out(thread: threading.Thread, ended: threading.Event) -> None:
+@contextmanager
+def open_database(path: str | Path) -> Iterator[pycolmap.Database]:
+    """COLMAP's database, closed at the end of the block."""
+    link = pycolmap.Database.open(path)
+    try:
+        yield link
+    finally:
+        link.close()
+
+
+def _wait_for_end(thread: threading.Thread, ended: threading.Event) -> None:
     """Wait for a cancelled call to come back, however often the user presses Ctrl-C meanwhile."""
     while thread.ident is not None and not ended.is_set():
         with suppress(KeyboardInterrupt):
@@ -184,7 +195,7 @@ def no_stderr() -> Iterator[None]:
         os.close(nowhere)
 
 
-def settle(database: Path) -> None:
+def checkpoint_database(database: Path) -> None:
     """Fold the write-ahead log into the database, so that it is one file and can be renamed."""
     with closing(sqlite3.connect(database)) as link:
         link.execute("PRAGMA wal_checkpoint(TRUNCATE)")

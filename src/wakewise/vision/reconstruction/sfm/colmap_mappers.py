@@ -11,14 +11,14 @@ import numpy as np
 
 from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
-from wakewise.vision.reconstruction.sfm.colmap import call, call_apart, pycolmap
+from wakewise.vision.reconstruction.sfm.colmap import call, call_in_process, open_database, pycolmap
 from wakewise.vision.reconstruction.sfm.features import match_pairs
 from wakewise.vision.reconstruction.sfm.pairs import Pairs, read_descriptors
 
 # Most iterations of a bundle adjustment.
 BUNDLE_ITERATIONS = 100
 GROWTH = 1.4
-SECOND_CHANCES = 1000
+MOST_RETRIED_PAIRS = 1000
 """Most pairs that are matched for photos which found no place: some minutes."""
 NEVER = 2**31 - 1
 
@@ -55,7 +55,7 @@ def solve(
         adjustment.ceres.solver_options.max_num_iterations = BUNDLE_ITERATIONS
         adjustment.refine_focal_length = adjustment.refine_extra_params = settings.refine_camera
         # It takes no cancellation token.
-        call_apart("mapping", "global_mapping", database, folder, out, options, watch=watch)
+        call_in_process("mapping", "global_mapping", database, folder, out, options, watch=watch)
         found = [pycolmap.Reconstruction(path) for path in sorted(out.iterdir()) if (path / "images.bin").is_file()]
         return largest_first(found)
     options = pycolmap.IncrementalPipelineOptions()
@@ -96,36 +96,30 @@ def solve_again(
     """Models after those photos that are not in the largest were matched with others than they have been.
 
     Where all pairs were matched, or none of those that were not verifies, the models are as they were. Those that look
-    most alike are tried first, up to `SECOND_CHANCES` pairs.
+    most alike are tried first, up to `MOST_RETRIED_PAIRS` pairs.
 
     `database`: COLMAP's; what is found is written into it. `models`: from `solve`, the largest first.
     """
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         names = {image.image_id: image.name for image in link.read_all_images()}
         pair_ids, _ = link.read_all_matches()
         before = link.num_inlier_matches()
-    finally:
-        link.close()
     tried = {frozenset(names[k] for k in pycolmap.pair_id_to_image_pair(pair_id)) for pair_id in pair_ids}
     placed = {image.name for image in models[0].images.values() if image.has_pose}
     count = len(names)
     if len(placed) == count or len(tried) == count * (count - 1) // 2:
         return models
-    looks = read_descriptors(database)
-    likeness = looks.likeness()
+    described = read_descriptors(database)
+    likeness = described.likeness()
     one, two = np.triu_indices(count, 1)
     pairs: Pairs = []
     for k in np.argsort(-likeness[one, two], kind="stable").tolist():
-        pair = looks.names[one[k]], looks.names[two[k]]
+        pair = described.names[one[k]], described.names[two[k]]
         if (pair[0] not in placed or pair[1] not in placed) and frozenset(pair) not in tried:
             pairs.append(pair)
-    match_pairs(database, settings, pairs[:SECOND_CHANCES], progress)
-    link = pycolmap.Database.open(database)
-    try:
+    match_pairs(database, settings, pairs[:MOST_RETRIED_PAIRS], progress)
+    with open_database(database) as link:
         more = link.num_inlier_matches() > before
-    finally:
-        link.close()
     if not more:
         return models
     again = solve(folder, database, scratch, settings, count, progress)

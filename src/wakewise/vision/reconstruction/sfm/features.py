@@ -31,7 +31,13 @@ from wakewise.vision.reconstruction.photos.lenses import Lens
 from wakewise.vision.reconstruction.photos.masks import write_for_colmap
 from wakewise.vision.reconstruction.photos.photo_folder import Image, Photo, PhotoStore
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
-from wakewise.vision.reconstruction.sfm.colmap import call, database_folder, pycolmap, settle
+from wakewise.vision.reconstruction.sfm.colmap import (
+    call,
+    checkpoint_database,
+    database_folder,
+    open_database,
+    pycolmap,
+)
 from wakewise.vision.reconstruction.sfm.guided_matching import Poses, match_by_poses
 from wakewise.vision.reconstruction.sfm.pairs import Pairs, read_descriptors, retrieve_pairs
 
@@ -138,7 +144,7 @@ def match_photos(
     poses: Poses | None = None,
     groups: tuple[LensGroup, ...] | None = None,
     may_be_none: bool = False,
-    look_alikes: int = 0,
+    retrieved: int = 0,
 ) -> dict[str, Any]:
     """Find SIFT features, match and verify; write COLMAP's database whole.
 
@@ -147,7 +153,7 @@ def match_photos(
     them all, instead of a focal length. `groups`: which photos share a lens; found from the photos if not given.
     `poses`: rough R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name: pairs are matched along epipolar lines
     first, and only those that do not verify among all features. `may_be_none`: whether it is no failure that nothing
-    matches, as where the cameras are known. `look_alikes`: with how many others each is matched besides, because they
+    matches, as where the cameras are known. `retrieved`: with how many others each is matched besides, because they
     look alike. Returns features_per_image, inlier_matches (verified, all pairs together), verified_pairs, pairs,
     posed_pairs (those verified along epipolar lines). Raises InputError if a pair names a photo that is not there;
     StageError if no pair of photos could be verified.
@@ -155,7 +161,7 @@ def match_photos(
     names = [photo.name for photo in photos]
     _check_pairs(names, pairs)
     pycolmap.set_random_seed(RANDOM_SEED)
-    size = database_bytes(len(photos), len(pairs) + look_alikes * len(photos), settings)
+    size = database_bytes(len(photos), len(pairs) + retrieved * len(photos), settings)
     with whole_file(database) as whole, database_folder(database, size) as room:
         work = room / "database.db"
         work.touch()
@@ -163,12 +169,12 @@ def match_photos(
         store = store or PhotoStore(folder)
         _extract(store, lenses, work, settings, focal_px, progress, room)
         _check_all_there(work, folder, names)
-        if look_alikes:
-            pairs = sorted({*pairs, *retrieve_pairs(read_descriptors(work), look_alikes)})
+        if retrieved:
+            pairs = sorted({*pairs, *retrieve_pairs(read_descriptors(work), retrieved)})
         left = pairs if poses is None else match_by_poses(work, pairs, poses, settings.threads, progress)
         match_pairs(work, settings, left, progress)
         figures = _figures(work, len(photos)) | {"pairs": len(pairs), "posed_pairs": len(pairs) - len(left)}
-        settle(work)
+        checkpoint_database(work)
         shutil.copyfile(work, whole)
         if figures["inlier_matches"] == 0 and not may_be_none:
             count = figures["features_per_image"]
@@ -190,11 +196,8 @@ def database_bytes(photos: int, pairs: int, settings: ReconstructionSettings) ->
 
 
 def _check_all_there(database: Path, folder: Path, names: list[str]) -> None:
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         known = {image.name for image in link.read_all_images()}
-    finally:
-        link.close()
     for name in names:
         if name not in known:
             raise StageError(f"features: COLMAP cannot read {folder / name}; save it anew as PNG or remove it")
@@ -270,15 +273,12 @@ def _by_opencv(
     for k, features in enumerate(folder_features(store, names, settings)):
         tell(k)
         found.append(features if store.masks is None else within(features, store.masks.of(names[k])))
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         for name, features in zip(names, found, strict=True):
             image_id = link.read_image_with_name(name).image_id
             link.write_keypoints(image_id, features.keypoints)
             kind = pycolmap.FeatureExtractorType.SIFT
             link.write_descriptors(image_id, pycolmap.FeatureDescriptors(kind, features.descriptors))
-    finally:
-        link.close()
 
 
 def _by_colmap(
@@ -365,15 +365,12 @@ def match_pairs(
 
 def _renamed(database: Path, name: Callable[[pycolmap.Image], str]) -> dict[str, str]:
     """Give every photo of the database another name; the new ones by the old ones."""
-    link = pycolmap.Database.open(database)
     out = {}
-    try:
+    with open_database(database) as link:
         for image in link.read_all_images():
             out[image.name] = name(image)
             image.name = out[image.name]
             link.update_image(image)
-    finally:
-        link.close()
     return out
 
 
@@ -388,12 +385,9 @@ def _batches(items: list[T], count: int) -> list[list[T]]:
 
 
 def _figures(database: Path, photos: int) -> dict[str, Any]:
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         return {
             "features_per_image": link.num_keypoints() / photos,
             "inlier_matches": int(link.num_inlier_matches()),
             "verified_pairs": int(np.count_nonzero(link.read_two_view_geometry_num_inliers()[1])),
         }
-    finally:
-        link.close()

@@ -21,7 +21,7 @@ from wakewise.core.geometry import matrix_from_quat, quat_from_rotvec, skew
 from wakewise.core.interfaces import Progress
 from wakewise.core.jit.njit import njit
 from wakewise.core.threads import in_order
-from wakewise.vision.reconstruction.sfm.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.colmap import open_database, pycolmap
 from wakewise.vision.reconstruction.sfm.pairs import Pairs
 
 BAND_RAD = 0.04
@@ -86,22 +86,19 @@ def match_by_poses(
     `poses`: R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name; a pair without both is returned. `most_bytes`:
     of descriptors in memory; where there are more, all pairs are returned.
     """
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         images = {image.name: image for image in link.read_all_images() if image.name in poses}
         cameras = {camera.camera_id: camera for camera in link.read_all_cameras()}
         if 128.0 * link.num_descriptors() > most_bytes:
             return pairs
-        looked = {name: _spots(link, image, cameras[image.camera_id]) for name, image in images.items()}
-    finally:
-        link.close()
-    spots = {name: spot for name, spot in looked.items() if spot is not None}
+        read = {name: _rays_of_features(link, image, cameras[image.camera_id]) for name, image in images.items()}
+    features = {name: rays for name, rays in read.items() if rays is not None}
     focal = {name: cameras[image.camera_id].mean_focal_length() for name, image in images.items()}
 
     def one(pair: tuple[str, str]) -> tuple[IntArray, RelativePose] | None:
-        if pair[0] not in spots or pair[1] not in spots:
+        if pair[0] not in features or pair[1] not in features:
             return None
-        a, b = (spots[name] for name in pair)
+        a, b = (features[name] for name in pair)
         pose = RelativePose.between(*poses[pair[0]], *poses[pair[1]])
         if pose is None:
             return None
@@ -113,17 +110,14 @@ def match_by_poses(
     for done, result in enumerate(in_order(one, pairs, threads)):
         progress(done, len(pairs), "matches along epipolar lines")
         found.append(result)
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         for pair, result in zip(pairs, found, strict=True):
             if result is not None:
                 _write(link, images[pair[0]].image_id, images[pair[1]].image_id, *result)
-    finally:
-        link.close()
     return [pair for pair, result in zip(pairs, found, strict=True) if result is None]
 
 
-def _spots(link: pycolmap.Database, image: pycolmap.Image, camera: pycolmap.Camera) -> PhotoFeatures | None:
+def _rays_of_features(link: pycolmap.Database, image: pycolmap.Image, camera: pycolmap.Camera) -> PhotoFeatures | None:
     """Features of a photo as rays; None where the lens has no ray for one of them."""
     places = np.asarray(link.read_keypoints(image.image_id), dtype=np.float64)[:, :2].reshape(-1, 2)
     xy = np.asarray(camera.cam_from_img(places)).reshape(-1, 2)

@@ -16,7 +16,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import StageError
 from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.settings import RANDOM_SEED
-from wakewise.vision.reconstruction.sfm.colmap import pycolmap, silence_logging
+from wakewise.vision.reconstruction.sfm.colmap import open_database, pycolmap, silence_logging
 from wakewise.vision.reconstruction.sfm.guided_matching import Poses
 from wakewise.vision.reconstruction.sfm.registered_photos import MIN_SHARED, RegionOfInterest
 
@@ -43,14 +43,11 @@ def map_at_poses(database: Path, poses: Poses, photos: int, progress: Progress) 
     by photo name; a photo without one is left out. `photos`: how many there are, for the progress.
     """
     silence_logging()
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         options = pycolmap.DatabaseCacheOptions()
         options.min_num_matches = 15
         options.load_all_images = True
         cache = pycolmap.DatabaseCache.create(link, options)
-    finally:
-        link.close()
     mapper, model = pycolmap.IncrementalMapper(cache), pycolmap.Reconstruction()
     mapper.begin_reconstruction(model)
     manager = mapper.observation_manager

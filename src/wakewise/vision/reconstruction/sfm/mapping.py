@@ -25,7 +25,14 @@ from wakewise.vision.reconstruction.quality.model_quality import (
     registration_warnings,
 )
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
-from wakewise.vision.reconstruction.sfm.colmap import call, database_folder, no_stderr, pycolmap, settle
+from wakewise.vision.reconstruction.sfm.colmap import (
+    call,
+    checkpoint_database,
+    database_folder,
+    no_stderr,
+    open_database,
+    pycolmap,
+)
 from wakewise.vision.reconstruction.sfm.colmap_mappers import BUNDLE_ITERATIONS, NEVER, solve, solve_again
 from wakewise.vision.reconstruction.sfm.guided_matching import Poses
 from wakewise.vision.reconstruction.sfm.known_pose_triangulation import map_at_poses
@@ -40,7 +47,7 @@ from wakewise.vision.reconstruction.sfm.prior_pose_mapping import SeededModel, m
 
 # Fewer registered photos are a failure; of fewer, lenses are not looked into.
 MIN_REGISTERED, LEAST_FOR_CHECK = 3, 5
-MOST_OPINION_PCT, MOST_FOCAL_RATIO, MOST_FOCAL_SPREAD_PCT = 10.0, 1.05, 5.0
+MOST_SHIFT_PCT, MOST_FOCAL_RATIO, MOST_FOCAL_SPREAD_PCT = 10.0, 1.05, 5.0
 """What a lens of its own for each photo may change: camera places in percent of their spread, focal lengths."""
 # Largest reprojection errors that are let pass, one after the other, until the mean is small enough (COLMAP's own: 4).
 CUTS_PX = (2.0, 1.5, 1.0, 0.75)
@@ -130,10 +137,10 @@ def map_photos(
         cut_pct = 100.0 * (1.0 - model.compute_num_observations() / max(before, 1))
         found = evidence(model, copy)
         left = unregistered_photos(model, copy)
-    opinion_pct = None if own is None else _second_opinion_pct(model, own)
+    shift_pct = None if own is None else _camera_shift_pct(model, own)
     if given is None:
         wrong = registration_warnings(registered, photos) + quality_warnings(found, uncut_px=uncut_px, cut_pct=cut_pct)
-        wrong += lens_warnings(model, own, opinion_pct)
+        wrong += lens_warnings(model, own, shift_pct)
     else:
         wrong = known_pose_warnings(found, error_px=uncut_px, kept_pct=given.kept_pct)
     figures: dict[str, Any] = {
@@ -161,9 +168,9 @@ def map_photos(
         "reprojection_uncut_px": uncut_px,
         "cut_pct": cut_pct,
         "reprojection_met": not wrong,
-        "doubts": wrong,
+        "warnings": wrong,
         **asdict(found),
-        "second_opinion_pct": opinion_pct,
+        "second_opinion_pct": shift_pct,
         "lenses": _lenses(model),
         "lenses_split": regrouped is not None,
         "left_out": left,
@@ -181,12 +188,9 @@ def _by_own_lens(database: Path, own: PerPhotoIntrinsics) -> list[tuple[tuple[st
 
     Of a lens that was split, a photo that has no focal length of its own is of none of the parts: it gets its own.
     """
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         cameras = {camera.camera_id: camera for camera in link.read_all_cameras()}
         images = link.read_all_images()
-    finally:
-        link.close()
     out = []
     for number, camera in cameras.items():
         names = [image.name for image in images if image.camera_id == number]
@@ -197,7 +201,7 @@ def _by_own_lens(database: Path, own: PerPhotoIntrinsics) -> list[tuple[tuple[st
     return out or None
 
 
-def _second_opinion_pct(model: pycolmap.Reconstruction, own: PerPhotoIntrinsics) -> float | None:
+def _camera_shift_pct(model: pycolmap.Reconstruction, own: PerPhotoIntrinsics) -> float | None:
     """How far cameras are from where they are with a lens for each photo, rms, in percent of their spread."""
     mine = {image.name: image.projection_center() for image in model.images.values() if image.has_pose}
     both = sorted(mine.keys() & own.centres.keys())
@@ -212,17 +216,15 @@ def _second_opinion_pct(model: pycolmap.Reconstruction, own: PerPhotoIntrinsics)
     return 100.0 * float(np.sqrt((error**2).mean()) / np.sqrt(((b - b.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 
-def lens_warnings(
-    model: pycolmap.Reconstruction, own: PerPhotoIntrinsics | None, opinion_pct: float | None
-) -> list[str]:
+def lens_warnings(model: pycolmap.Reconstruction, own: PerPhotoIntrinsics | None, shift_pct: float | None) -> list[str]:
     """Reasons not to trust a model that come from mapping with a lens for each photo."""
     if own is None:
         return []
     out = []
-    if opinion_pct is not None and opinion_pct > MOST_OPINION_PCT:
+    if shift_pct is not None and shift_pct > MOST_SHIFT_PCT:
         out.append(
-            f"with a lens for each photo the cameras come out {opinion_pct:.0f} % of their spread elsewhere, "
-            f"{MOST_OPINION_PCT:g} % is sound: several lenses, or photos that do not tell the lens"
+            f"with a lens for each photo the cameras come out {shift_pct:.0f} % of their spread elsewhere, "
+            f"{MOST_SHIFT_PCT:g} % is sound: several lenses, or photos that do not tell the lens"
         )
     for camera in model.cameras.values():
         names = [i.name for i in model.images.values() if i.camera_id == camera.camera_id and i.name in own.lenses]
@@ -252,12 +254,9 @@ def _lenses(model: pycolmap.Reconstruction) -> list[dict[str, Any]]:
 def unregistered_photos(model: pycolmap.Reconstruction, database: Path) -> list[dict[str, Any]]:
     """Each photo that found no place, with the photo that it shares most verified matches with."""
     placed = {image.name for image in model.images.values() if image.has_pose}
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         names = {image.image_id: image.name for image in link.read_all_images()}
         pair_ids, counts = link.read_two_view_geometry_num_inliers()
-    finally:
-        link.close()
     best: dict[str, tuple[int, str]] = {name: (0, "") for name in names.values() if name not in placed}
     for pair_id, count in zip(pair_ids, counts, strict=True):
         one, two = (names[number] for number in pycolmap.pair_id_to_image_pair(pair_id))
@@ -269,8 +268,7 @@ def unregistered_photos(model: pycolmap.Reconstruction, database: Path) -> list[
 
 def _write_priors(database: Path, references: dict[str, Array], sigma_m: float) -> None:
     """Put known camera positions into a database that is then mapped."""
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         for image in link.read_all_images():
             if image.name in references:
                 prior = pycolmap.PosePrior()
@@ -279,9 +277,7 @@ def _write_priors(database: Path, references: dict[str, Array], sigma_m: float) 
                 prior.position_covariance = sigma_m**2 * np.eye(3)
                 prior.coordinate_system = pycolmap.PosePriorCoordinateSystem.CARTESIAN
                 link.write_pose_prior(prior)
-    finally:
-        link.close()
-    settle(database)
+    checkpoint_database(database)
 
 
 def _tighten(model: pycolmap.Reconstruction, settings: ReconstructionSettings) -> None:

@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.errors import InputError
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
-from wakewise.vision.reconstruction.sfm.colmap import pycolmap
+from wakewise.vision.reconstruction.sfm.colmap import open_database
 
 Pairs = list[tuple[str, str]]
 # Views whose axes differ by more hardly share a SIFT match (Mikolajczyk & Schmid 2005, doi 10.1109/TPAMI.2005.188).
@@ -112,8 +112,8 @@ SAMPLE, MOST_FEATURES = 20_000, 2_000
 """Descriptors that the words are learnt from, and most of a photograph that count."""
 Descriptors = NDArray[np.uint8]
 Singles = NDArray[np.float32]
-LOOK_ALIKES = 20
-"""Photographs that each is matched with for its looks."""
+RETRIEVED_NEIGHBOURS = 20
+"""Photographs that each is matched with for its described."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -135,28 +135,25 @@ class ImageDescriptors:
 
 def read_descriptors(database: Path) -> ImageDescriptors:
     """Looks of every photograph in COLMAP's database."""
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         images = sorted(link.read_all_images(), key=lambda image: image.name)
         described = [
             np.asarray(link.read_descriptors(image.image_id).data, dtype=np.uint8).reshape(-1, 128)[:MOST_FEATURES]
             for image in images
         ]
-    finally:
-        link.close()
     words = learn_words(np.concatenate(described), np.random.default_rng(RANDOM_SEED))
     vectors = np.array([describe(one, words) for one in described])
     return ImageDescriptors(names=tuple(image.name for image in images), vectors=vectors)
 
 
-def retrieve_pairs(looks: ImageDescriptors, most: int = LOOK_ALIKES) -> Pairs:
+def retrieve_pairs(described: ImageDescriptors, most: int = RETRIEVED_NEIGHBOURS) -> Pairs:
     """Each photograph with those that look most like it."""
-    likeness = looks.likeness()
+    likeness = described.likeness()
     found = set()
     for i, row in enumerate(likeness):
-        for j in np.argsort(-row, kind="stable")[: min(most, len(looks.names) - 1)].tolist():
+        for j in np.argsort(-row, kind="stable")[: min(most, len(described.names) - 1)].tolist():
             found.add((min(i, j), max(i, j)))
-    return [(looks.names[a], looks.names[b]) for a, b in sorted(found)]
+    return [(described.names[a], described.names[b]) for a, b in sorted(found)]
 
 
 def learn_words(descriptors: Descriptors, rng: np.random.Generator) -> Singles:

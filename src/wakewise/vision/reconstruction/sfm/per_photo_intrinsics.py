@@ -17,7 +17,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
-from wakewise.vision.reconstruction.sfm.colmap import pycolmap, settle
+from wakewise.vision.reconstruction.sfm.colmap import checkpoint_database, open_database, pycolmap
 from wakewise.vision.reconstruction.sfm.colmap_mappers import solve
 
 LEAST_POINTS, LEAST_PHOTOS = 40, 3
@@ -53,12 +53,9 @@ def fit_per_photo_intrinsics(
     Raises StageError if COLMAP fails.
     """
     copy = Path(shutil.copyfile(database, scratch / "own.db"))
-    link = pycolmap.Database.open(copy)
-    try:
+    with open_database(copy) as link:
         cameras = {camera.camera_id: camera for camera in link.read_all_cameras()}
         images = {image.name: image.camera_id for image in link.read_all_images()}
-    finally:
-        link.close()
     set_cameras(copy, [((name,), cameras[number]) for name, number in images.items()])
     free = settings.model_copy(update={"refine_camera": True, "mapper": "incremental", "position_priors": False})
     found: dict[str, PhotoIntrinsics] = {}
@@ -77,8 +74,7 @@ def fit_per_photo_intrinsics(
 
 def set_cameras(database: Path, groups: list[tuple[tuple[str, ...], pycolmap.Camera]]) -> None:
     """Give each group of photos, by name, a camera of its own that begins as the given one is."""
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         images = {image.name: image for image in link.read_all_images()}
         frames = {frame.frame_id: frame for frame in link.read_all_frames()}
         for names, camera in groups:
@@ -95,9 +91,7 @@ def set_cameras(database: Path, groups: list[tuple[tuple[str, ...], pycolmap.Cam
                 link.update_frame(frame)
                 image.camera_id = number
                 link.update_image(image)
-    finally:
-        link.close()
-    settle(database)
+    checkpoint_database(database)
 
 
 def _like(camera: pycolmap.Camera) -> pycolmap.Camera:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
-from wakewise.vision.reconstruction.sfm.colmap import call, no_stderr, pycolmap, silence_logging
+from wakewise.vision.reconstruction.sfm.colmap import call, no_stderr, open_database, pycolmap, silence_logging
 from wakewise.vision.reconstruction.sfm.guided_matching import Poses
 
 ROUGH_ANGLE_DEG, ROUGH_PX = 3.0, 40.0
@@ -51,18 +51,17 @@ def map_from_poses(
     COLMAP fails.
     """
     silence_logging()
-    link = pycolmap.Database.open(database)
-    try:
+    with open_database(database) as link:
         options = pycolmap.DatabaseCacheOptions()
         options.min_num_matches = 15
         cache = pycolmap.DatabaseCache.create(link, options)
-    finally:
-        link.close()
     graph = cache.correspondence_graph
     matched = {number: graph.num_observations_for_image(number) for number in cache.images}
-    strangers = [image.name for n, image in cache.images.items() if matched[n] and image.name not in poses]
-    if strangers:
-        return SeededModel(model=None, refusal=f"{len(strangers)} photos have no known pose, such as {strangers[0]}")
+    without_pose = [image.name for n, image in cache.images.items() if matched[n] and image.name not in poses]
+    if without_pose:
+        return SeededModel(
+            model=None, refusal=f"{len(without_pose)} photos have no known pose, such as {without_pose[0]}"
+        )
     mapper, model = pycolmap.IncrementalMapper(cache), pycolmap.Reconstruction()
     mapper.begin_reconstruction(model)
     manager = mapper.observation_manager
