@@ -51,7 +51,7 @@ def hover_and_arc(parts: Parts, about: str = "true") -> Parts:
     """
     mission = parts.scenario.mission
     elevations = sorted(mission.elevations_deg)
-    target = parts.target if about == "true" else parts.found_target
+    target = parts.target if about == "true" else parts.surveyed_target
     route = gentle_route(
         target.centre_W_m,
         mission.standoff_m,
@@ -63,7 +63,7 @@ def hover_and_arc(parts: Parts, about: str = "true") -> Parts:
 
 def station(parts: Parts) -> Parts:
     """Hold one view of the target from above for three minutes, from a side that the seed draws."""
-    target = parts.found_target
+    target = parts.surveyed_target
     return parts.replace(route=station_route(target, target.centre_W_m, azimuth_of(parts.scenario.seed)))
 
 

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from wakewise_paper.reproduction.claim import TABLES, UNQUOTED, PublishedFigure
-from wakewise_paper.reproduction.published_tables import CLAIMS, UNKNOWN
+from wakewise_paper.reproduction.claim import CLAIMS, TABLES, UNKNOWN, UNQUOTED, PublishedFigure
 
 EVERY = [(name, claim) for name, claims in CLAIMS.items() for claim in claims]
 

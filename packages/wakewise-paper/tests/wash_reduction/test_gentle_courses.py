@@ -24,7 +24,7 @@ VEHICLE = load_vehicle("paper")
 def test_every_course_clears_floor_target_and_surface(name, vehicle):
     """By the clearance of a mission, on one seed of each."""
     parts = parts_of(f"{name}/{vehicle}", "dp", 1)
-    mesh = parts.found_target.mesh.vertices_m
+    mesh = parts.surveyed_target.mesh.vertices_m
     assert check_clearance(parts.route, parts.aim, parts.vehicle.size_m, parts.bounds, mesh, CLEARANCE_M) >= CLEARANCE_M
 
 
@@ -42,11 +42,11 @@ def test_a_station_is_held_for_three_minutes_above_the_target():
     """The camera is 0.2 m above the target's top and looks at its centre."""
     parts = parts_of("station/paper", "dp", 1)
     X_WC, velocity, _ = parts.route.camera(100.0)
-    top = parts.found_target.mesh.vertices_m[:, 2].min()
+    top = parts.surveyed_target.mesh.vertices_m[:, 2].min()
     assert top - X_WC.p_m[2] == pytest.approx(0.2) and not velocity.any()
     assert parts.route.duration_s - parts.route.starts_s[0] > 180.0
     ahead = X_WC.R[:, 2]
-    way = parts.found_target.centre_W_m - X_WC.p_m
+    way = parts.surveyed_target.centre_W_m - X_WC.p_m
     assert ahead @ way == pytest.approx(np.linalg.norm(way))
 
 
@@ -54,7 +54,7 @@ def test_a_station_is_held_for_three_minutes_above_the_target():
 def test_a_transect_goes_straight_over_the_target_with_the_camera_down(vehicle):
     """Level body, camera down, over the centre half way, at the altitude drawn; its twist is that of the way."""
     parts = parts_of(f"nadir/{vehicle}", "dp", 1)
-    route, target = parts.route, parts.found_target
+    route, target = parts.route, parts.surveyed_target
     middle = float(route.starts_s[0] + 0.5 * route.legs[0].duration_s)
     X_WC, velocity, omega = route.camera(middle)
     np.testing.assert_allclose(X_WC.p_m[:2], target.centre_W_m[:2], atol=1e-9)
@@ -78,7 +78,7 @@ def test_braking_ends_at_rest_before_the_target():
     ]
     assert at == pytest.approx([0.3, 0.0], abs=1e-9)
     X_WC, _, _ = parts.route.camera(float(parts.route.starts_s[1]) + 1.0)
-    assert np.linalg.norm(X_WC.p_m - parts.found_target.centre_W_m) == pytest.approx(0.4)
+    assert np.linalg.norm(X_WC.p_m - parts.surveyed_target.centre_W_m) == pytest.approx(0.4)
 
 
 def test_a_route_that_is_held_waits_and_photographs_nothing():

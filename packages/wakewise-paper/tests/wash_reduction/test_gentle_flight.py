@@ -48,4 +48,4 @@ def test_a_float_changes_the_true_vehicle_alone():
     assert net_buoyancy_N(after) - net_buoyancy_N(before) == pytest.approx(2.5)
     assert after.mass_kg > before.mass_kg  # foam weighs, too
     assert light.vehicle.displaced_volume_m3 == parts.vehicle.displaced_volume_m3
-    assert light.from_outside == parts.from_outside
+    assert light.external_parts == parts.external_parts

@@ -15,7 +15,7 @@ DURATION_S, FROM_S = 14.0, 6.0
 def hover(method):
     """Figures of a hover of the paper's vehicle, 5 N heavy, half a metre from the target in the plain tank."""
     parts = Scenario(method=method, seed=2).replace(**{"tank.mismatch.trim_N": -5.0}).parts()
-    parts = parts.replace(route=gentle_route(parts.found_target.centre_W_m, STANDOFF_M, 0.6))
+    parts = parts.replace(route=gentle_route(parts.surveyed_target.centre_W_m, STANDOFF_M, 0.6))
     steps = fly(parts, checked=False, duration_s=DURATION_S, water_every_s=0.25).steps
     judged = steps.filter(pl.col("time_s") >= FROM_S)
     return flight_figures(judged) | camera_errors(judged, parts.vehicle)

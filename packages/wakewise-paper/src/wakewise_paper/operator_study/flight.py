@@ -248,7 +248,7 @@ def operated(parts: Parts, world: str, pilot: str, seed: int, w_track: float) ->
     `ControllerProbe`.
     """
     water = water_of(world, seed)
-    course, target = COURSES[course_of(world, pilot, seed)], parts.found_target
+    course, target = COURSES[course_of(world, pilot, seed)], parts.surveyed_target
     standoff_m = parts.scenario.mission.standoff_m
     dt_s, hands = 1.0 / parts.control.rate_hz, None
     if pilot == "human":

@@ -1,19 +1,16 @@
-"""What one figure of the paper's tables is, as data: its value where it is known here, its side, how we measure it.
+"""What the paper says (`published.yaml`), what each of its tables is judged by, and how many of its figures are met.
 
-The paper: Y. Gao, T. Xu, Q. Liu and Y. Cai, Disturbance-Aware Motion Planning for Over-Actuated Underwater Vehicles
-Exploiting Actuation Redundancy for High-Fidelity 3D Reconstruction (2026). Its figures stand here by section or table;
-a number that it does not give, or that is not quoted, is None and said so, never guessed. `than` names the method
-against which a claim is a difference.
-
-What each of the paper's tables is judged by, and how many of its figures are met.
+A number that the paper does not give, or that is not quoted, is None and said so, never guessed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import resources
 from typing import Any, Literal
 
+from wakewise.core.safe_yaml import read_yaml
 from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place, summarize
 
 Reading = Literal["mean", "less_pct", "share_pct", "order", "spread_pct"]
@@ -21,7 +18,6 @@ Reading = Literal["mean", "less_pct", "share_pct", "order", "spread_pct"]
 the order of the methods; how much repeats of one thing differ (coefficient of variation)."""
 Side = Literal["less", "more", "none"]
 
-UNQUOTED = "not quoted here"
 TABLES: dict[str, str] = {
     "dynamic": "models while flying round, by hand, by plans that do not know their wash, and by ours",
     "success": "models that succeed, over varied starts, angles and command patterns",
@@ -37,38 +33,20 @@ TABLES: dict[str, str] = {
 }
 """Tables in the order of `all`, and what each is about."""
 
-OURS = "wake-aware"
 ORDER = ("manual", "mpc", "mpc-smooth", "wake-aware")
 """The paper's order by RMSE, the worst first."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PublishedFigure:
-    """One figure of a table.
+    """One figure of a table of the paper.
 
-    Parameters
-    ----------
-    method, figure : str
-        Whose it is, and the key of a trial's figures.
-    title, unit : str
-    paper : float or None
-        The paper's value in that unit; None where it is not known here.
-    said : str
-        The claim in words.
-    side : Side
-        Which side of the paper's value, or of `asked`, is as good: at most ("less"), at least ("more"); "none" where
-        the figure only says how it was.
-    asked : float or None
-        What is asked where the paper's number is not known but its direction is.
-    than : str or None
-        Of "less_pct": the method that it is held against.
-    reading : Reading
-    scale : float
-        From the trial's unit to this one.
-    how : str
-        How it is measured here.
-    itt : bool
-        Trials that failed count as the worst; else they are left out, as in the paper.
+    `method` and `figure` (a key of a trial's figures) say whose it is. `paper` is the value in `unit`, None where
+    it is not known here; `where` is its section or table; `said` is the claim in words. `side` is which side of the
+    paper's value, or of `asked`, is as good: at most ("less"), at least ("more"); "none" where the figure only says how
+    it was. `asked` is what is asked where the paper's number is not known but its direction is; `than` names the method
+    of a "less_pct". `scale` is from the trial's unit to this one; `how` is how it is measured here. `itt`: trials that
+    failed count as the worst; else they are left out, as in the paper.
     """
 
     method: str
@@ -79,6 +57,7 @@ class PublishedFigure:
     said: str
     side: Side
     how: str
+    where: str = ""
     asked: float | None = None
     than: str | None = None
     reading: Reading = "mean"
@@ -97,100 +76,46 @@ class PublishedFigure:
         return value <= self.bar if self.side == "less" else value >= self.bar
 
 
-RMSE = "distance of the model's points from the truth, rms, each capped at 20 mm, after rigid alignment"
-COMPLETE = "share of the whole surface with a point of the model within 3 mm"
-WASH = (
-    "speed of the water at the target's surface in excess of the same water without the vehicle, mean over the flight"
-)
-SUCCESS = "rmse below 3 mm and completeness above 85 %"
-"""What counts as a success."""
+def read_claims(tree: Mapping[str, Any]) -> dict[str, tuple[PublishedFigure, ...]]:
+    """Claims by table, from the values of `published.yaml`, which says how they are written."""
+    hows: Mapping[str, str] = tree["hows"]
+    return {
+        table: tuple(_claim(one, hows, tree["unquoted"]) for entry in entries for one in _expanded(entry))
+        for table, entries in tree["tables"].items()
+    }
 
 
-def model_claims(paper_rmse: dict[str, float | None], paper_complete: dict[str, float | None]) -> list[PublishedFigure]:
-    """RMSE, failed trials left out and counted as 20 mm, and completeness of each method.
-
-    Only ours is held against the paper's: a rival that is better here than there meets no claim.
-    """
-    claims: list[PublishedFigure] = []
-    for method, value in paper_rmse.items():
-        said = UNQUOTED if value is None else f"RMSE {value:g} mm"
-        judged = value is not None and method == OURS
-        for itt in (False, True):
-            words = "RMSE, failed trials 20 mm" if itt else "RMSE of models that were made"
-            claims.append(
-                PublishedFigure(
-                    method=method,
-                    figure="rmse_mm",
-                    title=words,
-                    unit="mm",
-                    paper=None if itt else value,
-                    asked=value if itt and judged else None,
-                    said=f"{said}; the paper leaves failures out" if itt else said,
-                    side="less" if judged else "none",
-                    how=RMSE,
-                    itt=itt,
-                )
-            )
-        share = paper_complete.get(method)
-        claims.append(
-            PublishedFigure(
-                method=method,
-                figure="completeness_pct",
-                title="completeness",
-                unit="%",
-                paper=share,
-                said=UNQUOTED if share is None else f"{share:g} % of the surface",
-                side="more" if share is not None and method == OURS else "none",
-                how=COMPLETE,
-            )
-        )
-    return claims
-
-
-def less(
-    figure: str,
-    title: str,
-    than: str,
-    paper: float | None,
-    said: str,
-    how: str,
-    *,
-    asked: float | None = None,
-    method: str = "wake-aware",
-) -> PublishedFigure:
-    """How much less a figure is than another method's, in percent."""
-    return PublishedFigure(
-        method=method,
-        figure=figure,
-        title=f"{title}, less than {than}",
-        unit="%",
-        paper=paper,
-        said=said,
-        side="none" if paper is None and asked is None else "more",
-        asked=asked,
-        than=than,
-        reading="less_pct",
-        how=f"{how}; ratio of the means over pairs of one seed",
-    )
-
-
-def washes(methods: tuple[str, ...]) -> list[PublishedFigure]:
-    """The wash itself, whose size says whether there is anything to take away."""
+def _expanded(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """An entry, or the claims that it repeats for each value of a field."""
+    if "each" not in entry:
+        return [dict(entry)]
+    ((field, values),) = entry["each"].items()
     return [
-        PublishedFigure(
-            method=method,
-            figure="target_speed_mean_m_s",
-            title="wash at the target",
-            unit="mm/s",
-            paper=None,
-            said="180 and 60 mm/s by its PIV, see flow",
-            side="none",
-            scale=1e3,
-            how=WASH,
-        )
-        for method in methods
+        {key: told.get(value) if isinstance(told, dict) else told for key, told in claim.items()} | {field: value}
+        for value in values
+        for claim in entry["claims"]
     ]
 
+
+def _claim(entry: Mapping[str, Any], hows: Mapping[str, str], unquoted: str) -> PublishedFigure:
+    told = {"method": "wake-aware", "unit": "", "side": "none", "said": unquoted}
+    told |= {key: value for key, value in entry.items() if value is not None}
+    told["how"] = hows.get(told["how"], told["how"])
+    if (ratio := told.pop("ratio", None)) is not None:
+        told["paper"] = 100.0 * (1.0 - ratio[0] / ratio[1])
+    if (than := told.get("than")) is not None:
+        told |= {"title": f"{told['title']}, less than {than}", "unit": "%", "reading": "less_pct"}
+        told["how"] = f"{told['how']}; ratio of the means over pairs of one seed"
+        told["side"] = "none" if told.get("paper") is None and told.get("asked") is None else "more"
+    return PublishedFigure(**{"paper": None} | told)
+
+
+_PUBLISHED = read_yaml((resources.files("wakewise_paper.reproduction") / "published.yaml").read_text("utf-8"))
+CLAIMS = read_claims(_PUBLISHED)
+"""By table; `comparison` has none, since the paper's cells are words, which are not quoted here."""
+UNQUOTED: str = _PUBLISHED["unquoted"]
+UNKNOWN: tuple[str, ...] = tuple(_PUBLISHED["unknown"])
+"""What of the paper is not known here, or measures something else than our tables do."""
 
 JUDGED = {
     "dynamic": ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True),

@@ -26,8 +26,7 @@ from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.campaigns import run as run_campaign
 from wakewise.experiments.campaigns.definition import keep_plan
 from wakewise.experiments.campaigns.store import CampaignStore, open_store
-from wakewise_paper.reproduction.claim import TABLES, UNQUOTED, PublishedFigure
-from wakewise_paper.reproduction.published_tables import CLAIMS
+from wakewise_paper.reproduction.claim import CLAIMS, TABLES, UNQUOTED, PublishedFigure
 from wakewise_paper.reproduction.rows import CompletedTrial, Row, TableTrials, once_rows, table_rows
 from wakewise_paper.reproduction.table_trials import (
     APPROACHES,

@@ -17,11 +17,11 @@ from wakewise.experiments.campaigns.study import flight_trial
 from wakewise.experiments.campaigns.task import PHOTOGRAPHS, Task
 from wakewise.scene.targets import coral_kinds
 from wakewise_paper import flights
+from wakewise_paper.operator_study.bench import W_TRACKS
 from wakewise_paper.operator_study.flight import operator_trial
 from wakewise_paper.operator_study.paper import paper_trial
 from wakewise_paper.reproduction.claim import ORDER, TABLES
 from wakewise_paper.reproduction.piv_flights import PIV
-from wakewise_paper.reproduction.published_tables import VARIANTS, W_TRACKS
 from wakewise_paper.reproduction.worlds import (
     CACO3,
     FIELD,
@@ -305,6 +305,8 @@ def _asked(world: str) -> tuple[str, ...]:
     return ("front", "over") if world == PAPER else (_SCRIPT,)
 
 
+VARIANTS = ("mpc", "linear", "six thrusters")
+"""Methods of the ablation; the whole is `wake-aware`."""
 _FLOWN = (PUMP_TANK, TROUBLE, PAPER)
 _STATION_METHODS = ("manual", "dp", "mpc", "mpc-smooth", "wake-aware")
 

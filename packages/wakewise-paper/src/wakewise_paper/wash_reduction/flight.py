@@ -147,15 +147,15 @@ def scenario_setup(parts: Parts, name: str, seed: int) -> Parts:
 
 def route_of(course: str, parts: Parts, what: SampledConditions) -> Route:
     """The route of a course, about where the target is taken to be."""
-    centre, azimuth = parts.found_target.centre_W_m, what.azimuth_rad
+    centre, azimuth = parts.surveyed_target.centre_W_m, what.azimuth_rad
     if course == "station":
-        return station_route(parts.found_target, centre, azimuth)
+        return station_route(parts.surveyed_target, centre, azimuth)
     if course == "nadir":
-        return transect_route(parts.found_target, centre, azimuth, what.altitude_m or 0.0)
+        return transect_route(parts.surveyed_target, centre, azimuth, what.altitude_m or 0.0)
     if course == "orbit":
         return gentle_route(centre, STANDOFF_M, azimuth)
     standoff_m = CLOSE_M if course == "close" else BRAKE_AT_M
-    low_deg = lowest_clear_deg(parts.vehicle, parts.bounds, parts.found_target, standoff_m)
+    low_deg = lowest_clear_deg(parts.vehicle, parts.bounds, parts.surveyed_target, standoff_m)
     if course == "close":
         return gentle_route(centre, standoff_m, azimuth, (max(HOVER_DEG, low_deg), low_deg))
     return brake_route(centre, azimuth, low_deg)

@@ -17,8 +17,8 @@ from wakewise.experiments.campaigns.definition import PlannedTrial
 from wakewise.experiments.campaigns.flights import FlightProbe, settled
 from wakewise.experiments.campaigns.study import flight_trial
 from wakewise.operation import Parts
-from wakewise.operation.scenario.randomization import Seeds
 from wakewise.operation.scenario import Scenario
+from wakewise.operation.scenario.randomization import Seeds
 from wakewise.scene.targets import find_target, sample_region
 from wakewise.wake import InfluenceModel, WakeSettings, disturbance, wake_model
 from wakewise_paper import flights
@@ -73,7 +73,7 @@ def paper_setup(parts: Parts) -> Parts:
     """
     target, region = paper_place(parts.scenario.tank.size_m[2])
     parts = parts.replace(target=target)
-    found = parts.found_target.centre_W_m
+    found = parts.surveyed_target.centre_W_m
     route = gentle_route(found, STANDOFF_M, flights.azimuth_of(parts.scenario.seed))
     return parts.replace(region=region.moved(found - target.centre_W_m), route=route)
 

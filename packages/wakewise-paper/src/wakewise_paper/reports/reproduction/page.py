@@ -14,8 +14,7 @@ from wakewise.ui.reports.page import collapsible_section, missing, plot, prose, 
 from wakewise.ui.reports.text import NONE, duration, number, shown
 from wakewise_paper.flights import read_series
 from wakewise_paper.reports.reproduction import plots, sentences
-from wakewise_paper.reproduction.claim import CIRCULAR, JUDGED, count_met, glances
-from wakewise_paper.reproduction.published_tables import UNKNOWN
+from wakewise_paper.reproduction.claim import CIRCULAR, JUDGED, UNKNOWN, count_met, glances
 from wakewise_paper.reproduction.worlds import water
 
 PAGE = "reproduce.html"

@@ -24,8 +24,7 @@ from wakewise.ui.reports.svg_style import CARD, CORAL, INK, LINE, MUTED, SAND, S
 from wakewise.ui.reports.text import duration, number, shown
 from wakewise_paper.flights import read_series
 from wakewise_paper.reports.reproduction import plots, sentences
-from wakewise_paper.reproduction.claim import CIRCULAR, JUDGED, glances
-from wakewise_paper.reproduction.published_tables import UNKNOWN
+from wakewise_paper.reproduction.claim import CIRCULAR, JUDGED, UNKNOWN, glances
 from wakewise_paper.reproduction.run import COLUMNS, command_of
 from wakewise_paper.reproduction.run import tables as compared_tables
 from wakewise_paper.reproduction.worlds import water
