@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.allocation import Weights, compile_layout, min_norm_allocation, min_wash_allocation
-from wakewise.allocation.attainable_set import AXES, parse_priority
+from wakewise.allocation.layout import AXES, parse_priority
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
 

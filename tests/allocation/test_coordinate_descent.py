@@ -3,7 +3,7 @@
 import numpy as np
 
 from wakewise.allocation import compile_layout
-from wakewise.allocation.coordinate_descent import coupled_directions, feasible_starts, start_directions, step_limit
+from wakewise.allocation.line_search import coupled_directions, feasible_starts, start_directions, step_limit
 from wakewise.robot.vehicles import load_vehicle
 
 PAPER = load_vehicle("paper")

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.allocation import Weights, compile_layout, disturbance_of, min_norm_allocation, min_wash_allocation
-from wakewise.allocation.attainable_set import _at_limits, _box_scale
-from wakewise.allocation.layout import axis_scaling
+from wakewise.allocation.layout import _at_limits, _box_scale, axis_scaling
 from wakewise.robot.vehicles import load_vehicle
 
 
@@ -38,7 +37,7 @@ def test_an_answer_at_its_limits_is_made_exact() -> None:
     layout = compile_layout(B, np.full(9, -5.0), np.full(9, 8.0))
     full = rng.normal(size=9) * 60.0
     full -= layout.null @ (layout.null.T @ full)
-    from wakewise.allocation.attainable_set import _within_polytope
+    from wakewise.allocation.layout import _within_polytope
 
     exact, share = _within_polytope(layout, full)
     at_low, at_high = np.isclose(exact, -5.0, atol=1e-9), np.isclose(exact, 8.0, atol=1e-9)

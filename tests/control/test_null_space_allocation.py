@@ -15,7 +15,7 @@ from wakewise.core.interfaces import BodyState, Goal
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake import InfluenceModel, RoundJet
-from wakewise.wake.merging_jets import with_merging_jets
+from wakewise.wake.influence import with_merging_jets
 
 VEHICLE = load_vehicle("paper")
 LAYOUT = vehicle_layout(VEHICLE)

@@ -7,7 +7,7 @@ import pytest
 
 from wakewise.core.jit.njit import COMPILED
 from wakewise.wake import wake_model
-from wakewise.wake.kernels import FAST, _cored_law, as_tuple, fill_cored_jet, own_constants, speed_and_slope
+from wakewise.wake.jets import FAST, _cored_law, as_tuple, fill_cored_jet, own_constants, speed_and_slope
 
 AREAS = np.array([np.pi * 0.03**2])
 LAW = wake_model("jet").law

@@ -11,7 +11,7 @@ from wakewise.scene.targets import Region
 from wakewise.wake import ImpingingJet, InfluenceModel, RoundJet, disturbance
 from wakewise.wake.advected_jets import CrossFlow
 from wakewise.wake.disturbance import advected_velocity
-from wakewise.wake.merging_jets import joined_jets, merging_pairs, with_merging_jets
+from wakewise.wake.influence import joined_jets, merging_pairs, with_merging_jets
 
 VEHICLE = load_vehicle("paper")
 LAYOUT = vehicle_layout(VEHICLE)

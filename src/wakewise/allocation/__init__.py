@@ -6,10 +6,9 @@ thrusters and axis priorities. It depends on arrays and errors only. The disturb
 s' G s, where s are square roots of thrusts.
 
 - `allocate.py`: the functions and their results; the convex case (incoherent sum, diagonal G).
-- `layout.py`: allocation matrix B, pseudo-inverse, null space. `attainable_set.py`: largest feasible share of a wrench,
-  axis priorities.
-- `line_search.py`: exact minimum along a line of the null space. `coordinate_descent.py`: multistart descent;
-  `branch_and_bound.py`: global minimum with a proven gap.
+- `layout.py`: allocation matrix B, pseudo-inverse, null space, largest feasible share of a wrench, axis priorities.
+- `line_search.py`: exact minimum along a line of the null space, multistart descent along coupled ones.
+- `branch_and_bound.py`: global minimum with a proven gap.
 - `power_budget.py`: null-space allocation within a bound on electrical power.
 """
 

@@ -17,17 +17,25 @@ from functools import cached_property
 
 import numpy as np
 
-from wakewise.allocation.attainable_set import (
+from wakewise.allocation.branch_and_bound import RELATIVE_GAP, global_minimum
+from wakewise.allocation.layout import (
     AXES,
+    Layout,
+    compile_layout,
     largest_feasible_share,
     makes_wrench,
     parse_priority,
     prioritized_allocation,
 )
-from wakewise.allocation.branch_and_bound import RELATIVE_GAP, global_minimum
-from wakewise.allocation.coordinate_descent import coupled_directions, feasible_starts, idle_starts, start_directions
-from wakewise.allocation.layout import Layout, compile_layout
-from wakewise.allocation.line_search import cost, disjoint_search, split_allocation
+from wakewise.allocation.line_search import (
+    cost,
+    coupled_directions,
+    disjoint_search,
+    feasible_starts,
+    idle_starts,
+    split_allocation,
+    start_directions,
+)
 from wakewise.core.arrays import Array, freeze, frozen
 from wakewise.core.checks import finite_number, instance_of, whole_number
 from wakewise.core.defaults import BUDGET, CHANGE_WEIGHT, EFFORT_WEIGHT

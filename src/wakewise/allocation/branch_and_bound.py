@@ -17,8 +17,7 @@ import heapq
 
 import numpy as np
 
-from wakewise.allocation.coordinate_descent import descend, multistart_descent
-from wakewise.allocation.line_search import cost
+from wakewise.allocation.line_search import cost, descend, multistart_descent
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import assign, njit
 

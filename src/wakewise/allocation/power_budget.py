@@ -32,8 +32,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wakewise.allocation.allocate import Allocation, Weights, disturbance_of, min_wash_allocation
-from wakewise.allocation.attainable_set import largest_feasible_share
-from wakewise.allocation.layout import Layout
+from wakewise.allocation.layout import Layout, largest_feasible_share
 from wakewise.allocation.line_search import cost
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.jit.njit import njit

@@ -40,8 +40,7 @@ from wakewise.robot.thrusters import electrical_power_W
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake.advected_jets import CrossFlow
-from wakewise.wake.influence import InfluenceMatrices, InfluenceModel
-from wakewise.wake.merging_jets import with_merging_jets
+from wakewise.wake.influence import InfluenceMatrices, InfluenceModel, with_merging_jets
 
 if TYPE_CHECKING:
     from wakewise.control.pipeline import PipelineState

@@ -7,9 +7,9 @@ this package.
 - `disturbance.py`: D, its Gram matrix, its derivatives; D of jets of uncertain direction.
 - `gram.py`: compiled Gram matrix and Gauss-Newton sums; `plan_disturbance.py`: the same, faster, for one MPC stage;
   `finite_difference.py`: the same by differences, for models without derivatives.
-- `influence.py`: Gram matrix of a vehicle at a pose; `merging_jets.py`: with jets that cross and merge.
-- `models.py`: models by name and their settings. `jets.py`: the paper's cone (cos^4 attenuation), cones with free
-  parameters, turbulent round jets; `kernels.py`: their compiled speeds.
+- `influence.py`: Gram matrix of a vehicle at a pose, with jets that cross and merge.
+- `models.py`: models by name and their settings. `jets.py`: turbulent round jets, and the compiled speeds of all
+  jets; `cones.py`: the paper's cone (cos^4 attenuation) and cones with free parameters.
 - `wall_jet.py`: jets that strike the bed; `advected_jets.py`: jets and wall jets in a current.
 - `learned.py`: a neural network as a wake model.
 - `samples.py`: measured velocities and scores of a model; `point_files.py`: files of velocities at points;
@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_attributes
 
 if TYPE_CHECKING:
+    from wakewise.wake.cones import PaperJet, PowerJet
     from wakewise.wake.disturbance import (
         SUPERPOSITIONS,
         Superposition,
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
         velocity,
     )
     from wakewise.wake.influence import InfluenceModel
-    from wakewise.wake.jets import AxialJet, GaussianJet, PaperJet, PowerJet, RoundJet
+    from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
     from wakewise.wake.learned import bed_of, free_jet
     from wakewise.wake.models import WakeSettings, model_names, wake_model
     from wakewise.wake.wall_jet import ImpingingJet

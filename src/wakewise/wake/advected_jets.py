@@ -46,7 +46,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.jit.njit import njit
-from wakewise.wake.kernels import ROUND_JET, Numbers, as_tuple, own_constants, section_of, speed_and_slope
+from wakewise.wake.jets import ROUND_JET, Numbers, as_tuple, own_constants, section_of, speed_and_slope
 from wakewise.wake.wall_jet import HALF_THICKNESS, LEAST_SINE, ROUND_DECAY, WALL_SPEED
 
 MAX_AGE_S = 40.0

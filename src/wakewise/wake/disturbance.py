@@ -48,8 +48,7 @@ from wakewise.core.jit.njit import njit
 from wakewise.wake.advected_jets import CrossFlow, add_advected_wall_jets, plumes
 from wakewise.wake.finite_difference import FiniteDifferenceWake
 from wakewise.wake.gram import dot, gram_slope_sum, gram_sum, stage_sum
-from wakewise.wake.jets import AxialJet
-from wakewise.wake.kernels import FAST, as_tuple, own_constants, section_of
+from wakewise.wake.jets import FAST, AxialJet, as_tuple, own_constants, section_of
 from wakewise.wake.learned import free_jet
 from wakewise.wake.wall_jet import ImpingingJet, bed_gram_sum, bed_stage_sum
 

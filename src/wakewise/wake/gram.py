@@ -19,7 +19,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import njit
-from wakewise.wake.kernels import FAST, Numbers, as_tuple, own_constants, speed_and_slope
+from wakewise.wake.jets import FAST, Numbers, as_tuple, own_constants, speed_and_slope
 
 BLOCK = 256
 PERPENDICULAR = 1e-14

@@ -30,7 +30,8 @@ from wakewise.core.errors import InputError
 from wakewise.core.interfaces import WakeModel
 from wakewise.core.plugins import find, names, offered
 from wakewise.core.settings import Settings
-from wakewise.wake.jets import AxialJet, GaussianJet, PaperJet, PowerJet, RoundJet
+from wakewise.wake.cones import PaperJet, PowerJet
+from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
 from wakewise.wake.learned import learned_wake
 from wakewise.wake.wall_jet import ImpingingJet
 

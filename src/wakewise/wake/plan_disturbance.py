@@ -19,12 +19,13 @@ from wakewise.core.arrays import Array, IntArray, frozen
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import WakeModel
 from wakewise.core.jit.njit import assign, njit
+from wakewise.wake.cones import PaperJet, PowerJet
 from wakewise.wake.gram import dot, smooth_root
-from wakewise.wake.jets import AxialJet, PaperJet, PowerJet
-from wakewise.wake.kernels import (
+from wakewise.wake.jets import (
     FAST,
     PRINTED_CONE,
     ROUND_JET,
+    AxialJet,
     Numbers,
     as_tuple,
     fill_cored_jet,
@@ -49,9 +50,9 @@ class PackedWakeModel(NamedTuple):
     positions: Array  # (n, 3), in B
     axes: Array  # (n, 3), in B
     areas: Array  # (n,)
-    own: Array  # (n, 6), see `wakewise.wake.kernels`
+    own: Array  # (n, 6), see `wakewise.wake.jets`
     kind: int
-    numbers: Array  # (7,), see `wakewise.wake.kernels`
+    numbers: Array  # (7,), see `wakewise.wake.jets`
     walls: bool
     floor: Array  # (2,), used if `walls`
     coherent: bool

@@ -39,8 +39,7 @@ from wakewise.wake.gram import (
     turn_gradient,
     turn_hessian,
 )
-from wakewise.wake.jets import AxialJet, RoundJet
-from wakewise.wake.kernels import FAST, Numbers, as_tuple, own_constants
+from wakewise.wake.jets import FAST, AxialJet, Numbers, RoundJet, as_tuple, own_constants
 
 WALL_SPEED = 1.16
 """u_max r / sqrt(M) of a wall jet (Rajaratnam 1976)."""

@@ -28,7 +28,7 @@ FORMAT = "wakewise craft 1"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class KernelJet(AxialJet):
-    """A wake model as the kernels know it: its name, which kernel (`wakewise.wake.kernels`), and its numbers."""
+    """A wake model as the kernels know it: its name, which kernel (`wakewise.wake.jets`), and its numbers."""
 
     label: str
     kind: int
