@@ -42,7 +42,7 @@ def surface_of(target: Target, keep: np.ndarray | None = None) -> np.ndarray:
 
 def test_a_whole_model_agrees_with_what_was_seen_well(parts: Parts, photos: pl.DataFrame) -> None:
     """Of a model that has everything all patches are complete; agreement is then the share of patches seen well."""
-    coverage = coverage_of(parts.found_target, parts.camera, shots_of(photos))
+    coverage = coverage_of(parts.surveyed_target, parts.camera, shots_of(photos))
     both = agreement_with(coverage, parts, surface_of(parts.target))
     assert both.completeness_pct == 100.0
     assert both.trivial_pct == 100.0
@@ -53,7 +53,7 @@ def test_half_a_model_halves_the_agreement(parts: Parts, photos: pl.DataFrame) -
     """A model without its northern half disagrees there, where photographs saw well."""
     middles = parts.target.mesh.triangles_m.mean(axis=1)
     south = middles[:, 0] < parts.target.centre_W_m[0]
-    coverage = coverage_of(parts.found_target, parts.camera, shots_of(photos))
+    coverage = coverage_of(parts.surveyed_target, parts.camera, shots_of(photos))
     both = agreement_with(coverage, parts, surface_of(parts.target, south))
     assert 30.0 < both.completeness_pct < 75.0
     assert abs(both.agreement_pct - both.completeness_pct) < 15.0
@@ -67,7 +67,7 @@ def test_what_was_not_photographed_and_is_not_there_agrees(parts: Parts, photos:
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     some = photos.filter(pl.col("est_x_m") < float(parts.target.centre_W_m[0]) - 0.1)
     both = agreement_with(
-        coverage_of(parts.found_target, parts.camera, shots_of(some)),
+        coverage_of(parts.surveyed_target, parts.camera, shots_of(some)),
         parts,
         surface_of(parts.target, outward[:, 0] < 0.3),
     )

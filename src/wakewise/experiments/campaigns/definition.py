@@ -44,7 +44,7 @@ def external_parts(scenario: Scenario) -> dict[str, str]:
     InputError
         If a controller or a file cannot be found or read.
     """
-    found = dict(scenario.parts().from_outside)
+    found = dict(scenario.parts().external_parts)
     if scenario.method not in MAKERS:
         find("method", scenario.method, MAKERS)
     for name, named in (

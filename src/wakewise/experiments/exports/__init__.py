@@ -4,7 +4,6 @@
 - `colmap.py`: COLMAP models, nerfstudio's transforms.json, TUM trajectories.
 - `training_data.py`: held-out split, undistorted photographs, dense points and water for trainers of fields and splats.
 - `rosbag2.py`: ROS 2 bags. `qgc_plan.py`: QGroundControl plans. `auv_controllers.py`: allocation matrices for ROS 2.
-- `croissant.py`: metadata and check sums of data sets.
 """
 
 from typing import TYPE_CHECKING

@@ -1,10 +1,10 @@
-"""A data set of trials: what a crew could know and what is true, apart, with metadata, check sums and a data sheet.
+"""Data sets of trials: what a crew could know and what is true, apart, with metadata, check sums and a data sheet.
 
-Start reading in `build.py` (a folder of trials becomes a data set, and can go on where it was cut off).
-`part.py` finds the trials, `part.py` reads what they were set to, `part.py` makes one trial's share,
-`part.py` says which column is known and which is truth and what each means. `statement.py` takes licence, creators
-and name, `metadata.py` writes Croissant, `build.py` the data sheet from `sheet.md`; `metadata.py` says whether a data
-set is still what it was.
+- `build.py`: a folder of trials becomes a data set, and goes on where it was cut off; the data sheet from `sheet.md`.
+- `part.py`: which folders are trials, one trial's share of a data set, which columns are known and what each means.
+- `statement.py`: licence, creators, name and answers, as given.
+- `metadata.py`: Croissant metadata from the template `croissant.json`; whether a data set is still what it was.
+- `checksums.py`: SHA256SUMS.
 """
 
 from typing import TYPE_CHECKING

@@ -25,7 +25,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file, write_json, write_text
 from wakewise.core.interfaces import no_progress
 from wakewise.core.run_lock import LOCK, exclusive_run
-from wakewise.experiments.exports.croissant import SUMS, sha256_of, sums_text
+from wakewise.experiments.trials.dataset.checksums import SUMS, sha256_of, sums_text
 from wakewise.experiments.trials.dataset.metadata import FIGURES, METADATA, SHEET, TRIALS, columns_of, metadata
 from wakewise.experiments.trials.dataset.part import KNOWN, NOTE, TRUTH, TrialPart, TrialSource, part_of, trials_of
 from wakewise.experiments.trials.dataset.statement import QUESTIONS, DatasetStatement

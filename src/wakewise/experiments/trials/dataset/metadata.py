@@ -1,56 +1,31 @@
-"""Croissant metadata of a data set of trials: its files, and what every column of every table means.
+"""Croissant 1.0 metadata of a data set: its files, and what every column of every table means, as JSON-LD.
 
-Whether a data set is still what it was when it was made.
+`croissant.json` beside this module is the template: context, files, sets of files and tables. Filled in are what the
+statement says, sizes and check sums, and the columns that the tables have; what a data set does not hold is left out.
+Terms are those of https://docs.mlcommons.org/croissant/docs/croissant-spec.html. Parquet has the media type that
+readers of Croissant 1.0 know.
 """
 
 from __future__ import annotations
 
 import json
+import mimetypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import no_progress
-from wakewise.experiments.exports.croissant import (
-    SUMS,
-    ChecksumMismatch,
-    Column,
-    DatasetDescription,
-    FileObject,
-    FileSet,
-    Kind,
-    RecordSet,
-    croissant,
-    differences,
-    read_sums,
-    sha256_of,
-)
-from wakewise.experiments.trials.dataset.part import KNOWN, TRUTH, TrialPart, meaning
+from wakewise.experiments.trials.dataset.checksums import SUMS, ChecksumMismatch, differences, read_sums, sha256_of
+from wakewise.experiments.trials.dataset.part import TrialPart, meaning
 from wakewise.experiments.trials.dataset.statement import DatasetStatement
+from wakewise.experiments.trials.metrics import DEFINITIONS, UNITS
 
 METADATA, SHEET, TRIALS, FIGURES = "croissant.json", "DATASHEET.md", "trials.parquet", "truth/figures.parquet"
-PARQUET = "application/x-parquet"
-"""As readers of Croissant 1.0 know it; the type that is registered since is application/vnd.apache.parquet."""
-_SETS = {
-    f"{KNOWN}/states": ("states as a controller had them, a row per control step", "known-states"),
-    f"{TRUTH}/states": ("true states and the water at the target, a row per control step", "true-states"),
-    f"{KNOWN}/images": ("photographs with estimated camera poses, a row each", "known-images"),
-    f"{TRUTH}/images": ("true camera poses of the photographs, a row each", "true-images"),
-}
-_LOOSE = {
-    f"{KNOWN}/*/images/*": ("photographs", "image-files"),
-    f"{KNOWN}/*/cameras.txt": ("the camera as the crew knew it, COLMAP's text format", "known-cameras"),
-    f"{KNOWN}/*/model.ply": ("models made from the photographs, north-east-down in m", "models"),
-    f"{TRUTH}/*/target.ply": ("ground truth: the target's surface, north-east-down in m", "true-targets"),
-    f"{TRUTH}/*/camera.json": ("the camera as it is, OpenCV's model, centres of pixels at +0.5", "true-cameras"),
-    f"{TRUTH}/*/scenario.yaml": ("everything a trial was set to, the seed included", "scenarios"),
-    f"{TRUTH}/*/metrics.json": ("figures of a trial with unit and definition", "figures-of-trials"),
-}
-_MIME = {".png": "image/png", ".jpg": "image/jpeg", ".ply": "model/ply", ".json": "application/json",
-         ".txt": "text/plain", ".yaml": "application/yaml"}  # fmt: skip
-_KINDS: dict[str, Kind] = {"Float64": "sc:Float", "Float32": "sc:Float", "Boolean": "sc:Boolean", "String": "sc:Text"}
+_KINDS = {"Float64": "sc:Float", "Float32": "sc:Float", "Boolean": "sc:Boolean", "String": "sc:Text"}
+_PYTHON = {bool: "Boolean", int: "Int64", float: "Float64"}
 _FACTS = {
     "trial": "name of the trial, and of its folders", "scenario": "name of its scenario", "vehicle": "vehicle's name",
     "method": "how thrusts were chosen", "pilot": "who flew", "world": "where it was flown",
@@ -83,92 +58,75 @@ def metadata(
     folder: Path, words: DatasetStatement, description: str, parts: Sequence[TrialPart], figures: Sequence[str]
 ) -> dict[str, Any]:
     """Croissant of a data set whose other files are all in `folder`."""
-    trials = _object(folder, TRIALS, PARQUET, "all trials, a row each")
-    files: list[FileObject | FileSet] = [
-        _object(folder, SUMS, "text/plain", "check sums of all files but this and croissant.json"),
-        _object(folder, SHEET, "text/markdown", "data sheet: what it is, how it was made, what for"),
-        trials,
-    ]
-    facts = {name: kind for name, kind in _types_of_facts(parts).items() if name in _FACTS}
-    fields = tuple(Column(name=name, kind=kind, description=_FACTS[name]) for name, kind in facts.items())
-    tables = [RecordSet(name="trials", source=trials, columns=fields, key=("trial",), description="one row per trial")]
-    if figures:
-        true = _object(folder, FIGURES, PARQUET, "figures by which trials were judged, which need the truth")
-        files.append(true)
-        names = ("trial", *figures)
-        columns = tuple(
-            Column(name=name, kind="sc:Text" if name == "trial" else "sc:Float", description=_figure(name))
-            for name in names
-        )
-        tables.append(
-            RecordSet(name="figures", source=true, columns=columns, key=("trial",), description="one row per trial")
-        )
-    for path, columns_told in columns_of(parts).items():
-        about, name = _SETS[path]
-        side, what = path.split("/")
-        source = FileSet(name=f"{name}-files", includes=f"{side}/*/{what}.parquet", mime=PARQUET, description=about)
-        files.append(source)
-        tables.append(
-            RecordSet(
-                name=name,
-                source=source,
-                columns=_columns(columns_told, what == "images"),
-                key=("trial", "name" if what == "images" else "time_s"),
-                description=about,
-            )
-        )
+    told: dict[str, Any] = json.loads((files(__package__) / METADATA).read_text(encoding="utf-8"))
+    told |= {
+        "name": words.name,
+        "description": description,
+        "license": words.licence,
+        "url": words.url,
+        "citeAs": words.citation,
+        "creator": [{"@type": "sc:Organization", "name": name} for name in words.creators],
+        "datePublished": words.published,
+        "version": words.version,
+    }
     paths = [path for part in parts for path in part.sums]
-    for pattern, (about, name) in _LOOSE.items():
-        matching = [path for path in paths if Path(path).match(pattern)]
-        if matching:
-            mime = _MIME.get(Path(matching[0]).suffix.lower(), "application/octet-stream")
-            files.append(FileSet(name=name, includes=pattern, mime=mime, description=about))
-    about_it = DatasetDescription(
-        name=words.name,
-        description=description,
-        licence=words.licence,
-        creators=words.creators,
-        url=words.url,
-        published=words.published,
-        version=words.version,
-        keywords=("underwater robotics", "ROV", "photogrammetry", "thruster allocation", "wake"),
-    )
-    return croissant(about_it, files, tables)
+    told["distribution"] = [one for one in told["distribution"] if _completed(one, folder, paths)]
+    tables = {"trials": _facts_of(parts)} | columns_of(parts)
+    if figures:
+        tables["figures"] = {"trial": "String"} | dict.fromkeys(figures, "Float64")
+    told["recordSet"] = [_records(one, tables) for one in told["recordSet"] if one["field"]["table"] in tables]
+    return told
 
 
-def _object(folder: Path, path: str, mime: str, description: str) -> FileObject:
-    file = folder / path
-    return FileObject(path=path, size=file.stat().st_size, sha256=sha256_of(file), mime=mime, description=description)
+def _completed(one: dict[str, Any], folder: Path, paths: Sequence[str]) -> bool:
+    """Fill in size and check sum of a file, or the type of a set's files; False of what the data set does not hold."""
+    if "includes" in one:
+        matching = [path for path in paths if Path(path).match(one["includes"])]
+        if matching and one["includes"].endswith("*"):
+            one["encodingFormat"] = mimetypes.guess_type(matching[0])[0] or "application/octet-stream"
+        return bool(matching)
+    file = folder / one["contentUrl"]
+    if not file.is_file():
+        return False
+    one |= {"contentSize": f"{file.stat().st_size} B", "sha256": sha256_of(file)}
+    return True
 
 
-def _columns(told: Mapping[str, str], of_camera: bool) -> tuple[Column, ...]:
-    return tuple(
-        Column(name=name, kind=_kind(kind), description=meaning(name, of_camera)) for name, kind in told.items()
-    )
+def _records(one: dict[str, Any], tables: Mapping[str, Mapping[str, str]]) -> dict[str, Any]:
+    """A table of the template with its columns."""
+    name, field = one["@id"], one["field"]
+    return one | {
+        "key": [{"@id": f"{name}/{key}"} for key in one["key"]],
+        "field": [
+            {
+                "@type": "cr:Field",
+                "@id": f"{name}/{column}",
+                "name": column,
+                "description": _described(field["table"], column),
+                "dataType": _KINDS.get(kind, "sc:Integer" if kind.startswith(("Int", "UInt")) else "sc:Text"),
+                "source": {**field["source"], "extract": {"column": column}},
+            }
+            for column, kind in tables[field["table"]].items()
+        ],
+    }
 
 
-def _kind(dtype: str) -> Kind:
-    return _KINDS.get(dtype, "sc:Integer" if dtype.startswith(("Int", "UInt")) else "sc:Text")
+def _described(table: str, column: str) -> str:
+    if table == "trials" or (table == "figures" and column == "trial"):
+        return _FACTS[column]
+    if table != "figures":
+        return meaning(column, table.endswith("images"))
+    unit = UNITS.get(column, "")
+    return f"{DEFINITIONS.get(column, column.replace('_', ' '))}{f'; {unit}' if unit else ''}"
 
 
-def _types_of_facts(parts: Sequence[TrialPart]) -> dict[str, Kind]:
-    kinds: dict[type, Kind] = {bool: "sc:Boolean", int: "sc:Integer", float: "sc:Float"}
-    found: dict[str, Kind] = {"trial": "sc:Text"}
-    for part in parts:
-        for name, value in part.facts.items():
-            found.setdefault(name, "sc:Text")
-            if value is not None:
-                found[name] = kinds.get(type(value), "sc:Text")
+def _facts_of(parts: Sequence[TrialPart]) -> dict[str, str]:
+    """Names and types of the columns of the table of trials."""
+    found = {"trial": "String"}
+    for name, value in ((name, value) for part in parts for name, value in part.facts.items() if name in _FACTS):
+        if value is not None or name not in found:
+            found[name] = _PYTHON.get(type(value), "String")
     return found
-
-
-def _figure(name: str) -> str:
-    from wakewise.experiments.trials.metrics import DEFINITIONS, UNITS
-
-    if name == "trial":
-        return _FACTS["trial"]
-    unit = UNITS.get(name, "")
-    return f"{DEFINITIONS.get(name, name.replace('_', ' '))}{f'; {unit}' if unit else ''}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -35,6 +35,18 @@ class DatasetStatement:
     version: str
     answers: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def citation(self) -> str:
+        """How the data set is cited, in BibTeX; a creator's name stands in braces, so that none is taken apart."""
+        key = "".join(letter for letter in self.name if letter.isalnum()) or "dataset"
+        year = self.published[:4]
+        where = "" if self.url == "./" else f", url = {{{self.url}}}"
+        authors = " and ".join(f"{{{name}}}" for name in self.creators)
+        return (
+            f"@misc{{{key}{year}, title = {{{self.name}}}, author = {{{authors}}}, year = {{{year}}}, "
+            f"version = {{{self.version}}}{where}}}"
+        )
+
 
 def read_words(
     *,
@@ -48,21 +60,9 @@ def read_words(
 ) -> DatasetStatement:
     """Check what was said.
 
-    Parameters
-    ----------
-    name : str
-    licence : str
-        One of `LICENCES`, or the address of another.
-    creators : sequence of str
-        People or institutions.
-    url : str, optional
-        Where the data set will be; "./", its own folder, until that is known.
-    published : str, optional
-        ISO date; today's if not given.
-    version : str
-        MAJOR.MINOR.PATCH.
-    answers : Path, optional
-        YAML file with answers to some of `QUESTIONS`.
+    `licence` is one of `LICENCES` or the address of another; `url` is where the data set will be ("./", its own folder,
+    until that is known); `published` is an ISO date, today's if not given; `version` is MAJOR.MINOR.PATCH; `answers` is
+    a YAML file with answers to some of `QUESTIONS`.
 
     Raises
     ------
