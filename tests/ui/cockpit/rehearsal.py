@@ -19,8 +19,7 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cockpit.control_mailbox import ControlMailbox
-from wakewise.ui.cockpit.server import PAGE
-from wakewise.ui.cockpit.server import CockpitServer
+from wakewise.ui.cockpit.server import PAGE, CockpitServer
 from wakewise.ui.cockpit.view_model import CameraPicture, StatusMessage
 from wakewise.ui.web.files import StaticFiles
 

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 from rehearsal import Rehearsal
 
-from wakewise.ui.cockpit.server import SERVICE, page_files
-from wakewise.ui.cockpit.server import CockpitServer
+from wakewise.ui.cockpit.server import SERVICE, CockpitServer, page_files
 
 # Required and optional keys of each object, as Cockpit's "External Integrations" lists them.
 EXTRAS = (

@@ -10,8 +10,7 @@ import pytest
 from browser import Browser, Page, until
 from rehearsal import Rehearsal
 
-from wakewise.ui.cockpit.server import page_files
-from wakewise.ui.cockpit.server import CockpitServer
+from wakewise.ui.cockpit.server import CockpitServer, page_files
 
 
 @pytest.fixture

@@ -67,4 +67,4 @@ def test_the_shown_places_lie_where_the_target_is_taken_to_be(parts: Parts, gaug
     """As far from the true ones as the survey is wrong."""
     off_m = gauges.points_W_m - gauges.true_points_W_m
     np.testing.assert_allclose(off_m, off_m[0] * np.ones((len(off_m), 1)), atol=1e-12)
-    np.testing.assert_allclose(off_m[0], parts.found_target.centre_W_m - parts.target.centre_W_m, atol=1e-12)
+    np.testing.assert_allclose(off_m[0], parts.surveyed_target.centre_W_m - parts.target.centre_W_m, atol=1e-12)
