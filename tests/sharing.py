@@ -32,8 +32,10 @@ LONGEST = "tests/experiments/trials/test_whole_trial.py"
 
 
 def room_of(file: str) -> str:
-    """The folder in `tests/` that a file lies in, however deep; a file that lies in none is its own."""
-    return "/".join(file.split("/")[:2])
+    """The first two folders below `tests/` that a file lies in; a file that lies in none is its own."""
+    folders = file.split("/")[:-1]
+    below = folders.index("tests") + 1
+    return "/".join(folders[: below + 2]) if folders[below:] else file
 
 
 def waits(file: str) -> bool:
