@@ -173,13 +173,13 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
             spare=ProtectedRegion(),
             session=7,
         )
-        estimated = session.warden.estimated
+        estimated = session.gate.estimated
 
         def watched(estimate: Any) -> None:
             steps_s.append(time.monotonic())
             estimated(estimate)
 
-        session.warden.estimated = watched  # type: ignore[method-assign]
+        session.gate.estimated = watched  # type: ignore[method-assign]
         other.start()
         try:
             session.start()
@@ -189,8 +189,8 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
             steps_s.clear()
             time.sleep(seconds)
             bare_s = asleep.recv() if asleep.poll(_PATIENCE_S) else []
-            still = session.warden.entry is not None
-            how = f"{session.warden.engagement.state}: {session.warden.engagement.why}"
+            still = session.gate.entry is not None
+            how = f"{session.gate.engagement.state}: {session.gate.engagement.why}"
         finally:
             session.stop("measured")
             for process in (other, sleeper):
@@ -231,8 +231,8 @@ def _engage(session: Any, within_s: float = _READY_S) -> bool:
     """Consent as soon as all is well; whether that was within so long."""
     end_s = time.monotonic() + within_s
     while time.monotonic() < end_s and session.running:
-        if session.live is not None and session.warden.engagement.state == "ready":
-            return bool(session.warden.press() == "engaged")
+        if session.live is not None and session.gate.engagement.state == "ready":
+            return bool(session.gate.press() == "engaged")
         time.sleep(0.1)
     return False
 
@@ -240,14 +240,14 @@ def _engage(session: Any, within_s: float = _READY_S) -> bool:
 def loss_figures() -> dict[str, Any]:
     """How long after each loss a script still drove an output, and thrusts while disarmed."""
     from wakewise.robot.vehicles import load_vehicle
-    from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD, run_companion_fault
+    from wakewise_ardusub.sitl.companion_harness import COMPANION_FAULTS, run_companion_fault
     from wakewise_ardusub.sitl.inprocess_session import FAULTS, FaultOutcome, run_fault
 
     vehicle = load_vehicle(VEHICLE)
     after: dict[str, FaultOutcome] = {
         f"script alone: {name}": run_fault(vehicle, fault) for name, fault in FAULTS.items()
     }
-    after |= {name: run_companion_fault(vehicle, fault) for name, fault in FAULTS_ABOARD.items()}
+    after |= {name: run_companion_fault(vehicle, fault) for name, fault in COMPANION_FAULTS.items()}
     return {
         "neutral_ms_max": max(one.neutral_ms for one in after.values()),
         "neutral_ms": {name: round(one.neutral_ms, 1) for name, one in after.items()},
@@ -280,5 +280,5 @@ def noise_figures(count: int = FUZZ_BYTES) -> dict[str, Any]:
                 crashes += 1
         flight.run(1.0)
         thrusts += outcome(flight, flight.now_s).disarmed_thrusts
-        crashes += len(flight.stand_in.script_faults)
+        crashes += len(flight.autopilot.script_faults)
     return {"fuzz_bytes": heard, "crashes": crashes, "thrust_while_disarmed": thrusts}

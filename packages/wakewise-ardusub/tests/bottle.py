@@ -60,7 +60,7 @@ class Bottle:
     acts: float = 0.0
 
     def __post_init__(self) -> None:
-        self.warden = OutputGate(
+        self.gate = OutputGate(
             send=lambda name, fields: self.sent.append((self.now_s, name, dict(fields))),
             drive=Tenths(),
             limits=self.limits,
@@ -70,14 +70,14 @@ class Bottle:
             listen_only=self.listen_only,
             clock=lambda: self.now_s,
         )
-        self.warden.target_W_m = np.array([1.0, 0.0, 2.0])
-        self.warden.begin()
+        self.gate.target_W_m = np.array([1.0, 0.0, 2.0])
+        self.gate.begin()
         self.parameters()
         self._step = 0
 
     def say(self, name: str, /, system: int = 1, component: int = 1, **fields: Any) -> None:
         """A message comes."""
-        self.warden.take(MavlinkMessage(system, component, name, fields))
+        self.gate.take(MavlinkMessage(system, component, name, fields))
 
     def parameter(self, name: str, value: float) -> None:
         """The autopilot says what a parameter is."""
@@ -122,18 +122,18 @@ class Bottle:
             if "script" not in self.silent and k % 25 == 0:
                 self.say("NAMED_VALUE_FLOAT", name="WKW_ENG", value=self.acts, time_boot_ms=boot_ms)
                 self.say("NAMED_VALUE_FLOAT", name="WKW_VER", value=float(SCRIPT_VERSION), time_boot_ms=boot_ms)
-            self.warden.tick()
+            self.gate.tick()
             if self.deciding and k % 5 == 0:
-                self.warden.estimated(BodyState(X_WB=Pose(np.array(self.at), np.array([1.0, 0.0, 0.0, 0.0]))))
-            if self.deciding and k % 5 == 0 and (entry := self.warden.entry) is not None:
+                self.gate.estimated(BodyState(X_WB=Pose(np.array(self.at), np.array([1.0, 0.0, 0.0, 0.0]))))
+            if self.deciding and k % 5 == 0 and (entry := self.gate.entry) is not None:
                 self.acts = 1.0
-                self.warden.command(THRUSTS, entry)
+                self.gate.command(THRUSTS, entry)
             self._step += 1
 
     def engage(self) -> str:
         """All well, and the operator consents."""
         self.run(1.2)
-        return self.warden.press()
+        return self.gate.press()
 
     @property
     def thrusts(self) -> list[float]:

@@ -51,7 +51,7 @@ class FakeAutopilot:
         self.counts[kind] = self.counts.get(kind, 0) + 1
         return self.lose(kind, self.counts[kind])
 
-    def hear_any(self, timeout_s: float) -> Any:
+    def receive_any(self, timeout_s: float) -> Any:
         return self.waiting.popleft() if self.waiting else None
 
     def hear(self, kinds: Collection[str], timeout_s: float) -> Any:

@@ -146,11 +146,11 @@ def test_the_ardusub_of_a_log_is_taken_before_a_busier_vehicle(tmp_path: Path) -
 
 def test_the_meter_asks_it_too() -> None:
     """A mode of another vehicle has a number and no name."""
-    hearing = VehicleListener()
+    listener = VehicleListener()
     beat = {"type": 12, "autopilot": 3, "base_mode": 81, "custom_mode": 19}
-    hearing.hear(0.0, 1, 1, "SERVO_OUTPUT_RAW", {"port": 0})
-    hearing.hear(0.0, 1, 1, "HEARTBEAT", beat)
-    assert hearing.mode(0.5) == "MANUAL"
-    hearing.hear(1.0, 1, 1, "HEARTBEAT", beat | {"type": 2})
-    assert hearing.mode(1.5) == "mode 19"
-    assert hearing.identity.is_other
+    listener.hear(0.0, 1, 1, "SERVO_OUTPUT_RAW", {"port": 0})
+    listener.hear(0.0, 1, 1, "HEARTBEAT", beat)
+    assert listener.mode(0.5) == "MANUAL"
+    listener.hear(1.0, 1, 1, "HEARTBEAT", beat | {"type": 2})
+    assert listener.mode(1.5) == "mode 19"
+    assert listener.identity.is_other

@@ -230,17 +230,17 @@ def test_a_spoiled_chunk_costs_its_own_messages(tmp_path: Path) -> None:
 @QUICK
 def test_mutated_bytes_never_stop_a_reader(name: str, data: st.DataObject) -> None:
     """Any bytes changed, cut out or put in: every sample that comes back is finite in time, in order, and in range."""
-    spoiled = bytearray(WHOLE[name])
+    count_bad = bytearray(WHOLE[name])
     for _ in range(data.draw(st.integers(1, 12))):
-        at = data.draw(st.integers(0, len(spoiled) - 1))
+        at = data.draw(st.integers(0, len(count_bad) - 1))
         what = data.draw(st.sampled_from(["change", "remove", "insert"]))
         if what == "change":
-            spoiled[at] = data.draw(st.integers(0, 255))
+            count_bad[at] = data.draw(st.integers(0, 255))
         elif what == "remove":
-            del spoiled[at : at + data.draw(st.integers(1, 400))]
+            del count_bad[at : at + data.draw(st.integers(1, 400))]
         else:
-            spoiled[at:at] = data.draw(st.binary(max_size=300))
-    _is_sound(READERS[name](bytes(spoiled)), name)
+            count_bad[at:at] = data.draw(st.binary(max_size=300))
+    _is_sound(READERS[name](bytes(count_bad)), name)
 
 
 @pytest.mark.parametrize("name", MADE)
@@ -251,8 +251,8 @@ def test_noise_never_stops_a_reader(name: str, noise: bytes) -> None:
     _is_sound(READERS[name](noise), name)
 
 
-def _is_sound(gather: LogCollector, name: str) -> None:
-    log = gather.done(Path(name), "dataflash" if name.endswith("BIN") else name.rpartition(".")[2])
+def _is_sound(collector: LogCollector, name: str) -> None:
+    log = collector.done(Path(name), "dataflash" if name.endswith("BIN") else name.rpartition(".")[2])
     for channel, series in log.series.items():
         assert np.isfinite(series.time_s).all()
         assert (np.diff(series.time_s) >= 0.0).all()
@@ -285,8 +285,8 @@ def test_blueos_keys_without_quotes_are_read() -> None:
     """Its JSON may be JSON5."""
     from wakewise_ardusub.logs import mavlink
 
-    gather = LogCollector()
+    collector = LogCollector()
     body = b'{header: {system_id: 1}, message: {type: "VFR_HUD", alt: -2.5}}'
     head = mavlink._MESSAGE_HEAD.pack(7, 0, 10**9, 10**9)
-    assert mavlink._message(gather, head + body, {7: (1, 1, "VFR_HUD")})
-    assert gather.vessel(1).rows["depth VFR_HUD"] == [(0.0, 2.5)]
+    assert mavlink._message(collector, head + body, {7: (1, 1, "VFR_HUD")})
+    assert collector.records_of(1).rows["depth VFR_HUD"] == [(0.0, 2.5)]

@@ -65,17 +65,17 @@ def test_numpy_alone_judges_as_the_whole_package_does(vehicle: str, model: str, 
     (tmp_path / "craft.json").write_text(vehicle_summary_json(craft), encoding="utf-8")
     told = iter(json.loads(bare(JUDGE, str(tmp_path / "asked.json"), str(tmp_path / "craft.json"))))
     points = bow_ball(craft.bow_m, craft.camera_z_m, 0.4)
-    sparing = WashSavingsCalculator(craft, directions)
+    calculator = WashSavingsCalculator(craft, directions)
     largest = 0.0
     for pose in POSES:
         view = influence_model(craft, points, np.ones(len(points)))
         gram = view.gram(Pose(np.array(pose[:3]), quat_from_euler(*pose[3:])))
         for pulses, volts in rows:
-            spared = sparing.judge(np.array(pulses), sparing.supply_V(volts), gram)
+            savings = calculator.judge(np.array(pulses), calculator.supply_V(volts), gram)
             for share, (disturbance, thrusts_N) in zip(SHARES, next(told), strict=True):
-                assert disturbance == pytest.approx(spared.disturbance[share], rel=1e-9, abs=1e-15)
-                assert thrusts_N == pytest.approx(spared.thrusts_N[share], abs=1e-6)
-                largest = max(largest, spared.disturbance[share])
+                assert disturbance == pytest.approx(savings.disturbance[share], rel=1e-9, abs=1e-15)
+                assert thrusts_N == pytest.approx(savings.thrusts_N[share], abs=1e-6)
+                largest = max(largest, savings.disturbance[share])
     assert largest > 1e-6
     assert next(told, None) is None
 

@@ -37,7 +37,7 @@ Capture = pytest.CaptureFixture[str]
 
 
 @pytest.fixture
-def stand_in() -> Iterator[tuple[SimulatedAutopilot, str]]:
+def autopilot() -> Iterator[tuple[SimulatedAutopilot, str]]:
     """A stand-in autopilot without any script, and where it is: it speaks to that port of this computer only."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
@@ -55,10 +55,10 @@ def stand_in() -> Iterator[tuple[SimulatedAutopilot, str]]:
 
 
 def test_the_script_goes_onto_an_autopilot_and_starts(
-    stand_in: tuple[SimulatedAutopilot, str], capsys: Capture
+    autopilot: tuple[SimulatedAutopilot, str], capsys: Capture
 ) -> None:
     """Uploaded over UDP, read back, SCR_ENABLE set and rebooted: then the script runs there."""
-    autopilot, where = stand_in
+    autopilot, where = autopilot
     assert run(["link", "install-script", "--upload", where, "--start", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said == {"version": SCRIPT_VERSION, "uploaded": "/APM/scripts/wakewise.lua", "written": []}
@@ -82,10 +82,10 @@ def test_the_script_by_hand(capsys: Capture, tmp_path: Path) -> None:
 
 
 def test_a_live_check_says_go_or_no_go(
-    stand_in: tuple[SimulatedAutopilot, str], capsys: Capture, tmp_path: Path
+    autopilot: tuple[SimulatedAutopilot, str], capsys: Capture, tmp_path: Path
 ) -> None:
     """A fresh autopilot without pilot or script is no-go with 1, row by row."""
-    _, where = stand_in
+    _, where = autopilot
     results = str(tmp_path / "none.json")
     assert run(["link", "ardusub", "--check", "--connection", where, "--motor-results", results, "--json"]) == 1
     said = json.loads(capsys.readouterr().out)
@@ -101,13 +101,13 @@ def test_a_live_check_says_go_or_no_go(
 
 
 def test_a_motor_turns_only_by_consent(
-    stand_in: tuple[SimulatedAutopilot, str], capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    autopilot: tuple[SimulatedAutopilot, str], capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Said no, a motor does not turn and the file says so; said yes, that one alone gets the pulse that was said.
 
     What is seen is kept and turned into advice, and the autopilot disarms itself.
     """
-    autopilot, where = stand_in
+    autopilot, where = autopilot
     results, seen = tmp_path / "motors.json", set()
     turned = autopilot.step
 
@@ -140,11 +140,11 @@ def test_a_motor_turns_only_by_consent(
 
 
 def test_a_refusal_is_the_autopilots_own_words(
-    stand_in: tuple[SimulatedAutopilot, str], capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    autopilot: tuple[SimulatedAutopilot, str], capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Disarmed between question and turn: one line, and nothing turns."""
-    autopilot, where = stand_in
-    monkeypatch.setattr("wakewise_ardusub.link.motor_test._armed", lambda talk: True)
+    autopilot, where = autopilot
+    monkeypatch.setattr("wakewise_ardusub.link.motor_test._armed", lambda link: True)
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
     results = str(tmp_path / "motors.json")
     asked = ["link", "ardusub", "--motor-test", "--connection", where, "--motor-results", results, "--motors", "2"]

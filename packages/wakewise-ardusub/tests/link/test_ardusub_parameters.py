@@ -46,11 +46,11 @@ def test_what_was_lost_is_asked_for_again(kind: str) -> None:
 
 def test_an_autopilot_that_says_nothing_is_said() -> None:
     """Nobody there, or another vehicle's id: one line, no hang."""
-    mute = FakeAutopilot(SOME, lose=lambda where, count: True)
+    send_blocked = FakeAutopilot(SOME, lose=lambda where, count: True)
     with pytest.raises(EnvironmentFailure, match="says no parameter"):
-        read_parameters(mute)
+        read_parameters(send_blocked)
     with pytest.raises(EnvironmentFailure, match="says no parameter"):
-        read_all_parameters(mute)
+        read_all_parameters(send_blocked)
     other = FakeAutopilot({"A": 1.0, "B": 2.0, "C": 3.0}, lose=lambda where, count: where == "out" and count > 1)
     with pytest.raises(EnvironmentFailure, match="2 of 3 parameters never came"):
         read_all_parameters(other)
@@ -58,18 +58,18 @@ def test_an_autopilot_that_says_nothing_is_said() -> None:
 
 def test_answers_of_others_are_not_the_autopilots() -> None:
     """A camera's PARAM_VALUE, or another vehicle's, is none of this autopilot's."""
-    talk = FakeAutopilot(SOME)
+    link = FakeAutopilot(SOME)
     value = {"param_id": b"SCR_ENABLE", "param_value": 0.0, "param_type": 9, "param_count": 1, "param_index": 0}
-    talk.say("param_value", component=100, **value)
-    talk.say("param_value", system=9, **value)
-    assert read_parameters(talk)["SCR_ENABLE"] == 1.0
+    link.say("param_value", component=100, **value)
+    link.say("param_value", system=9, **value)
+    assert read_parameters(link)["SCR_ENABLE"] == 1.0
 
 
 def test_setting_is_believed_only_when_read_back() -> None:
     """Also after a loss; one that is not taken or not known is an error, and so is a name that cannot be."""
-    talk = FakeAutopilot(dict(SOME), lose=lambda where, count: where == "in" and count == 1)
-    set_parameter(talk, "SCR_ENABLE", 0.1)
-    assert talk.parameters["SCR_ENABLE"] == pytest.approx(0.1)
+    link = FakeAutopilot(dict(SOME), lose=lambda where, count: where == "in" and count == 1)
+    set_parameter(link, "SCR_ENABLE", 0.1)
+    assert link.parameters["SCR_ENABLE"] == pytest.approx(0.1)
     with pytest.raises(EnvironmentFailure, match="MOT_3_DIRECTION: set to 1, and the autopilot still says -1"):
         set_parameter(FakeAutopilot(dict(SOME), deaf_to=frozenset({"MOT_3_DIRECTION"})), "MOT_3_DIRECTION", 1.0)
     with pytest.raises(EnvironmentFailure, match="does not know it"):

@@ -35,7 +35,7 @@ class Around:
 
 
 def plant(around, entry=3):
-    return ArduSubPlant(warden=around, clock=around, wait=around.wait, entry=lambda: entry)
+    return ArduSubPlant(gate=around, clock=around, wait=around.wait, entry=lambda: entry)
 
 
 def test_measurements_come_shortly_before_the_next_decision_is_due():

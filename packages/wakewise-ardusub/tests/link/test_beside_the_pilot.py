@@ -9,7 +9,7 @@ from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.engagement_fsm import EngagementLimits
 from wakewise_ardusub.link.protocol import NEUTRAL_WITHIN_S
 from wakewise_ardusub.link.session_log import SessionLog, read_journal
-from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD, CompanionHarness
+from wakewise_ardusub.sitl.companion_harness import COMPANION_FAULTS, CompanionHarness
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession, noise
 
 HEAVY = load_vehicle("bluerov2-heavy")
@@ -24,7 +24,7 @@ def aboard(journal: SessionLog | None = None, **flight) -> CompanionHarness:
     return CompanionHarness(made, limits=WIDE, journal=journal, thrusts_N=np.tile([6.0, -6.0], 4))
 
 
-@pytest.mark.parametrize("fault", FAULTS_ABOARD)
+@pytest.mark.parametrize("fault", COMPANION_FAULTS)
 def test_after_a_fault_the_outputs_are_the_pilots(fault, tmp_path):
     """From the fault on no output is driven for longer than the bound; what ended it is in the journal."""
     journal = SessionLog(tmp_path / "journal.jsonl")
@@ -32,7 +32,7 @@ def test_after_a_fault_the_outputs_are_the_pilots(fault, tmp_path):
     flight = companion.flight
     assert flight.moments[-1].overridden
     at_s = flight.now_s
-    FAULTS_ABOARD[fault](companion)
+    COMPANION_FAULTS[fault](companion)
     flight.run(2.5)
     driven = [moment.time_s for moment in flight.moments if moment.overridden]
     assert max(driven) - at_s <= NEUTRAL_WITHIN_S + SLACK_S
@@ -53,7 +53,7 @@ def test_the_pilots_own_sticks_act_before_and_after_and_not_between():
     assert not before.overridden
     assert between.overridden
     assert between.pulses_us != before.pulses_us
-    companion.warden.press()
+    companion.gate.press()
     flight.run(0.3)
     after = flight.moments[-1]
     assert not after.overridden
@@ -67,7 +67,7 @@ def test_a_ground_station_that_is_lost_disarms_by_the_autopilots_own_failsafe():
     flight.beats, flight.sticks = False, None
     flight.run(6.0)
     assert max(m.time_s for m in flight.moments if m.overridden) - at_s <= NEUTRAL_WITHIN_S + SLACK_S
-    assert companion.warden.entry is None
+    assert companion.gate.entry is None
     assert "Lost ground station" in " ".join(flight.texts())
 
 
@@ -83,8 +83,8 @@ def test_a_million_bytes_of_noise_neither_crash_nor_drive_anything():
             flight.run(0.02)
     flight.run(1.0)
     assert taken >= 1_000_000
-    assert companion.warden.known.garbage > 0
-    assert not companion.warden.thrusts_sent
+    assert companion.gate.known.garbage > 0
+    assert not companion.gate.thrusts_sent
     assert not any(moment.thrusting for moment in flight.moments)
 
 
@@ -97,4 +97,4 @@ def test_noise_while_engaged_does_no_harm():
         flight.run(0.02)
     assert all(moment.armed for moment in flight.moments if moment.overridden)
     last_s = max(moment.time_s for moment in flight.moments if moment.overridden)
-    assert companion.warden.entry is not None or last_s < flight.now_s
+    assert companion.gate.entry is not None or last_s < flight.now_s

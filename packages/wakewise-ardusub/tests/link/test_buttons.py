@@ -46,11 +46,11 @@ def test_a_button_at_which_the_autopilot_acts_is_refused(button: int) -> None:
             flight = InProcessSession(HEAVY, loop_hz=50.0, values={"BTN5_FUNCTION": 1.0}).run(0.2)
             flight.arm(armed)
             flight.run(0.2)
-            before = (flight.stand_in.armed, flight.stand_in.mode)
+            before = (flight.autopilot.armed, flight.autopilot.mode)
             assert before[0] is armed
             flight.buttons = 1 << button | shift
             flight.run(0.3)
-            changed |= (flight.stand_in.armed, flight.stand_in.mode) != before
+            changed |= (flight.autopilot.armed, flight.autopilot.mode) != before
     words = button_faults({"engage": button}, FRESH)
     assert not changed or words
     assert bool(words) == (button not in {0, 15})
@@ -64,7 +64,7 @@ def test_without_a_button_that_disarms_arduSub_does_not_arm() -> None:
     flight = InProcessSession(HEAVY, values={"BTN4_FUNCTION": 0.0}).run(0.2)
     flight.arm(True)
     flight.run(0.2)
-    assert not flight.stand_in.armed
+    assert not flight.autopilot.armed
     assert "Must assign a disarm or arm_toggle button" in " ".join(flight.texts())
     full = {name: 32.0 if name.startswith("BTN") else value for name, value in FRESH.items()}
     assert "not those of disarm" in button_faults({"engage": 4}, full)
@@ -97,13 +97,13 @@ def test_a_session_never_engages_with_a_button_of_the_autopilots() -> None:
     """Before they are known it says what it waits for; then which of them it is."""
     bottle = Bottle()
     bottle.parameter("BTN3_FUNCTION", 4.0)
-    assert bottle.warden.buttons_amiss == (
+    assert bottle.gate.button_fault == (
         "--buttons engage=3: BTN3_FUNCTION is 4 (disarm) on this autopilot; "
         "free are 0, 1, 2, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 and 15"
     )
-    assert bottle.engage() == f"not engaged: {bottle.warden.buttons_amiss}"
-    bottle.warden.known = bottle.warden.known.__class__(system=1, session=1)
-    assert bottle.warden.buttons_amiss is None
+    assert bottle.engage() == f"not engaged: {bottle.gate.button_fault}"
+    bottle.gate.known = bottle.gate.known.__class__(system=1, session=1)
+    assert bottle.gate.button_fault is None
 
 
 def test_every_button_that_a_page_names_is_free_on_a_fresh_autopilot() -> None:

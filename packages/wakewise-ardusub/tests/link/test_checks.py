@@ -189,21 +189,21 @@ def test_real_parameters_say_what_is_wrong_with_them(name: str, vehicle: str) ->
 
 def test_a_survey_finds_what_there_is() -> None:
     """Version, script, sticks, pose and parameters over MAVLink bytes are what the checks are given."""
-    talk = FakeAutopilot(parameters=dict(PARAMETERS))
-    talk.heartbeat()
+    link = FakeAutopilot(parameters=dict(PARAMETERS))
+    link.heartbeat()
 
     def answer_version(heard: object) -> None:
-        talk._command(heard)
+        link._command(heard)
         if heard.command != 512:  # the rates that a session asks for
             return
-        talk.say("named_value_float", time_boot_ms=1, name=b"WKW_VER", value=float(protocol.SCRIPT_VERSION))
-        talk.say("named_value_float", component=191, time_boot_ms=1, name=b"WW_D", value=7.0)
-        talk.say("manual_control", system=255, component=190, target=1, x=0, y=0, z=500, r=0, buttons=0)
-        talk.say("manual_control", system=255, component=190, target=9, x=0, y=0, z=500, r=0, buttons=0)
-        talk.say("local_position_ned", time_boot_ms=1, x=0, y=0, z=1, vx=0, vy=0, vz=0)
+        link.say("named_value_float", time_boot_ms=1, name=b"WKW_VER", value=float(protocol.SCRIPT_VERSION))
+        link.say("named_value_float", component=191, time_boot_ms=1, name=b"WW_D", value=7.0)
+        link.say("manual_control", system=255, component=190, target=1, x=0, y=0, z=500, r=0, buttons=0)
+        link.say("manual_control", system=255, component=190, target=9, x=0, y=0, z=500, r=0, buttons=0)
+        link.say("local_position_ned", time_boot_ms=1, x=0, y=0, z=1, vx=0, vy=0, vz=0)
 
-    talk.on["COMMAND_LONG"] = answer_version
-    facts = survey(talk, HEAVY, seconds=0.05)
+    link.on["COMMAND_LONG"] = answer_version
+    facts = survey(link, HEAVY, seconds=0.05)
     assert facts.heard == ReceivedTelemetry(
         seconds=0.05,
         firmware=(4, 5, 3),
@@ -217,9 +217,9 @@ def test_a_survey_finds_what_there_is() -> None:
 
 def test_nobody_or_another_vehicle_is_said() -> None:
     """The systems that were heard instead are named."""
-    talk = FakeAutopilot()
-    talk.say("heartbeat", system=42, type=12, autopilot=3, base_mode=0, custom_mode=19, system_status=4)
+    link = FakeAutopilot()
+    link.say("heartbeat", system=42, type=12, autopilot=3, base_mode=0, custom_mode=19, system_status=4)
     with pytest.raises(EnvironmentFailure, match=r"no heartbeat of system 1 in 0\.05 s; heard were systems 42"):
-        await_autopilot(talk, 0.05)
+        await_autopilot(link, 0.05)
     with pytest.raises(EnvironmentFailure, match="nobody was heard"):
         await_autopilot(FakeAutopilot(), 0.05)

@@ -13,10 +13,10 @@ def test_ages_are_those_of_the_last_minute() -> None:
     """Of a hundred looks the one that is far off is left out; what is over its limit is marked."""
     margins = FreshnessMargins()
     assert margins.words(EngagementLimits()) == ""
-    margins.looked(EngagementInputs(now_s=0.0))
+    margins.observe(EngagementInputs(now_s=0.0))
     assert margins.words(EngagementLimits()) == ""
     for k in range(1000):
-        margins.looked(
+        margins.observe(
             EngagementInputs(now_s=0.02 * k, pose_s=0.25 if k % 50 == 0 else 0.05, operator_s=0.04, telemetry_s=0.02)
         )
     assert margins.p99_s() == pytest.approx({"pose": 0.25, "sticks": 0.04, "attitude": 0.02})
@@ -27,20 +27,20 @@ def test_each_trip_is_counted_by_its_kind() -> None:
     """Engaged or ready, a fault is one trip; taking the sticks back and what keeps it from being ready are none."""
     bottle = Bottle()
     assert bottle.engage() == "engaged"
-    bottle.warden.press()
+    bottle.gate.press()
     bottle.run(0.5)
-    assert not bottle.warden.margins.trips
+    assert not bottle.gate.margins.trips
     bottle.silent.add("pose")
     bottle.run(1.0)
-    assert bottle.warden.margins.trips == {"pose": 1}
+    assert bottle.gate.margins.trips == {"pose": 1}
     bottle.silent.clear()
     bottle.run(1.5)
-    assert bottle.warden.press() == "engaged"
+    assert bottle.gate.press() == "engaged"
     bottle.run(0.5)
     bottle.silent.update({"pose", "sticks"})
     bottle.run(1.0)
     bottle.silent.clear()
     bottle.run(3.0)
-    assert bottle.warden.margins.trips.total() == 2
-    words = bottle.warden.margins.words(bottle.warden.limits)
+    assert bottle.gate.margins.trips.total() == 2
+    words = bottle.gate.margins.words(bottle.gate.limits)
     assert "trips 2 (pose 2)" in words or "trips 2 (pose 1, operator 1)" in words

@@ -13,7 +13,7 @@ from wakewise_ardusub.link.engagement_fsm import EngagementLimits
 from wakewise_ardusub.link.motor_interface import VehicleMotors
 from wakewise_ardusub.link.protocol import ALLOWED_MODES, ALT_HOLD, POSHOLD
 from wakewise_ardusub.link.script import script_text
-from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD
+from wakewise_ardusub.sitl.companion_harness import COMPANION_FAULTS
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 
@@ -31,7 +31,7 @@ def test_every_row_names_a_test_that_exists():
     for name, case in found:
         homes = [body for body in files.values() if re.search(rf"^def {name}\(", body, re.MULTILINE)]
         assert homes, name
-        assert not case or case in FAULTS_ABOARD or any(f'"{case}"' in body for body in homes), f"{name}[{case}]"
+        assert not case or case in COMPANION_FAULTS or any(f'"{case}"' in body for body in homes), f"{name}[{case}]"
 
 
 def test_a_vehicle_of_another_number_of_motors_is_refused():
@@ -57,16 +57,16 @@ def risen_m(mode: int, script: str, seconds: float = 10.0) -> float:
     flight.run(15.0)
     assert flight.moments[-1].overridden
     flight.streams = False
-    flight.station.say(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    flight.station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     flight.run(0.3)
     assert not flight.moments[-1].overridden
-    deepest = float(flight.stand_in.motion.p_WB_m[2])
+    deepest = float(flight.autopilot.motion.p_WB_m[2])
     least = deepest
     for _ in range(round(10.0 * seconds)):
         flight.run(0.1)
-        least = min(least, float(flight.stand_in.motion.p_WB_m[2]))
-    assert flight.stand_in.mode == mode
-    assert not flight.stand_in.script_faults
+        least = min(least, float(flight.autopilot.motion.p_WB_m[2]))
+    assert flight.autopilot.mode == mode
+    assert not flight.autopilot.script_faults
     return deepest - least
 
 

@@ -35,7 +35,7 @@ class Bench:
     _ended_s: float = -1e9
 
     def __post_init__(self) -> None:
-        self.talk = FakeAutopilot(on={"COMMAND_LONG": self._command, "HEARTBEAT": self._hello})
+        self.link = FakeAutopilot(on={"COMMAND_LONG": self._command, "HEARTBEAT": self._hello})
 
     def clock(self) -> float:
         return self.now_s
@@ -50,8 +50,8 @@ class Bench:
 
     def _hello(self, heard: object) -> None:
         self._watch()
-        self.talk.armed = self.armed
-        self.talk.heartbeat()
+        self.link.armed = self.armed
+        self.link.heartbeat()
 
     def _command(self, heard: object) -> None:
         self._watch()
@@ -59,14 +59,14 @@ class Bench:
         result = 0
         if self._last_s is None and (not self.armed or self.now_s < self._ended_s + 10.0):
             words = b"Arm motors before testing motors." if not self.armed else b"10 second cooldown required"
-            self.talk.say("statustext", severity=4, text=words)
+            self.link.say("statustext", severity=4, text=words)
             result = 4
         else:
             self._last_s = self.now_s
             self.pulses[int(heard.param1)] = heard.param3
             self.turned.append((int(heard.param1), heard.param3, self.now_s))
             assert sum(pulse != 1500.0 for pulse in self.pulses.values()) <= 1
-        self.talk.say("command_ack", command=209, result=result)
+        self.link.say("command_ack", command=209, result=result)
 
 
 @dataclass
@@ -100,7 +100,7 @@ class Looker:
 
 def _run(bench: Bench, looker: Looker, motors: list[int] | None = None):
     turns = planned_turns(HEAVY, PARAMETERS, motors)
-    return run_motor_test(bench.talk, HEAVY, turns, looker, clock=bench.clock, sleep=bench.sleep)
+    return run_motor_test(bench.link, HEAVY, turns, looker, clock=bench.clock, sleep=bench.sleep)
 
 
 def test_each_motor_turns_alone_gently_and_is_expected_where_its_axis_points() -> None:
@@ -159,7 +159,7 @@ def test_a_refusal_is_said_with_the_autopilots_words() -> None:
     bench._ended_s = bench.now_s
     with pytest.raises(EnvironmentFailure, match="motor 1: the test is failed: 10 second cooldown required"):
         _run(bench, Looker(bench), [1])
-    assert bench.talk.sent[-1].param3 == 1500.0
+    assert bench.link.sent[-1].param3 == 1500.0
 
 
 def test_what_was_seen_is_kept_motor_by_motor() -> None:
@@ -168,7 +168,7 @@ def test_what_was_seen_is_kept_motor_by_motor() -> None:
     looker = Looker(bench, broken_at=3)
     with pytest.raises(KeyboardInterrupt):
         run_motor_test(
-            bench.talk,
+            bench.link,
             HEAVY,
             planned_turns(HEAVY, PARAMETERS),
             looker,
@@ -190,7 +190,7 @@ def test_ctrl_c_brings_the_motor_to_rest() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         run_motor_test(
-            bench.talk,
+            bench.link,
             HEAVY,
             planned_turns(HEAVY, PARAMETERS, [2]),
             Looker(bench),
@@ -203,7 +203,7 @@ def test_ctrl_c_brings_the_motor_to_rest() -> None:
 def test_a_lost_autopilot_turns_nothing() -> None:
     """No heartbeat, no command."""
     bench = Bench()
-    bench.talk.on["HEARTBEAT"] = lambda heard: None
+    bench.link.on["HEARTBEAT"] = lambda heard: None
     with pytest.raises(EnvironmentFailure, match="not heard any more"):
         _run(bench, Looker(bench), [1])
     assert not bench.turned

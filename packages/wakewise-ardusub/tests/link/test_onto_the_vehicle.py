@@ -42,7 +42,7 @@ class Wire:
         self.behind = InProcessPhysics(body=FreeWater(HEAVY), table=PulseTable.of(HEAVY, parameters))
         self.piloted, self._loops = True, 0
         self._waiting: deque[Any] = deque()
-        self._ears = ardupilotmega.MAVLink(None)
+        self._parsers = ardupilotmega.MAVLink(None)
         self._voices: dict[tuple[int, int], Any] = {}
 
     def say(self, who: tuple[int, int], name: str, /, **fields: Any) -> None:
@@ -51,7 +51,7 @@ class Wire:
         voice.seq = (voice.seq + 1) % 256
         self.autopilot.hear(data, str(who))
         if who != (1, 191):
-            self._waiting.extend(self._ears.parse_buffer(data) or [])
+            self._waiting.extend(self._parsers.parse_buffer(data) or [])
 
     def send(self, name: str, **fields: Any) -> None:
         self.say((1, 191), name, **fields)
@@ -64,9 +64,9 @@ class Wire:
         assert motion is not None
         self.autopilot.step(motion)
         for packet in self.autopilot.take_out():
-            self._waiting.extend(self._ears.parse_buffer(packet) or [])
+            self._waiting.extend(self._parsers.parse_buffer(packet) or [])
 
-    def hear_any(self, timeout_s: float) -> Any:
+    def receive_any(self, timeout_s: float) -> Any:
         for _ in range(max(round(100 * timeout_s), 1)):
             if self._waiting:
                 return self._waiting.popleft()

@@ -28,7 +28,7 @@ def engaged(**more) -> Bottle:
     bottle = Bottle(**more)
     assert bottle.engage() == "engaged"
     bottle.run(1.0)
-    assert bottle.warden.entry == 1
+    assert bottle.gate.entry == 1
     assert bottle.thrusts
     return bottle
 
@@ -46,7 +46,7 @@ def test_thrusts_go_out_while_engaged():
 def test_times_of_thrusts_only_grow():
     """The script takes what is newer than the last, so no two messages have one time, released or not."""
     bottle = engaged()
-    bottle.warden.press()
+    bottle.gate.press()
     bottle.run(0.2)
     times = [fields["time_usec"] for _, name, fields in bottle.sent if name == THRUST]
     assert all(b > a for a, b in itertools.pairwise(times))
@@ -62,7 +62,7 @@ def test_two_companions_on_one_clock_are_two_senders():
     assert np.abs(apart).min() > MOST_AHEAD_US
     for time_us in times[0]:  # as the second hears the first
         bottle.say("SET_ACTUATOR_CONTROL_TARGET", component=191, time_usec=time_us, group_mlx=0)
-    assert "another program sends thrusts" in bottle.warden.engagement.why
+    assert "another program sends thrusts" in bottle.gate.engagement.why
 
 
 def test_sessions_drawn_at_random_are_apart_and_fit_the_script():
@@ -77,9 +77,9 @@ def test_nothing_goes_out_without_consent():
     """All is well for ten seconds, and no thrust is sent; neither is one that a controller hands over unasked."""
     bottle = Bottle()
     bottle.run(10.0)
-    assert bottle.warden.engagement.state == "ready"
-    assert not bottle.warden.command(THRUSTS, 0)
-    assert not bottle.warden.command(THRUSTS, 1)
+    assert bottle.gate.engagement.state == "ready"
+    assert not bottle.gate.command(THRUSTS, 0)
+    assert not bottle.gate.command(THRUSTS, 1)
     assert not bottle.thrusts
 
 
@@ -118,8 +118,8 @@ LOSSES = {
     "tilted": lambda b: setattr(b, "roll_rad", 1.2),
     "parameter": lambda b: b.parameter("MOT_1_DIRECTION", -1.0),
     "button": lambda b: b.parameter("BTN3_FUNCTION", 4.0),
-    "operator takes over": lambda b: b.warden.press(),
-    "end": lambda b: b.warden.end("Ctrl-C"),
+    "operator takes over": lambda b: b.gate.press(),
+    "end": lambda b: b.gate.end("Ctrl-C"),
 }
 
 
@@ -133,7 +133,7 @@ def test_after_any_loss_thrusts_end_in_time(loss):
     at_s = bottle.now_s
     LOSSES[loss](bottle)
     bottle.run(2.0)
-    assert bottle.warden.entry is None
+    assert bottle.gate.entry is None
     last_s, first_release_s = bottle.thrusts[-1], bottle.releases[0]
     assert last_s - at_s <= 0.25 + SLACK_S
     assert first_release_s - at_s <= NEUTRAL_WITHIN_S - TICK_S + SLACK_S
@@ -147,10 +147,10 @@ def test_after_any_loss_thrusts_end_in_time(loss):
 def test_a_heartbeat_alone_that_stays_away_ends_it_too():
     """Heartbeats come once a second: with all else fresh it ends two and a half after the last."""
     bottle = engaged()
-    at_s = bottle.warden.known.heartbeat_s
+    at_s = bottle.gate.known.heartbeat_s
     bottle.silent.add("heartbeat")
     bottle.run(4.0)
-    assert bottle.warden.entry is None
+    assert bottle.gate.entry is None
     assert bottle.releases[0] - at_s <= LIMITS.heartbeat_s + TICK_S + SLACK_S
 
 
@@ -160,8 +160,8 @@ def test_a_script_that_falls_silent_ends_it():
     at_s = bottle.now_s
     bottle.silent.add("script")
     bottle.run(3.0)
-    assert bottle.warden.entry is None
-    assert bottle.warden.engagement.why.startswith("no script on the autopilot for")
+    assert bottle.gate.entry is None
+    assert bottle.gate.engagement.why.startswith("no script on the autopilot for")
     assert bottle.releases[0] - at_s <= LIMITS.script_s + 0.5 + TICK_S + SLACK_S
 
 
@@ -170,19 +170,19 @@ def test_a_process_that_stood_still_lets_go():
     bottle = engaged()
     before = len(bottle.sent)
     bottle.now_s += 0.5
-    bottle.warden.tick()
+    bottle.gate.tick()
     assert [fields["group_mlx"] for _, name, fields in bottle.sent[before:] if name == THRUST] == [1]
 
 
 def test_thrusts_whose_own_call_ends_the_engagement_are_not_sent():
     """The position grew too old since the last tick: the call finds it out, and nothing follows the release."""
     bottle = engaged()
-    before, entry = len(bottle.sent), bottle.warden.entry
+    before, entry = len(bottle.sent), bottle.gate.entry
     bottle.now_s += LIMITS.pose_s + TICK_S
-    assert bottle.warden.entry == entry
-    assert not bottle.warden.command(THRUSTS, entry)
-    assert bottle.warden.entry is None
-    assert bottle.warden.engagement.why.startswith("no ")
+    assert bottle.gate.entry == entry
+    assert not bottle.gate.command(THRUSTS, entry)
+    assert bottle.gate.entry is None
+    assert bottle.gate.engagement.why.startswith("no ")
     assert [fields["group_mlx"] for _, name, fields in bottle.sent[before:] if name == THRUST] == [1]
     bottle.run(0.5)
     assert bottle.thrusts[-1] < bottle.releases[0]
@@ -196,7 +196,7 @@ def test_letting_go_is_said_three_times(ends):
     bottle.run(1.0)
     assert len(bottle.releases) == 3
     assert 0.02 - SLACK_S <= np.ptp(bottle.releases) <= 0.04 + SLACK_S
-    assert bottle.warden.releases_sent == 3
+    assert bottle.gate.releases_sent == 3
 
 
 @pytest.mark.parametrize("twist", [[1.5, 0.0, 0.0], [0.0, -1.1, 0.0], [0.7, 0.7, 0.7]])
@@ -204,23 +204,23 @@ def test_a_speed_that_only_the_estimator_knows_ends_it(twist):
     """The autopilot says that it stands still; the larger of both counts."""
     bottle = engaged()
     fast = BodyState(X_WB=Pose(np.array(bottle.at), np.array([1.0, 0.0, 0.0, 0.0])), nu_B=np.array([*twist, 0, 0, 0]))
-    bottle.warden.estimated(fast)
+    bottle.gate.estimated(fast)
     bottle.now_s += TICK_S
-    bottle.warden.tick()
-    assert bottle.warden.entry is None
-    assert bottle.warden.engagement.why == f"{np.linalg.norm(twist):.2f} m/s, allowed 1 m/s"
+    bottle.gate.tick()
+    assert bottle.gate.entry is None
+    assert bottle.gate.engagement.why == f"{np.linalg.norm(twist):.2f} m/s, allowed 1 m/s"
 
 
 def test_thrusts_of_an_engagement_before_are_not_sent():
     """A controller that answers late hands over thrusts of an engagement that is over; the next does not get them."""
     bottle = engaged()
-    bottle.warden.press()
+    bottle.gate.press()
     bottle.run(1.5)
-    assert bottle.warden.press() == "engaged"
+    assert bottle.gate.press() == "engaged"
     count = len(bottle.thrusts)
-    assert not bottle.warden.command(THRUSTS, 1)
+    assert not bottle.gate.command(THRUSTS, 1)
     assert len(bottle.thrusts) == count
-    assert bottle.warden.command(THRUSTS, 2)
+    assert bottle.gate.command(THRUSTS, 2)
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
@@ -228,7 +228,7 @@ def test_thrusts_that_are_no_numbers_are_not_sent(wrong):
     """One thrust of eight that is not finite, and none goes out."""
     bottle = engaged()
     count = len(bottle.thrusts)
-    assert not bottle.warden.command(np.array([*THRUSTS[:7], wrong]), 1)
+    assert not bottle.gate.command(np.array([*THRUSTS[:7], wrong]), 1)
     assert len(bottle.thrusts) == count
 
 
@@ -239,7 +239,7 @@ def test_its_own_echo_is_no_rival():
         if name in (THRUST, "heartbeat"):
             bottle.say(name.upper(), component=191, **dict(fields))
     bottle.run(0.5)
-    assert bottle.warden.entry == 1
+    assert bottle.gate.entry == 1
 
 
 def test_the_pilots_button_consents_and_releases():
@@ -248,19 +248,19 @@ def test_the_pilots_button_consents_and_releases():
     bottle.run(1.2)
     bottle.buttons = 1 << 3
     bottle.run(0.5)
-    assert bottle.warden.entry == 1
+    assert bottle.gate.entry == 1
     bottle.buttons = 1 << 4
     bottle.run(0.5)
-    assert bottle.warden.pressed() == ("capture",)
+    assert bottle.gate.pressed() == ("capture",)
     bottle.buttons = 1 << 3
     bottle.run(0.1)
-    assert bottle.warden.entry is None
+    assert bottle.gate.entry is None
 
 
 def test_it_beats_as_a_companion_and_reports_twice_a_second():
     """Heartbeats are those of an onboard controller, once a second; figures go out as named values, each twice."""
     bottle = Bottle()
-    bottle.warden.figures = {"WW_D": 0.25, "WW_SAVED": math.nan}
+    bottle.gate.figures = {"WW_D": 0.25, "WW_SAVED": math.nan}
     bottle.run(10.0)
     beats = [fields for _, name, fields in bottle.sent if name == "heartbeat"]
     assert {fields["type"] for fields in beats} == {18}
@@ -273,7 +273,7 @@ def test_it_beats_as_a_companion_and_reports_twice_a_second():
 def test_what_is_missing_is_asked_for():
     """A vehicle that sends neither attitude nor parameters is asked for them, and no more once they come."""
     bottle = Bottle()
-    bottle.warden.known = bottle.warden.known.__class__(system=1, session=SESSION)
+    bottle.gate.known = bottle.gate.known.__class__(system=1, session=SESSION)
     bottle.silent.update({"attitude", "pose"})
     bottle.run(5.0)
     names = [name for _, name, _ in bottle.sent]
@@ -294,7 +294,7 @@ def test_every_change_of_state_is_in_the_journal(tmp_path):
     for _ in range(50):
         bottle.say("COMMAND_LONG", system=255, component=190, target_system=1, command=176)
     bottle.run(3.0)
-    bottle.warden.end("Ctrl-C")
+    bottle.gate.end("Ctrl-C")
     journal.close()
     lines, _ = read_journal(tmp_path / "journal.jsonl")
     states = [(line["before"], line["after"]) for line in lines if line["event"] == "state"]
@@ -314,9 +314,9 @@ def test_a_cable_pulled_out_does_not_end_the_watch():
     def fails(name, fields):
         raise OSError(101, "Network is unreachable")
 
-    bottle.warden._send = fails
+    bottle.gate._send = fails
     bottle.run(0.5)
-    assert bottle.warden.unsent > 0
+    assert bottle.gate.unsent > 0
 
 
 EVENTS = st.sampled_from([
@@ -342,12 +342,12 @@ def test_never_a_thrust_while_disarmed_nor_after_a_loss(steps):
         boot_ms = round(1e3 * (bottle.now_s - 1000.0 + bottle.boot_s))
         match event:
             case "press":
-                bottle.warden.press()
+                bottle.gate.press()
                 pressed = True
             case "command":
-                bottle.warden.command(THRUSTS, bottle.warden.engagement.entries)
+                bottle.gate.command(THRUSTS, bottle.gate.engagement.entries)
             case "tick":
-                bottle.warden.tick()
+                bottle.gate.tick()
             case "arm" | "disarm":
                 bottle.armed = event == "arm"
                 bottle.beat()
@@ -371,7 +371,7 @@ def test_never_a_thrust_while_disarmed_nor_after_a_loss(steps):
                 bottle.stick(system=250)
                 last["sticks"] = bottle.now_s
             case "release":
-                bottle.warden.release("asked")
+                bottle.gate.release("asked")
             case "jump":
                 bottle.boot_s += 3.0
             case "well" | "run":
@@ -406,13 +406,13 @@ def test_messages_that_say_nonsense_do_no_harm(data):
     keys = st.sampled_from(KEYS)
     for _ in range(10):
         fields = data.draw(st.dictionaries(keys, value, max_size=12))
-        bottle.warden.take(
+        bottle.gate.take(
             MavlinkMessage(
                 data.draw(st.integers(0, 255)), data.draw(st.sampled_from([1, 190, 191])), data.draw(names), fields
             )
         )
         bottle.now_s += 0.02
-        bottle.warden.tick()
+        bottle.gate.tick()
     assert not bottle.thrusts
 
 

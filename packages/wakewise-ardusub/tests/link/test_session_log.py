@@ -43,8 +43,8 @@ def test_arrays_and_numbers_that_are_none(tmp_path):
     journal = SessionLog(tmp_path / "j.jsonl", clock=lambda: 1.5, wall=lambda: 2.0)
     journal.write("pose", p=np.array([1.0, math.nan]), n=np.int64(3))
     journal.close()
-    lines, spoiled = read_journal(tmp_path / "j.jsonl")
-    assert spoiled == 0
+    lines, count_bad = read_journal(tmp_path / "j.jsonl")
+    assert count_bad == 0
     assert lines == [{"t_s": 1.5, "utc_s": 2.0, "event": "pose", "p": [1.0, None], "n": 3}]
 
 
@@ -62,8 +62,8 @@ def test_a_killed_program_leaves_every_line_that_it_wrote(tmp_path):
         while said < 200:
             said = int(process.stdout.readline())
         process.kill()
-    lines, spoiled = read_journal(path)
-    assert spoiled == 0
+    lines, count_bad = read_journal(path)
+    assert count_bad == 0
     assert [line["k"] for line in lines] == list(range(len(lines)))
     assert len(lines) > said >= 200
 
@@ -78,9 +78,9 @@ def test_a_line_cut_short_is_left_out_and_what_follows_is_not(tmp_path):
     second = SessionLog(path)
     second.write("two")
     second.close()
-    lines, spoiled = read_journal(path)
+    lines, count_bad = read_journal(path)
     assert [line["event"] for line in lines] == ["one", "two"]
-    assert spoiled == 1
+    assert count_bad == 1
 
 
 def test_a_full_disk_is_counted_and_does_not_end_the_session(tmp_path):

@@ -14,13 +14,13 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise_ardusub.link.connection import Endpoint, parse_connection
-from wakewise_ardusub.link.transports import MavlinkCodec, StreamTransport, UdpTransport, carrier_of
+from wakewise_ardusub.link.transports import MavlinkCodec, StreamTransport, UdpTransport, open_transport
 
 
 def test_a_host_without_an_address_is_said():
     """Its name, and that it has none."""
     with pytest.raises(InputError, match=r"no-such-host\.invalid has no address"):
-        carrier_of(parse_connection("udpout:no-such-host.invalid:14550"))
+        open_transport(parse_connection("udpout:no-such-host.invalid:14550"))
 
 
 def test_a_port_that_is_taken_is_said():
@@ -28,7 +28,7 @@ def test_a_port_that_is_taken_is_said():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         with pytest.raises(EnvironmentFailure, match="another program listens there already"):
-            carrier_of(Endpoint(way="udpin", host="127.0.0.1", port=other.getsockname()[1]))
+            open_transport(Endpoint(way="udpin", host="127.0.0.1", port=other.getsockname()[1]))
 
 
 def test_who_waits_answers_whoever_spoke():
@@ -54,7 +54,7 @@ def test_a_record_cannot_be_flown(tmp_path):
     """A file is refused, and what reads it is named."""
     (tmp_path / "flight.tlog").write_bytes(b"")
     with pytest.raises(InputError, match="a record cannot be flown; wakewise link log reads it"):
-        carrier_of(parse_connection(f"file:{tmp_path / 'flight.tlog'}"))
+        open_transport(parse_connection(f"file:{tmp_path / 'flight.tlog'}"))
 
 
 def test_nobody_at_the_other_end_of_tcp_is_said():
@@ -63,7 +63,7 @@ def test_nobody_at_the_other_end_of_tcp_is_said():
         unused.bind(("127.0.0.1", 0))
         port = unused.getsockname()[1]
     with pytest.raises(EnvironmentFailure, match=f"tcp:127.0.0.1:{port}: Connection refused"):
-        carrier_of(parse_connection(f"tcp:127.0.0.1:{port}"))
+        open_transport(parse_connection(f"tcp:127.0.0.1:{port}"))
 
 
 def test_a_stream_over_tcp_carries_both_ways():
@@ -72,41 +72,41 @@ def test_a_stream_over_tcp_carries_both_ways():
         taken: list[socket.socket] = []
         waits = threading.Thread(target=lambda: taken.append(server.accept()[0]))
         waits.start()
-        carrier = carrier_of(parse_connection(f"tcp:127.0.0.1:{server.getsockname()[1]}"))
+        transport = open_transport(parse_connection(f"tcp:127.0.0.1:{server.getsockname()[1]}"))
         waits.join()
         with taken[0] as vehicle:
             mav = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
             packet = bytes(mav.attitude_encode(1, 0.5, 0, 0, 0, 0, 0.5).pack(mav))
             vehicle.sendall(packet[:20])
-            assert carrier.receive(1.0) == b""
+            assert transport.receive(1.0) == b""
             vehicle.sendall(packet[20:])
-            assert carrier.receive(1.0) == packet
-            carrier.send(b"out")
+            assert transport.receive(1.0) == packet
+            transport.send(b"out")
             assert vehicle.recv(10) == b"out"
-        assert carrier.receive(0.2) == b""
-        carrier.close()
+        assert transport.receive(0.2) == b""
+        transport.close()
 
 
 def test_a_serial_line_carries_both_ways():
     """A pseudo-terminal as the cable: packets come in whole, bytes go out as they are; pulled out, it is silence."""
     master, slave = os.openpty()
-    carrier = carrier_of(parse_connection(f"serial:{os.ttyname(slave)}:115200"))
+    transport = open_transport(parse_connection(f"serial:{os.ttyname(slave)}:115200"))
     mav = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
     packet = bytes(mav.attitude_encode(1, 0.5, 0, 0, 0, 0, 0.5).pack(mav))
     os.write(master, packet[:20])
-    assert carrier.receive(1.0) == b""
+    assert transport.receive(1.0) == b""
     os.write(master, packet[20:])
-    assert carrier.receive(1.0) == packet
-    carrier.send(bytes(range(256)))
+    assert transport.receive(1.0) == packet
+    transport.send(bytes(range(256)))
     assert os.read(master, 300) == bytes(range(256))
     os.close(slave)
     os.close(master)
     began_s = time.monotonic()
-    assert [carrier.receive(0.1) for _ in range(3)] == [b""] * 3
+    assert [transport.receive(0.1) for _ in range(3)] == [b""] * 3
     assert time.monotonic() - began_s > 0.15  # it waits, and does not spin
     with pytest.raises(OSError, match="Input/output"):
-        carrier.send(b"more")
-    carrier.close()
+        transport.send(b"more")
+    transport.close()
 
 
 @given(cuts=st.lists(st.integers(1, 60), max_size=30), noise=st.binary(max_size=20))

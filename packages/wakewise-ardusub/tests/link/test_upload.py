@@ -30,18 +30,18 @@ class Card:
     _open: str | None = None
     _last: tuple[bytes, bytes] | None = None
 
-    def talk(self, **kwargs: Any) -> FakeAutopilot:
-        talk = FakeAutopilot(**kwargs)
-        talk.on["FILE_TRANSFER_PROTOCOL"] = lambda heard: self._serve(talk, bytes(heard.payload))
-        return talk
+    def link(self, **kwargs: Any) -> FakeAutopilot:
+        link = FakeAutopilot(**kwargs)
+        link.on["FILE_TRANSFER_PROTOCOL"] = lambda heard: self._serve(link, bytes(heard.payload))
+        return link
 
-    def _serve(self, talk: FakeAutopilot, payload: bytes) -> None:
+    def _serve(self, link: FakeAutopilot, payload: bytes) -> None:
         if self._last is None or self._last[0] != payload:
             number, _, operation, size, _, _, offset = _HEAD.unpack_from(payload)
             code, data = self._do(operation, payload[12 : 12 + size], offset)
             head = _HEAD.pack((number + 1) % 65536, 5, code, len(data), operation, 0, offset)
             self._last = payload, (head + data).ljust(251, b"\0")
-        talk.say(
+        link.say(
             "file_transfer_protocol",
             target_network=0,
             target_system=1,
@@ -83,8 +83,8 @@ class Card:
 def test_it_is_there_as_it_was_sent(lose: int) -> None:
     """Also where every fifth packet is lost, either way; the progress ends at the whole."""
     card, seen = Card(), []
-    talk = card.talk(lose=lambda where, count: lose > 0 and count % lose == 0)
-    path = upload_script(talk, SCRIPT, progress=lambda done, total: seen.append((done, total)))
+    link = card.link(lose=lambda where, count: lose > 0 and count % lose == 0)
+    path = upload_script(link, SCRIPT, progress=lambda done, total: seen.append((done, total)))
     assert path == "/APM/scripts/wakewise.lua"
     assert card.files == {path: SCRIPT}
     assert seen[-1] == (len(SCRIPT), len(SCRIPT))
@@ -92,18 +92,18 @@ def test_it_is_there_as_it_was_sent(lose: int) -> None:
 
 def test_it_goes_where_this_autopilot_looks() -> None:
     """On Linux boards scripts lie where the firmware runs; a folder that is missing is made."""
-    assert upload_script(Card(folders={"./scripts"}).talk(), SCRIPT) == "./scripts/wakewise.lua"
+    assert upload_script(Card(folders={"./scripts"}).link(), SCRIPT) == "./scripts/wakewise.lua"
     made = Card(folders=set(), makes=("./scripts",))
-    assert upload_script(made.talk(), SCRIPT) == "./scripts/wakewise.lua"
+    assert upload_script(made.link(), SCRIPT) == "./scripts/wakewise.lua"
     with pytest.raises(EnvironmentFailure, match="no folder for scripts: set SCR_ENABLE"):
-        upload_script(Card(folders=set()).talk(), SCRIPT)
+        upload_script(Card(folders=set()).link(), SCRIPT)
 
 
 def test_what_cannot_be_is_said() -> None:
     """No answer, a full card, or bytes that come back changed: one line each."""
     with pytest.raises(EnvironmentFailure, match="does not answer file transfers"):
-        upload_script(Card().talk(lose=lambda where, count: where == "in"), SCRIPT)
+        upload_script(Card().link(lose=lambda where, count: where == "in"), SCRIPT)
     with pytest.raises(EnvironmentFailure, match=r"wakewise\.lua: its file system refused"):
-        upload_script(Card(refuses=7).talk(), SCRIPT)
+        upload_script(Card(refuses=7).link(), SCRIPT)
     with pytest.raises(EnvironmentFailure, match="not what was sent"):
-        upload_script(Card(damages=True).talk(), SCRIPT)
+        upload_script(Card(damages=True).link(), SCRIPT)

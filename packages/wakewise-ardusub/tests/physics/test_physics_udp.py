@@ -40,12 +40,12 @@ def test_frames_over_a_socket_move_the_vehicle() -> None:
 
 def test_nobody_there_is_no_answer() -> None:
     """The client says so and sends the same frame again later."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as deaf:
-        deaf.bind((LOOPBACK, 0))
-        client = UdpPhysics(LOOPBACK, deaf.getsockname()[1])
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receive_blocked:
+        receive_blocked.bind((LOOPBACK, 0))
+        client = UdpPhysics(LOOPBACK, receive_blocked.getsockname()[1])
         assert client.exchange((1500,) * 16, 400) is None
         assert client.exchange((1500,) * 16, 400) is None
-        assert deaf.recv(100) == deaf.recv(100)
+        assert receive_blocked.recv(100) == receive_blocked.recv(100)
         assert client.resent == 1
         client.close()
 

@@ -54,14 +54,14 @@ class Clock:
 
 def afloat(companion: CompanionHarness, method: str = "dp"):
     """The parts of a flight of the vehicle of a companion, and how often it took a photograph."""
-    known = companion.warden.known
+    known = companion.gate.known
     start = BodyState(X_WB=Pose(known.place_W_m, attitude_of(known)))
     middle = start.X_WB.apply(np.array([0.9, 0.0, 0.0]))
     scenario = Scenario(vehicle="bluerov2-heavy", method=method).replace(**SEA, **MISSION)
     photographs: list[float] = []
     sea = join_vehicle(
         scenario,
-        companion.warden,
+        companion.gate,
         start=start,
         target=ball(middle, 0.2),
         region=ball_points(middle, 0.2),
@@ -99,13 +99,13 @@ def test_arm_engage_fly_an_orbit_capture_release_disarm(tmp_path):
 
     def direct(time_s: float) -> None:
         """What the operator does, by the clock of the flight."""
-        if companion.warden.entry is None and at["engaged"] == 0.0 and time_s > 2.5:
-            assert companion.warden.press() == "engaged"
+        if companion.gate.entry is None and at["engaged"] == 0.0 and time_s > 2.5:
+            assert companion.gate.press() == "engaged"
             at["engaged"] = companion.clock()
         elif at["engaged"] and companion.clock() > at["engaged"] + 1.0 and not photographs:
             sea.desk.set(mode="scan")
         if at["engaged"] and not at["released"] and len(photographs) == 4 and sea.desk.state.mode == "hold":
-            companion.warden.press()
+            companion.gate.press()
             at["released"] = companion.clock()
 
     companion.flight.arm(True)
@@ -115,7 +115,7 @@ def test_arm_engage_fly_an_orbit_capture_release_disarm(tmp_path):
     companion.flight.run(1.0)
     companion.flight.arm(False)
     companion.flight.run(1.0)
-    companion.warden.end("the session is over")
+    companion.gate.end("the session is over")
     companion.flight.run(0.2)
     journal.close()
 
@@ -133,8 +133,8 @@ def test_arm_engage_fly_an_orbit_capture_release_disarm(tmp_path):
     assert not companion.flight.moments[-1].thrusting
     values = {m.name for m in companion.flight.said if m.get_type() == "NAMED_VALUE_FLOAT"}
     assert {"WKW_ENG", "WKW_VER"} <= values
-    lines, spoiled = read_journal(tmp_path / "journal.jsonl")
-    assert spoiled == 0
+    lines, count_bad = read_journal(tmp_path / "journal.jsonl")
+    assert count_bad == 0
     states = [line["after"] for line in lines if line["event"] == "state"]
     assert states.count("engaged") == 1
     assert "refused" not in states
@@ -161,25 +161,25 @@ def test_depth_is_held_while_engaged_in_alt_hold_and_after_hand_back():
     def direct(time_s: float) -> None:
         """Consent, down by the stick for 4 s, 6 s to come to rest and 5 s of holding, then hand back."""
         if not at["engaged"] and time_s > 1.5:
-            assert companion.warden.press() == "engaged"
+            assert companion.gate.press() == "engaged"
             at["engaged"] = time_s
         since_s = time_s - at["engaged"] if at["engaged"] else -1.0
         flight.sticks = (0, 0, 200, 0) if 0.5 < since_s < 4.5 else (0, 0, 500, 0)
         if since_s > 10.5:
-            depths["held"].append(float(flight.stand_in.motion.p_WB_m[2]))
+            depths["held"].append(float(flight.autopilot.motion.p_WB_m[2]))
         if since_s > 15.5 and not at["released"]:
-            assert "released" in companion.warden.press()
+            assert "released" in companion.gate.press()
             at["released"] = time_s
 
-    before_m = float(flight.stand_in.motion.p_WB_m[2])
+    before_m = float(flight.autopilot.motion.p_WB_m[2])
     plant, witness = sea.parts.world.begin()
     fly = loop_of(sea.parts, plant, witness, sea.figures)
     fly(duration_s=None, pace=direct, stop=lambda: bool(at["released"]))
-    assert flight.stand_in.mode in (ALT_HOLD, STABILIZE)
+    assert flight.autopilot.mode in (ALT_HOLD, STABILIZE)
     for _ in range(100):
         flight.run(0.1)
-        depths["after"].append(float(flight.stand_in.motion.p_WB_m[2]))
-    assert flight.stand_in.mode == ALT_HOLD
+        depths["after"].append(float(flight.autopilot.motion.p_WB_m[2]))
+    assert flight.autopilot.mode == ALT_HOLD
     assert not flight.moments[-1].overridden
     held = np.array(depths["held"])
     assert held.mean() - before_m > 0.2
@@ -195,7 +195,7 @@ class Deaf:
         return [], 0
 
 
-def session_of(folder, monkeypatch, **wardens) -> VehicleSession:
+def session_of(folder, monkeypatch, **gate_options) -> VehicleSession:
     """A session that compiles nothing and hears nothing by itself."""
     monkeypatch.setattr("wakewise_ardusub.session.session.compile_kernels", lambda jobs, progress: None)
     return VehicleSession(
@@ -205,7 +205,7 @@ def session_of(folder, monkeypatch, **wardens) -> VehicleSession:
         folder=folder,
         spare=ProtectedRegion(),
         session=1,
-        wardens=wardens,
+        gate_options=gate_options,
     )
 
 
@@ -214,7 +214,7 @@ def test_a_session_with_a_button_of_the_autopilots_ends_in_one_line(tmp_path, mo
     companion = CompanionHarness(InProcessSession(load_vehicle("bluerov2-heavy"), loop_hz=50.0), buttons={"engage": 4})
     session = session_of(tmp_path / "sea", monkeypatch, buttons={"engage": 4, "scan": 0})
     companion.flight.run(3.0)
-    session.warden.known = companion.warden.known
+    session.gate.known = companion.gate.known
     session.start()
     session._thread.join(60.0)
     session.stop("over")
@@ -228,16 +228,16 @@ def test_a_flight_begins_where_the_vehicle_is_when_its_parts_are_made(tmp_path, 
     companion = aboard()
     companion.flight.run(1.0)
     session = session_of(tmp_path / "sea", monkeypatch)
-    session.warden.known = companion.warden.known
-    facts = companion.warden.facts()
-    session.warden.facts = lambda: facts
+    session.gate.known = companion.gate.known
+    facts = companion.gate.facts()
+    session.gate.facts = lambda: facts
     before = session._here()
 
     def moved(sea):
         assert sea.parts.start.X_WB.p_m == pytest.approx(before.X_WB.p_m)
-        known = session.warden.known
+        known = session.gate.known
         place_W_m = np.asarray(known.place_W_m) + np.array([0.2, 0.0, 0.3])
-        session.warden.known = replace(known, place_W_m=place_W_m)
+        session.gate.known = replace(known, place_W_m=place_W_m)
         return 0.0
 
     monkeypatch.setattr("wakewise_ardusub.session.session.run_warm_up", moved)
@@ -250,17 +250,17 @@ def test_a_session_waits_for_a_hull_that_is_still_afloat(tmp_path, monkeypatch):
     companion = aboard()
     companion.flight.run(1.0)
     session = session_of(tmp_path / "sea", monkeypatch)
-    session.warden.known = replace(companion.warden.known, depth_m=0.0)
-    facts = replace(companion.warden.facts(), depth_m=0.0)
+    session.gate.known = replace(companion.gate.known, depth_m=0.0)
+    facts = replace(companion.gate.facts(), depth_m=0.0)
     said = []
 
-    def looked():
+    def look():
         said.append(session.preparing)
         if len(said) == 3:
             session._over.set()
         return facts
 
-    session.warden.facts = looked
+    session.gate.facts = look
     assert session._prepared() is None
     assert said[-1] == "waits until the hull is under water, 0.13 m of it are above"
 
@@ -271,7 +271,7 @@ def test_sticks_never_break_the_surface_at_sea():
     companion.flight.run(1.0)
     sea, _ = afloat(companion)
     around = sea.parts.surroundings
-    known = companion.warden.known
+    known = companion.gate.known
     assert around.names == ("the water surface", "the target")
     assert around.planes[0][:3] == pytest.approx([0.0, 0.0, 1.0])
     assert around.planes[0][3] == pytest.approx(known.place_W_m[2] - known.depth_m, abs=1e-6)

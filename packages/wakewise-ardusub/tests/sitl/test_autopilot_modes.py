@@ -31,13 +31,13 @@ def test_manual_holds_nothing() -> None:
 def test_stabilize_holds_attitude_and_heading() -> None:
     """After a turn the heading stays within 3 degrees at half speed ahead, roll within 3 and pitch within 8."""
     flight = _flown(STABILIZE, 2.0, sticks=(0, 0, 500, 300))
-    turned = euler_from_quat(flight.stand_in.motion.q_WB)[2]
+    turned = euler_from_quat(flight.autopilot.motion.q_WB)[2]
     assert abs(turned) > math.radians(10.0)
     flight.sticks = (400, 0, 500, 0)
     flight.run(3.0)
-    heading = euler_from_quat(flight.stand_in.motion.q_WB)[2]
+    heading = euler_from_quat(flight.autopilot.motion.q_WB)[2]
     flight.run(5.0)
-    after = euler_from_quat(flight.stand_in.motion.q_WB)
+    after = euler_from_quat(flight.autopilot.motion.q_WB)
     assert abs(after[0]) < math.radians(3.0)
     assert abs(after[1]) < math.radians(8.0)
     assert abs(math.remainder(after[2] - heading, 2 * math.pi)) < math.radians(3.0)
@@ -48,5 +48,5 @@ def test_alt_hold_holds_the_depth_that_stabilize_does_not() -> None:
     depths = {}
     for mode in (STABILIZE, ALT_HOLD):
         flight = _flown(mode, 20.0)
-        depths[mode] = abs(float(flight.stand_in.motion.p_WB_m[2]) - 2.0)
+        depths[mode] = abs(float(flight.autopilot.motion.p_WB_m[2]) - 2.0)
     assert depths[ALT_HOLD] < 0.05 < depths[STABILIZE]

@@ -65,14 +65,14 @@ class Ashore:
     wall.
     """
 
-    vehicle, stand_in = HEAVY, SimpleNamespace(system=1)
+    vehicle, autopilot = HEAVY, SimpleNamespace(system=1)
 
     def __init__(self, listening: socket.socket, physics: PhysicsServer) -> None:
         self._socket, self.physics = listening, physics
         self._station = mavlink.MAVLink(None, srcSystem=STATION, srcComponent=STATION_COMPONENT)
         self._companion = mavlink.MAVLink(None, srcSystem=1, srcComponent=COMPANION_COMPONENT)
-        self._ears = mavlink.MAVLink(None)
-        self._ears.robust_parsing = True
+        self._parsers = mavlink.MAVLink(None)
+        self._parsers.robust_parsing = True
         self._peer: tuple[str, int] | None = None
         self._due = {"beat": 0.0, "sticks": 0.0, "stream": 0.0}
         self.sticks: tuple[int, int, int, int] | None = (0, 0, 500, 0)
@@ -120,7 +120,7 @@ class Ashore:
         except TimeoutError:
             return
         self._tell(data, "")
-        for message in self._ears.parse_buffer(data) or []:
+        for message in self._parsers.parse_buffer(data) or []:
             if message.get_srcComponent() != 1:
                 continue
             self.last[message.get_type()] = message
@@ -351,14 +351,14 @@ def test_the_warden_drives_by_consent_and_lets_go_when_the_sticks_fall_silent(as
 
     def drives() -> bool:
         """Consent is given whenever it may be: a computer that is busy elsewhere makes the warden let go."""
-        if aboard.warden.engagement.state == "ready":
-            aboard.warden.press()
+        if aboard.gate.engagement.state == "ready":
+            aboard.gate.press()
         return all(abs(pulse - 1500) > 28 for pulse in ashore.pulses)
 
     ashore.until(drives, FIRST_S, "the companion's thrusts on the motors")
     ashore.sticks = None
     assert ashore.until(lambda: ashore.pulses == MIDDLE, 2.0, "neutral after the sticks fall silent") < 0.4
-    assert aboard.warden.entry is None
+    assert aboard.gate.entry is None
     ashore.sticks = (0, 0, 500, 0)
     ashore.run(1.5)
     assert ashore.pulses == MIDDLE

@@ -19,7 +19,7 @@ HEAVY = load_vehicle("bluerov2-heavy")
 def test_all_well_and_the_operators_consent_put_thrusts_on_the_motors() -> None:
     """An autopilot that streams as slowly as out of the box is asked for more; 5 N are the pulses of the table."""
     aboard = CompanionHarness(InProcessSession(HEAVY)).engaged()
-    assert aboard.warden.entry == 1
+    assert aboard.gate.entry == 1
     pulses = aboard.flight.moments[-1].pulses_us[:8]
     assert len(set(pulses)) == 1
     assert 1560 < pulses[0] < 1620
@@ -30,10 +30,10 @@ def test_given_back_the_sticks_are_the_pilots() -> None:
     aboard = CompanionHarness(InProcessSession(HEAVY)).engaged()
     aboard.flight.sticks = (500, 0, 500, 0)
     aboard.flight.run(0.2)
-    assert "released" in aboard.warden.press()
+    assert "released" in aboard.gate.press()
     aboard.flight.run(NEUTRAL_WITHIN_S)
     assert aboard.flight.moments[-1].pulses_us[:8] == (1400, 1400, 1600, 1600, 1500, 1500, 1500, 1500)
-    assert aboard.flight.stand_in.armed
+    assert aboard.flight.autopilot.armed
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_it_never_thrusts_while_disarmed() -> None:
     """Consent is refused; disarmed in flight, the script's next turn ends it: no thrust after two of its periods."""
     aboard = CompanionHarness(InProcessSession(HEAVY))
     aboard.flight.run(4.0)
-    assert "disarmed" in aboard.warden.press()
+    assert "disarmed" in aboard.gate.press()
     aboard = CompanionHarness(InProcessSession(HEAVY)).engaged()
     aboard.flight.arm(False)
     aboard.flight.run(1.0)
@@ -83,6 +83,6 @@ def test_after_a_loss_it_engages_again_only_by_consent() -> None:
     aboard.flight.sticks = (0, 0, 500, 0)
     aboard.flight.run(3.0)
     assert not aboard.flight.moments[-1].overridden
-    assert aboard.warden.press() == "engaged"
+    assert aboard.gate.press() == "engaged"
     aboard.flight.run(1.0)
     assert aboard.flight.moments[-1].overridden

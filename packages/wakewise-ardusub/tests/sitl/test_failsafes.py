@@ -35,8 +35,8 @@ def test_it_may_hold_depth_instead() -> None:
     flight.run(1.0)
     flight.beats = False
     flight.run(3.5)
-    assert flight.stand_in.armed
-    assert flight.stand_in.mode == ALT_HOLD
+    assert flight.autopilot.armed
+    assert flight.autopilot.mode == ALT_HOLD
 
 
 def test_silent_sticks_go_to_the_middle_and_disarm() -> None:
@@ -48,7 +48,7 @@ def test_silent_sticks_go_to_the_middle_and_disarm() -> None:
     flight.run(2.5)
     assert flight.moments[-1].thrusting
     flight.run(1.0)
-    assert not flight.stand_in.armed
+    assert not flight.autopilot.armed
     assert not flight.moments[-1].thrusting
 
 

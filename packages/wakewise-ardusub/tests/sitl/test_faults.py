@@ -46,7 +46,7 @@ def test_a_lost_ground_station_ends_thrusts_although_they_are_streamed() -> None
     flight = InProcessSession(HEAVY).engaged()
     flight.beats = False
     flight.run(4.0)
-    assert not flight.stand_in.armed
+    assert not flight.autopilot.armed
     disarmed_s = next(m.time_s for m in flight.moments if not m.armed and m.time_s > 2.0)
     assert flight.last_override_s() <= disarmed_s + 0.03
 
@@ -71,7 +71,7 @@ def test_others_than_the_companion_drive_nothing() -> None:
     """Another component, another system, the ground station: refused, and the companion's own go on."""
     flight = InProcessSession(HEAVY).engaged()
     strangers = [
-        MavlinkSender(flight.stand_in.hear, system, component, f"{system} {component}")
+        MavlinkSender(flight.autopilot.hear, system, component, f"{system} {component}")
         for system, component in ((1, 190), (2, 191), (255, 190), (1, 1))
     ]
     flight.each = lambda now: [now.send_thrusts((0.9,) * 8, who=who) for who in strangers]
@@ -103,14 +103,14 @@ def test_a_million_bytes_of_noise_crash_nothing_and_turn_no_motor() -> None:
     flight = InProcessSession(HEAVY).run(0.1)
     heard = 0
     for k, piece in enumerate(noise(1_000_000, 7)):
-        flight.stand_in.hear(piece, "noise")
+        flight.autopilot.hear(piece, "noise")
         heard += len(piece)
         if k % 20 == 0:
             flight.run(0.01)
     assert heard >= 1_000_000
-    assert flight.stand_in.bad_data > 1000
+    assert flight.autopilot.bad_data > 1000
     assert not any(moment.thrusting for moment in flight.moments)
-    assert flight.stand_in.script_faults == []
+    assert flight.autopilot.script_faults == []
     flight.engaged()
     assert flight.moments[-1].overridden
 
@@ -119,11 +119,11 @@ def test_noise_beside_an_engaged_companion_leaves_it_safe() -> None:
     """Whatever it does to the stream, the stream's end is the end within 300 ms."""
     flight = InProcessSession(HEAVY).engaged()
     pieces = iter(noise(100_000, 8))
-    flight.each = lambda now: [now.stand_in.hear(piece, "noise") for piece in [next(pieces, b"")] * 1]
+    flight.each = lambda now: [now.autopilot.hear(piece, "noise") for piece in [next(pieces, b"")] * 1]
     flight.run(4.0)
     flight.streams, flight.each = False, None
     began_s = flight.now_s
     flight.run(1.0)
     last_s = flight.last_override_s() or 0.0
     assert last_s - began_s <= NEUTRAL_WITHIN_S
-    assert flight.stand_in.script_faults == []
+    assert flight.autopilot.script_faults == []

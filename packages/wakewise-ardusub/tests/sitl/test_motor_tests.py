@@ -18,8 +18,8 @@ HEAVY = load_vehicle("bluerov2-heavy")
 
 def ask(flight: InProcessSession, motor: float, pulse: float, by: float = 1.0, order: float = 2.0) -> None:
     command = mavlink.MAV_CMD_DO_MOTOR_TEST
-    flight.station.say(
-        mavlink.MAVLink_command_long_message(flight.stand_in.system, 1, command, 0, motor, by, pulse, 0, 0, order, 0)
+    flight.station.send(
+        mavlink.MAVLink_command_long_message(flight.autopilot.system, 1, command, 0, motor, by, pulse, 0, 0, order, 0)
     )
 
 
@@ -39,7 +39,7 @@ def armed() -> InProcessSession:
 def test_one_motor_turns_past_mixer_and_direction_until_nobody_asks() -> None:
     """Counted from 0, its pulse as it is, the others in the middle though the sticks ask for more; silence disarms."""
     flight = armed()
-    flight.stand_in.set_parameter("MOT_2_DIRECTION", -1.0)
+    flight.autopilot.set_parameter("MOT_2_DIRECTION", -1.0)
     for _ in range(10):
         ask(flight, 1, 1560)
         flight.run(0.1)
@@ -47,7 +47,7 @@ def test_one_motor_turns_past_mixer_and_direction_until_nobody_asks() -> None:
     flight.run(SILENT_S - 0.2)
     assert flight.moments[-1].pulses_us[1] == 1560
     flight.run(0.3)
-    assert not flight.stand_in.armed
+    assert not flight.autopilot.armed
     assert set(flight.moments[-1].pulses_us[:8]) == {1500}
     assert "Motor test timed out!" in flight.texts()
     assert set(results(flight)) == {mavlink.MAV_RESULT_ACCEPTED}

@@ -32,7 +32,7 @@ def test_a_script_without_a_loop_runs_once() -> None:
     """It is done, and no fault."""
     flight = _flown("gcs:send_text(6, 'once')")
     assert flight.texts() == ["once"]
-    assert flight.stand_in.script_faults == []
+    assert flight.autopilot.script_faults == []
 
 
 @pytest.mark.parametrize(
@@ -60,10 +60,10 @@ def test_a_script_without_a_loop_runs_once() -> None:
 def test_a_script_that_fails_is_stopped_and_said(text: str, words: str) -> None:
     """The autopilot flies on without it."""
     flight = _flown(text, SCR_VM_I_COUNT=2_000_000 if "rep" in text else 10_000)
-    (fault,) = flight.stand_in.script_faults
+    (fault,) = flight.autopilot.script_faults
     assert words in fault
     assert sum(said.startswith("Lua: own.lua") for said in flight.texts()) == 1
-    assert flight.stand_in.arm()
+    assert flight.autopilot.arm()
 
 
 def test_numbers_of_time_wrap_like_the_firmwares() -> None:
@@ -83,8 +83,8 @@ def test_its_parameters_are_the_ground_stations_too() -> None:
         "local a = Parameter('OWN_A')\nassert(a:set_and_save(4) and a:get() == 4)\n"
         "assert(param:set('OWN_A', 6) and param:get('OWN_A') == 6 and not param:set('OWN_Z', 1))"
     )
-    assert flight.stand_in.script_faults == []
-    assert flight.stand_in.parameters.get("OWN_A") == 6.0
+    assert flight.autopilot.script_faults == []
+    assert flight.autopilot.parameters.get("OWN_A") == 6.0
 
 
 def test_an_override_lasts_as_long_as_it_says() -> None:

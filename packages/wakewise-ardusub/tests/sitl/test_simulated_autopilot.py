@@ -27,7 +27,7 @@ def _of(flight: InProcessSession, kind: str) -> list[object]:
 def _command(flight: InProcessSession, command: int, *numbers: float) -> int:
     """Result of a command, as its acknowledgement says."""
     flight.said.clear()
-    flight.station.say(mavlink.MAVLink_command_long_message(1, 1, command, 0, *(*numbers, 0, 0, 0, 0, 0, 0, 0)[:7]))
+    flight.station.send(mavlink.MAVLink_command_long_message(1, 1, command, 0, *(*numbers, 0, 0, 0, 0, 0, 0, 0)[:7]))
     flight.run(0.05)
     (answer,) = (message for message in flight.said if message.get_type() == "COMMAND_ACK")
     assert answer.command == command
@@ -73,7 +73,7 @@ def test_sticks_of_others_steer_nothing() -> None:
     flight = InProcessSession(HEAVY, sticks=(500, 0, 500, 0), values={"SYSID_MYGCS": 254}).run(0.1)
     flight.arm(True)
     flight.run(0.3)
-    assert flight.stand_in.armed
+    assert flight.autopilot.armed
     assert not flight.moments[-1].thrusting
 
 
@@ -85,14 +85,14 @@ def test_a_turned_motor_gets_its_pulse_turned() -> None:
         flight.arm(True)
         flight.run(2.0)
     assert (turned.moments[-1].pulses_us[0], plain.moments[-1].pulses_us[0]) == (1600, 1400)
-    assert turned.stand_in.motion.p_WB_m[0] == pytest.approx(plain.stand_in.motion.p_WB_m[0], rel=0.15)
+    assert turned.autopilot.motion.p_WB_m[0] == pytest.approx(plain.autopilot.motion.p_WB_m[0], rel=0.15)
 
 
 def test_all_parameters_are_listed_once() -> None:
     """With their count and places, the script's own among them."""
     flight = InProcessSession(HEAVY).run(0.1)
     flight.said.clear()
-    flight.station.say(mavlink.MAVLink_param_request_list_message(1, 1))
+    flight.station.send(mavlink.MAVLink_param_request_list_message(1, 1))
     flight.run(3.0)
     told = _of(flight, "PARAM_VALUE")
     names = [message.param_id for message in told]
@@ -106,9 +106,9 @@ def test_a_parameter_is_read_by_name_or_place_and_set() -> None:
     flight = InProcessSession(HEAVY).run(0.1)
     flight.said.clear()
     read = mavlink.MAVLink_param_request_read_message
-    flight.station.say(read(1, 1, b"SERVO3_FUNCTION", -1))
-    flight.station.say(read(1, 1, b"", 0))
-    flight.station.say(read(1, 1, b"NO_SUCH", -1))
+    flight.station.send(read(1, 1, b"SERVO3_FUNCTION", -1))
+    flight.station.send(read(1, 1, b"", 0))
+    flight.station.send(read(1, 1, b"NO_SUCH", -1))
     flight.set("FS_GCS_TIMEOUT", 5.0)
     flight.set("NO_SUCH", 5.0)
     flight.run(0.05)
@@ -130,17 +130,17 @@ def test_it_tells_where_it_is_as_physics_says() -> None:
     flight = InProcessSession(HEAVY, sticks=(500, 0, 500, 10)).run(0.1)
     flight.arm(True)
     flight.run(3.0)
-    motion = flight.stand_in.motion
+    motion = flight.autopilot.motion
     said = {}
     for identity in BUILDERS:
-        message = BUILDERS[identity](flight.stand_in)
+        message = BUILDERS[identity](flight.autopilot)
         said[message.get_type()] = message
     assert said["LOCAL_POSITION_NED"].x == motion.p_WB_m[0] > 0.1
     assert said["VFR_HUD"].alt == -motion.p_WB_m[2]
     water_hPa = said["SCALED_PRESSURE2"].press_abs - 1013.25
     assert water_hPa == pytest.approx(98.0665 * motion.p_WB_m[2])
     assert said["ATTITUDE"].yaw != 0.0
-    assert said["SERVO_OUTPUT_RAW"].servo1_raw == flight.stand_in.pulses_us[0]
+    assert said["SERVO_OUTPUT_RAW"].servo1_raw == flight.autopilot.pulses_us[0]
     for message in said.values():
         assert message.pack(mavlink.MAVLink(None))
 
@@ -166,9 +166,9 @@ def test_modes_that_it_does_not_fly_are_refused() -> None:
     flight = InProcessSession(HEAVY).run(0.1)
     assert _command(flight, mavlink.MAV_CMD_DO_SET_MODE, 1, STABILIZE) == mavlink.MAV_RESULT_ACCEPTED
     assert _command(flight, mavlink.MAV_CMD_DO_SET_MODE, 1, 3) == mavlink.MAV_RESULT_FAILED
-    assert flight.stand_in.mode == STABILIZE
+    assert flight.autopilot.mode == STABILIZE
     flight.set_mode(ALT_HOLD)
-    assert flight.stand_in.mode == ALT_HOLD
+    assert flight.autopilot.mode == ALT_HOLD
     assert _command(flight, mavlink.MAV_CMD_DO_SET_SERVO, 1, 1900) == mavlink.MAV_RESULT_UNSUPPORTED
 
 
@@ -177,14 +177,14 @@ def test_a_start_anew_forgets_who_was_there_and_switches_off() -> None:
     flight = InProcessSession(HEAVY).engaged()
     reboot = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
     assert _command(flight, reboot, 1) == mavlink.MAV_RESULT_DENIED
-    assert flight.stand_in.parameters.get("WKW_ENABLE") == 1.0
+    assert flight.autopilot.parameters.get("WKW_ENABLE") == 1.0
     flight.arm(False)
     flight.run(0.05)
     assert _command(flight, reboot, 1) == mavlink.MAV_RESULT_ACCEPTED
-    assert not flight.stand_in.armed
-    assert flight.stand_in.now_s < 0.2
+    assert not flight.autopilot.armed
+    assert flight.autopilot.now_s < 0.2
     flight.run(0.1)
-    assert flight.stand_in.parameters.get("WKW_ENABLE") == 0.0
+    assert flight.autopilot.parameters.get("WKW_ENABLE") == 0.0
 
 
 def test_bad_arguments_are_refused() -> None:
@@ -196,17 +196,17 @@ def test_bad_arguments_are_refused() -> None:
 def test_the_pilot_ashore_leaves_alone_what_somebody_else_switched_off() -> None:
     """It arms and switches on once; what another station undoes stays undone until the stand-in starts anew."""
     flight = InProcessSession(HEAVY, sticks=None, beats=False)
-    pilot = ScriptedGroundStation(flight.stand_in, flight.carry)
+    pilot = ScriptedGroundStation(flight.autopilot, flight.carry)
     flight.turns.append(pilot.turn)
     flight.run(3.0)
-    assert flight.stand_in.armed
-    assert flight.stand_in.parameters.get("WKW_ENABLE") == 1.0
+    assert flight.autopilot.armed
+    assert flight.autopilot.parameters.get("WKW_ENABLE") == 1.0
     flight.arm(False)
     flight.set("WKW_ENABLE", 0.0)
     flight.run(6.0)
-    assert not flight.stand_in.armed
-    assert flight.stand_in.parameters.get("WKW_ENABLE") == 0.0
-    flight.stand_in.reboot()
+    assert not flight.autopilot.armed
+    assert flight.autopilot.parameters.get("WKW_ENABLE") == 0.0
+    flight.autopilot.reboot()
     flight.run(3.0)
-    assert flight.stand_in.armed
-    assert flight.stand_in.parameters.get("WKW_ENABLE") == 1.0
+    assert flight.autopilot.armed
+    assert flight.autopilot.parameters.get("WKW_ENABLE") == 1.0

@@ -130,8 +130,8 @@ def test_a_silent_meter_hears_and_says_nothing(craft_file: Path, tmp_path: Path)
         assert state["directions_known"]
         assert state["bad_messages"] > 0
         craft = VehicleSummary.of(load_vehicle("bluerov2-heavy"), wake_model("jet"))
-        sparing = WashSavingsCalculator(craft, np.array(made_logs.DIRECTIONS, dtype=float))
-        flown = sparing.flown_N(np.array(PULSES, dtype=float), sparing.supply_V(made_logs.VOLTAGE_V))
+        calculator = WashSavingsCalculator(craft, np.array(made_logs.DIRECTIONS, dtype=float))
+        flown = calculator.flown_N(np.array(PULSES, dtype=float), calculator.supply_V(made_logs.VOLTAGE_V))
         assert state["thrusts_N"]["flown"] == pytest.approx(flown)
         assert state["saved_pct"] > 50.0
         assert (vehicle.heard, other.heard) == ({}, {})

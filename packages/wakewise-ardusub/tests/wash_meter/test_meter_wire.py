@@ -65,38 +65,38 @@ def test_messages_come_through_a_hundred_thousand_bytes_of_rubbish() -> None:
 )
 def test_no_fields_stop_the_hearing(name: str, fields: dict[str, object]) -> None:
     """Missing, of another kind, or no numbers: passed over, and what is told stays finite or unknown."""
-    hearing = VehicleListener(system=1)
-    hearing.hear(0.0, 1, 1, name, fields)
-    pose = hearing.pose(0.1)
+    listener = VehicleListener(system=1)
+    listener.hear(0.0, 1, 1, name, fields)
+    pose = listener.pose(0.1)
     assert pose is None or np.isfinite(pose.p_m).all()
-    volts = hearing.number("voltage", 0.1)
+    volts = listener.number("voltage", 0.1)
     assert volts is None or math.isfinite(volts)
-    assert hearing.mode(0.1) is None or isinstance(hearing.mode(0.1), str)
+    assert listener.mode(0.1) is None or isinstance(listener.mode(0.1), str)
 
 
 def test_the_first_vehicle_with_outputs_is_the_one() -> None:
     """Others are told apart; companions and ground stations are no vehicles; a system that was named is waited for."""
     outputs = {"port": 0} | {f"servo{i}_raw": 1500 for i in range(1, 17)}
-    hearing, named = VehicleListener(), VehicleListener(system=3)
-    for one in (hearing, named):
+    listener, named = VehicleListener(), VehicleListener(system=3)
+    for one in (listener, named):
         one.hear(0.0, 255, 190, "HEARTBEAT", {"base_mode": 0, "custom_mode": 0})
         one.hear(0.0, 2, 191, "SERVO_OUTPUT_RAW", outputs)
         one.hear(0.0, 2, 1, "SERVO_OUTPUT_RAW", outputs)
         one.hear(0.0, 3, 1, "SERVO_OUTPUT_RAW", outputs)
-    assert (hearing.system, hearing.others) == (2, (3,))
+    assert (listener.system, listener.others) == (2, (3,))
     assert (named.system, named.others) == (3, (2,))
-    assert hearing.age_s("servo", 1.0) == 1.0
-    assert hearing.age_s("position", 1.0) == math.inf
+    assert listener.age_s("servo", 1.0) == 1.0
+    assert listener.age_s("position", 1.0) == math.inf
 
 
 def reading(time_s: float, flown: float, gentle: float) -> MeterReading:
     craft_thrusts = np.array([1.0, -2.0])
-    spared = WashSavings(
+    savings = WashSavings(
         thrusts_N=dict.fromkeys(("flown", "least", "gentle"), craft_thrusts),
         disturbance={"flown": flown, "least": flown, "gentle": gentle},
     )
     speeds = {"flown": 0.2, "least": 0.2, "gentle": 0.1}
-    return MeterReading(time_s=time_s, spared=spared, peak_m_s=speeds, rms_m_s=speeds)  # type: ignore[arg-type]
+    return MeterReading(time_s=time_s, savings=savings, peak_m_s=speeds, rms_m_s=speeds)  # type: ignore[arg-type]
 
 
 def test_the_past_is_a_mean_of_each_second_with_gaps() -> None:

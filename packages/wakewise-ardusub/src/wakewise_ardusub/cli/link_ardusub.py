@@ -181,7 +181,7 @@ def ardusub(
     scenario = load_scenario(None, None, changes)
     low, high = _numbers(depths, "--depths", "LEAST,MOST", 2)
     limits = EngagementLimits(depth_m=(low, high), distance_m=fence, battery_V=battery)
-    wardens: dict[str, Any] = {
+    gate_options: dict[str, Any] = {
         "limits": limits,
         "buttons": meant,
         "listen_only": listen_only,
@@ -194,8 +194,8 @@ def ardusub(
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {folder}: a file is there, a folder is needed")
     with ExitStack() as stack:
-        carrier, finish = _carried(stack, vehicle_at, ground_at)
-        post = MavlinkCodec(carrier, system)
+        transport, finish = _carried(stack, vehicle_at, ground_at)
+        post = MavlinkCodec(transport, system)
         session = VehicleSession(
             scenario=scenario,
             receiving=post,
@@ -203,7 +203,7 @@ def ardusub(
             folder=folder,
             spare=spare,
             session=secrets.randbelow(2**31) + 1,
-            wardens=wardens,
+            gate_options=gate_options,
             camera=made_camera,
         )
         finish(session)
@@ -220,7 +220,7 @@ def ardusub(
     if session.fault is not None:
         raise session.fault
     if json:
-        print_json({"folder": str(folder), "engagements": session.warden.engagement.entries, **session.figures()})
+        print_json({"folder": str(folder), "engagements": session.gate.engagement.entries, **session.figures()})
 
 
 @contextmanager
@@ -240,12 +240,12 @@ def _carried(stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None)
     """What carries the bytes, and what is to be done once the session is there."""
     from wakewise.core.errors import InputError
     from wakewise_ardusub.link.mavlink_relay import MavlinkRelay
-    from wakewise_ardusub.link.transports import RelayTransport, carrier_of, open_udp
+    from wakewise_ardusub.link.transports import RelayTransport, open_transport, open_udp
 
     if ground_at is None:
-        carrier = carrier_of(vehicle_at)
-        stack.callback(carrier.close)
-        return carrier, lambda session: None  # noqa: ARG005
+        transport = open_transport(vehicle_at)
+        stack.callback(transport.close)
+        return transport, lambda session: None  # noqa: ARG005
     for option, end in (("--connection", vehicle_at), ("--relay", ground_at)):
         if end.way not in ("udpin", "udpout"):
             raise InputError(f"{option} {end.words}: the relay forwards udpin:HOST:PORT and udpout:HOST:PORT only")
@@ -254,10 +254,10 @@ def _carried(stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None)
     known = [None if end.way == "udpin" else (end.host, end.port) for end in (vehicle_at, ground_at)]
 
     def begin(session: VehicleSession) -> None:
-        warden = session.warden
+        gate = session.gate
         relay = MavlinkRelay(
             *sockets,
-            driving=lambda: warden.entry is not None,
+            driving=lambda: gate.entry is not None,
             heard=tap.put,
             vehicle_at=known[0],
             ground_at=known[1],
@@ -280,12 +280,12 @@ def _watch(session: VehicleSession, where: str) -> None:
     consent = "no terminal, so only --buttons engage=N consents" if keys is None else "Enter consents and takes back"
     _say(f"listening at {where}; {consent}, Ctrl-C ends")
     while session.running:
-        if session.warden.buttons_amiss:
-            raise InputError(session.warden.buttons_amiss)
+        if session.gate.button_fault:
+            raise InputError(session.gate.button_fault)
         if keys is None:
             time.sleep(LINE_S)
         elif select.select([keys], [], [], LINE_S)[0] and keys.readline():
-            said = session.warden.press()
+            said = session.gate.press()
             session.journal.write("key", said=said)
             _say(f"{chr(13) if terminal else ''}{said}")
         line = session.line()

@@ -118,7 +118,7 @@ def test_vehicle_motors(
             link,
             chosen,
             turns,
-            _Person(),
+            _ConsoleOperator(),
             keep=lambda found: write_results(motor_results, _with_those_before(found, before)),
         )
     if json:
@@ -131,7 +131,7 @@ def test_vehicle_motors(
     typer.echo(f"kept in {motor_results}, which --check reads")
 
 
-class _Person:
+class _ConsoleOperator:
     """Who sits at the terminal; implements `wakewise_ardusub.link.motor_test.Operator`."""
 
     def consents(self, turn: MotorTestStep) -> bool:

@@ -267,17 +267,17 @@ def _depth_watch(stack: ExitStack, where: str) -> DepthMonitor | None:
         typer.echo("the autopilot's depth is not compared: the extra `links` is not installed", err=True)
         return None
     from wakewise_ardusub.link.protocol import DEFAULT_SYSTEM
-    from wakewise_ardusub.link.transports import MavlinkCodec, carrier_of
+    from wakewise_ardusub.link.transports import MavlinkCodec, open_transport
 
     try:
-        carrier = carrier_of(parse_connection(f"udpin:{where}", "--watch"))
+        transport = open_transport(parse_connection(f"udpin:{where}", "--watch"))
     except EnvironmentFailure as fault:
         if where != _WATCH:
             raise
         typer.echo(f"the autopilot's depth is not compared: {fault} (--watch HOST:PORT takes another)", err=True)
         return None
-    stack.callback(carrier.close)
-    return DepthMonitor(MavlinkCodec(carrier, DEFAULT_SYSTEM))
+    stack.callback(transport.close)
+    return DepthMonitor(MavlinkCodec(transport, DEFAULT_SYSTEM))
 
 
 def _physics_line(figures: PhysicsFigures, depths: DepthMonitor | None) -> str:

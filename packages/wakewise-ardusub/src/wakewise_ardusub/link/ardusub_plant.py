@@ -45,7 +45,7 @@ class ArduSubPlant:
         In which engagement the controller decided what it hands over; None: in none, and nothing is sent.
     """
 
-    warden: OutputGate
+    gate: OutputGate
     clock: FlightClock
     wait: Callable[[float], object]
     entry: Callable[[], int | None]
@@ -55,13 +55,13 @@ class ArduSubPlant:
         """Send thrusts, shape (n,), if they may be, and return what was measured until they are nearly due again."""
         entry = self.entry()
         if entry is not None:
-            self.warden.command(thrusts_N, entry)
+            self.gate.command(thrusts_N, entry)
         self._time_s += dt_s
-        left_s = self.clock.due_s(self._time_s) - EARLY * dt_s - self.warden.clock()
+        left_s = self.clock.due_s(self._time_s) - EARLY * dt_s - self.gate.clock()
         if left_s > 0.0:
             self.wait(left_s)
         begun_s = self.clock.due_s(0.0)
-        return tuple(replace(found, time_s=found.time_s - begun_s) for found in self.warden.measurements())
+        return tuple(replace(found, time_s=found.time_s - begun_s) for found in self.gate.measurements())
 
 
 @dataclass(kw_only=True, eq=False)
@@ -96,40 +96,40 @@ class MessageReceiver(Protocol):
 class LinkThread:
     """Runs until it is stopped; what breaks it is kept in `fault`, after the warden has let go."""
 
-    def __init__(self, connection: MessageReceiver, warden: OutputGate) -> None:
-        self._connection, self._warden = connection, warden
+    def __init__(self, connection: MessageReceiver, gate: OutputGate) -> None:
+        self._connection, self._gate = connection, gate
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self.fault: BaseException | None = None
 
     def start(self) -> None:
         """Begin to listen."""
-        self._warden.begin()
+        self._gate.begin()
         self._thread.start()
 
     def stop(self, why: str) -> None:
         """Let go of the vehicle, say so as often as it takes, and end."""
-        self._warden.end(why)
+        self._gate.end(why)
         self._over.set()
         self._thread.join(timeout=2.0)
 
     def _run(self) -> None:
-        warden = self._warden
+        gate = self._gate
         try:
-            due_s, left = warden.clock(), RELEASES + 1
+            due_s, left = gate.clock(), RELEASES + 1
             while left:
-                said, noise = self._connection.receive(max(due_s - warden.clock(), 0.0))
+                said, noise = self._connection.receive(max(due_s - gate.clock(), 0.0))
                 if noise:
-                    warden.noise(noise)
+                    gate.noise(noise)
                 for k, message in enumerate(said):
-                    warden.take(message)
-                    if k % MOST_AT_ONCE == 0 and warden.clock() >= due_s:
-                        warden.tick()
-                        due_s = warden.clock() + TICK_S
-                if warden.clock() >= due_s:
-                    warden.tick()
-                    due_s = max(due_s + TICK_S, warden.clock())
+                    gate.take(message)
+                    if k % MOST_AT_ONCE == 0 and gate.clock() >= due_s:
+                        gate.tick()
+                        due_s = gate.clock() + TICK_S
+                if gate.clock() >= due_s:
+                    gate.tick()
+                    due_s = max(due_s + TICK_S, gate.clock())
                     left -= self._over.is_set()
         except BaseException as fault:  # whatever it is, the vehicle is let go first
             self.fault = fault
-            warden.end(f"the link broke ({type(fault).__name__}: {fault})")
+            gate.end(f"the link broke ({type(fault).__name__}: {fault})")

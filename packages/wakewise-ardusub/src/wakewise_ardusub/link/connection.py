@@ -103,7 +103,7 @@ class MavlinkSession(Protocol):
         """The next message of these kinds that the vehicle's autopilot sent, None if none came in time."""
         ...
 
-    def hear_any(self, timeout_s: float) -> Any:
+    def receive_any(self, timeout_s: float) -> Any:
         """The next message of anybody, None if none came in time."""
         ...
 
@@ -134,7 +134,7 @@ class Connection:
         """Whether somebody may answer."""
         return self.endpoint.way != "file"
 
-    def hear_any(self, timeout_s: float) -> Any:
+    def receive_any(self, timeout_s: float) -> Any:
         """The next message of anybody that is whole, None if none came in time."""
         until = time.monotonic() + timeout_s
         while True:
@@ -166,24 +166,24 @@ class Connection:
             raise EnvironmentFailure(f"{self.endpoint.words}: {fault.strerror or fault}") from None
 
 
-def receive_kind(talk: MavlinkSession, kinds: Collection[str], timeout_s: float) -> Any:
+def receive_kind(link: MavlinkSession, kinds: Collection[str], timeout_s: float) -> Any:
     """The next message of these kinds from the autopilot of a connection's vehicle, None if none came in time."""
     until = time.monotonic() + timeout_s
     while True:
-        message = talk.hear_any(max(until - time.monotonic(), 0.0))
+        message = link.receive_any(max(until - time.monotonic(), 0.0))
         if message is None:
             return None
-        at_home = message.get_srcSystem() == talk.system and message.get_srcComponent() == AUTOPILOT_COMPONENT
+        at_home = message.get_srcSystem() == link.system and message.get_srcComponent() == AUTOPILOT_COMPONENT
         if at_home and message.get_type() in kinds:
             return message
 
 
-def send_command(talk: MavlinkSession, number: int, *params: float) -> None:
+def send_command(link: MavlinkSession, number: int, *params: float) -> None:
     """Send a COMMAND_LONG; parameters that are left out are 0."""
     filled = (*params, *[0.0] * (7 - len(params)))
-    talk.send(
+    link.send(
         "command_long",
-        target_system=talk.system,
+        target_system=link.system,
         target_component=AUTOPILOT_COMPONENT,
         command=number,
         confirmation=0,

@@ -101,7 +101,7 @@ def planned_turns(
 
 
 def run_motor_test(
-    talk: MavlinkSession,
+    link: MavlinkSession,
     vehicle: Vehicle,
     turns: Sequence[MotorTestStep],
     operator: Operator,
@@ -126,8 +126,8 @@ def run_motor_test(
             wait_s = COOL_S - (clock() - ended_s)
             if ended_s >= 0.0 and wait_s > 0.0:
                 sleep(wait_s)
-            _until_armed(talk, operator)
-            _turn(talk, turn, clock, sleep)
+            _until_armed(link, operator)
+            _turn(link, turn, clock, sleep)
             ended_s = clock()
             answer = operator.saw(turn)
         seen[turn.motor] = MotorObservation(
@@ -143,36 +143,36 @@ def run_motor_test(
     return results
 
 
-def _until_armed(talk: MavlinkSession, operator: Operator) -> None:
-    send_heartbeat(talk)
-    while not _armed(talk):
+def _until_armed(link: MavlinkSession, operator: Operator) -> None:
+    send_heartbeat(link)
+    while not _armed(link):
         operator.arms("ArduSub turns motors only while it is armed, and disarms by itself after each")
 
 
-def _armed(talk: MavlinkSession) -> bool:
+def _armed(link: MavlinkSession) -> bool:
     """What the next heartbeat says; one that was waiting may be old, so the last of them counts."""
     armed = False
-    beat: Any = talk.hear({"HEARTBEAT"}, 2.5)
+    beat: Any = link.hear({"HEARTBEAT"}, 2.5)
     if beat is None:
         raise EnvironmentFailure("the autopilot is not heard any more: nothing is turned")
     while beat is not None:
         armed = bool(beat.base_mode & _ARMED)
-        beat = talk.hear({"HEARTBEAT"}, 0.0)
+        beat = link.hear({"HEARTBEAT"}, 0.0)
     return armed
 
 
 def _turn(
-    talk: MavlinkSession, turn: MotorTestStep, clock: Callable[[], float], sleep: Callable[[float], None]
+    link: MavlinkSession, turn: MotorTestStep, clock: Callable[[], float], sleep: Callable[[float], None]
 ) -> None:
     """One motor's pulse, renewed, then rest; whatever happens, rest is sent."""
     try:
-        _renew(talk, turn.motor, turn.pulse_us, TURN_S, clock, sleep)
+        _renew(link, turn.motor, turn.pulse_us, TURN_S, clock, sleep)
     finally:
-        _renew(talk, turn.motor, MIDDLE_US, REST_S, clock, sleep, refusal=False)
+        _renew(link, turn.motor, MIDDLE_US, REST_S, clock, sleep, refusal=False)
 
 
 def _renew(
-    talk: MavlinkSession,
+    link: MavlinkSession,
     motor: int,
     pulse_us: int,
     seconds: float,
@@ -184,9 +184,9 @@ def _renew(
     until = clock() + seconds
     words = ""
     while clock() < until:
-        send_command(talk, _COMMAND, motor - 1, _BY_PULSE, pulse_us, 0.0, 0.0, _ORDER_BOARD)
+        send_command(link, _COMMAND, motor - 1, _BY_PULSE, pulse_us, 0.0, 0.0, _ORDER_BOARD)
         due_s = clock() + RENEW_S
-        while (answer := talk.hear({"COMMAND_ACK", "STATUSTEXT"}, max(due_s - clock(), 0.0))) is not None:
+        while (answer := link.hear({"COMMAND_ACK", "STATUSTEXT"}, max(due_s - clock(), 0.0))) is not None:
             if answer.get_type() == "STATUSTEXT":
                 words = str(answer.text)
             elif refusal and answer.command == _COMMAND and answer.result in _REFUSALS:

@@ -55,7 +55,7 @@ class FreshnessMargins:
         self.trips: Counter[str] = Counter()
         self._ages: deque[tuple[float, float, float]] = deque(maxlen=_MOST)
 
-    def looked(self, facts: EngagementInputs) -> None:
+    def observe(self, facts: EngagementInputs) -> None:
         """What is known at a tick."""
         ages = (facts.pose_s, facts.operator_s, facts.telemetry_s)
         if all(map(math.isfinite, ages)):
@@ -99,7 +99,7 @@ class EventLogger:
         self._due: dict[str, tuple[float, int]] = {}
         self._jump = ""
 
-    def tell(self, event: str, **told: Any) -> None:
+    def log(self, event: str, **told: Any) -> None:
         """A line; what is told over and over only now and then, with how often it was left out."""
         if self._journal is None:
             return
@@ -114,22 +114,22 @@ class EventLogger:
     def changed(self, before: LinkState, after: LinkState, jump: str) -> None:
         """What a message changed; `jump` is what was last said of a clock."""
         if (before.armed, before.mode) != (after.armed, after.mode):
-            self.tell("vehicle", armed=after.armed, mode=after.mode_name)
+            self.log("vehicle", armed=after.armed, mode=after.mode_name)
         if after.duplicate_s != before.duplicate_s and before.duplicate != after.duplicate:
-            self.tell("rival", words=after.duplicate)
+            self.log("rival", words=after.duplicate)
         if after.takeover_s != before.takeover_s:
-            self.tell("takeover", words=after.takeover)
+            self.log("takeover", words=after.takeover)
         if after.camera_s != before.camera_s:
-            self.tell("camera", words=after.camera)
+            self.log("camera", words=after.camera)
         if after.status != before.status:
-            self.tell("status", words=after.status)
+            self.log("status", words=after.status)
         if jump != self._jump:
             self._jump = jump
-            self.tell("clock", words=jump)
+            self.log("clock", words=jump)
         if set(before.ground) != set(after.ground):
-            self.tell("ground stations", systems=sorted(after.ground))
+            self.log("ground stations", systems=sorted(after.ground))
         if before.odd != after.odd:
-            self.tell("nonsense", message=after.odd[-1])
+            self.log("nonsense", message=after.odd[-1])
 
 
 Send = Callable[[str, Mapping[str, Any]], None]
@@ -199,9 +199,9 @@ class OutputGate:
         self._ticked_s, self._standstill_s, self._last_us = -math.inf, 0.0, 0
         self._pressed: deque[str] = deque(maxlen=64)
         self._measurements: deque[Measurement] = deque(maxlen=_KEPT)
-        self._news = EventLogger(journal, clock)
+        self._events = EventLogger(journal, clock)
         self._judged_for: Mapping[str, float] | None = None
-        self._amiss, self._engaged_with, self._engaged_mode = "", dict[str, float](), ""
+        self._fault, self._engaged_with, self._engaged_mode = "", dict[str, float](), ""
         self._releases_left, self.margins = 0, FreshnessMargins()
         self.thrusts_sent = self.releases_sent = self.unsent = 0
 
@@ -216,7 +216,7 @@ class OutputGate:
             self._told(self.engagement.ended(self.clock(), why))
 
     @property
-    def buttons_amiss(self) -> str | None:
+    def button_fault(self) -> str | None:
         """At which of its buttons the autopilot acts as well, in words, empty for none; None before that is known."""
         parameters = self.known.parameters
         if self._buttons and any(name not in parameters for name in BUTTON_PARAMETERS):
@@ -280,9 +280,9 @@ class OutputGate:
             missing = next((name for name in self._needs if name not in parameters), None)
             words = f"parameters of the autopilot are not known yet: {missing}" if missing else ""
             words = words or button_faults(self._buttons, parameters) or self._drive.amiss(parameters)
-            self._judged_for, self._amiss = parameters, words
+            self._judged_for, self._fault = parameters, words
         changed = [name for name, value in self._engaged_with.items() if parameters.get(name) != value]
-        return self._amiss or (f"{changed[0]} was changed" if changed else "")
+        return self._fault or (f"{changed[0]} was changed" if changed else "")
 
     def take(self, said: MavlinkMessage) -> None:
         """A message came."""
@@ -291,7 +291,7 @@ class OutputGate:
             self.known = known = update_link_state(before, said, now_s)
             self._telemetry, found = to_measurements(self._telemetry, said, now_s, known.system)
             self._measurements.extend(found)
-            self._news.changed(before, known, self._telemetry.jump)
+            self._events.changed(before, known, self._telemetry.jump)
             if known.sticks is not None and known.sticks is not before.sticks:
                 self._press(known.sticks.buttons & ~(0 if before.sticks is None else before.sticks.buttons))
             self._judge()
@@ -313,7 +313,7 @@ class OutputGate:
             self._standstill_s = gap_s
             self._judge()
             self._standstill_s = 0.0
-            self.margins.looked(self.facts())
+            self.margins.observe(self.facts())
             if self.engagement.state == "off":
                 return
             if self.entry is not None and self._slots is not None and now_s - self._sent_s >= protocol.SEND_PERIOD_S:
@@ -385,7 +385,7 @@ class OutputGate:
         with self._lock:
             self._told(self.engagement.released(self.clock(), why))
 
-    def say(self, name: str, fields: Mapping[str, Any]) -> None:
+    def send(self, name: str, fields: Mapping[str, Any]) -> None:
         """Send a message that drives nothing, such as a request to a camera, until it has ended."""
         with self._lock:
             if self.engagement.state != "off":
@@ -481,4 +481,4 @@ class OutputGate:
                     self._pressed.append(what)
 
     def _write(self, event: str, **told: Any) -> None:
-        self._news.tell(event, **told)
+        self._events.log(event, **told)

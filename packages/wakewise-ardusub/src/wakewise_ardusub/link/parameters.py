@@ -44,7 +44,7 @@ def first_of(parameters: Mapping[str, float], names: Iterable[str]) -> tuple[str
 
 
 def read_parameters(
-    talk: MavlinkSession, names: Iterable[str] = WANTED, *, progress: Progress | None = None, quiet_s: float = QUIET_S
+    link: MavlinkSession, names: Iterable[str] = WANTED, *, progress: Progress | None = None, quiet_s: float = QUIET_S
 ) -> dict[str, float]:
     """Ask for parameters by name; those that the firmware does not know are left out.
 
@@ -64,8 +64,8 @@ def read_parameters(
         for start in range(0, len(missing), _AT_ONCE):
             asked = missing[start : start + _AT_ONCE]
             for name in asked:
-                _ask(talk, name)
-            _collect(talk, found, quiet_s, asked)
+                _ask(link, name)
+            _collect(link, found, quiet_s, asked)
             if progress is not None:
                 progress(len(found), len(wanted))
         idle = idle + 1 if len(found) == before else 0
@@ -77,7 +77,7 @@ def read_parameters(
 
 
 def read_all_parameters(
-    talk: MavlinkSession, *, progress: Progress | None = None, quiet_s: float = 2.0 * QUIET_S
+    link: MavlinkSession, *, progress: Progress | None = None, quiet_s: float = 2.0 * QUIET_S
 ) -> dict[str, float]:
     """All parameters of the autopilot: its list, then those that were lost on the way by their index.
 
@@ -89,9 +89,9 @@ def read_all_parameters(
     found: dict[str, float] = {}
     indices: set[int] = set()
     count = 0
-    talk.send("param_request_list", target_system=talk.system, target_component=AUTOPILOT_COMPONENT)
+    link.send("param_request_list", target_system=link.system, target_component=AUTOPILOT_COMPONENT)
     for _ in range(ROUNDS + 1):
-        while (answer := talk.hear({"PARAM_VALUE"}, quiet_s)) is not None:
+        while (answer := link.hear({"PARAM_VALUE"}, quiet_s)) is not None:
             count = max(count, int(answer.param_count))
             # An answer to somebody's request by name carries no index.
             if answer.param_index < count:
@@ -102,9 +102,9 @@ def read_all_parameters(
             if count and len(indices) >= count:
                 return dict(sorted(found.items()))
         for index in [i for i in range(count) if i not in indices][:200]:
-            talk.send(
+            link.send(
                 "param_request_read",
-                target_system=talk.system,
+                target_system=link.system,
                 target_component=AUTOPILOT_COMPONENT,
                 param_id=b"",
                 param_index=index,
@@ -114,7 +114,7 @@ def read_all_parameters(
     raise EnvironmentFailure(f"{count - len(indices)} of {count} parameters never came: the link loses too much")
 
 
-def set_parameter(talk: MavlinkSession, name: str, value: float, *, quiet_s: float = QUIET_S) -> None:
+def set_parameter(link: MavlinkSession, name: str, value: float, *, quiet_s: float = QUIET_S) -> None:
     """Set a parameter and read it back: nothing else says that it was taken.
 
     Raises
@@ -128,19 +128,19 @@ def set_parameter(talk: MavlinkSession, name: str, value: float, *, quiet_s: flo
         raise InputError(f"parameter {name} = {value:g}: a name has up to 16 capital letters, a value is finite")
     held: float | None = None
     for _ in range(ROUNDS):
-        talk.send(
+        link.send(
             "param_set",
-            target_system=talk.system,
+            target_system=link.system,
             target_component=AUTOPILOT_COMPONENT,
             param_id=name.encode("ascii"),
             param_value=value,
             param_type=_REAL32,
         )
         # The echo of the setting may come before it holds: what counts is the answer to a question put after it.
-        _collect(talk, {}, 0.1, [name, ""])
+        _collect(link, {}, 0.1, [name, ""])
         found: dict[str, float] = {}
-        _ask(talk, name)
-        _collect(talk, found, quiet_s, [name])
+        _ask(link, name)
+        _collect(link, found, quiet_s, [name])
         held = found.get(name, held)
         if held is not None and held == _float32(value):
             return
@@ -178,21 +178,21 @@ def read_parameter_file(path: Path) -> dict[str, float]:
     return found
 
 
-def _ask(talk: MavlinkSession, name: str) -> None:
-    talk.send(
+def _ask(link: MavlinkSession, name: str) -> None:
+    link.send(
         "param_request_read",
-        target_system=talk.system,
+        target_system=link.system,
         target_component=AUTOPILOT_COMPONENT,
         param_id=name.encode("ascii"),
         param_index=-1,
     )
 
 
-def _collect(talk: MavlinkSession, found: dict[str, float], quiet_s: float, wanted: list[str]) -> None:
+def _collect(link: MavlinkSession, found: dict[str, float], quiet_s: float, wanted: list[str]) -> None:
     """Take answers until all are there or none comes for a while; never for longer than ten such whiles."""
     until = time.monotonic() + 10.0 * quiet_s
     while time.monotonic() < until and not all(name in found for name in wanted):
-        answer = talk.hear({"PARAM_VALUE"}, quiet_s)
+        answer = link.hear({"PARAM_VALUE"}, quiet_s)
         if answer is None:
             return
         _keep(found, answer)

@@ -100,7 +100,7 @@ def read_journal(path: Path) -> tuple[list[dict[str, Any]], int]:
     except OSError:
         raise InputError(f"{path}: cannot be read, the journal of a session is needed") from None
     lines: list[dict[str, Any]] = []
-    spoiled = 0
+    count_bad = 0
     for raw in text.split(b"\n"):
         if not raw.strip():
             continue
@@ -111,8 +111,8 @@ def read_journal(path: Path) -> tuple[list[dict[str, Any]], int]:
         if isinstance(line, dict) and isinstance(line.get("event"), str):
             lines.append(line)
         else:
-            spoiled += 1
-    return lines, spoiled
+            count_bad += 1
+    return lines, count_bad
 
 
 def _plain(value: Any) -> Any:

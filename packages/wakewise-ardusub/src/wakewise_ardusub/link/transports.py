@@ -122,7 +122,7 @@ _PATIENCE_S = 5.0
 _TAKEN = 98
 
 
-def carrier_of(endpoint: Endpoint) -> UdpTransport | StreamTransport:
+def open_transport(endpoint: Endpoint) -> UdpTransport | StreamTransport:
     """The carrier to an endpoint.
 
     Raises
@@ -278,14 +278,14 @@ class MavlinkCodec:
         The vehicle's id, which its companion shares.
     """
 
-    def __init__(self, carrier: Transport, system: int) -> None:
-        self._carrier = carrier
+    def __init__(self, transport: Transport, system: int) -> None:
+        self._transport = transport
         self._out = dialect().MAVLink(None, srcSystem=system, srcComponent=COMPANION_COMPONENT)
         self._in = dialect().MAVLink(None)
 
     def receive(self, timeout_s: float) -> tuple[list[MavlinkMessage], int]:
         """Messages that came, and how many stretches of bytes were none; waits at most so long for the first."""
-        data = self._carrier.receive(timeout_s)
+        data = self._transport.receive(timeout_s)
         said: list[MavlinkMessage] = []
         noise = 0
         for part in packets(data):
@@ -302,7 +302,7 @@ class MavlinkCodec:
         message = getattr(self._out, f"{name}_encode")(**fields)
         data = message.pack(self._out)
         self._out.seq = (self._out.seq + 1) % 256
-        self._carrier.send(bytes(data))
+        self._transport.send(bytes(data))
 
 
 class RelayTransport:

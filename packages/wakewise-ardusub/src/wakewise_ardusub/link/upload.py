@@ -59,18 +59,18 @@ class _Answer:
 class _Client:
     """Requests one at a time, each until it is answered; the server answers a repeated one as it did before."""
 
-    def __init__(self, talk: MavlinkSession) -> None:
-        self._talk, self._number, self.session = talk, 0, 0
+    def __init__(self, link: MavlinkSession) -> None:
+        self._link, self._number, self.session = link, 0, 0
 
     def ask(self, operation: int, data: bytes = b"", *, offset: int = 0, size: int | None = None) -> _Answer:
         self._number = (self._number + 1) % 65536
         head = _HEAD.pack(self._number, self.session, operation, len(data) if size is None else size, 0, 0, offset)
         payload = (head + data).ljust(_PAYLOAD_BYTES, b"\0")
         for _ in range(ATTEMPTS):
-            self._talk.send(
+            self._link.send(
                 "file_transfer_protocol",
                 target_network=0,
-                target_system=self._talk.system,
+                target_system=self._link.system,
                 target_component=AUTOPILOT_COMPONENT,
                 payload=payload,
             )
@@ -92,7 +92,7 @@ class _Client:
     def _answer(self, operation: int) -> _Answer | None:
         until = time.monotonic() + WAIT_S
         while True:
-            heard: Any = self._talk.hear({"FILE_TRANSFER_PROTOCOL"}, max(until - time.monotonic(), 0.0))
+            heard: Any = self._link.hear({"FILE_TRANSFER_PROTOCOL"}, max(until - time.monotonic(), 0.0))
             if heard is None:
                 return None
             payload = bytes(heard.payload)
@@ -102,7 +102,7 @@ class _Client:
                 return _Answer(code == _ACK, session, data)
 
 
-def upload_script(talk: MavlinkSession, script: bytes, *, progress: Progress | None = None) -> str:
+def upload_script(link: MavlinkSession, script: bytes, *, progress: Progress | None = None) -> str:
     """Put the script where the autopilot looks for scripts, and say where that was.
 
     Raises
@@ -110,7 +110,7 @@ def upload_script(talk: MavlinkSession, script: bytes, *, progress: Progress | N
     EnvironmentFailure
         If the autopilot does not answer or refuses, or what is read back is not what was sent.
     """
-    client = _Client(talk)
+    client = _Client(link)
     client.ask(_RESET)
     path = f"{_folder(client)}/{SCRIPT_NAME}"
     client.session = client.done(_CREATE, path, path.encode("ascii")).session
@@ -124,7 +124,7 @@ def upload_script(talk: MavlinkSession, script: bytes, *, progress: Progress | N
     return path
 
 
-def start_script(talk: MavlinkSession) -> None:
+def start_script(link: MavlinkSession) -> None:
     """Have the autopilot load its scripts: SCR_ENABLE to 1, read back, and a reboot. It must be disarmed.
 
     Raises
@@ -132,14 +132,14 @@ def start_script(talk: MavlinkSession) -> None:
     EnvironmentFailure
         If it is armed, or does not do either.
     """
-    beat: Any = talk.hear({"HEARTBEAT"}, 3.0)
+    beat: Any = link.hear({"HEARTBEAT"}, 3.0)
     if beat is None or beat.base_mode & _ARMED:
         raise EnvironmentFailure("the autopilot is armed or not heard: it is not rebooted; disarm it first")
-    set_parameter(talk, "SCR_ENABLE", 1.0)
-    send_command(talk, _REBOOT_COMMAND, _REBOOT_AUTOPILOT)
+    set_parameter(link, "SCR_ENABLE", 1.0)
+    send_command(link, _REBOOT_COMMAND, _REBOOT_AUTOPILOT)
     until = time.monotonic() + 3.0
     while (left_s := until - time.monotonic()) > 0.0:
-        answer: Any = talk.hear({"COMMAND_ACK"}, left_s)
+        answer: Any = link.hear({"COMMAND_ACK"}, left_s)
         if answer is not None and answer.command == _REBOOT_COMMAND:
             if answer.result == _ACCEPTED:
                 return

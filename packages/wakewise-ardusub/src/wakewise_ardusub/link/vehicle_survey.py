@@ -30,7 +30,7 @@ Progress = Callable[[float, float], None]
 
 
 def survey(
-    talk: MavlinkSession,
+    link: MavlinkSession,
     vehicle: Vehicle,
     *,
     results: MotorResults | None = None,
@@ -45,21 +45,21 @@ def survey(
     EnvironmentFailure
         If no autopilot of the connection's system id is heard, or it says no parameter.
     """
-    beat = await_autopilot(talk)
+    beat = await_autopilot(link)
     kind = "ArduSub" if (beat.autopilot, beat.type) == (_ARDUPILOT, _SUBMARINE) else _kind(beat)
-    heard = _listened(talk, seconds, kind, mavlink_2=bytes(beat.get_msgbuf()[:1]) == b"\xfd")
-    parameters = read_parameters(talk, progress=progress)
+    heard = _listened(link, seconds, kind, mavlink_2=bytes(beat.get_msgbuf()[:1]) == b"\xfd")
+    parameters = read_parameters(link, progress=progress)
     return CheckInputs(
         vehicle=vehicle,
         parameters=parameters,
-        system=talk.system,
+        system=link.system,
         heard=heard,
         results=results,
         buttons=buttons or {},
     )
 
 
-def await_autopilot(talk: MavlinkSession, patience_s: float | None = None) -> Any:
+def await_autopilot(link: MavlinkSession, patience_s: float | None = None) -> Any:
     """A heartbeat of the vehicle's autopilot; our own goes out meanwhile, since routers send to those they know.
 
     Raises
@@ -71,33 +71,33 @@ def await_autopilot(talk: MavlinkSession, patience_s: float | None = None) -> An
     patience_s = PATIENCE_S if patience_s is None else patience_s
     until = time.monotonic() + patience_s
     while True:
-        send_heartbeat(talk)
+        send_heartbeat(link)
         next_s = time.monotonic() + HEARTBEAT_PERIOD_S
-        while (message := talk.hear_any(max(min(next_s, until) - time.monotonic(), 0.0))) is not None:
+        while (message := link.receive_any(max(min(next_s, until) - time.monotonic(), 0.0))) is not None:
             if message.get_type() != "HEARTBEAT":
                 continue
-            if (message.get_srcSystem(), message.get_srcComponent()) == (talk.system, AUTOPILOT_COMPONENT):
+            if (message.get_srcSystem(), message.get_srcComponent()) == (link.system, AUTOPILOT_COMPONENT):
                 return message
             if message.get_srcComponent() == AUTOPILOT_COMPONENT:
                 others.add(message.get_srcSystem())
         if time.monotonic() >= until:
             break
     instead = f"; heard were systems {', '.join(map(str, sorted(others)))}" if others else "; nobody was heard"
-    raise EnvironmentFailure(f"no heartbeat of system {talk.system} in {patience_s:g} s{instead}")
+    raise EnvironmentFailure(f"no heartbeat of system {link.system} in {patience_s:g} s{instead}")
 
 
-def send_heartbeat(talk: MavlinkSession) -> None:
+def send_heartbeat(link: MavlinkSession) -> None:
     """The companion's heartbeat: an onboard controller, never a ground station."""
-    talk.send("heartbeat", type=18, autopilot=8, base_mode=0, custom_mode=0, system_status=4)
+    link.send("heartbeat", type=18, autopilot=8, base_mode=0, custom_mode=0, system_status=4)
 
 
-def _listened(talk: MavlinkSession, seconds: float, kind: str, *, mavlink_2: bool) -> ReceivedTelemetry:
+def _listened(link: MavlinkSession, seconds: float, kind: str, *, mavlink_2: bool) -> ReceivedTelemetry:
     """Everything that is said for a while, at the rates that a session asks for; the version is asked for until it is.
 
     Pauses count from the second message of a kind after `SETTLE_S`.
     """
-    for request, fields in interval_requests(talk.system):
-        talk.send(request, **fields)
+    for request, fields in interval_requests(link.system):
+        link.send(request, **fields)
     last_s: dict[str, float] = {}
     gaps_s: dict[str, float] = {}
 
@@ -117,18 +117,18 @@ def _listened(talk: MavlinkSession, seconds: float, kind: str, *, mavlink_2: boo
     settled_s = time.monotonic() + min(SETTLE_S, 0.5 * seconds)
     while (left_s := until - time.monotonic()) > 0.0:
         if time.monotonic() >= hello_s:
-            send_heartbeat(talk)
+            send_heartbeat(link)
             if firmware is None:
-                send_command(talk, _REQUEST_MESSAGE, _AUTOPILOT_VERSION)
+                send_command(link, _REQUEST_MESSAGE, _AUTOPILOT_VERSION)
             hello_s = time.monotonic() + HEARTBEAT_PERIOD_S
-        message = talk.hear_any(min(left_s, HEARTBEAT_PERIOD_S))
+        message = link.receive_any(min(left_s, HEARTBEAT_PERIOD_S))
         if message is None:
             continue
         name = message.get_type()
-        if name == "MANUAL_CONTROL" and message.target == talk.system:
+        if name == "MANUAL_CONTROL" and message.target == link.system:
             sticks[message.get_srcSystem()] += 1
             came("sticks")
-        elif message.get_srcSystem() != talk.system:
+        elif message.get_srcSystem() != link.system:
             continue
         elif name == "AUTOPILOT_VERSION" and message.get_srcComponent() == AUTOPILOT_COMPONENT:
             firmware = _version(message)

@@ -361,13 +361,13 @@ class LogCollector:
         self.bad_bytes = 0
         self.unread: Counter[str] = Counter()
         self.cut_short = False
-        self.vessels: dict[int | None, SystemRecords] = {}
+        self.systems: dict[int | None, SystemRecords] = {}
 
-    def vessel(self, system: int | None = None) -> SystemRecords:
+    def records_of(self, system: int | None = None) -> SystemRecords:
         """Where samples of a system go."""
-        return self.vessels.setdefault(system, SystemRecords())
+        return self.systems.setdefault(system, SystemRecords())
 
-    def spoiled(self, reason: str, size: int) -> None:
+    def count_bad(self, reason: str, size: int) -> None:
         """Count a bad record of some bytes."""
         self.bad[reason] += 1
         self.bad_bytes += size
@@ -375,11 +375,15 @@ class LogCollector:
     def done(self, path: Path, kind: str) -> VehicleLog:
         """The log of the ArduSub, or where none is of the system, that most is known of."""
         self.clock.close()
-        held = {s: (vessel.identity.is_ardusub, vessel.samples) for s, vessel in self.vessels.items() if vessel.samples}
+        held = {
+            s: (system_records.identity.is_ardusub, system_records.samples)
+            for s, system_records in self.systems.items()
+            if system_records.samples
+        }
         system = max(held, key=lambda s: held[s], default=None)
-        vessel = self.vessels.get(system, SystemRecords())
+        system_records = self.systems.get(system, SystemRecords())
         series = {}
-        for channel, rows in vessel.rows.items():
+        for channel, rows in system_records.rows.items():
             table = np.array(rows, dtype=np.float64)
             series[channel] = ChannelSeries(time_s=table[:, 0].copy(), values=table[:, 1:].copy())
         return VehicleLog(
@@ -390,11 +394,11 @@ class LogCollector:
             bad_bytes=self.bad_bytes,
             cut_short=self.cut_short,
             series=series,
-            parameters=vessel.parameters,
+            parameters=system_records.parameters,
             jumps=tuple(self.clock.jumps),
             started_s=self.clock.first_stamp_s,
             system=system,
-            identity=vessel.identity,
+            identity=system_records.identity,
             unread=dict(self.unread),
-            others=tuple(sorted(s for s, v in self.vessels.items() if s is not None and s != system and v.samples)),
+            others=tuple(sorted(s for s, v in self.systems.items() if s is not None and s != system and v.samples)),
         )

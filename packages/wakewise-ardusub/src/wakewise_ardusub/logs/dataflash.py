@@ -58,8 +58,8 @@ class RecordFormat:
 
 def read_dataflash(data: Any) -> LogCollector:
     """Read all records of a log of the autopilot, damaged or not."""
-    gather = LogCollector()
-    vessel = gather.vessel()
+    collector = LogCollector()
+    system_records = collector.records_of()
     formats: dict[int, RecordFormat] = {}
     at, size = 0, len(data)
     lost = False
@@ -69,8 +69,8 @@ def read_dataflash(data: Any) -> LogCollector:
         whole = data[at : at + 2] == HEAD and length > 0
         if whole and at + length > size:
             # The last record of a file that was cut, or damage that looks like one.
-            gather.cut_short = data.find(HEAD, at + 1) < 0
-            if gather.cut_short:
+            collector.cut_short = data.find(HEAD, at + 1) < 0
+            if collector.cut_short:
                 break
             whole = False
         if whole and lost and data[at + length : at + length + 2] not in (HEAD, b""):
@@ -79,9 +79,9 @@ def read_dataflash(data: Any) -> LogCollector:
             after = data.find(HEAD, at + 1)
             after = size if after < 0 else after
             if lost:
-                gather.bad_bytes += after - at
+                collector.bad_bytes += after - at
             else:
-                gather.spoiled("no record", after - at)
+                collector.count_bad("no record", after - at)
             at, lost = after, True
             continue
         lost = False
@@ -92,12 +92,12 @@ def read_dataflash(data: Any) -> LogCollector:
                 number, described = _format(body)
                 formats[number] = described
             else:
-                _take(gather, vessel, formats[kind], body)
+                _take(collector, system_records, formats[kind], body)
         except (KeyError, TypeError, ValueError, struct.error):
-            gather.spoiled("fields", length)
+            collector.count_bad("fields", length)
             continue
-        gather.records += 1
-    return gather
+        collector.records += 1
+    return collector
 
 
 def _format(body: bytes) -> tuple[int, RecordFormat]:
@@ -116,60 +116,60 @@ def _format(body: bytes) -> tuple[int, RecordFormat]:
     )
 
 
-def _take(gather: LogCollector, vessel: SystemRecords, form: RecordFormat, body: bytes) -> None:
+def _take(collector: LogCollector, system_records: SystemRecords, form: RecordFormat, body: bytes) -> None:
     if form.name not in _WANTED:
         return
     fields = form.read(body)
-    time_s = gather.clock.now_s
+    time_s = collector.clock.now_s
     for label, second in (("TimeUS", 1e-6), ("TimeMS", 1e-3)):
         if label in fields:
-            time_s = gather.clock.at(second * fields[label])
+            time_s = collector.clock.at(second * fields[label])
             break
     try:
-        _keep(vessel, form.name, time_s, fields)
+        _keep(system_records, form.name, time_s, fields)
     except KeyError:
-        gather.unread[form.name] += 1
+        collector.unread[form.name] += 1
 
 
-def _keep(vessel: SystemRecords, name: str, time_s: float, fields: dict[str, Any]) -> None:
+def _keep(system_records: SystemRecords, name: str, time_s: float, fields: dict[str, Any]) -> None:
     """Keep what a record says; KeyError if it lacks a field that is needed."""
     match name:
         case "ATT":
-            vessel.put("attitude", time_s, (_turn(fields[k]) for k in ("Roll", "Pitch", "Yaw")))
+            system_records.put("attitude", time_s, (_turn(fields[k]) for k in ("Roll", "Pitch", "Yaw")))
         case "RCOU":
-            vessel.put("servo", time_s, (_output(fields, i) for i in range(1, SERVOS + 1)))
+            system_records.put("servo", time_s, (_output(fields, i) for i in range(1, SERVOS + 1)))
         case "RCIN":
             # ArduSub's channels: pitch, roll, throttle (up), yaw, forward, lateral.
             forward, right, up, turn = ((fields[f"C{i}"] - _MIDDLE_US) / _HALF_US for i in (5, 6, 3, 4))
-            vessel.put("sticks", time_s, (max(-1.0, min(1.0, v)) for v in (forward, right, -up, turn)))
+            system_records.put("sticks", time_s, (max(-1.0, min(1.0, v)) for v in (forward, right, -up, turn)))
         case "CTUN":
-            vessel.put("depth CTUN", time_s, (-fields["Alt"],))
+            system_records.put("depth CTUN", time_s, (-fields["Alt"],))
         case "BARO":
             # The first is inside the hull; old logs have a kind of record for each.
             if fields.get("I", fields.get("Id", 0)) == 1:
-                vessel.put("depth BARO", time_s, (-fields["Alt"],))
+                system_records.put("depth BARO", time_s, (-fields["Alt"],))
         case "BAR2":
-            vessel.put("depth BARO", time_s, (-fields["Alt"],))
+            system_records.put("depth BARO", time_s, (-fields["Alt"],))
         case "XKF1":
             # The estimator's first core; the autopilot may change over to another, which MAVLink's position follows.
             if fields.get("C", 0) == 0:
-                vessel.put("position", time_s, (fields[k] for k in ("PN", "PE", "PD")))
+                system_records.put("position", time_s, (fields[k] for k in ("PN", "PE", "PD")))
         case "BAT":
             if fields.get("Inst", fields.get("Instance", fields.get("I", 0))) == 0:
-                vessel.put("voltage", time_s, (fields["Volt"],))
+                system_records.put("voltage", time_s, (fields["Volt"],))
         case "MODE":
-            vessel.put("mode", time_s, (float(fields["ModeNum"] if "ModeNum" in fields else fields["Mode"]),))
+            system_records.put("mode", time_s, (float(fields["ModeNum"] if "ModeNum" in fields else fields["Mode"]),))
         case "ARM":
-            vessel.put("armed", time_s, (fields["ArmState"],))
+            system_records.put("armed", time_s, (fields["ArmState"],))
         case "EV":
             if fields["Id"] in (_ARMED_EVENT, _DISARMED_EVENT):
-                vessel.put("armed", time_s, (float(fields["Id"] == _ARMED_EVENT),))
+                system_records.put("armed", time_s, (float(fields["Id"] == _ARMED_EVENT),))
         case "PARM":
-            vessel.parameter(_text(fields["Name"]), float(fields["Value"]))
+            system_records.parameter(_text(fields["Name"]), float(fields["Value"]))
         case "MSG":
-            vessel.firmware = vessel.firmware or firmware_of(_text(fields["Message"]))
+            system_records.firmware = system_records.firmware or firmware_of(_text(fields["Message"]))
         case "VER":
-            vessel.firmware = firmware_of(_text(fields["FWS"])) or vessel.firmware
+            system_records.firmware = firmware_of(_text(fields["FWS"])) or system_records.firmware
 
 
 def _output(fields: dict[str, Any], number: int) -> float:

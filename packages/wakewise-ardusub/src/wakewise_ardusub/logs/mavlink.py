@@ -72,13 +72,13 @@ class MessageListener(Protocol):
         """Its clock."""
         ...
 
-    def vessel(self, system: int) -> SampleSink:
+    def records_of(self, system: int) -> SampleSink:
         """Where a system's go."""
         ...
 
 
 def record_message(
-    gather: MessageListener, stamp_s: float, system: int, component: int, name: str, fields: Mapping[str, Any]
+    collector: MessageListener, stamp_s: float, system: int, component: int, name: str, fields: Mapping[str, Any]
 ) -> None:
     """Keep what a message says; those that are not `WANTED` only set the clock.
 
@@ -91,41 +91,43 @@ def record_message(
         sticks = [_number(fields[k]) for k in ("x", "y", "z", "r")]
         x, y, z, r = (math.nan if v == _NO_PILOT else v for v in sticks)
         # The throttle goes from 0 (down) by 500 (none) to 1000 (up).
-        time_s = gather.clock.at(stamp_s)
-        gather.vessel(int(fields["target"])).put("sticks", time_s, (x / 1e3, y / 1e3, (500.0 - z) / 500.0, r / 1e3))
+        time_s = collector.clock.at(stamp_s)
+        collector.records_of(int(fields["target"])).put(
+            "sticks", time_s, (x / 1e3, y / 1e3, (500.0 - z) / 500.0, r / 1e3)
+        )
         return
     if component != AUTOPILOT or name not in WANTED:
-        gather.clock.at(stamp_s)
+        collector.clock.at(stamp_s)
         return
     boot = fields.get("time_boot_ms")
-    time_s = gather.clock.at(stamp_s, None if boot is None else 1e-3 * _number(boot))
-    vessel = gather.vessel(system)
+    time_s = collector.clock.at(stamp_s, None if boot is None else 1e-3 * _number(boot))
+    system_records = collector.records_of(system)
     if name == "SERVO_OUTPUT_RAW":
         if not fields.get("port"):
-            vessel.put("servo", time_s, (_number(fields.get(f"servo{i}_raw", 0)) for i in range(1, SERVOS + 1)))
+            system_records.put("servo", time_s, (_number(fields.get(f"servo{i}_raw", 0)) for i in range(1, SERVOS + 1)))
     elif name == "ATTITUDE":
-        vessel.put("attitude", time_s, (_number(fields[k]) for k in ("roll", "pitch", "yaw")))
+        system_records.put("attitude", time_s, (_number(fields[k]) for k in ("roll", "pitch", "yaw")))
     elif name == "LOCAL_POSITION_NED":
-        vessel.put("position", time_s, (_number(fields[k]) for k in ("x", "y", "z")))
+        system_records.put("position", time_s, (_number(fields[k]) for k in ("x", "y", "z")))
     elif name == "VFR_HUD":
-        vessel.put("depth VFR_HUD", time_s, (-_number(fields["alt"]),))
+        system_records.put("depth VFR_HUD", time_s, (-_number(fields["alt"]),))
     elif name == "AHRS2":
-        vessel.put("depth AHRS2", time_s, (-_number(fields["altitude"]),))
+        system_records.put("depth AHRS2", time_s, (-_number(fields["altitude"]),))
     elif name.startswith("SCALED_PRESSURE"):
         number = name.removeprefix("SCALED_PRESSURE") or "1"
-        vessel.put(f"pressure {number}", time_s, (_PASCAL_PER_MBAR * _number(fields["press_abs"]),))
+        system_records.put(f"pressure {number}", time_s, (_PASCAL_PER_MBAR * _number(fields["press_abs"]),))
     elif name == "SYS_STATUS":
         voltage = _number(fields["voltage_battery"])
-        vessel.put("voltage", time_s, (math.nan if voltage == _NO_VOLTAGE else 1e-3 * voltage,))
+        system_records.put("voltage", time_s, (math.nan if voltage == _NO_VOLTAGE else 1e-3 * voltage,))
     elif name == "HEARTBEAT":
-        vessel.put("armed", time_s, (float(_is_armed(fields["base_mode"])),))
-        vessel.put("mode", time_s, (_number(fields["custom_mode"]),))
+        system_records.put("armed", time_s, (float(_is_armed(fields["base_mode"])),))
+        system_records.put("mode", time_s, (_number(fields["custom_mode"]),))
         # BlueOS's JSON has the message's own name under `type`, and the vehicle's type beside it.
         kind = fields.get("mavtype", fields.get("type", name))
         if kind != name and (autopilot := enumerated("MAV_AUTOPILOT", fields["autopilot"])) != NO_AUTOPILOT:
-            vessel.beat(enumerated("MAV_TYPE", kind), autopilot)
+            system_records.beat(enumerated("MAV_TYPE", kind), autopilot)
     elif name == "PARAM_VALUE":
-        vessel.parameter(_text(fields["param_id"]), _number(fields["param_value"]))
+        system_records.parameter(_text(fields["param_id"]), _number(fields["param_value"]))
 
 
 def _is_armed(base_mode: Any) -> bool:
@@ -163,9 +165,9 @@ MOST_CHUNK_BYTES = 1 << 28
 
 def read_mcap(data: Any) -> LogCollector:
     """Read the MAVLink messages of an MCAP file, damaged or not."""
-    gather = LogCollector()
-    _walk(gather, data, len(MAGIC), {}, inside=False)
-    return gather
+    collector = LogCollector()
+    _walk(collector, data, len(MAGIC), {}, inside=False)
+    return collector
 
 
 def is_ros_bag(data: Any) -> bool:
@@ -177,7 +179,9 @@ def is_ros_bag(data: Any) -> bool:
     return bytes(data[start + 4 : start + 4 + min(length, 4)]) in (b"ros1", b"ros2")
 
 
-def _walk(gather: LogCollector, data: Any, at: int, topics: dict[int, tuple[int, int, str]], *, inside: bool) -> None:
+def _walk(
+    collector: LogCollector, data: Any, at: int, topics: dict[int, tuple[int, int, str]], *, inside: bool
+) -> None:
     """Go through the records of a file, or of an unpacked chunk."""
     size = len(data)
     while at + _HEAD.size <= size:
@@ -190,18 +194,18 @@ def _walk(gather: LogCollector, data: Any, at: int, topics: dict[int, tuple[int,
         at = end
         try:
             if kind == _CHUNK and not inside:
-                _walk(gather, _unpacked(data[start:end]), 0, topics, inside=True)
+                _walk(collector, _unpacked(data[start:end]), 0, topics, inside=True)
             elif kind == _CHANNEL:
                 _channel(bytes(data[start:end]), topics)
             elif kind == _MESSAGE:
-                gather.records += _message(gather, bytes(data[start:end]), topics)
+                collector.records += _message(collector, bytes(data[start:end]), topics)
         except Exception:  # compressors and readers raise errors of many kinds
-            gather.spoiled("chunk" if kind == _CHUNK else "message", length)
+            collector.count_bad("chunk" if kind == _CHUNK else "message", length)
     if inside:
         if at != size:
-            gather.spoiled("chunk", size - at)
+            collector.count_bad("chunk", size - at)
     else:
-        gather.cut_short = True
+        collector.cut_short = True
 
 
 def _unpacked(body: bytes) -> bytes:
@@ -226,7 +230,7 @@ def _channel(body: bytes, topics: dict[int, tuple[int, int, str]]) -> None:
         topics[channel.id] = int(named[1]), int(named[2]), named[3]
 
 
-def _message(gather: LogCollector, body: bytes, topics: dict[int, tuple[int, int, str]]) -> bool:
+def _message(collector: LogCollector, body: bytes, topics: dict[int, tuple[int, int, str]]) -> bool:
     """Keep what a message says; whether it was one of MAVLink."""
     number, _, at_ns, _ = _MESSAGE_HEAD.unpack(body[: _MESSAGE_HEAD.size])
     if number not in topics:
@@ -237,7 +241,7 @@ def _message(gather: LogCollector, body: bytes, topics: dict[int, tuple[int, int
         content = json.loads(text)
     except ValueError:  # JSON5, whose keys need no quotes
         content = json.loads(_BARE_KEY.sub(r'\1"\2":', text))
-    record_message(gather, 1e-9 * at_ns, system, component, name, content["message"])
+    record_message(collector, 1e-9 * at_ns, system, component, name, content["message"])
     return True
 
 
@@ -289,32 +293,32 @@ def read_tlog(data: Buffer) -> LogCollector:
 
     known = ardupilotmega.mavlink_map
     decoder = ardupilotmega.MAVLink(None)
-    gather = LogCollector()
-    for packet, size in _records(data, gather, ardupilotmega):
+    collector = LogCollector()
+    for packet, size in _records(data, collector, ardupilotmega):
         if packet is None:
-            gather.spoiled("no record", size)
+            collector.count_bad("no record", size)
             continue
         message = known.get(packet.number)
         if message is None:
             # Another dialect's: whole as far as can be told.
-            gather.records += 1
+            collector.records += 1
             continue
         if not _is_whole(data, packet, ardupilotmega):
-            gather.spoiled("checksum", size)
+            collector.count_bad("checksum", size)
             continue
-        gather.records += 1
+        collector.records += 1
         fields: dict[str, Any] = {}
         if message.msgname in WANTED:
             try:
                 fields = decoder.decode(bytearray(data[packet.start : packet.end])).to_dict()
             except Exception:  # pymavlink raises what the fields made it raise
-                gather.spoiled("fields", size)
+                collector.count_bad("fields", size)
                 continue
         try:
-            record_message(gather, packet.stamp_s, packet.system, packet.component, message.msgname, fields)
+            record_message(collector, packet.stamp_s, packet.system, packet.component, message.msgname, fields)
         except (KeyError, TypeError, ValueError):
-            gather.spoiled("fields", size)
-    return gather
+            collector.count_bad("fields", size)
+    return collector
 
 
 def holds_packets(data: Buffer) -> bool:
@@ -324,7 +328,7 @@ def holds_packets(data: Buffer) -> bool:
     return _next(data, 0, ardupilotmega) is not None
 
 
-def _records(data: Buffer, gather: LogCollector, dialect: Any) -> Iterator[tuple[TlogPacket | None, int]]:
+def _records(data: Buffer, collector: LogCollector, dialect: Any) -> Iterator[tuple[TlogPacket | None, int]]:
     """Records in their order with their sizes; None is a stretch that is none."""
     at, size = 0, len(data)
     while at < size:
@@ -335,7 +339,7 @@ def _records(data: Buffer, gather: LogCollector, dialect: Any) -> Iterator[tuple
             continue
         after = _next(data, at + 1, dialect)
         if after is None and _is_head(data, at) and _promises_more(data, at):
-            gather.cut_short = True
+            collector.cut_short = True
             return
         yield None, (size if after is None else after) - at
         at = size if after is None else after

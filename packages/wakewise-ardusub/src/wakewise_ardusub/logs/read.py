@@ -61,18 +61,20 @@ def read_log(path: Path, *, any_vehicle: bool = False) -> VehicleLog:
                 if foreign is not None:
                     raise InputError(f"{path}: {foreign}; expected {FORMATS}")
                 if data[: len(MAGIC)] == MAGIC:
-                    kind, gather = "mcap", read_mcap(data)
-                    if is_ros_bag(data) and not any(vessel.rows for vessel in gather.vessels.values()):
+                    kind, collector = "mcap", read_mcap(data)
+                    if is_ros_bag(data) and not any(
+                        system_records.rows for system_records in collector.systems.values()
+                    ):
                         raise InputError(f"{path}: a ROS bag (MCAP), not a recording of BlueOS; expected {FORMATS}")
                 elif data[:3] == HEAD + b"\x80" or (path.suffix.lower() == ".bin" and data.find(HEAD) >= 0):
-                    kind, gather = "dataflash", read_dataflash(data)
+                    kind, collector = "dataflash", read_dataflash(data)
                 elif holds_packets(data):
-                    kind, gather = "tlog", read_tlog(data)
+                    kind, collector = "tlog", read_tlog(data)
                 else:
                     raise InputError(f"{path}: not one record found, expected {FORMATS}")
     except (OSError, ValueError) as fault:
         raise InputError(f"{path}: cannot be read, {getattr(fault, 'strerror', None) or fault}") from None
-    log = gather.done(path, kind)
+    log = collector.done(path, kind)
     if not log.series:
         raise InputError(
             f"{path}: {log.records} records and {log.bad_records} bad ones, none of which says sticks, servo outputs, "

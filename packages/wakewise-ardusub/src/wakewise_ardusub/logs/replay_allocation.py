@@ -114,9 +114,9 @@ def replay_log(
     """
     craft = VehicleSummary.of(vehicle, wake)
     motors, directions = motor_channels(craft, parameters), directions_of_motors(parameters, craft.count)
-    sparing = WashSavingsCalculator(craft, directions)
+    calculator = WashSavingsCalculator(craft, directions)
     pulses = rows.select(f"servo_{channel}_us" for channel in motors).to_numpy().astype(np.float64)
-    voltages = np.array([sparing.supply_V(volts) for volts in rows["voltage_V"]])
+    voltages = np.array([calculator.supply_V(volts) for volts in rows["voltage_V"]])
     known = np.isfinite(pulses).all(axis=1)
     unique, back = _distinct(np.column_stack([pulses[known], voltages[known]]))
     view = influence_model(craft, region.points_W_m, region.weights)
@@ -125,9 +125,9 @@ def replay_log(
     thrusts = {share: np.zeros((len(unique), m)) for share in SHARES}
     found = {share: np.zeros(len(unique)) for share in SHARES}
     for i, row in enumerate(unique):
-        spared = sparing.judge(row[:m], float(row[m]), gram)
+        savings = calculator.judge(row[:m], float(row[m]), gram)
         for share in SHARES:
-            thrusts[share][i], found[share][i] = spared.thrusts_N[share], spared.disturbance[share]
+            thrusts[share][i], found[share][i] = savings.thrusts_N[share], savings.disturbance[share]
     every: dict[Shares, Array] = {share: np.full((len(rows), m), np.nan) for share in SHARES}
     disturbances: dict[Shares, Array] = {share: np.full(len(rows), np.nan) for share in SHARES}
     for share in SHARES:

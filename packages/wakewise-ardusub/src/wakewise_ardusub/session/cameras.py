@@ -67,7 +67,7 @@ def parse_camera(words: str) -> MakeCamera:
         If it is none of the ways, or the program is not there.
     """
     if words in ("mavlink", "digicam"):
-        return lambda warden, folder, journal: MavlinkCamera(warden, digicam=words == "digicam")  # noqa: ARG005
+        return lambda gate, folder, journal: MavlinkCamera(gate, digicam=words == "digicam")  # noqa: ARG005
     way, _, line = words.partition(":")
     if way != "run":
         raise InputError(f"--camera {words!r}: right is {RIGHT}")
@@ -79,14 +79,14 @@ def parse_camera(words: str) -> MakeCamera:
         raise InputError(f"--camera {words!r}: nothing to run; right is {RIGHT}")
     if shutil.which(program[0]) is None:
         raise InputError(f"--camera {words!r}: there is no program {program[0]}")
-    return lambda warden, folder, journal: ProgramCamera(program, folder / PHOTOGRAPHS, journal)  # noqa: ARG005
+    return lambda gate, folder, journal: ProgramCamera(program, folder / PHOTOGRAPHS, journal)  # noqa: ARG005
 
 
 @dataclass(eq=False)
 class MavlinkCamera:
     """A camera of the vehicle that takes MAVLink's commands; what it answers is the warden's to hear."""
 
-    warden: OutputGate
+    gate: OutputGate
     digicam: bool = False
 
     def take(self, number: int) -> None:
@@ -95,8 +95,8 @@ class MavlinkCamera:
         numbers = (0, 0, 0, 0, 1, number, 0) if self.digicam else (0, 0, 1, number, 0, 0, 0)
         command = DIGICAM_CONTROL if self.digicam else IMAGE_START_CAPTURE
         fields = {f"param{i}": float(value) for i, value in enumerate(numbers, start=1)}
-        target = {"target_system": self.warden.known.system, "target_component": _ALL_COMPONENTS}
-        self.warden.say("command_long", {**target, "command": command, "confirmation": 0, **fields})
+        target = {"target_system": self.gate.known.system, "target_component": _ALL_COMPONENTS}
+        self.gate.send("command_long", {**target, "command": command, "confirmation": 0, **fields})
 
     def close(self) -> None:
         """Nothing is held."""

@@ -27,13 +27,13 @@ class FlightOwnership:
 class GroundStationInput:
     """A `ControlSource`: the sticks that the pilot moves at the ground station, and the buttons that mean something."""
 
-    warden: OutputGate
+    gate: OutputGate
     stale_s: float = 0.3
 
     def read(self, time_s: float) -> Controls | None:  # noqa: ARG002  (as they are now)
         """The sticks as last heard; None where nobody was heard for a while."""
-        sticks, pressed = self.warden.known.sticks, self.warden.pressed()
-        if sticks is None or self.warden.clock() - sticks.came_s > self.stale_s:
+        sticks, pressed = self.gate.known.sticks, self.gate.pressed()
+        if sticks is None or self.gate.clock() - sticks.came_s > self.stale_s:
             return Controls(axes=CENTRED.axes, pressed=pressed) if pressed else None
         return Controls(axes=sticks.axes, pressed=pressed)
 
@@ -43,15 +43,15 @@ class EngagedPilot:
     """A `Pilot`: the assisted one while engaged, on its own clock; else the vehicle is wished to be where it is."""
 
     inner: AssistedPilot
-    warden: OutputGate
+    gate: OutputGate
     turn: FlightOwnership
     photographed: Callable[[], None]
     _notes_told: int = 0
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
         """What is wanted now; settles in which engagement this step is flown."""
-        self.warden.estimated(estimate)
-        entry, turn = self.warden.entry, self.turn
+        self.gate.estimated(estimate)
+        entry, turn = self.gate.entry, self.turn
         if entry is None:
             turn.entry = None
             return Goal(X_WB=estimate.X_WB, nu_B=estimate.nu_B)
@@ -59,13 +59,13 @@ class EngagedPilot:
             turn.entry, turn.began_s = entry, time_s
         goal = self.inner.goal(time_s - turn.began_s, estimate)
         for note in self.inner.notes():
-            if self.warden.journal is not None:
-                self.warden.journal.write("note", level=note.level, words=note.text)
+            if self.gate.journal is not None:
+                self.gate.journal.write("note", level=note.level, words=note.text)
         return goal
 
     def taken(self) -> tuple[str, ...]:
         """Photographs and the end asked for since the last call."""
-        actions = self.inner.taken() if self.turn.entry is not None else self.warden.pressed()
+        actions = self.inner.taken() if self.turn.entry is not None else self.gate.pressed()
         found = tuple(what for what in actions if what in ("capture", "stop"))
         for _ in range(found.count("capture")):
             self.photographed()

@@ -57,7 +57,7 @@ class WashFigures:
     """
 
     parts: Parts
-    warden: OutputGate
+    gate: OutputGate
     turn: FlightOwnership
     flown_N: Callable[[], Array]
     speeds_m_s: tuple[float, float] | None = None
@@ -83,7 +83,7 @@ class WashFigures:
             found[SAVED_NAME] = 100.0 * (1.0 - found[DISTURBANCE_NAME] / least)
         if self._covered_pct is not None:
             found[COVERAGE_NAME] = self._covered_pct
-        self.warden.figures = found
+        self.gate.figures = found
 
     def photographed(self, X_WC: Pose) -> None:
         """A photograph was taken from here; what it has seen is reckoned beside the flight."""
@@ -99,7 +99,7 @@ class WashFigures:
     def begin(self) -> None:
         """Reckon afresh at the next step."""
         self._due_s = -math.inf
-        self.warden.figures = {}
+        self.gate.figures = {}
 
     def __post_init__(self) -> None:
         self._view = InfluenceModel.of(self.parts.vehicle, self.parts.region, self.parts.wake)
@@ -133,7 +133,7 @@ class VehicleFlight:
 
 def join_vehicle(
     scenario: Scenario,
-    warden: OutputGate,
+    gate: OutputGate,
     *,
     start: BodyState,
     target: Target,
@@ -170,7 +170,7 @@ def join_vehicle(
     InputError
         If the vehicle stands where no plan can be good, such as with the target inside its hull.
     """
-    turn, known = FlightOwnership(), warden.known
+    turn, known = FlightOwnership(), gate.known
     place_z = float(start.X_WB.p_m[2])
     surface = np.array([[0.0, 0.0, 1.0, place_z - known.depth_m]]) if math.isfinite(known.depth_m) else np.zeros((0, 4))
     around = Surroundings(
@@ -180,33 +180,33 @@ def join_vehicle(
     )
 
     def plant() -> ArduSubPlant:
-        return ArduSubPlant(warden=warden, clock=clock(), wait=wait, entry=lambda: turn.entry)
+        return ArduSubPlant(gate=gate, clock=clock(), wait=wait, entry=lambda: turn.entry)
 
     parts = Parts(scenario).replace(
         target=target, region=region, surroundings=around, start=start, world=ArduSubWorld(plant=plant)
     )
     check_start(parts.vehicle, region, state_of(start), around, what="here")
-    if warden.target_W_m is None:
-        warden.target_W_m = target.centre_W_m
+    if gate.target_W_m is None:
+        gate.target_W_m = target.centre_W_m
     desk = OperatorState(OperatorSettings(mode="operator"))
-    flown = assisted(parts, GroundStationInput(warden=warden), desk, OperatorSettings(mode="operator"))
+    flown = assisted(parts, GroundStationInput(gate=gate), desk, OperatorSettings(mode="operator"))
     inner = flown.pilot
     if not isinstance(inner, AssistedPilot):
         raise InputError("pilot: only hands fly at sea")
-    beside = EngagedPilot(inner=inner, warden=warden, turn=turn, photographed=photographed)
+    beside = EngagedPilot(inner=inner, gate=gate, turn=turn, photographed=photographed)
     rests = EngagedController(inner=flown.controller, turn=turn, thrusters=len(parts.vehicle.thrusters))
     told = ServoEstimator(inner=flown.estimator, turn=turn, flown_N=flown_N)
     whole = flown.replace(pilot=beside, controller=rests, estimator=told)
     return VehicleFlight(
         parts=whole,
         bare=parts,
-        figures=WashFigures(parts=parts, warden=warden, turn=turn, flown_N=flown_N),
+        figures=WashFigures(parts=parts, gate=gate, turn=turn, flown_N=flown_N),
         desk=desk,
         turn=turn,
     )
 
 
-class _Patience:
+class _WaitingWorld:
     """A world that waits for its controller: what takes long the first time is not cut short."""
 
     name, waits = "rehearsal", True
@@ -215,7 +215,7 @@ class _Patience:
         raise NotImplementedError  # nobody flies in it
 
 
-class _Waving:
+class _MovingInput:
     """Sticks that are moved a little, for a rehearsal."""
 
     def read(self, time_s: float) -> Controls:  # noqa: ARG002
@@ -232,10 +232,12 @@ def run_warm_up(sea: VehicleFlight, steps: int = 12) -> float:
     """
     parts, start = sea.parts, sea.parts.start
     dt_s, layout = 1.0 / parts.control.rate_hz, vehicle_layout(parts.vehicle)
-    chain = assisted(sea.bare.replace(world=_Patience()), _Waving(), OperatorState(), OperatorSettings(mode="operator"))
+    chain = assisted(
+        sea.bare.replace(world=_WaitingWorld()), _MovingInput(), OperatorState(), OperatorSettings(mode="operator")
+    )
     resting = sea.parts.controller
     assert isinstance(resting, EngagedController)  # see `join.at_sea`
-    flying, filtering, method = chain.flying, chain.estimator, resting.inner
+    flying, filtering, method = chain.pipeline, chain.estimator, resting.inner
     state, own, known, estimate, took_s = flying.init(), method.init(), filtering.init(start), start, 0.0
     for k in range(steps):
         began = time.perf_counter()

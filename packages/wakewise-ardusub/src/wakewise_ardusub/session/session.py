@@ -136,7 +136,7 @@ class VehicleSession:
     folder: Path
     spare: ProtectedRegion
     session: int
-    wardens: dict[str, Any] = field(default_factory=dict)
+    gate_options: dict[str, Any] = field(default_factory=dict)
     camera: MakeCamera | None = None
     fault: BaseException | None = None
     preparing: str = "not begun"
@@ -150,17 +150,17 @@ class VehicleSession:
         self.vehicle = any_vehicle(self.scenario.vehicle)
         self.drive = VehicleMotors(self.vehicle)
         self.journal = SessionLog(self.folder / JOURNAL_FILE)
-        self.warden = OutputGate(
-            send=self.send, drive=self.drive, journal=self.journal, session=self.session, **self.wardens
+        self.gate = OutputGate(
+            send=self.send, drive=self.drive, journal=self.journal, session=self.session, **self.gate_options
         )
-        self._camera = None if self.camera is None else self.camera(self.warden, self.folder, self.journal)
-        self._link = LinkThread(self.receiving, self.warden)
+        self._camera = None if self.camera is None else self.camera(self.gate, self.folder, self.journal)
+        self._link = LinkThread(self.receiving, self.gate)
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="session", daemon=True)
 
     def start(self) -> None:
         """Listen, and fly once the vehicle is heard."""
-        told = {"vehicle": self.vehicle.name, "method": self.scenario.method, "system": self.warden.known.system}
+        told = {"vehicle": self.vehicle.name, "method": self.scenario.method, "system": self.gate.known.system}
         self.journal.write("begin", **told)
         self._link.start()
         self._thread.start()
@@ -177,10 +177,10 @@ class VehicleSession:
         if self._camera is not None:
             self._camera.close()
         self.fault = self.fault or self._link.fault
-        known, warden = self.warden.known, self.warden
+        known, gate = self.gate.known, self.gate
         self.journal.write(
-            "end", why=why, messages=known.messages, garbage=known.garbage, thrusts=warden.thrusts_sent,
-            releases=warden.releases_sent, not_sent=warden.unsent, engagements=warden.engagement.entries,
+            "end", why=why, messages=known.messages, garbage=known.garbage, thrusts=gate.thrusts_sent,
+            releases=gate.releases_sent, not_sent=gate.unsent, engagements=gate.engagement.entries,
             **self.figures(),
         )  # fmt: skip
         self.journal.close()
@@ -199,21 +199,21 @@ class VehicleSession:
             "flown_s": None if live is None else round(live.time_s, 3),
             "loop_jitter_ms_p99": None if pace is None else round(1e3 * pace.late_s(), 3),
             "photographs": self.photographs,
-            "photographs_confirmed": self.warden.known.photographs,
-            "trips": dict(self.warden.margins.trips),
+            "photographs_confirmed": self.gate.known.photographs,
+            "trips": dict(self.gate.margins.trips),
         }
 
     def line(self) -> str:
         """How it stands, in one line for people."""
-        warden, facts = self.warden, self.warden.facts()
-        known, engagement = warden.known, warden.engagement
+        gate, facts = self.gate, self.gate.facts()
+        known, engagement = gate.known, gate.engagement
         armed = {True: "armed", False: "disarmed", None: "not heard"}[known.armed]
         state = f"{engagement.state:<9}" + ("" if engagement.state == "engaged" else f" ({engagement.why})")
         parts = [state, f"{known.mode_name or '-'} {armed}", f"pose {_age(facts.pose_s)}"]
         if self.sea is not None and self.sea.figures.speeds_m_s is not None:
             flown, least = (1e3 * speed for speed in self.sea.figures.speeds_m_s)
             parts.append(f"water at the target {flown:.1f} mm/s rms, by least thrusts {least:.1f}")
-        margins = warden.margins.words(warden.limits)
+        margins = gate.margins.words(gate.limits)
         if margins:
             parts.append(margins)
         if self._camera is not None and known.camera:
@@ -237,17 +237,17 @@ class VehicleSession:
             live.run()
         except BaseException as fault:  # the owner asks for it; the vehicle is not driven without a flight
             self.fault = fault
-            self.warden.release(f"the flight ended ({type(fault).__name__}: {fault})")
+            self.gate.release(f"the flight ended ({type(fault).__name__}: {fault})")
 
     def _warming(self, done: float, total: float, note: str = "") -> None:
         self.preparing = f"compiles, {done:g} of {total:g} done: {note}" if total else note
 
     def _prepared(self) -> VehicleFlight | None:
         """Wait for the vehicle, and join the parts to it; None where the session ended before."""
-        warden = self.warden
+        gate = self.gate
         compile_kernels(FLIGHT_JOBS, self._warming)
         while not self._over.wait(LOOK_S):
-            facts, buttons = warden.facts(), warden.buttons_amiss
+            facts, buttons = gate.facts(), gate.button_fault
             if buttons:
                 raise InputError(buttons)
             lacking = [
@@ -257,13 +257,13 @@ class VehicleSession:
                     ("depth", 0.0 if math.isfinite(facts.depth_m) else math.inf),
                     ("BTNn_FUNCTION", math.inf if buttons is None else 0.0),
                 )
-                if not age_s < warden.limits.heartbeat_s
+                if not age_s < gate.limits.heartbeat_s
             ]  # fmt: skip
             above_m = 0.0 if lacking else self._above_water_m()
             if not lacking and above_m <= 0.0:
                 break
             self.preparing = (
-                f"waits for {', '.join(lacking)} of system {warden.known.system}"
+                f"waits for {', '.join(lacking)} of system {gate.known.system}"
                 if lacking
                 else f"waits until the hull is under water, {above_m:.2f} m of it are above"
             )
@@ -272,10 +272,10 @@ class VehicleSession:
         self.preparing = "makes the parts"
         start = self._here()
         middle, radius, region = self.spare.found(start, self.vehicle.size_m[0], float(self.vehicle.X_BC.p_m[2]))
-        warden.target_W_m = middle
+        gate.target_W_m = middle
         sea = join_vehicle(
             self.scenario,
-            warden,
+            gate,
             start=start,
             target=ball(middle, radius),
             region=region,
@@ -298,21 +298,21 @@ class VehicleSession:
 
     def _here(self) -> BodyState:
         """Where the vehicle is now, as heard; a position was heard."""
-        known = self.warden.known
+        known = self.gate.known
         assert known.place_W_m is not None
         return BodyState(X_WB=Pose(known.place_W_m, attitude_of(known)))
 
     def _above_water_m(self) -> float:
         """How far the highest corner of the hull's box is above the surface (m); negative if it is below."""
-        R_WB = matrix_from_quat(attitude_of(self.warden.known))
-        return float(0.5 * np.abs(R_WB[2]) @ np.array(self.vehicle.size_m)) - self.warden.known.depth_m
+        R_WB = matrix_from_quat(attitude_of(self.gate.known))
+        return float(0.5 * np.abs(R_WB[2]) @ np.array(self.vehicle.size_m)) - self.gate.known.depth_m
 
     def _flight(self) -> LiveFlight:
         assert self.live is not None  # nobody asks before there is one
         return self.live
 
     def _flown_N(self) -> Array:
-        known = self.warden.known
+        known = self.gate.known
         return self.drive.flown_N(known.parameters, known.servo_us, known.battery_V)
 
     def _photographed(self) -> None:

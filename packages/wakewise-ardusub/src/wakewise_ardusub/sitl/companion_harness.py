@@ -68,27 +68,27 @@ class CompanionHarness:
         self.drive = VehicleMotors(flight.vehicle)
         self.withheld: set[str] = set()
         """Names of messages that do not reach it."""
-        self.deaf = self.mute = self.stuck = False
+        self.receive_blocked = self.send_blocked = self.controller_blocked = False
         """Faults: nothing reaches it, nothing of it reaches others, its program has stopped."""
         self.decides = True
         """Whether the plain controller decides."""
         self._waiting: deque[bytes] = deque(maxlen=4096)
         self._ticked_s = self._decided_s = -1.0
-        self._post = MavlinkCodec(self, flight.stand_in.system)
-        self.warden = OutputGate(
+        self._post = MavlinkCodec(self, flight.autopilot.system)
+        self.gate = OutputGate(
             send=self._post.send,
             drive=self.drive,
             limits=limits,
             journal=journal,
-            system=flight.stand_in.system,
+            system=flight.autopilot.system,
             session=SESSION,
             buttons=buttons,
             clock=self.clock,
         )
-        self.warden.target_W_m = np.array([1.0, 0.0, 2.0])
+        self.gate.target_W_m = np.array([1.0, 0.0, 2.0])
         flight.listeners["companion"] = self.hear
         flight.turns.append(self.turn)
-        self.warden.begin()
+        self.gate.begin()
 
     def clock(self) -> float:
         """The companion's clock, which began at another time than the autopilot's."""
@@ -102,23 +102,23 @@ class CompanionHarness:
 
     def send(self, data: bytes) -> None:
         """To everybody else."""
-        if not self.mute:
+        if not self.send_blocked:
             self.flight.carry(data, "companion")
 
     def turn(self) -> None:
         """What the program does in the time of a loop: listen, watch, decide."""
-        if self.stuck:
+        if self.controller_blocked:
             return
         said, bad = self._post.receive(0.0)
         if bad:
-            self.warden.noise(bad)
+            self.gate.noise(bad)
         for message in said:
             if message.name not in self.withheld:
-                self.warden.take(message)
+                self.gate.take(message)
         now_s = self.flight.now_s
         if now_s - self._ticked_s >= TICK_S - 1e-9:
             self._ticked_s = now_s
-            self.warden.tick()
+            self.gate.tick()
         if self.decides and now_s - self._decided_s >= DECIDES_S - 1e-9:
             self._decided_s = now_s
             self._decide()
@@ -137,9 +137,9 @@ class CompanionHarness:
         flight.arm(True)
         for _ in range(60):
             flight.run(0.1)
-            if self.warden.engagement.state == "ready":
+            if self.gate.engagement.state == "ready":
                 break
-        answer = self.warden.press()
+        answer = self.gate.press()
         if answer != "engaged":
             raise WakewiseError(answer)
         flight.run(1.0)
@@ -147,22 +147,22 @@ class CompanionHarness:
 
     def flown_N(self) -> Array:
         """Thrusts by the servos' pulses, shape (n,), as the companion knows them."""
-        known = self.warden.known
+        known = self.gate.known
         return self.drive.flown_N(known.parameters, known.servo_us, known.battery_V)
 
     def hear(self, data: bytes) -> None:
         """Bytes come; they are taken in at its next turn."""
-        if not self.deaf:
+        if not self.receive_blocked:
             self._waiting.append(data)
 
     def _decide(self) -> None:
-        known, warden = self.warden.known, self.warden
+        known, gate = self.gate.known, self.gate
         if known.place_W_m is None or not np.isfinite(known.attitude[0]):
             return
-        warden.estimated(BodyState(X_WB=Pose(known.place_W_m, attitude_of(known))))
-        entry = warden.entry
+        gate.estimated(BodyState(X_WB=Pose(known.place_W_m, attitude_of(known))))
+        entry = gate.entry
         if entry is not None:
-            warden.command(self.thrusts_N, entry)
+            gate.command(self.thrusts_N, entry)
 
 
 def _no_sticks(aboard: CompanionHarness) -> None:
@@ -181,19 +181,19 @@ def _withheld(*names: str) -> Callable[[CompanionHarness], None]:
 
 
 def _cut(aboard: CompanionHarness) -> None:
-    aboard.deaf = aboard.mute = True
+    aboard.receive_blocked = aboard.send_blocked = True
 
 
-def _deaf(aboard: CompanionHarness) -> None:
-    aboard.deaf = True
+def _block_receive(aboard: CompanionHarness) -> None:
+    aboard.receive_blocked = True
 
 
-def _mute(aboard: CompanionHarness) -> None:
-    aboard.mute = True
+def _block_send(aboard: CompanionHarness) -> None:
+    aboard.send_blocked = True
 
 
-def _stuck(aboard: CompanionHarness) -> None:
-    aboard.stuck = True
+def _block_controller(aboard: CompanionHarness) -> None:
+    aboard.controller_blocked = True
 
 
 def _controller_stuck(aboard: CompanionHarness) -> None:
@@ -214,7 +214,7 @@ def _switch_off(aboard: CompanionHarness) -> None:
 
 def _second_station(aboard: CompanionHarness) -> None:
     other = MavlinkSender(aboard.flight.carry, SECOND_STATION, STATION_COMPONENT, "second station")
-    other.say(mavlink.MAVLink_manual_control_message(aboard.flight.stand_in.system, 900, 0, 500, 0, 0))
+    other.send(mavlink.MAVLink_manual_control_message(aboard.flight.autopilot.system, 900, 0, 500, 0, 0))
 
 
 def _channel(aboard: CompanionHarness) -> None:
@@ -222,12 +222,12 @@ def _channel(aboard: CompanionHarness) -> None:
 
 
 def _direction(aboard: CompanionHarness) -> None:
-    aboard.flight.set("MOT_3_DIRECTION", -aboard.warden.known.parameters["MOT_3_DIRECTION"])
+    aboard.flight.set("MOT_3_DIRECTION", -aboard.gate.known.parameters["MOT_3_DIRECTION"])
 
 
 def _second_companion(aboard: CompanionHarness) -> None:
     """One that sends for less than a second: after that the script takes a sender that is left alone for its own."""
-    rival = MavlinkSender(aboard.flight.carry, aboard.flight.stand_in.system, COMPANION_COMPONENT, "rival")
+    rival = MavlinkSender(aboard.flight.carry, aboard.flight.autopilot.system, COMPANION_COMPONENT, "rival")
     until_s = aboard.flight.now_s + 0.9
 
     def speak(flight: InProcessSession) -> None:
@@ -244,14 +244,14 @@ def _noise(aboard: CompanionHarness) -> None:
 
 
 def _operator(aboard: CompanionHarness) -> None:
-    aboard.warden.press()
+    aboard.gate.press()
 
 
 def _end(aboard: CompanionHarness) -> None:
-    aboard.warden.end("Ctrl-C")
+    aboard.gate.end("Ctrl-C")
 
 
-FAULTS_ABOARD: dict[str, Callable[[CompanionHarness], None]] = {
+COMPANION_FAULTS: dict[str, Callable[[CompanionHarness], None]] = {
     "the operator takes the sticks": _operator,
     "the session ends": _end,
     "the sticks stop": _no_sticks,
@@ -261,10 +261,10 @@ FAULTS_ABOARD: dict[str, Callable[[CompanionHarness], None]] = {
     "nothing from the autopilot": _withheld(
         "ATTITUDE", "LOCAL_POSITION_NED", "HEARTBEAT", "NAMED_VALUE_FLOAT", "VFR_HUD"
     ),
-    "the companion hears nothing": _deaf,
-    "nobody hears the companion": _mute,
+    "the companion hears nothing": _block_receive,
+    "nobody hears the companion": _block_send,
     "the cable is cut": _cut,
-    "the companion's program dies": _stuck,
+    "the companion's program dies": _block_controller,
     "the controller hangs": _controller_stuck,
     "disarmed": _disarm,
     "mode changed": _mode,

@@ -49,7 +49,7 @@ class MavlinkSender:
         self._mav = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
         self._hear, self._link = hear, link
 
-    def say(self, message: Any) -> None:
+    def send(self, message: Any) -> None:
         """Send a message."""
         self._hear(bytes(message.pack(self._mav)), self._link)
         self._mav.seq = (self._mav.seq + 1) & 0xFF
@@ -100,15 +100,15 @@ class InProcessSession:
     def __post_init__(self) -> None:
         values = own_parameters(len(self.vehicle.thrusters)) | dict(self.values)
         scripts = shipped_script() if self.scripts is None else self.scripts
-        self.stand_in = SimulatedAutopilot(values, loop_hz=self.loop_hz, scripts=scripts)
+        self.autopilot = SimulatedAutopilot(values, loop_hz=self.loop_hz, scripts=scripts)
         self._behind = InProcessPhysics(body=FreeWater(self.vehicle), table=PulseTable.of(self.vehicle, values))
         self.station = MavlinkSender(self.carry, STATION, STATION_COMPONENT, "station")
-        self.companion = MavlinkSender(self.carry, self.stand_in.system, COMPANION_COMPONENT, "companion")
+        self.companion = MavlinkSender(self.carry, self.autopilot.system, COMPANION_COMPONENT, "companion")
         self.listeners: dict[str, Callable[[bytes], None]] = {}
         """Others on the vehicle's links, by name: each hears what the autopilot and all others say."""
         self.turns: list[Callable[[], None]] = []
         """Called after each loop."""
-        self._ears = mavlink.MAVLink(None)
+        self._parsers = mavlink.MAVLink(None)
         self._due = {"beat": 0.0, "sticks": 0.0, "stream": 0.0}
         self.each: Callable[[InProcessSession], None] | None = None
         """Called before every loop, if given."""
@@ -116,11 +116,11 @@ class InProcessSession:
     @property
     def now_s(self) -> float:
         """Time since the stand-in's start."""
-        return self.stand_in.motion.time_s
+        return self.autopilot.motion.time_s
 
     def carry(self, data: bytes, link: str) -> None:
         """Bytes that somebody sends: to the autopilot and to all others, as the vehicle's router does."""
-        self.stand_in.hear(data, link)
+        self.autopilot.hear(data, link)
         for name, hear in self.listeners.items():
             if name != link:
                 hear(data)
@@ -132,19 +132,19 @@ class InProcessSession:
             self._speak()
             if self.each is not None:
                 self.each(self)
-            motion = self._behind.exchange(self.stand_in.pulses_us, round(self.loop_hz))
+            motion = self._behind.exchange(self.autopilot.pulses_us, round(self.loop_hz))
             if motion is not None:
-                pulses = self.stand_in.step(motion)
+                pulses = self.autopilot.step(motion)
                 self.moments.append(
                     LoopRecord(
                         time_s=self.now_s,
-                        armed=self.stand_in.armed,
-                        overridden=self.stand_in.overridden,
+                        armed=self.autopilot.armed,
+                        overridden=self.autopilot.overridden,
                         pulses_us=pulses,
                     )
                 )
-            for packet in self.stand_in.take_out():
-                self.said += self._ears.parse_buffer(packet) or []
+            for packet in self.autopilot.take_out():
+                self.said += self._parsers.parse_buffer(packet) or []
                 for hear in self.listeners.values():
                     hear(packet)
             for turn in self.turns:
@@ -161,32 +161,32 @@ class InProcessSession:
 
     def arm(self, armed: bool) -> None:
         """Ask to arm or to disarm."""
-        self.station.say(
+        self.station.send(
             mavlink.MAVLink_command_long_message(
-                self.stand_in.system, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, float(armed), 0, 0, 0, 0, 0, 0
+                self.autopilot.system, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, float(armed), 0, 0, 0, 0, 0, 0
             )
         )
 
     def set(self, name: str, value: float) -> None:
         """Ask for a parameter's value."""
-        self.station.say(
+        self.station.send(
             mavlink.MAVLink_param_set_message(
-                self.stand_in.system, 1, name.encode(), value, mavlink.MAV_PARAM_TYPE_REAL32
+                self.autopilot.system, 1, name.encode(), value, mavlink.MAV_PARAM_TYPE_REAL32
             )
         )
 
     def set_mode(self, mode: int) -> None:
         """Ask for a mode."""
-        self.station.say(mavlink.MAVLink_set_mode_message(self.stand_in.system, 1, mode))
+        self.station.send(mavlink.MAVLink_set_mode_message(self.autopilot.system, 1, mode))
 
     def send_thrusts(
         self, values: tuple[float, ...], *, who: MavlinkSender | None = None, ahead_s: float = 0.0
     ) -> None:
         """One message of thrusts, its clock ahead of this one by so much."""
         stamp_us = max(0, round(1e6 * (self.now_s + ahead_s)))
-        (who or self.companion).say(
+        (who or self.companion).send(
             mavlink.MAVLink_set_actuator_control_target_message(
-                stamp_us, THRUST_GROUP, self.stand_in.system, 1, list(values)
+                stamp_us, THRUST_GROUP, self.autopilot.system, 1, list(values)
             )
         )
 
@@ -207,10 +207,10 @@ class InProcessSession:
 
     def _speak(self) -> None:
         if self.beats and self._is_due("beat", 1.0):
-            self.station.say(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+            self.station.send(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
         if self.sticks is not None and self._is_due("sticks", 0.05):
-            sticks = mavlink.MAVLink_manual_control_message(self.stand_in.system, *self.sticks, self.buttons)
-            self.station.say(sticks)
+            sticks = mavlink.MAVLink_manual_control_message(self.autopilot.system, *self.sticks, self.buttons)
+            self.station.send(sticks)
         if self.streams and self._is_due("stream", SEND_PERIOD_S):
             self.send_thrusts(self.thrusts)
 
@@ -246,7 +246,9 @@ def _not_a_number(flight: InProcessSession) -> None:
 
 
 def _script_restart(flight: InProcessSession) -> None:
-    flight.station.say(mavlink.MAVLink_command_long_message(flight.stand_in.system, 1, 42701, 0, 3.0, 0, 0, 0, 0, 0, 0))
+    flight.station.send(
+        mavlink.MAVLink_command_long_message(flight.autopilot.system, 1, 42701, 0, 3.0, 0, 0, 0, 0, 0, 0)
+    )
 
 
 FAULTS: dict[str, Callable[[InProcessSession], None]] = {

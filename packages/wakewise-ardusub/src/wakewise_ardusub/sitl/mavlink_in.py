@@ -67,7 +67,7 @@ def raw_record(message: Any) -> str:
 
 def _heartbeat(board: SimulatedAutopilot, message: Any) -> None:
     if message.get_srcSystem() == board.ground_station and message.type == mavlink.MAV_TYPE_GCS:
-        board.heard_station()
+        board.note_ground_station()
 
 
 def _manual_control(board: SimulatedAutopilot, message: Any) -> None:
@@ -174,7 +174,7 @@ def _request(board: SimulatedAutopilot, numbers: list[float]) -> int:
 
 
 def _motor_test(board: SimulatedAutopilot, numbers: list[float]) -> int:
-    turned = board.motor_test.ask(numbers, board.now_s, board.armed, board.say)
+    turned = board.motor_test.ask(numbers, board.now_s, board.armed, board.send_text)
     return int(ACCEPTED if turned else FAILED)
 
 

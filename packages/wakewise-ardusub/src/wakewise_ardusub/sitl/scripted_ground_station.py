@@ -49,17 +49,17 @@ class ScriptedGroundStation:
             self._begin()
         self._last_s = made.now_s
         if self._is_due("sticks", STICKS_S):
-            pilot.say(mavlink.MAVLink_manual_control_message(made.system, *STICKS_MIDDLE, 0))
+            pilot.send(mavlink.MAVLink_manual_control_message(made.system, *STICKS_MIDDLE, 0))
         if self._is_due("beat", BEAT_S):
-            pilot.say(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+            pilot.send(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
         self._done |= made.armed and made.parameters.get(ENABLE_PARAMETER) == 1.0
         if not self._done and self._is_due("ask", ASKS_S):
             if not made.armed:
                 arm = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
-                pilot.say(mavlink.MAVLink_command_long_message(made.system, 1, arm, 0, 1.0, 0, 0, 0, 0, 0, 0))
+                pilot.send(mavlink.MAVLink_command_long_message(made.system, 1, arm, 0, 1.0, 0, 0, 0, 0, 0, 0))
             if made.parameters.get(ENABLE_PARAMETER) != 1.0:
                 real = mavlink.MAV_PARAM_TYPE_REAL32
-                pilot.say(mavlink.MAVLink_param_set_message(made.system, 1, ENABLE_PARAMETER.encode(), 1.0, real))
+                pilot.send(mavlink.MAVLink_param_set_message(made.system, 1, ENABLE_PARAMETER.encode(), 1.0, real))
 
     def _is_due(self, what: str, every_s: float) -> bool:
         now_s = self._made.now_s

@@ -61,11 +61,11 @@ class ScriptHost(Protocol):
         """Put a pulse on an output for so long."""
         ...
 
-    def say(self, severity: int, words: str) -> None:
+    def send_text(self, severity: int, words: str) -> None:
         """STATUSTEXT."""
         ...
 
-    def say_float(self, name: str, value: float) -> None:
+    def send_named_float(self, name: str, value: float) -> None:
         """NAMED_VALUE_FLOAT."""
         ...
 
@@ -142,7 +142,7 @@ class LuaScript:
 
     def _stop(self, fault: object) -> None:
         self.fault, self._call = str(fault), None
-        self._board.say(_ERROR, f"Lua: {self._name}: {self.fault}"[:_LETTERS])
+        self._board.send_text(_ERROR, f"Lua: {self._name}: {self.fault}"[:_LETTERS])
 
     def _host(self) -> dict[str, Callable[..., Any]]:
         board = self._board
@@ -174,8 +174,8 @@ class LuaScript:
             "set_param": board.parameters.set,
             "add_table": board.parameters.add_table,
             "add_param": board.parameters.add_param,
-            "send_text": board.say,
-            "send_float": lambda name, value: board.say_float(name[:10], value),
+            "send_text": board.send_text,
+            "send_float": lambda name, value: board.send_named_float(name[:10], value),
             "millis": lambda: round(1e3 * board.now_s),
             "micros": lambda: round(1e6 * board.now_s),
         }

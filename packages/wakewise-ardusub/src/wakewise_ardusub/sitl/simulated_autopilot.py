@@ -140,7 +140,7 @@ class SimulatedAutopilot:
         for name, text in (scripts or {}).items():
             self.files.put(f"/APM/scripts/{name}", text.encode("latin-1", "replace"))
         self._mav = mavlink.MAVLink(None, srcSystem=self.system, srcComponent=self.component)
-        self._ears: dict[str, Any] = {}
+        self._parsers: dict[str, Any] = {}
         self._out: list[bytes] = []
         self.bad_data = 0
         """Stretches of bytes that were no packet."""
@@ -195,9 +195,9 @@ class SimulatedAutopilot:
 
     def hear(self, data: bytes, link: str = "") -> None:
         """Take bytes that came on a link, whatever they are; each link has its own place in a packet."""
-        ears = self._ears.get(link)
+        ears = self._parsers.get(link)
         if ears is None:
-            ears = self._ears[link] = mavlink.MAVLink(None)
+            ears = self._parsers[link] = mavlink.MAVLink(None)
             ears.robust_parsing = True
         try:
             found = ears.parse_buffer(data) or []
@@ -232,7 +232,7 @@ class SimulatedAutopilot:
         self._loops, demands = apply_mode(self.mode, self._loops, self._demands, motion, self.parameters, dt_s or 1e-3)
         motors: list[int] | None = None
         if self.motor_test.over(self.now_s):
-            self.say(_INFO, "Motor test timed out!")
+            self.send_text(_INFO, "Motor test timed out!")
             self.disarm("motor test")
         if self.armed and self.motor_test.pulses_us is not None:
             motors = self.motor_test.pulses_us
@@ -296,26 +296,26 @@ class SimulatedAutopilot:
         if self.mode not in MODES:
             return False
         if not can_disarm(self.parameters):
-            self.say(_CRITICAL, "Arm: Must assign a disarm or arm_toggle button")
+            self.send_text(_CRITICAL, "Arm: Must assign a disarm or arm_toggle button")
             return False
         if not self.armed:
             self.armed, self._loops = True, ModeControllers()
             # Sticks and heartbeats from before count from now: a pilot has as long as ever to begin.
             self._sticks_s = self.now_s
-            self.say(_INFO, "Arming motors")
+            self.send_text(_INFO, "Arming motors")
         return True
 
     def disarm(self, why: str) -> bool:
         """Disarm them."""
         if self.armed:
             self.armed, self._demands = False, PilotDemands()
-            self.say(_INFO, f"Disarming motors ({why})")
+            self.send_text(_INFO, f"Disarming motors ({why})")
         return True
 
     def set_mode(self, mode: int) -> bool:
         """Change the mode; False for one that the stand-in does not fly."""
         if mode not in MODES:
-            self.say(_WARNING, f"Mode change failed: no mode {mode} here")
+            self.send_text(_WARNING, f"Mode change failed: no mode {mode} here")
             return False
         if mode != self.mode:
             self.mode, self._loops = mode, self._loops.entered(mode)
@@ -329,7 +329,7 @@ class SimulatedAutopilot:
         """Begin to tell all parameters, some in each loop."""
         self._to_list = deque(self.parameters)
 
-    def heard_station(self) -> None:
+    def note_ground_station(self) -> None:
         """A heartbeat of the ground station."""
         self._station_s = self.now_s
 
@@ -347,7 +347,7 @@ class SimulatedAutopilot:
         faults = {"Lost ground station": station, "Lost manual control": pilot}
         for who, action in faults.items():
             if action not in ("none", self._told.get(who)):
-                self.say(_ERROR, f"{who}: {action}")
+                self.send_text(_ERROR, f"{who}: {action}")
             if action == "disarm":
                 self.disarm(who)
             elif action in ("hold depth", "surface") and self.mode != ALT_HOLD:
@@ -369,7 +369,7 @@ class SimulatedAutopilot:
         """Put a pulse on an output for so long."""
         self._servos.override(channel, pulse_us, timeout_ms)
 
-    def say(self, severity: int, words: str) -> None:
+    def send_text(self, severity: int, words: str) -> None:
         """STATUSTEXT; longer words go in several, of 50 letters each and numbered."""
         self.texts.append(words)
         log.info("%s", words)
@@ -380,7 +380,7 @@ class SimulatedAutopilot:
         for k, part in enumerate(parts[:255]):
             self.send(mavlink.MAVLink_statustext_message(severity, part, number, k))
 
-    def say_float(self, name: str, value: float) -> None:
+    def send_named_float(self, name: str, value: float) -> None:
         """NAMED_VALUE_FLOAT."""
         self.send(mavlink.MAVLink_named_value_float_message(self.boot_ms, name[:10].encode("ascii", "replace"), value))
 

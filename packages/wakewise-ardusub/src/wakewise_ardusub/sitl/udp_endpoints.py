@@ -140,7 +140,7 @@ def _own_side(host: str) -> str:
 
 
 def run(
-    stand_in: SimulatedAutopilot,
+    autopilot: SimulatedAutopilot,
     behind: PhysicsBackend,
     links: list[UdpEndpoint],
     going: Callable[[], bool],
@@ -150,30 +150,30 @@ def run(
     every_s: float = 1.0,
 ) -> None:
     """Loops until `going` says no, by the clock on the wall; `turn` is called in each, `said` now and then."""
-    rate_hz = round(stand_in.loop_hz)
+    rate_hz = round(autopilot.loop_hz)
     began_s = next_s = time.monotonic()
-    began_at_s = stand_in.motion.time_s
+    began_at_s = autopilot.motion.time_s
     while going():
         for link in links:
             for data in link.read():
-                stand_in.hear(data, link.name)
+                autopilot.hear(data, link.name)
                 for other in links:
                     if other is not link:
                         other.write(data)
         if turn is not None:
             turn()
-        motion = behind.exchange(stand_in.pulses_us, rate_hz)
+        motion = behind.exchange(autopilot.pulses_us, rate_hz)
         if motion is not None:
-            stand_in.step(motion)
-        for packet in stand_in.take_out():
+            autopilot.step(motion)
+        for packet in autopilot.take_out():
             for link in links:
                 link.write(packet)
         now_s = time.monotonic()
         if said is not None and now_s >= next_s:
             said()
             next_s = now_s + every_s
-        ahead_s = began_s + (stand_in.motion.time_s - began_at_s) - now_s
+        ahead_s = began_s + (autopilot.motion.time_s - began_at_s) - now_s
         if ahead_s > 0.0:
             time.sleep(ahead_s)
         elif ahead_s < -_BEHIND_S:
-            began_s, began_at_s = now_s, stand_in.motion.time_s
+            began_s, began_at_s = now_s, autopilot.motion.time_s

@@ -57,7 +57,7 @@ class MeterReading:
 
     time_s: float
     why_not: str | None = None
-    spared: WashSavings | None = None
+    savings: WashSavings | None = None
     peak_m_s: dict[Shares, float] = field(default_factory=dict)
     rms_m_s: dict[Shares, float] = field(default_factory=dict)
     shares: Array = field(default_factory=lambda: np.zeros(0))
@@ -66,7 +66,7 @@ class MeterReading:
     @property
     def running(self) -> bool:
         """Whether a thruster runs."""
-        return self.spared is not None and bool(np.any(self.spared.thrusts_N["flown"]))
+        return self.savings is not None and bool(np.any(self.savings.thrusts_N["flown"]))
 
 
 @dataclass
@@ -104,28 +104,28 @@ class WashMeter:
         If the autopilot's parameters as known beforehand do not fit the craft, or this computer cannot judge it.
     """
 
-    def __init__(self, craft: VehicleSummary, hearing: VehicleListener, points_B_m: Array, weights: Array) -> None:
-        self.craft, self.hearing = craft, hearing
+    def __init__(self, craft: VehicleSummary, listener: VehicleListener, points_B_m: Array, weights: Array) -> None:
+        self.craft, self.listener = craft, listener
         self.weight = float(np.sum(weights))
         self.dive = WashTotals()
         self._points_B_m, self._weights = points_B_m, weights
-        self._carried = _Seen.at(influence_model(craft, points_B_m, weights), _HERE)
+        self._carried = _TargetView.at(influence_model(craft, points_B_m, weights), _HERE)
         self._mark: InfluenceModel | None = None
         self._minute: deque[tuple[float, float, float]] = deque()
         self._known: dict[str, float] | None = None
         self._misfit: str | None = None
-        self._sparing = WashSavingsCalculator(craft, directions_of_motors({}, craft.count))
+        self._calculator = WashSavingsCalculator(craft, directions_of_motors({}, craft.count))
         self._channels = motor_channels(craft, {})
         self._fit()
         if self._misfit is not None:
             raise InputError(self._misfit)
         # Kernels that are compiled or read are so now, not when thrusters first run.
-        self._sparing.judge(np.full(craft.count, 1600.0), self._sparing.supply_V(None), self._carried.gram)
+        self._calculator.judge(np.full(craft.count, 1600.0), self._calculator.supply_V(None), self._carried.gram)
 
     @property
     def directions_known(self) -> bool:
         """Whether the autopilot has said which motors run the other way."""
-        known = self.hearing.parameters
+        known = self.listener.parameters
         return all(f"MOT_{i + 1}_DIRECTION" in known for i in range(self.craft.count))
 
     @property
@@ -135,7 +135,7 @@ class WashMeter:
 
     def mark(self, now_s: float) -> str | None:
         """Let the points stay where they are now while the vehicle moves; why not, where its place is not known."""
-        pose = self.hearing.pose(now_s)
+        pose = self.listener.pose(now_s)
         if pose is None:
             return "the autopilot does not say where the vehicle is (LOCAL_POSITION_NED and ATTITUDE)"
         self._mark = influence_model(self.craft, pose.apply(self._points_B_m), self._weights)
@@ -155,9 +155,9 @@ class WashMeter:
         self._fit()
         while self._minute and self._minute[0][0] < now_s - MINUTE_S:
             self._minute.popleft()
-        pulses = self.hearing.last("servo", now_s)
-        if self.hearing.identity.is_other:
-            return MeterReading(time_s=now_s, why_not=f"the vehicle is no ArduSub: {self.hearing.identity.words}")
+        pulses = self.listener.last("servo", now_s)
+        if self.listener.identity.is_other:
+            return MeterReading(time_s=now_s, why_not=f"the vehicle is no ArduSub: {self.listener.identity.words}")
         if self._misfit is not None:
             return MeterReading(time_s=now_s, why_not=self._misfit)
         if pulses is None:
@@ -167,29 +167,29 @@ class WashMeter:
             return MeterReading(time_s=now_s, why_not="a motor's servo output says nothing")
         seen = self._carried
         if self._mark is not None:
-            pose = self.hearing.pose(now_s)
+            pose = self.listener.pose(now_s)
             if pose is None:
                 return MeterReading(time_s=now_s, why_not="the vehicle's place is not known, so the mark's is not")
-            seen = _Seen.at(self._mark, pose)
-        supply_V = self._sparing.supply_V(self.hearing.number("voltage", now_s))
-        spared = self._sparing.judge(own, supply_V, seen.gram)
+            seen = _TargetView.at(self._mark, pose)
+        supply_V = self._calculator.supply_V(self.listener.number("voltage", now_s))
+        savings = self._calculator.judge(own, supply_V, seen.gram)
         reading = MeterReading(
             time_s=now_s,
-            spared=spared,
-            peak_m_s={share: seen.peak_m_s(spared.thrusts_N[share]) for share in SHARES},
-            rms_m_s={share: float(np.sqrt(spared.disturbance[share] / self.weight)) for share in SHARES},
-            shares=seen.shares_pct(spared.thrusts_N["flown"]),
+            savings=savings,
+            peak_m_s={share: seen.peak_m_s(savings.thrusts_N[share]) for share in SHARES},
+            rms_m_s={share: float(np.sqrt(savings.disturbance[share] / self.weight)) for share in SHARES},
+            shares=seen.shares_pct(savings.thrusts_N["flown"]),
             in_world=self._mark is not None,
         )
         if reading.running:
-            flown, gentle = spared.disturbance["flown"], spared.disturbance["gentle"]
+            flown, gentle = savings.disturbance["flown"], savings.disturbance["gentle"]
             self._minute.append((now_s, flown, gentle))
             self.dive.add(flown, gentle)
         return reading
 
     def _fit(self) -> None:
         """Take the autopilot's parameters when they changed."""
-        known = self.hearing.parameters
+        known = self.listener.parameters
         if known == self._known:
             return
         self._known = known
@@ -201,19 +201,19 @@ class WashMeter:
             self._channels = motor_channels(self.craft, {})
             self._misfit = str(fault) if all(f"SERVO{i + 1}_FUNCTION" in known for i in range(SERVOS)) else None
         directions = directions_of_motors(known, self.craft.count)
-        if not np.array_equal(directions, self._sparing.directions):
-            self._sparing = WashSavingsCalculator(self.craft, directions)
+        if not np.array_equal(directions, self._calculator.directions):
+            self._calculator = WashSavingsCalculator(self.craft, directions)
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _TargetView:
     """Points before the jets at one pose: D's matrix, shape (2 m, 2 m), and velocities, shape (2 m, n, 3)."""
 
     gram: Array
     velocity: Array
 
     @classmethod
-    def at(cls, view: InfluenceModel, pose: Pose) -> _Seen:
+    def at(cls, view: InfluenceModel, pose: Pose) -> _TargetView:
         """What a pose makes of a view."""
         R = pose.R
         origins, axes = pose.apply(view.positions_B_m), view.axes_B @ R.T
@@ -257,9 +257,9 @@ class WashHistory:
             self._flown, self._gentle = [], []
             # After a pause of any length only what is kept is gone through.
             self._now = max(self._now + 1, second - KEPT_S)
-        if reading.spared is not None:
-            self._flown.append(reading.spared.disturbance["flown"])
-            self._gentle.append(reading.spared.disturbance["gentle"])
+        if reading.savings is not None:
+            self._flown.append(reading.savings.disturbance["flown"])
+            self._gentle.append(reading.savings.disturbance["gentle"])
 
     def told(self) -> dict[str, Any]:
         """Root mean square speeds in mm/s, oldest first; the last ended `until_s`."""
@@ -316,12 +316,12 @@ class DiveRecord:
 
     def add(self, unix_s: float, reading: MeterReading) -> None:
         """Write a reading under the time of day, if thrusters ran."""
-        if reading.spared is None or not reading.running:
+        if reading.savings is None or not reading.running:
             return
-        spared = reading.spared
-        row = [f"{unix_s:.3f}", *(f"{spared.disturbance[share]:.9g}" for share in SHARES)]
+        savings = reading.savings
+        row = [f"{unix_s:.3f}", *(f"{savings.disturbance[share]:.9g}" for share in SHARES)]
         row += [f"{reading.peak_m_s['flown']:.6g}", f"{reading.peak_m_s['gentle']:.6g}"]
-        row += [f"{thrust:.5g}" for share in ("flown", "gentle") for thrust in spared.thrusts_N[share]]
+        row += [f"{thrust:.5g}" for share in ("flown", "gentle") for thrust in savings.thrusts_N[share]]
         self._rows.writerow(row)
 
     def close(self, summary: dict[str, Any]) -> None:
@@ -332,8 +332,8 @@ class DiveRecord:
 
 def reading_as_json(meter: WashMeter, reading: MeterReading, history: WashHistory, points: str) -> dict[str, Any]:
     """How it stands; no number is NaN, what is not known is null."""
-    craft, hearing, now_s = meter.craft, meter.hearing, reading.time_s
-    armed = hearing.number("armed", now_s)
+    craft, listener, now_s = meter.craft, meter.listener, reading.time_s
+    armed = listener.number("armed", now_s)
     second, flown, gentle = history.last
     state: dict[str, Any] = {
         "time_s": now_s,
@@ -341,13 +341,13 @@ def reading_as_json(meter: WashMeter, reading: MeterReading, history: WashHistor
         "wake_model": craft.wake.name,
         "points": "of a mark in the world" if meter.marked else points,
         "marked": meter.marked,
-        "can_mark": hearing.pose(now_s) is not None,
-        "system": hearing.system,
+        "can_mark": listener.pose(now_s) is not None,
+        "system": listener.system,
         "armed": None if armed is None else armed > 0.5,
-        "mode": hearing.mode(now_s),
-        "voltage_V": hearing.number("voltage", now_s),
+        "mode": listener.mode(now_s),
+        "voltage_V": listener.number("voltage", now_s),
         "directions_known": meter.directions_known,
-        "others": list(hearing.others),
+        "others": list(listener.others),
         "why_not": reading.why_not,
         "running": reading.running,
         "saved_pct": meter.saved_pct(),
@@ -357,12 +357,12 @@ def reading_as_json(meter: WashMeter, reading: MeterReading, history: WashHistor
         "second_mm_s": [flown, gentle],
         "thrusters": list(craft.thrusters),
     }
-    if reading.spared is not None:
+    if reading.savings is not None:
         state |= {
-            "disturbance": dict(reading.spared.disturbance),
+            "disturbance": dict(reading.savings.disturbance),
             "rms_mm_s": {share: 1e3 * reading.rms_m_s[share] for share in SHARES},
             "peak_mm_s": {share: 1e3 * reading.peak_m_s[share] for share in SHARES},
-            "thrusts_N": {share: reading.spared.thrusts_N[share].tolist() for share in SHARES},
+            "thrusts_N": {share: reading.savings.thrusts_N[share].tolist() for share in SHARES},
             "shares_pct": reading.shares.tolist(),
         }
     return state

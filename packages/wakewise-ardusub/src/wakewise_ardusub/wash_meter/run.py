@@ -136,8 +136,8 @@ class MeterLoop:
     ) -> None:
         self.settings, self.points, self.say = settings, points, say
         self.over = threading.Event()
-        self.hearing = VehicleListener(settings.system, parameters)
-        self.meter = WashMeter(craft, self.hearing, points_B_m, weights)
+        self.listener = VehicleListener(settings.system, parameters)
+        self.meter = WashMeter(craft, self.listener, points_B_m, weights)
         self.history = WashHistory(weight=float(np.sum(weights)))
         self._lock = threading.Lock()
         self._began_s = time.monotonic()
@@ -182,7 +182,7 @@ class MeterLoop:
             state = reading_as_json(self.meter, self._reading, self.history, self.points)
         return state | {
             "up_s": state["time_s"] - self._began_s,
-            "messages": self.hearing.messages,
+            "messages": self.listener.messages,
             "bad_messages": self.wire.bad,
             "publishes": self.settings.publish,
         }
@@ -206,7 +206,7 @@ class MeterLoop:
         while True:
             for heard in self.wire.heard():
                 with self._lock:
-                    self.hearing.hear(heard.time_s, heard.system, heard.component, heard.name, heard.fields)
+                    self.listener.hear(heard.time_s, heard.system, heard.component, heard.name, heard.fields)
             left_s = until_s - time.monotonic()
             if left_s <= 0.0 or self.over.is_set():
                 return
@@ -214,16 +214,16 @@ class MeterLoop:
 
     def _speak(self, now_s: float) -> None:
         """Say what was allowed: heartbeat, values, and questions that are still open."""
-        settings, system = self.settings, self.hearing.system or self.settings.system or 1
+        settings, system = self.settings, self.listener.system or self.settings.system or 1
         if (settings.publish or settings.ends.way != "udpin") and self._is_due("beat", now_s, BEAT_S):
             self.wire.beat(system)
-        if settings.publish and self._is_due("publish", now_s, PUBLISH_S) and self._reading.spared is not None:
+        if settings.publish and self._is_due("publish", now_s, PUBLISH_S) and self._reading.savings is not None:
             boot_ms = round(1e3 * (now_s - self._began_s))
-            self.wire.publish(system, boot_ms, DISTURBANCE_NAME, self._reading.spared.disturbance["flown"])
+            self.wire.publish(system, boot_ms, DISTURBANCE_NAME, self._reading.savings.disturbance["flown"])
             saved = self.meter.saved_pct()
             if saved is not None:
                 self.wire.publish(system, boot_ms, SAVED_NAME, saved)
-        if settings.ask and self.hearing.system is not None and self._is_due("ask", now_s, ASK_S):
+        if settings.ask and self.listener.system is not None and self._is_due("ask", now_s, ASK_S):
             self._ask(system)
 
     def _ask(self, system: int) -> None:
@@ -238,7 +238,7 @@ class MeterLoop:
         """Parameters that matter and are not known."""
         wanted = [f"MOT_{i + 1}_DIRECTION" for i in range(self.meter.craft.count)]
         wanted += [f"SERVO{i + 1}_FUNCTION" for i in range(SERVOS)]
-        return [name for name in wanted if name not in self.hearing.parameters]
+        return [name for name in wanted if name not in self.listener.parameters]
 
     def _is_due(self, what: str, now_s: float, every_s: float) -> bool:
         if now_s < self._due_s[what]:

@@ -80,7 +80,7 @@ class VehicleListener:
         self._before = dict(parameters or {})
         self._said: dict[int, LatestSamples] = {}
 
-    def vessel(self, system: int) -> LatestSamples:
+    def records_of(self, system: int) -> LatestSamples:
         """Where a system's samples go."""
         return self._said.setdefault(system, LatestSamples())
 
