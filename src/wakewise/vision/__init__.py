@@ -1,3 +1,6 @@
-"""Vision: rendering (`imaging/`), photographs to models (`reconstruction/`), texture (`texturing/`), scores
-(`evaluation/`), particle image velocimetry (`piv/`).
+"""Vision: rendered photographs, photogrammetry, texture, scores and particle image velocimetry.
+
+- `imaging/`: the simulated camera. `reconstruction/`: photographs to 3D models. `texturing/`: colours of models.
+- `evaluation/`: scores of models, views and flights. `piv/`: particle image velocimetry.
+- `image_decoding.py`: pictures of bytes and files, after a check of their size.
 """

@@ -1,4 +1,4 @@
-"""Pictures are decoded here alone, after their size has been read from their header."""
+"""Decoding of pictures by OpenCV; the size in the header is checked first."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import relief
 
 from wakewise.core.errors import InputError
 from wakewise.vision.reconstruction import KnownCameras, Lens, ReconstructionSettings, read_cloud, reconstruct
-from wakewise.vision.reconstruction.sfm.known_pose_triangulation import nearest_to_lines
+from wakewise.vision.reconstruction.sfm.pose_mapping import nearest_to_lines
 from wakewise_benchmarks import adversarial_scenes as scenes
 
 SETTINGS = ReconstructionSettings(detector="opencv", max_features=1500, mesh=False)

@@ -15,7 +15,7 @@ from wakewise.core.geometry import look_at
 from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto
 from wakewise.vision.texturing import textured
 from wakewise.vision.texturing.colour import srgb_decode
-from wakewise.vision.texturing.photo_colours import RangeMaps, correct_photos, project, rays
+from wakewise.vision.texturing.photo_colours import RangeMaps, correct_photos
 from wakewise.vision.texturing.textured import (
     fill_unseen_colours,
     read_textured,
@@ -113,8 +113,8 @@ def test_rays_undo_projection() -> None:
     """A point along a pixel's ray projects back onto the pixel, with radial distortion, to a hundredth of a pixel."""
     view = _view("n.png", np.array([1.0, 0.2, -0.4]), radial=-0.12)
     pixels = np.array([[10.0, 12.0], [100.0, 80.0], [190.0, 150.0], [33.3, 120.7]])
-    points = view.p_WC_m + 0.7 * rays(view, pixels) @ view.R_CW
-    back, depth = project(view, points)
+    points = view.p_WC_m + 0.7 * view.rays(pixels) @ view.R_CW
+    back, depth = view.project(points)
     assert np.allclose(back, pixels, atol=0.01)
     assert np.allclose(depth, 0.7)
 
@@ -129,7 +129,7 @@ def test_ranges_on_a_plane_are_right() -> None:
     depths = RangeMaps(views={"n.png": view}, points_m=points, mesh=None, corners_m=np.zeros((0, 3)))
     found = depths.ranges_m("n.png", (160, 200)).astype(float)
     rows, columns = np.mgrid[0:160, 0:200] + 0.5
-    ways = rays(view, np.stack([columns.ravel(), rows.ravel()], axis=1)) @ view.R_CW
+    ways = view.rays(np.stack([columns.ravel(), rows.ravel()], axis=1)) @ view.R_CW
     true = (-eye[2] / ways[:, 2] * np.linalg.norm(ways, axis=1)).reshape(160, 200)
     known = np.isfinite(found)
     assert known.mean() > 0.7

@@ -1,4 +1,4 @@
-"""Bring a model into the frame of the truth: similarity from paired points, robustly; then rigid ICP on surfaces."""
+"""Alignment of a model with the reference: similarity of paired points (Umeyama, robust), rigid point-to-plane ICP."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A cloud against another cloud, such as a laser scan's: no surface lies between the points of either."""
+"""Accuracy and completeness of a cloud against a reference cloud, such as a laser scan."""
 
 from __future__ import annotations
 

@@ -1,15 +1,9 @@
-"""How near a cloud of points is to the true surface, and how much of the surface it covers.
+"""Accuracy and completeness of a cloud against a reference mesh; area, volume and faults of a mesh.
 
-*Accuracy* goes from the cloud to the truth, *completeness* from the truth to the cloud (DTU: H. Aanaes et al.,
-Large-scale data for multiple-view stereopsis, IJCV 120, 2016, doi 10.1007/s11263-016-0902-9). As shares within a
-threshold they are *precision* and *recall*, and their harmonic mean the *F-score* (Tanks and Temples: A. Knapitsch et
-al., ACM TOG 36(4), 2017, doi 10.1145/3072959.3073599).
-
-Shares of a model and of the truth within thresholds that suit the object's size, or that were asked for.
-
-Area and volume of what of a mesh stands clear of the bed: what biologists ask of a coral, and ask to repeat.
-
-Faults of a mesh that figures suffer from: faces that come twice, edges of many faces, faces without area.
+*Accuracy* is the distance from cloud to reference, *completeness* that from reference to cloud (DTU: H. Aanaes et al.,
+Large-scale data for multiple-view stereopsis, IJCV 120, 2016, doi 10.1007/s11263-016-0902-9). The shares below a
+threshold are *precision* and *recall*, their harmonic mean is the *F-score* (Tanks and Temples: A. Knapitsch et al.,
+ACM TOG 36(4), 2017, doi 10.1145/3072959.3073599).
 """
 
 from __future__ import annotations
@@ -35,11 +29,7 @@ USEFUL_PCT = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class ThresholdScore:
-    """Precision and recall at one threshold.
-
-    accuracy_pct: share of the model nearer to the truth than the threshold; completeness_pct: of the truth nearer to
-    the model; f_score: their harmonic mean, 0 to 100.
-    """
+    """Precision (accuracy_pct), recall (completeness_pct) and F-score at one threshold, 0 to 100."""
 
     threshold_mm: float
     accuracy_pct: float
@@ -133,15 +123,7 @@ class Crop:
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceScore:
-    """A model against the truth.
-
-    rmse_mm: root mean square distance from cloud to truth, each distance capped at `rmse_cap_mm` so that one stray
-    point cannot rule. accuracy_median_mm, accuracy_p90_mm: median and 90th percentile of the same distances, uncapped.
-    accuracy_*mm_pct: share of the cloud nearer than that (precision). completeness_*: share of the true surface that
-    has a cloud point nearer than that (recall); `completeness_pct` is at 3 mm. `_visible`: only over truth that at
-    least `visible_views` cameras saw; None where visibility was not given. f_score: harmonic mean of precision and
-    recall at 3 mm, 0 to 100. success: rmse_mm < 3 and completeness_pct > 85. `DEFINITIONS` says all of it by key.
-    """
+    """Scores of a model against a reference mesh; `definitions.SURFACE` defines each by its name."""
 
     rmse_mm: float
     rmse_cap_mm: float

@@ -1,4 +1,4 @@
-"""What every figure about a model means: unit, definition, and whose convention it is."""
+"""Unit, definition and source of each figure of a model."""
 
 from __future__ import annotations
 

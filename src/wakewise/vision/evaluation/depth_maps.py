@@ -1,4 +1,4 @@
-"""A cloud against depth maps of surveyed cameras, such as a laser scan rendered into each photograph."""
+"""Accuracy and completeness of a cloud against depth maps of surveyed cameras, such as a rendered laser scan."""
 
 from __future__ import annotations
 

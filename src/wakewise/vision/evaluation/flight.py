@@ -1,7 +1,6 @@
-"""How gently and how well a vehicle flew, from the table of its control steps.
+"""Figures of a flight from the table of its control steps.
 
-Every function takes plain arrays with one row per step and no NaN unless told; `flight_figures` takes the table.
-World W is NED, body B is FRD.
+Functions take arrays with one row per step and no NaN, `flight_figures` takes the table. World W is NED, body B is FRD.
 """
 
 from __future__ import annotations
@@ -108,27 +107,11 @@ def step_lengths_s(time_s: Array) -> Array:
 
 
 def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
-    """Figures of one flight from the table of its steps (`steps.parquet`); a column that is missing gives None.
+    """Figures of one flight from the table of its steps (`steps.parquet`); None where a column is missing.
 
-    target_speed_mean_m_s and target_speed_p95_m_s: what thrusters add to the water's speed about the target, mean and
-    95th percentile over the points there, averaged over time. exposure_speed_mean_m_s: the mean while the shutter is
-    open. bed_speed_p95_m_s: the same percentile at the bed. turbidity_mean_per_m, disturbance: averaged over time.
-    So are target_pressure_mean_Pa, target_pressure_p95_Pa, bed_shear_p95_Pa, tracer_speed_mean_m_s and
-    ray_optical_depth, of the whole water; exposure_*: speed, pressure and optical depth while the shutter is open.
-    exceedance_1cm_s_pct, exceedance_ambient_pct: share of the target's surface, and of time, where the excess is more
-    than 1 cm/s, and more than the ambient water's own speed; exposure_exceedance_1cm_s_pct while the shutter is open.
-    silt_lifted_g: given up by the bed until the end, settled again or not, so that sand counts at every hop.
-    silt_suspended_max_g: most in the water at once, the figure to compare beds by.
-    position_rmse_mm: true position against the goal's at the same instant. path_rmse_mm: against the goal's path.
-    estimate_rmse_mm: estimated against true position. tracking_rmse_mm: estimated position against the goal's, which is
-    what the controller sees of its own error. velocity_deviation_pct, roll_pitch_rms_deg,
-    attitude_rmse_deg: see the functions.
-    energy_kJ: electrical. sign_flips_per_s: reversals of all thrusters together per second. fallbacks: steps on which
-    the controller fell back. collisions: times that the vehicle touched something. duration_s: length of the flight.
-    Of a target that yields: sway_rms_mm, sway_wash_mm, sway_mean_mm, sway_about_mean_mm (see `sway_figures`),
-    sway_peak_mm and target_stress_peak_Pa, the largest at any time, and shifted_mm, how far it has slid in the end.
-
-    Raises InputError if the table has no rows or no time.
+    `wakewise.experiments.trials.metrics` defines each by its key, with its unit, but tracking_rmse_mm: estimated
+    position against the goal's, which is the error that the controller sees. Raises InputError if the table has no rows
+    or no time.
     """
     if "time_s" not in steps.columns or steps.height == 0:
         raise InputError(

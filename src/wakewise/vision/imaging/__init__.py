@@ -1,14 +1,11 @@
-"""What the camera would have seen: a lit and textured scene, the water between, motion blur and sensor noise.
+"""The simulated camera: scene, water, motion blur and sensor, as functions of true poses, true silt and a seed.
 
-`Scene.build` sets the target on its bed, `render` draws it as if there were no water, and `photograph` adds water,
-silt, flakes, the camera's motion while the shutter is open and the sensor. Everything is a function of the true
-poses, the true silt and a seed.
-
-Start reading in `photograph.py` (one photograph, step by step) and `scene.py` (what stands there). `camera.py`,
-`camera.py` and `camera.py` are the camera, also behind a flat port; `renderer.py`, `renderer.py`, `texture.py`,
-`bed_view.py`, `daylight.py` and `daylight.py` the picture without water, `bed_view.py`, `bed_view.py` and
-`scene.py` what makes it fast; `optics.py`, `forward_scatter.py`, `optics.py` and `particles.py` the water,
-`photograph.py`, `blur.py` and `sensor.py` the exposure.
+- `photograph.py`: one photograph, automatic exposure. `settings.py`: settings of camera, light and water.
+- `scene.py`: target, bed and stones. `daylight.py`: baked light of sky and panels. `texture.py`: albedo.
+- `renderer.py`: radiance and depth without water. `bed_view.py`: the bed as a height field.
+- `camera.py`: pinhole, lens with distortion, flat port. `sensor.py`: shot and read noise, sRGB.
+- `optics.py`: attenuation, veil and lamps' backscatter. `forward_scatter.py`: diffraction by silt.
+- `particles.py`: flakes. `blur.py`: motion blur and rolling shutter.
 """
 
 from typing import TYPE_CHECKING

@@ -1,18 +1,10 @@
-"""The bed in an image: which triangle of the height field each pixel's centre sees, and its colour.
+"""The bed in an image: a height field on a grid, rasterised in an ideal lens and met by rays elsewhere.
 
-In an ideal lens straight edges stay straight, so triangles are drawn into a buffer of nearness, the nearest one
-staying; edges are planes through the pupil (Olano & Greer 1997, "Triangle scan conversion using 2D homogeneous
-coordinates", doi 10.1145/258694.258723), which needs no clipping. Neighbours share an edge's numbers up to the sign, so
-no pixel falls between them. Through any other lens, and wherever nothing was drawn, the pixel's ray walks over the
-field by itself. Either way it is the same triangle, and place and depth are those of the pixel's own ray on it.
-
-The bed as a height field on a grid: where a ray first meets it, found by walking from cell to cell.
-
-Heights stand on the crossings of lines that need not be evenly spaced, and each cell is two triangles, so that the
-surface is exactly a triangle mesh. A ray needs no tree for it: it walks over blocks of cells, passes over those whose
-highest point stays below it, and in the others over the cells in its way, along which the gap to a triangle is linear.
-
-What bed and solids share in shading: the vehicle's lamps, and how wide a pixel is at unit depth.
+Heights stand on the crossings of lines of uneven spacing. A cell is two triangles, so the surface is a triangle mesh.
+In an ideal lens straight edges stay straight: triangles are drawn into a depth buffer, with edges as planes through the
+pupil (Olano & Greer 1997, "Triangle scan conversion using 2D homogeneous coordinates", doi 10.1145/258694.258723),
+which needs no clipping. Through another lens, and where nothing was drawn, the pixel's ray walks over blocks of cells
+and skips those whose highest point stays below it. Position and depth are always those of the pixel's own ray.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""Motion blur from the camera's true motion while the shutter is open.
+"""Motion blur of the camera's true motion while the shutter is open.
 
-Every pixel's depth is known, so the motion field is exact for what the middle view sees: a frame taken at another
-instant is the middle frame moved by it. The photograph is the mean of such frames. Strips that only the other frames
-see, behind an edge or outside of the image, are filled with the nearest thing seen.
-
-A rolling shutter opens row by row, the top row first: each row is the mean of frames over its own time.
+The depth of every pixel is known, so a frame at another instant is the middle frame, warped. The photograph is the mean
+of such frames. Strips that only other frames see, behind an edge or outside of the image, take the nearest pixel. A
+rolling shutter exposes row by row, top row first: each row is the mean of frames over its own time.
 """
 
 from __future__ import annotations

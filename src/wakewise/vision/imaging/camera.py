@@ -1,21 +1,14 @@
-"""Cameras: the ideal pinhole, and a real lens with distortion, maybe behind a flat port.
+"""Camera models: ideal pinhole, lens with distortion, lens behind a flat port; and COLMAP's OPENCV fitted to them.
 
-Pixels to rays in the water and back: pinhole, OpenCV's distortion, and a flat port; compiled, one point at a time.
+A camera is one row of numbers (`lens_row`) that every kernel takes. Distortion is that of OpenCV and COLMAP's OPENCV:
+k1, k2 radial, p1, p2 tangential (Brown 1971, "Close-range camera calibration", Photogrammetric Engineering 37). A flat
+port is a pane normal to the optical axis with air on the lens's side. Rays refract at both faces by Snell's law and
+meet the axis at heights that depend on their slope (Agrawal, Ramalingam, Taguchi & Chari 2012, "A theory of multi-layer
+flat refractive geometry", doi 10.1109/CVPR.2012.6248073): a ray is (0, 0, z0) + t (sx, sy, 1), and z0 + t is the depth
+from the pupil.
 
-A camera is one row of numbers (`lens_row`), so that every kernel of this room takes any camera.
-
-Distortion is that of OpenCV and of COLMAP's OPENCV model: k1, k2 radial, p1, p2 tangential (Brown 1971,
-"Close-range camera calibration", Photogrammetric Engineering 37). A flat port is a pane at right angles to the optical
-axis, air on the lens's side: a ray bends at both faces by Snell's law, n sin(angle) staying the same. Rays of one pixel
-still meet the axis, but each at its own height (Agrawal, Ramalingam, Taguchi & Chari 2012, "A theory of multi-layer
-flat refractive geometry", doi 10.1109/CVPR.2012.6248073): a ray is (0, 0, z0) + t (sx, sy, 1), so that z0 + t is the
-depth along the axis from the lens's pupil.
-
-The camera model that goes with the photographs: COLMAP's OPENCV, fitted where a flat port bends the rays.
-
-A pinhole with distortion has one centre of projection; behind a flat port rays of different slopes meet the axis at
-different heights, so that no such model is exact at all depths. The fit moves the centre along the axis and shares the
-error out over a range of depths; what remains is stated (Treibitz, Schechner, Kunz & Singh 2012, "Flat refractive
+No central model is exact behind a flat port. The fit moves the centre of projection along the axis and spreads the
+error over a range of depths; the residual is stated (Treibitz, Schechner, Kunz & Singh 2012, "Flat refractive
 geometry", doi 10.1109/TPAMI.2011.105).
 """
 

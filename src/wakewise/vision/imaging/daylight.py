@@ -1,14 +1,9 @@
-"""Light from above on every vertex, with the shade that target and stones cast: baked once per scene.
+"""Irradiance of sky and LED panels on every vertex, with the shadows of target and stones; baked once per scene.
 
-Under water the sky is squeezed into Snell's window, 48.6 deg about the zenith for a refractive index of 4/3, and dim
-diffuse light comes from outside of it (Mobley, Light and Water, Academic Press 1994, section 4.2). The shares used here
-are a choice for a shallow tank under a bright overcast sky, not a measurement.
-
-The tank's LED panels: flat lamps at the water surface that shine down, and what they give every vertex.
-
-A panel radiates evenly from each spot of its face by Lambert's law, so that a spot's light falls off with the squared
-distance and the cosines at both ends. The water's colour on the way from a panel, nearly the same for all that the
-camera sees, is counted in the reference irradiance and not here.
+Under water the sky is within Snell's window, 48.6 deg about the zenith for an index of 4/3; dim diffuse light comes
+from outside of it (Mobley, Light and Water, Academic Press 1994, section 4.2). The shares are a choice for a shallow
+tank under a bright overcast sky, not a measurement. Panels radiate by Lambert's law. The water's colour on the way from
+a panel is part of the reference irradiance.
 """
 
 from __future__ import annotations

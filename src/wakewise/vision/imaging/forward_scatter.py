@@ -1,14 +1,14 @@
-"""Light that grains diffract by a little comes to the camera all the same, from a little aside: blur, not loss.
+"""Forward scattering by silt: light that grains diffract by small angles is blurred, not lost.
 
-Grains much larger than a wavelength take twice their cross-section from a beam, and half of that is diffraction, which
-goes into a lobe as narrow as that of a hole of their size (Babinet; van de Hulst 1957, Light Scattering by Small
-Particles, chapter 8). A camera's images in turbid water are modelled so since McGlamery 1980 (Proc. SPIE 208, 221) and
-Jaffe 1990 (doi 10.1109/48.50695): direct signal, forward-scattered signal, backscatter.
+Grains much larger than a wavelength have an extinction of twice their cross-section. Half of it is diffraction into the
+lobe of a hole of their size (Babinet; van de Hulst 1957, Light Scattering by Small Particles, chapter 8). Direct
+signal, forward scatter and backscatter are those of McGlamery 1980 (Proc. SPIE 208, 221) and Jaffe 1990 (doi
+10.1109/48.50695).
 
-A ray scattered at a share s of its way from the camera to the scene is seen aside by (1 - s) times its turn. After n
-turns, whose number has Poisson's law, the variances add. So of light with an optical depth tau, half of it diffraction,
-exp(-tau) arrives straight and exp(-tau) (exp(tau / 2) - 1) blurred. The lobe is taken as a Gaussian with the width of
-Airy's pattern, and each pixel's blurred light as one Gaussian with the mean variance of its light.
+A ray scattered at a share s of its way from the camera is seen aside by (1 - s) times its turn. The number of turns has
+a Poisson distribution, and their variances add. Of light with an optical depth tau, half of it diffraction, exp(-tau)
+arrives straight and exp(-tau) (exp(tau / 2) - 1) blurred. The lobe is a Gaussian as wide as the Airy pattern; the
+blurred light of a pixel is one Gaussian with its mean variance.
 """
 
 from __future__ import annotations

@@ -1,21 +1,15 @@
-"""What water and silt do to light between the scene and the camera.
+"""Water and silt between scene and camera: attenuation, veil, and backscatter of the vehicle's lamps.
 
-Signal and veil fade differently (Akkaynak & Treibitz, CVPR 2018, doi 10.1109/CVPR.2018.00703):
-I = J exp(-beta_D r) + B_inf (1 - exp(-beta_B r)) along a ray of length r, one beta_D, beta_B and B_inf per colour band.
-Silt adds its beam attenuation, integrated along each ray through the field of concentration, and veils in turn; and the
-vehicle's lamps, whose light fades on the way out as well, are scattered back by water and silt.
-
-Half of what large grains take from a beam they only diffract by a degree or so: that half comes back as a blur.
-
-Left out: the ambient light that silt above the scene takes away, and forward scattering in the lamps' veil.
-
-Values of a field on grids, between their nodes.
+I = J exp(-beta_D r) + B_inf (1 - exp(-beta_B r)) along a ray of length r, with beta_D, beta_B and B_inf per colour band
+(Akkaynak & Treibitz, CVPR 2018, doi 10.1109/CVPR.2018.00703). Silt adds its beam attenuation, integrated through the
+field of concentration, and its own veil. Half of the attenuation by large grains is diffraction, which returns as blur.
+Not modelled: ambient light that silt above the scene removes, and forward scattering in the lamps' veil.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -126,7 +120,7 @@ class SiltOptics:
     diameter_m: float = 20e-6
     density_kg_m3: float = 2710.0
     efficiency: float = 2.0
-    single_scattering: Array = (0.965, 0.955, 0.935)  # type: ignore[assignment]
+    single_scattering: Array = field(default_factory=lambda: np.array([0.965, 0.955, 0.935]))
 
     def __post_init__(self) -> None:
         freeze(self, single_scattering=(3,))

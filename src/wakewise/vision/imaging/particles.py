@@ -1,8 +1,7 @@
-"""Flakes that drift between camera and scene, lit by daylight and lamps, mostly out of focus.
+"""Flakes between camera and scene, lit by daylight and lamps, mostly out of focus.
 
-Silt's single grains are far below a pixel and make haze; what a camera sees as specks are aggregates, a few tenths of
-a millimetre across. Their number follows the concentration of silt, with a little in clear water. Where a world tells
-which flakes drift in its water, photographs show those, and the same ones again later where the water has brought them.
+Grains of silt are far below a pixel and make haze. Specks are aggregates of some tenths of a millimetre; their number
+follows the concentration of silt, with a few in clear water. Flakes that a world moves appear in several photographs.
 """
 
 from __future__ import annotations

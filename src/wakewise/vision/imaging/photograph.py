@@ -1,12 +1,9 @@
-"""One photograph: the scene through silty water, over the time the shutter is open, on a noisy sensor.
+"""One photograph: the scene through silty water, over the exposure, on a noisy sensor; automatic exposure.
 
-Automatic exposure: how long the shutter is open, and how much the signal is amplified, by what was seen before.
-
-The law is that of libcamera's rpi.agc with its tuning for Sony's IMX290, a low-light 1080p sensor
-(src/ipa/rpi/vc4/data/imx290.json): the mean of the picture, its middle counting more, is led to 0.16 of saturation, a
-fifth of the way in each frame of 1/30 s; the shutter is opened for longer first, then the signal amplified. It goes by
-views before the photograph, drawn small, so that what a photograph gets depends on its own exposure's record alone:
-neither on other photographs nor on when it is made.
+Automatic exposure is libcamera's rpi.agc with its tuning for Sony's IMX290 (src/ipa/rpi/vc4/data/imx290.json): the
+centre-weighted mean is led to 0.16 of saturation by a fifth of the difference in each frame of 1/30 s, first by
+exposure, then by gain. It is computed from small views before the photograph, so a photograph depends on its own record
+only.
 """
 
 from __future__ import annotations

@@ -1,14 +1,9 @@
-"""From a scene and a pose to linear radiance, depth and the target's share of every pixel.
+"""Renderer: a scene and a pose to linear radiance, depth and the target's share of every pixel.
 
-Two passes over bands of the image. The first casts one ray through each pixel's centre: it gives the depth, exactly,
-and the bed's colour from maps already filtered to the pixel's footprint. The second casts `samples` x `samples` rays
-where one is not enough: on target and stones, whose colour is computed rather than filtered, and where neighbouring
-pixels see different things. Bands keep the rays in the processor's cache and the memory small at any image size.
-
-Compiled parts of the renderer: rays through samples, which pixels need more of them, the colour of what they hit.
-
-Kernels run outside of the interpreter's lock on one band of the image each, so that bands go to threads; what a band
-writes depends on nothing but its own pixels.
+Two passes over bands of the image. The first casts one ray through each pixel's centre, for the depth and the bed's
+colour from maps filtered to the pixel's footprint. The second casts `samples` x `samples` rays on target and stones and
+where neighbouring pixels see different things. Kernels run without the interpreter's lock, one band per thread; a band
+depends on its own pixels only.
 """
 
 from __future__ import annotations

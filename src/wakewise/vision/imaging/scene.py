@@ -1,12 +1,8 @@
-"""What stands before the camera: the target on a bed of sand with a few stones, ready for ray casting.
+"""The scene: the target on a bed of sand with stones, ready for ray casting; independent of the view.
 
-Everything here is fixed in the world and independent of the view. The scene keeps its own origin F, the target's foot
-(the bed under the target's centre), with axes parallel to the world's, so that single precision suffices.
-
-Which pixels may see target or stones: spheres round their pieces, tested against cones round tiles of the image.
-
-Casting rays through the others would be in vain, and most of a photograph shows nothing but bed. A tile's cone is that
-of its own rays, whatever the lens.
+Its origin F is the target's foot (the bed below the target's centre) with the world's axes, so single precision
+suffices. Bounding spheres of pieces of the solids, tested against the cones of image tiles, select the pixels that need
+rays.
 """
 
 from __future__ import annotations

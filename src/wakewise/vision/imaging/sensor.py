@@ -1,4 +1,4 @@
-"""From light to bytes: exposure, white balance, shot and read noise, sRGB encoding."""
+"""Sensor: exposure, white balance, shot and read noise, sRGB encoding."""
 
 from __future__ import annotations
 

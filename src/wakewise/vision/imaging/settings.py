@@ -1,4 +1,4 @@
-"""What a user may set about camera, light and water."""
+"""Settings of camera, light and water of simulated photographs."""
 
 from __future__ import annotations
 

@@ -1,11 +1,9 @@
-"""Colours fixed in the world: value noise on integer lattices, the coral's and the stones' albedo, and the bed's.
+"""Albedo fixed in the world: value noise for coral and stones, and baked maps for the bed.
 
-A point of the world has one colour whatever the view. What may change with the view is only how much detail survives:
-an octave whose cells are smaller than the pixel's footprint fades to its mean, as an ideal lens and sensor would do.
-The bed is nearly flat, so its colour is baked once into nested square maps, each twice as wide and half as fine.
-
-Value noise with octaves: Ebert et al., Texturing and Modeling, 3rd ed., Morgan Kaufmann 2003, ch. 2; the integer hash
-is the 32-bit finaliser of MurmurHash3 (Appleby, public domain) over products with large odd constants.
+A point has one colour whatever the view; octaves whose cells are smaller than the pixel's footprint fade to their mean.
+The bed is baked into nested square maps, each twice as wide and half as fine. Value noise: Ebert et al., Texturing and
+Modeling, 3rd ed., Morgan Kaufmann 2003, ch. 2; the integer hash is the 32-bit finaliser of MurmurHash3 (Appleby, public
+domain) over products with large odd constants.
 """
 
 from __future__ import annotations

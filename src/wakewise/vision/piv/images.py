@@ -1,7 +1,4 @@
-"""Pictures of tracers in a light sheet: a pair of frames, a pulse apart, as a 120 fps camera would take them.
-
-Tracer particles that mark moving water: how closely they follow it, and where it carries them between two frames.
-"""
+"""Synthetic PIV pictures: tracer particles that follow a flow, in a light sheet, two frames a pulse gap apart."""
 
 from __future__ import annotations
 
@@ -160,7 +157,7 @@ def picture(columns: Array, rows: Array, peak: Array, camera: CameraSettings, rn
 
 
 @njit
-def _add_spots(columns, rows, peak, sigma, light):  # type: ignore[no-untyped-def]
+def _add_spots(columns: Array, rows: Array, peak: Array, sigma: float, light: Array) -> None:
     """Add spots to `light`; a pixel gets the mean of the Gaussian over its area, by differences of erf."""
     height, width = light.shape
     reach = int(np.ceil(4.0 * sigma)) + 1

@@ -40,7 +40,6 @@ from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.sfm.colmap import pycolmap
 from wakewise.vision.reconstruction.sfm.features import database_bytes, match_photos
 from wakewise.vision.reconstruction.sfm.guided_matching import Poses
-from wakewise.vision.reconstruction.sfm.known_pose_triangulation import common_region
 from wakewise.vision.reconstruction.sfm.mapping import MAPPINGS, map_photos
 from wakewise.vision.reconstruction.sfm.pairs import (
     BAND_NEIGHBOURS,
@@ -50,6 +49,7 @@ from wakewise.vision.reconstruction.sfm.pairs import (
     choose_pairs,
     uses_retrieval,
 )
+from wakewise.vision.reconstruction.sfm.pose_mapping import common_region
 from wakewise.vision.reconstruction.sfm.registered_photos import RegionOfInterest
 from wakewise.vision.reconstruction.stages import (
     StageResult,

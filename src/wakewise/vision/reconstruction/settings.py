@@ -1,4 +1,4 @@
-"""Settings of a reconstruction that a user may write in a scenario file."""
+"""Settings of a reconstruction in a scenario file."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Stages that are skipped when their files are there and were made from the same input with the same settings.
-
-What each stage's result hangs on, as a fingerprint.
-"""
+"""Stages that are skipped if their files were made from the same input with the same settings; room on the disk."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""The model in the photographs' colours, for people: the water's veil undone, meshes with texture.
+"""Colours of models and photographs, for display; no figure depends on them.
 
-Nothing here enters a figure. Start reading in `textured.py` (a mesh coloured from its photographs) and
-`photo_colours.py` (photographs without the water's veil); `colour.py` is the image formation model that both invert.
-`atlas.py` puts photographs on a mesh as one picture, `orthophoto.py` sees a flat subject from straight above.
+- `colour.py`: removal of the water from a photograph, colour balance without ranges.
+- `photo_colours.py`: corrected copies of a folder of photographs; ranges of a model in its photographs.
+- `textured.py`: vertex colours, GLB. `atlas.py`: texture atlas, OBJ and GLB.
+- `orthophoto.py`: a flat subject from above.
 """

@@ -1,7 +1,7 @@
-"""The surface with its photographs as a texture: OBJ with its material and picture, and GLB.
+"""Texture atlas of a mesh from its photographs: OBJ with material and picture, and GLB.
 
-Every triangle has a place of its own in the picture, two to a square, row by row: no seams have to be cut. A triangle
-takes its colours from the few photographs that see it best, those that look at it straight and from near.
+Every triangle has its own place in the atlas, two to a square, row by row. Its colours are blended of the photographs
+that see it most directly and from nearest.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from wakewise.core.files import whole_file
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto, read_views
-from wakewise.vision.texturing.photo_colours import project
 
 SIDES_PX = (512, 1024, 2048, 4096, 8192)
 CELL_PX = 9
@@ -91,7 +90,7 @@ def best_views(
         length = np.maximum(np.linalg.norm(way, axis=1), 1e-12)
         facing = -np.einsum("ij,ij->i", normal, way) / length
         some = np.flatnonzero(facing > _STEEPEST_COS)
-        pixels, depth = project(view, corners[some].reshape(-1, 3))
+        pixels, depth = view.project(corners[some].reshape(-1, 3))
         size = np.array([view.width, view.height])
         inside = (depth > 1e-6) & ((pixels > 1.0) & (pixels < size - 1.0)).all(axis=1)
         some = some[inside.reshape(-1, 3).all(axis=1)]
@@ -141,7 +140,7 @@ def paint(
             for start in range(0, len(mine), _CHUNK):
                 part = mine[start : start + _CHUNK]
                 points = np.einsum("nk,mkd->mnd", bary, vertices[faces[part]]).reshape(-1, 3)
-                pixels = (project(view, points)[0] * scale - 0.5).astype(np.float32).reshape(len(part), -1, 2)
+                pixels = (view.project(points)[0] * scale - 0.5).astype(np.float32).reshape(len(part), -1, 2)
                 colours = cv2.remap(
                     image, pixels[..., 0], pixels[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
                 )

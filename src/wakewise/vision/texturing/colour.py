@@ -1,13 +1,12 @@
-"""Photographs made right for people's eyes: what the water took is put back. No measurement uses them unless asked.
+"""Colour correction of underwater photographs, for display.
 
-Where the range of every pixel is known, the water is fitted and undone, after the idea of Sea-thru (Akkaynak and
-Treibitz, CVPR 2019, doi 10.1109/CVPR.2019.00178): I = J exp(-beta_D r) + B (1 - exp(-beta_B r)) per colour band. The
-darkest pixels of each range show the veil alone, and what is left of a like surface falls with the range by
-exp(-beta_D r). Their beta_D varies over a picture; here it is one number per band and set of photographs.
+With ranges, the water is fitted and removed after Sea-thru (Akkaynak and Treibitz, CVPR 2019, doi
+10.1109/CVPR.2019.00178): I = J exp(-beta_D r) + B (1 - exp(-beta_B r)) per colour band. The darkest pixels of each
+range give the veil; the remaining brightness falls by exp(-beta_D r). beta_D is one number per band and set of
+photographs here.
 
-Without ranges, the red channel is helped by the green one and the mean made grey (Ancuti et al. 2018, doi
-10.1109/TIP.2017.2759252), and local contrast is stretched within limits (CLAHE, Zuiderveld 1994). That pleases; it
-is no physics.
+Without ranges, red is compensated by green, the mean is made grey (Ancuti et al. 2018, doi 10.1109/TIP.2017.2759252),
+and local contrast is stretched within limits (CLAHE, Zuiderveld 1994). That is no physics.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A flat subject seen straight from above: its picture without perspective, and its heights, on one grid."""
+"""Orthophoto and heights of a flat subject on one grid."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def write_orthophoto(
 ) -> dict[str, Any]:
     """Write `out/orthophoto.png` (transparent where nothing is known), `heights.png` (16 bits), world files and a JSON.
 
-    The plane is the subject's own (see `fit_ground_plane`); pictures have its across to the right and its along upwards.
+    The plane is that of `fit_ground_plane`; its first axis is to the right of the pictures, its second upwards.
 
     `cell`: side of a pixel in units of the model; one and a half point spacings if not given. Returns what
     orthophoto.json holds: cell, columns, rows, corner and axes in the model, step and lowest of the heights. Raises

@@ -1,4 +1,4 @@
-"""Colour correction of a folder of photographs, with the depths of its reconstruction where there is one."""
+"""Colour correction of a folder of photographs, with the ranges of its model if there is one."""
 
 from __future__ import annotations
 
@@ -214,38 +214,28 @@ class RangeMaps:
         view = self.views[name]
         h, w = shape
         scale = np.array([w / view.width, h / view.height])
-        pixels, z = project(view, self.points_m[view.seen])
+        pixels, z = view.project(self.points_m[view.seen])
         grid = _coarse_grid(h, w)
         inverse = _between(pixels * scale, 1.0 / np.maximum(z, 1e-6), grid)
         # Where the plane runs far beyond all that was seen there may be open water: nobody knows.
         farthest = _FARTHER * float(np.quantile(z, 0.99))
         depth = 1.0 / np.maximum(_fine(inverse, h, w), 1e-6)
         depth[depth > farthest] = np.inf
-        length = _fine(np.linalg.norm(rays(view, grid / scale), axis=1), h, w)
+        length = _fine(np.linalg.norm(view.rays(grid / scale), axis=1), h, w)
         if self.mesh is not None:
-            corners, _ = project(view, self.corners_m)
+            corners, _ = view.project(self.corners_m)
             low = np.clip(np.floor(corners.min(axis=0) * scale).astype(int) - 1, 0, [w, h])
             high = np.clip(np.ceil(corners.max(axis=0) * scale).astype(int) + 1, 0, [w, h])
             if np.all(high > low):
                 part = np.s_[low[1] : high[1], low[0] : high[0]]
                 rows, columns = np.mgrid[part]
-                ways_C = rays(view, (np.stack([columns.ravel(), rows.ravel()], axis=1) + 0.5) / scale)
+                ways_C = view.rays((np.stack([columns.ravel(), rows.ravel()], axis=1) + 0.5) / scale)
                 ways = np.ascontiguousarray((ways_C @ view.R_CW).astype(np.float32))
                 start = np.ascontiguousarray(np.broadcast_to(view.p_WC_m.astype(np.float32), ways.shape))
                 hit = self.mesh.run(start, ways, output=True)
                 struck = (np.asarray(hit["primID"]) >= 0).reshape(rows.shape)
                 depth[part] = np.where(struck, np.asarray(hit["tfar"]).reshape(rows.shape), depth[part])
         return np.asarray(depth * length, np.float32)
-
-
-def project(view: RegisteredPhoto, points_W_m: Array) -> tuple[Array, Array]:
-    """Pixels, shape (n, 2), and depths, shape (n,), of points before a view, through its lens."""
-    return view.project(points_W_m)
-
-
-def rays(view: RegisteredPhoto, pixels: Array) -> Array:
-    """Directions with unit z in the camera frame, shape (n, 3), of pixels, shape (n, 2), distortion undone."""
-    return view.rays(pixels)
 
 
 def _coarse_grid(h: int, w: int) -> Array:

@@ -1,7 +1,7 @@
-"""The model in the colours of its photographs, as a standard GLB file that any 3D viewer opens.
+"""Vertex colours of a mesh from its photographs, as GLB.
 
-Every vertex takes its colour from the photographs that see it, the best ones by far the most: those that look at it
-straight and from near. A photograph sees a vertex if no other part of the mesh stands between.
+A vertex takes its colour mostly from the photographs that see it most directly and from nearest. A photograph sees a
+vertex if no other part of the mesh is in between.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from wakewise.core.interfaces import no_progress
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto, read_views
 from wakewise.vision.texturing.colour import srgb_decode
-from wakewise.vision.texturing.photo_colours import project
 
 _SHARPNESS = 4
 """Power of a view's weight: at 4, one that sees a surface twice as well counts sixteen times."""
@@ -129,7 +128,7 @@ def vertex_colours(
         facing = -np.einsum("ij,ij->i", normals, way) / np.maximum(length, 1e-12)
         # What looks away is most of a mesh: it is left out before anything else is asked of it.
         some = np.flatnonzero(facing > _STEEPEST_COS)
-        pixels, depth = project(view, vertices_m[some])
+        pixels, depth = view.project(vertices_m[some])
         pixels = pixels * np.array([w / view.width, h / view.height])
         u, v = pixels.T
         inside = np.flatnonzero((depth > 1e-6) & (u > 1.0) & (u < w - 1.0) & (v > 1.0) & (v < h - 1.0))

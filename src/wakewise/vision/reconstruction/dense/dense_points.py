@@ -1,8 +1,6 @@
-"""Dense points from posed photos: photos and sparse/ in, dense.ply out.
+"""Dense points: photos and sparse model in, dense.ply out, by semi-global stereo or COLMAP's patch-match (CUDA).
 
-Depth maps of many photographs: a few in memory, the rest on disk, read when they are asked for.
-
-Dense points by COLMAP's patch-match stereo, where pycolmap was built with CUDA: sparse/ in, dense.ply out.
+Depth maps beyond a bound of memory lie on disk.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
-"""Many depth maps to one cloud: a point stays when enough other maps agree with it and few look through it.
+"""Fusion of depth maps: a point is kept if enough other maps agree with it and few see through it.
 
-Points that share a cell of a grid become one, their mean; in one pass over them, however many there are.
+Points in one cell of a grid become their mean, in one pass over all points.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 import small_gicp
@@ -17,6 +18,7 @@ from wakewise.core.jit.njit import njit
 from wakewise.vision.reconstruction.dense.stereo import DepthImage, DepthMap
 from wakewise.vision.reconstruction.photos.photo_folder import Image
 
+N = TypeVar("N", bound=np.generic)
 AT_ONCE = 250_000
 """Points whose neighbours are looked for at once."""
 
@@ -293,12 +295,12 @@ class CellMeans:
             return
         size = max(rows, 3 * len(self._counts) // 2)
 
-        def grown(old: NDArray[np.generic]) -> NDArray[np.generic]:
+        def grown(old: NDArray[N]) -> NDArray[N]:
             new = np.zeros((size, *old.shape[1:]), dtype=old.dtype)
             new[: self._used] = old[: self._used]
             return new
 
-        self._cells, self._sums, self._counts = grown(self._cells), grown(self._sums), grown(self._counts)  # type: ignore[assignment]
+        self._cells, self._sums, self._counts = grown(self._cells), grown(self._sums), grown(self._counts)
         table = 1 << int(2 * size).bit_length()
         if table > len(self._slots):
             self._slots = np.full(table, -1, dtype=np.int32)

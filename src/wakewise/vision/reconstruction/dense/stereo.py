@@ -1,8 +1,8 @@
-"""Depth of one photo from another: both turned onto a common row direction, then semi-global matching.
+"""Stereo of two photos: rectification to a common row direction, then semi-global matching.
 
-The rectified frame has x along the baseline, so a pair one above the other is as good as one side by side. Matching:
-H. Hirschmueller, Stereo processing by semiglobal matching and mutual information, IEEE TPAMI 30(2), 2008,
-doi 10.1109/TPAMI.2007.1166, as OpenCV's StereoSGBM has it (block costs instead of mutual information).
+x of the rectified frame is along the baseline, whatever its direction. H. Hirschmueller, Stereo processing by
+semiglobal matching and mutual information, IEEE TPAMI 30(2), 2008, doi 10.1109/TPAMI.2007.1166; OpenCV's StereoSGBM has
+block costs.
 """
 
 from __future__ import annotations

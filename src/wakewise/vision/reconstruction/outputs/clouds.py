@@ -1,6 +1,4 @@
-"""Points and surfaces on disk as binary PLY, readable by every viewer.
-
-Points as LAS 1.2, point format 2, which surveyors' programs read: places as whole numbers, colours of 16 bits.
+"""Point and mesh files: binary PLY, and LAS 1.2 with point format 2.
 
 American Society for Photogrammetry and Remote Sensing, LAS Specification Version 1.2, 2008, tables 3, 4 and 9.
 """

@@ -1,4 +1,4 @@
-"""A coloured surface from the dense points: dense.ply in, mesh.ply out."""
+"""Coloured surface of dense points by screened Poisson reconstruction: dense.ply to mesh.ply."""
 
 from __future__ import annotations
 

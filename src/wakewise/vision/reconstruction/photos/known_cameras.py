@@ -1,10 +1,6 @@
-"""Cameras that are known beforehand: pose and lens of each photograph, from COLMAP, nerfstudio, a table or Strecha.
+"""Known poses and intrinsics of photographs from COLMAP, nerfstudio, a CSV table or Strecha's .camera files.
 
-COLMAP's cameras and images from its files, text or binary, without the points that its own reader asks for.
-
-Formats: COLMAP documentation, Output format.
-
-Reference camera positions: a folder of Strecha's .camera files or a CSV table.
+COLMAP's cameras and images are read without the points that its own reader needs (COLMAP documentation, Output format).
 """
 
 from __future__ import annotations
@@ -326,14 +322,10 @@ def _read_strecha(files: list[Path]) -> KnownCameras:
     """K in three rows, a row of zeros, three rows of R_WC, the centre, the size (C. Strecha et al., CVPR 2008)."""
     rotations, positions, lenses = {}, {}, {}
     for path in files:
-        try:
-            rows = [[float(w) for w in line.split()] for line in path.read_text(encoding="utf-8").splitlines()]
-            rows = [row for row in rows if row]
-            K, R, centre, size = np.array(rows[:3]), np.array(rows[4:7]), np.array(rows[7]), rows[8]
-            if K.shape != (3, 3) or R.shape != (3, 3) or centre.shape != (3,) or len(size) != 2:
-                raise ValueError
-        except (OSError, ValueError, IndexError):
-            raise InputError(f"{path}: is no .camera file: K, a row of zeros, R (3 rows each), centre, size") from None
+        rows = _camera_rows(path)
+        if [len(row) for row in (*rows[:3], *rows[4:9])] != [3, 3, 3, 3, 3, 3, 3, 2]:
+            raise InputError(f"{path}: is no .camera file: K, a row of zeros, R (3 rows each), centre, size")
+        K, R, centre, size = np.array(rows[:3]), np.array(rows[4:7]), np.array(rows[7]), rows[8]
         name = path.name.removesuffix(".camera")
         # Printed with six digits: the nearest rotation.
         u, _, vt = np.linalg.svd(R)
@@ -341,6 +333,15 @@ def _read_strecha(files: list[Path]) -> KnownCameras:
         params = np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2], 0.0, 0.0, 0.0, 0.0])
         lenses[name] = Lens(width=int(size[0]), height=int(size[1]), params=params)
     return KnownCameras(rotations=rotations, positions=positions, lenses=lenses)
+
+
+def _camera_rows(path: Path) -> list[list[float]]:
+    """Rows of numbers of a .camera file, empty lines left out."""
+    try:
+        rows = [[float(word) for word in line.split()] for line in path.read_text(encoding="utf-8").splitlines()]
+    except (OSError, ValueError):
+        raise InputError(f"{path}: is no .camera file, holds something that is no number") from None
+    return [row for row in rows if row]
 
 
 def read_reference_cameras(path: Path) -> dict[str, Array]:
@@ -354,28 +355,12 @@ def read_reference_cameras(path: Path) -> dict[str, Array]:
         files = sorted(path.glob("*.camera"))
         if not files:
             raise InputError(f"{path}: holds no .camera files; a folder of them or a CSV file is needed")
-        return {file.name.removesuffix(".camera"): _read_camera(file) for file in files}
+        return {file.name.removesuffix(".camera"): _camera_centre(file) for file in files}
     if not path.is_file():
         raise InputError(
             f"{path}: does not exist; a folder of .camera files or a CSV file (name,x_m,y_m,z_m) is needed"
         )
-    return _read_csv(path)
-
-
-def _read_camera(path: Path) -> Array:
-    """Centre from one .camera file: the 8th row, after K (3 rows), zeros and R (3 rows)."""
-    try:
-        rows = [[float(word) for word in line.split()] for line in path.read_text(encoding="utf-8").splitlines()]
-    except (ValueError, UnicodeDecodeError):
-        raise InputError(f"{path}: is no .camera file, holds something that is no number") from None
-    rows = [row for row in rows if row]
-    if len(rows) < 8 or len(rows[7]) != 3 or not np.all(np.isfinite(rows[7])):
-        raise InputError(f"{path}: is no .camera file; row 8 must hold the camera centre, 3 numbers")
-    return np.array(rows[7])
-
-
-def _read_csv(path: Path) -> dict[str, Array]:
-    wanted = ("name", "x_m", "y_m", "z_m")
+    wanted = _POSE[:4]
     out: dict[str, Array] = {}
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
@@ -387,7 +372,7 @@ def _read_csv(path: Path) -> dict[str, Array]:
             for row in reader:
                 if row["name"] in out:
                     raise InputError(f"{path}: line {reader.line_num}: {row['name']} is there twice")
-                out[row["name"]] = _position(path, reader.line_num, [row[c] for c in wanted[1:]])
+                out[row["name"]] = _numbers(path, reader.line_num, row, wanted[1:])
     except (UnicodeDecodeError, csv.Error):
         raise InputError(f"{path}: is no CSV text; needed is a table with columns {', '.join(wanted)}") from None
     if not out:
@@ -395,14 +380,11 @@ def _read_csv(path: Path) -> dict[str, Array]:
     return out
 
 
-def _position(path: Path, line: int, words: list[str | None]) -> Array:
-    try:
-        position = np.array([float(word or "") for word in words])
-    except ValueError:
-        raise InputError(f"{path}: line {line} holds {words}, allowed are three numbers x_m, y_m, z_m") from None
-    if not np.all(np.isfinite(position)):
-        raise InputError(f"{path}: line {line} holds {words}, every coordinate must be finite")
-    return position
+def _camera_centre(path: Path) -> Array:
+    rows = _camera_rows(path)
+    if len(rows) < 8 or len(rows[7]) != 3 or not np.all(np.isfinite(rows[7])):
+        raise InputError(f"{path}: is no .camera file; row 8 must hold the camera centre, 3 numbers")
+    return np.array(rows[7])
 
 
 def match_references(references: dict[str, Array], names: Iterable[str]) -> dict[str, Array]:

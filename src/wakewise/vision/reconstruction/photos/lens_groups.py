@@ -1,4 +1,4 @@
-"""Which photographs share a lens: by what the user says, by folder, by size, and by what the camera wrote into them."""
+"""Which photographs share intrinsics: by the user, by folder, by size, and by EXIF."""
 
 from __future__ import annotations
 

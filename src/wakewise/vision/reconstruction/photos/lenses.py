@@ -1,10 +1,8 @@
-"""A calibrated camera as COLMAP's OPENCV or OPENCV_FISHEYE has it, from its cameras.txt or a calibration of ours.
+"""Intrinsics and distortion of a camera in COLMAP's OPENCV or OPENCV_FISHEYE model.
 
-What a lens does to slopes: OpenCV's two models of distortion, there and back.
-
-A slope is (x / z, y / z) of a direction, its image is (pixel - centre) / focal length. Perspective: D. C. Brown,
-Photogrammetric Engineering 37(8), 1971, with k1, k2, p1, p2. Fisheye: the distance from the middle is a polynomial of
-the angle from the axis, J. Kannala and S. S. Brandt, IEEE TPAMI 28(8), 2006, doi 10.1109/TPAMI.2006.153, with k1 to k4.
+A slope is (x / z, y / z) of a direction; its image is (pixel - centre) / focal length. Perspective: D. C. Brown,
+Photogrammetric Engineering 37(8), 1971, with k1, k2, p1, p2. Fisheye: the image radius is a polynomial of the angle
+from the axis, J. Kannala and S. S. Brandt, IEEE TPAMI 28(8), 2006, doi 10.1109/TPAMI.2006.153, with k1 to k4.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""Masks: what of a photograph is not to be looked at, such as moving water, a turntable's surroundings or a diver.
+"""Masks: pixels of photographs that are not used, such as moving water, a diver or a turntable's surroundings.
 
-From a folder of images of the photographs' names, black where nothing is to be looked at, or from the photographs' own
-transparency.
+They come from a folder of images with the photographs' names, black where nothing is used, or from transparency.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""A folder of photographs: which files are meant, whether they are whole, and a fingerprint of them.
-
-What a camera wrote into a photograph about itself.
-"""
+"""A folder of photographs: files, checks, digests, and what EXIF says of the camera."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Photographs out of a film: sharp frames, far enough apart to tell depth and near enough to match.
+"""Sharp frames of a film at even steps of image motion.
 
-A film is gone through once to see how far the picture moves from frame to frame (sparse optical flow, B. D. Lucas and
-T. Kanade, IJCAI 1981, in pyramids) and how sharp each frame is; the sharpest of each stretch of movement is taken.
+One pass measures the motion of the picture (sparse optical flow, B. D. Lucas and T. Kanade, IJCAI 1981, in pyramids)
+and the sharpness of each frame. The sharpest frame of each step is taken.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ _POINTS, _LEAST_POINTS, _QUALITY = 300, 20, 96
 
 @dataclass(frozen=True, kw_only=True)
 class VideoFrames:
-    """What was taken of a film. blurred: frames analysed at that are; blurred_taken: of those taken, as a stretch had no
-    better; moved_widths: how far the picture went in all, in widths; motion_px_s: how fast where frames were taken,
-    median; skew_px: what a rolling shutter of READOUT_S makes of that.
+    """Frames taken of a film. blurred: of the frames analysed; blurred_taken: of those taken, where none nearby is
+    sharper; moved_widths: motion of the picture in all, in widths; motion_px_s: median over the frames taken; skew_px:
+    shear by a rolling shutter of READOUT_S at that motion.
     """
 
     film: str
@@ -123,8 +123,8 @@ def _take(film: Path, folder: Path, progress: Progress) -> VideoFrames:
     chosen = choose_frames(analysed.way, analysed.sharpness, step)
     if len(chosen) < LEAST_FRAMES:
         raise InputError(
-            f"{film}: the picture moves by {float(analysed.way[-1]):.2f} of its width in {frames} frames, too little for "
-            f"{LEAST_FRAMES} photographs {100 * step:.0f} % apart; a model needs a camera that moves"
+            f"{film}: the picture moves by {float(analysed.way[-1]):.2f} of its width in {frames} frames, too little "
+            f"for {LEAST_FRAMES} photographs {100 * step:.0f} % apart; a model needs a camera that moves"
         )
     numbers = analysed.numbers[chosen]
     with whole_folder(folder) as temporary:
@@ -151,8 +151,8 @@ def _take(film: Path, folder: Path, progress: Progress) -> VideoFrames:
 def choose_frames(way: Array, sharpness: Array, step: float) -> IntArray:
     """Indices of the sharpest frame of each stretch of movement.
 
-    `way`, shape (n,): how far the picture has moved since the first frame; never falls. `sharpness` has shape (n,).
-    `step`: length of a stretch and its pause together, in units of `way`: a frame is analysed for within its first half.
+    `way`, shape (n,): motion of the picture since the first frame, never falling. `sharpness` has shape (n,). `step`:
+    motion from one stretch to the next, in units of `way`; a frame is taken from the first half of each.
     """
     place = (np.asarray(way) - way[0]) / step
     cell = np.floor(place).astype(np.int64)

@@ -1,9 +1,9 @@
-"""Whether a sparse model deserves trust: by what it says of the photographs, not by what was cut to make it look well.
+"""Tests of a sparse model by the photographs, independent of the observations that were cut.
 
-The mean reprojection error of what is left after cutting is small for wrong models, too. What a wrong one cannot do is
-agree with all verified pairs of photographs (R. Hartley and A. Zisserman, Multiple View Geometry, 2nd ed., Cambridge
-2004, section 11.4.3, Sampson's distance), foretell where a point is seen by a photograph that it was not computed from,
-cover the photographs, and come out the same when each photograph has a lens of its own.
+The mean reprojection error after cutting is small for wrong models too. A wrong model does not agree with all verified
+image pairs (Sampson distance: R. Hartley and A. Zisserman, Multiple View Geometry, 2nd ed., Cambridge 2004, section
+11.4.3), does not predict observations that were left out, does not cover the photographs, or changes if each photograph
+has intrinsics of its own.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""A look at photographs before anything long is done with them: sharpness, light, overlap, what to shoot again.
+"""Preview of photographs before a reconstruction: sharpness, exposure, overlap, and what to photograph again.
 
-Small copies are matched quickly and roughly (SIFT, epipolar geometry by random samples), which tells neighbours apart
-from without_pose; whether a model comes of them, only the model says.
+Small copies are matched fast (SIFT, fundamental matrix by RANSAC).
 """
 
 from __future__ import annotations

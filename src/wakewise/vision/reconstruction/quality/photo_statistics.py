@@ -1,4 +1,4 @@
-"""What a finished model says of each photograph, and which photographs share matches: read from its files."""
+"""Figures of each photograph of a finished model, and of the image pairs, from its files."""
 
 from __future__ import annotations
 
@@ -55,7 +55,8 @@ def model_facts(model: Path) -> ModelStatistics:
     sparse = pycolmap.Reconstruction(model / "sparse")
     with tempfile.TemporaryDirectory() as scratch:
         # A copy, as even reading makes COLMAP write into it.
-        with open_database(shutil.copyfile(model / "database.db", Path(scratch) / "database.db")) as link:
+        copy = shutil.copyfile(model / "database.db", Path(scratch) / "database.db")
+        with open_database(copy) as link:
             listed = sorted(link.read_all_images(), key=lambda image: image.name)
             features = {image.name: link.num_keypoints_for_image(image.image_id) for image in listed}
             cameras = {camera.camera_id: camera for camera in link.read_all_cameras()}

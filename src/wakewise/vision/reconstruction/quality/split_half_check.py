@@ -1,9 +1,7 @@
-"""Area, volume and rugosity of a model, and how well they repeat: measured anew on each half of the photographs.
+"""Area, volume and rugosity of a model above its ground plane, and their repeatability over halves of the photographs.
 
-Each half is reconstructed by itself, from its photographs on, and brought into the whole model's frame by its cameras.
-So what repeats is shape; an error of the scale is in all three alike.
-
-The plane that a flat subject lies in, such as a bed or a wall, and points told from it: along it and above it.
+Each half is reconstructed from its photographs and aligned with the model by its cameras. The figures are those of
+shape; an error of the scale is the same in all three.
 """
 
 from __future__ import annotations

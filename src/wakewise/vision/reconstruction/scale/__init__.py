@@ -1,9 +1,7 @@
-"""Metres by bars of known length between coded targets that the photographs show, or by where these were taken.
+"""Metric scale by bars between coded targets, or by position fixes of the cameras.
 
-Start reading in `stage.py` (a sparse model in, the same model in metres out). `bars.py` is what a user says, `marks.py`
-finds targets in photographs, `marks.py` puts them into the model, `bars.py` weighs the bars and says where they
-disagree. `position_fixes.py` reads what GPS receivers and depth gauges tell of the cameras, `position_fixes.py`
-asks what it is worth.
+- `stage.py`: a sparse model to the same model in metres. `bars.py`: bars, their weighted mean and residuals.
+- `marks.py`: coded targets in photographs, triangulated. `position_fixes.py`: GPS and depth of cameras, and their fit.
 """
 
 from typing import TYPE_CHECKING

@@ -1,7 +1,4 @@
-"""What a user says of lengths: bars between coded targets, the targets' family and size, a ChArUco board.
-
-Scale of a model from several bars: their weighted mean, how sure it is, and how far each bar is from the others.
-"""
+"""Scale bars: lengths between coded targets, a ChArUco board; their weighted mean, its uncertainty and residuals."""
 
 from __future__ import annotations
 

@@ -1,12 +1,9 @@
-"""Coded targets in photographs: ArUco and AprilTag squares by their four corners, a ChArUco board by its inner ones.
+"""Coded targets: ArUco and AprilTag squares and ChArUco corners in photographs, and their triangulation.
 
 S. Garrido-Jurado et al., Pattern Recognition 47(6), 2014, doi 10.1016/j.patcog.2014.01.005; E. Olson, AprilTag, ICRA
-2011, doi 10.1109/ICRA.2011.5979561; as OpenCV's aruco module has them.
-
-Where in the model something is that several of its photographs show, and how surely.
-
-Rays meet in the least-squares sense, then the squared distances in pixels are brought to their minimum (R. Hartley and
-A. Zisserman, Multiple View Geometry, 2nd ed., Cambridge 2004, sections 12.2 and 12.5).
+2011, doi 10.1109/ICRA.2011.5979561; by OpenCV's aruco module. Triangulation: the point nearest to the rays, then least
+squares in pixels (R. Hartley and A. Zisserman, Multiple View Geometry, 2nd ed., Cambridge 2004, sections 12.2 and
+12.5).
 """
 
 from __future__ import annotations

@@ -1,12 +1,8 @@
-"""Where photographs were taken, as GPS receivers and depth gauges tell it: from a table, or from what EXIF holds.
+"""Position fixes of cameras by GPS or depth gauge, from a table or EXIF; scale and orientation of a model from them.
 
-A fix is weak knowledge: metres off, or of the depth alone. `by_fixes.py` asks how far a model's scale can rest on it.
-
-A model's scale, and which way is down, from fixes; how sure that is, or why it cannot be told.
-
-Depths alone tell both: they are a linear function of the cameras' places, whose slope is metres down per unit of the
-model. With north and east the model comes to lie in their frame. Errors of fixes are taken for independent: one that
-all photos share does no harm, one that grows along the way is not seen.
+Depths alone give both: depth is a linear function of camera position, with a slope in metres per unit of the model.
+North and east also give the frame. Errors of fixes are taken as independent: a common error does no harm, a drift is
+not seen.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""A sparse model in metres by bars or by fixes: sparse/ and photographs in, the same sparse/ scaled out.
+"""Scale stage: sparse/ and photographs in, the same sparse/ in metres out.
 
-Neither asks what units the model has, so the stage may run again on what it left.
+The result does not depend on the units of the model, so the stage may run again on its own output.
 """
 
 from __future__ import annotations

@@ -4,8 +4,7 @@
 - `pairs.py`: which photographs are matched; image retrieval (VLAD).
 - `guided_matching.py`: matches along the epipolar lines of roughly known poses.
 - `mapping.py`: database to sparse model, filtered, adjusted and aligned. `colmap_mappers.py`: COLMAP's mappers.
-- `prior_pose_mapping.py`: bundle adjustment from approximate poses.
-- `known_pose_triangulation.py`: triangulation at fixed poses.
+- `pose_mapping.py`: bundle adjustment from approximate poses; triangulation at known, fixed poses.
 - `per_photo_intrinsics.py`: intrinsics for each photograph, and whether photographs really share theirs.
 - `registered_photos.py`: registered photographs as the dense stages use them. `colmap.py`: pycolmap's blocking calls.
 """

@@ -1,6 +1,6 @@
-"""COLMAP's blocking calls, quiet, watched and stoppable.
+"""pycolmap without its signal handlers: blocking calls that are quiet, observed and stoppable.
 
-The one door to pycolmap: whoever needs it takes it from here, without the signal handlers that it sets on import.
+Other modules take pycolmap from here, because its import sets handlers that are undone here.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,7 +26,9 @@ from wakewise.core.errors import EnvironmentFailure, StageError
 from wakewise.core.subprocesses import end_process, start_python
 
 __all__ = [
+    "NEVER",
     "RESERVE_MB",
+    "bundle_adjustment",
     "call",
     "call_in_process",
     "checkpoint_database",
@@ -38,6 +41,8 @@ __all__ = [
 ]
 
 T = TypeVar("T")
+NEVER = 2**31 - 1
+"""Residuals from which on COLMAP uses several threads: never."""
 # Room that a disk must keep while COLMAP writes its database: what it writes in about a second.
 RESERVE_MB = 16.0
 # Linux's file system in memory, and the largest database that is put there.
@@ -137,6 +142,35 @@ pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
 function, arguments = pickle.load(sys.stdin.buffer)
 getattr(pycolmap, function)(*arguments)
 """
+
+
+def bundle_adjustment(
+    model: pycolmap.Reconstruction,
+    *,
+    refine_intrinsics: bool,
+    threads: int,
+    iterations: int,
+    tolerance: float | None = None,
+    robust: bool = False,
+) -> None:
+    """Adjust all poses and points of a model, and its intrinsics if asked to.
+
+    With `robust`, residuals beyond 1 px count linearly. `tolerance`: relative gain at which it ends. Raises StageError
+    if COLMAP fails.
+    """
+    options = pycolmap.BundleAdjustmentOptions()
+    options.print_summary = False
+    options.refine_focal_length = options.refine_extra_params = refine_intrinsics
+    solver = options.ceres.solver_options
+    solver.max_num_iterations, solver.num_threads = iterations, threads
+    if tolerance is not None:
+        solver.function_tolerance = tolerance
+    # Two threads sum in any order, and the same photos would give another model.
+    options.ceres.min_num_residuals_for_cpu_multi_threading = NEVER
+    if robust:
+        options.ceres.loss_function_type, options.ceres.loss_function_scale = pycolmap.LossFunctionType.SOFT_L1, 1.0
+    with no_stderr():  # it announces itself whatever the level of logging
+        call(partial(pycolmap.bundle_adjustment, model, options), "bundle adjustment")
 
 
 @contextmanager

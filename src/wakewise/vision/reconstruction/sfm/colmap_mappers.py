@@ -1,4 +1,4 @@
-"""From a database of matches to cameras and sparse points, by COLMAP's incremental mapper or its global one."""
+"""COLMAP's incremental and global mappers: a database of matches to sparse models."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
-from wakewise.vision.reconstruction.sfm.colmap import call, call_in_process, open_database, pycolmap
+from wakewise.vision.reconstruction.sfm.colmap import NEVER, call, call_in_process, open_database, pycolmap
 from wakewise.vision.reconstruction.sfm.features import match_pairs
 from wakewise.vision.reconstruction.sfm.pairs import Pairs, read_descriptors
 
@@ -20,7 +20,6 @@ BUNDLE_ITERATIONS = 100
 GROWTH = 1.4
 MOST_RETRIED_PAIRS = 1000
 """Most pairs that are matched for photos which found no place: some minutes."""
-NEVER = 2**31 - 1
 
 
 def solve(

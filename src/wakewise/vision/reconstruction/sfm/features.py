@@ -1,10 +1,8 @@
-"""Features of each photo and verified matches between photos: photos in, database.db out.
+"""SIFT features and verified matches: photos in, COLMAP's database.db out.
 
-SIFT features of photos by OpenCV, written as COLMAP keeps its own.
-
-D. G. Lowe, Distinctive image features from scale-invariant keypoints, IJCV 60(2), 2004,
-doi 10.1023/B:VISI.0000029664.99615.94; descriptors as square roots of their L1-normalised entries (R. Arandjelovic and
-A. Zisserman, CVPR 2012, doi 10.1109/CVPR.2012.6248018), 512 times which is stored in a byte, as COLMAP does.
+D. G. Lowe, Distinctive image features from scale-invariant keypoints, IJCV 60(2), 2004, doi
+10.1023/B:VISI.0000029664.99615.94; descriptors are square roots of L1-normalised entries (R. Arandjelovic and A.
+Zisserman, CVPR 2012, doi 10.1109/CVPR.2012.6248018), times 512 in a byte, as COLMAP stores them.
 """
 
 from __future__ import annotations

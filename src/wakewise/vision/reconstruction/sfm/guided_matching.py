@@ -1,10 +1,9 @@
-"""Matches between photos whose poses are roughly known: each feature is held only against those near its epipolar line.
+"""Guided matching: photos with roughly known poses are matched along epipolar lines.
 
-A pose that is off by 5 mm and 5 mrad moves the line of a camera half a metre away by about 15 mrad, so a band about it
-still holds the partner, and a tenth of the other photo's features. What is matched is verified by turning and moving
-the pair's relative pose until its epipolar geometry fits (R. Hartley and A. Zisserman, Multiple View Geometry, 2nd ed.,
-Cambridge 2004, section 11.4.3, Sampson's distance), from the known pose on: no random search is needed where nearly all
-are right. A pair that does not verify is left to those who look without poses.
+A pose error of 5 mm and 5 mrad moves an epipolar line by about 15 mrad at half a metre, so a band about the line holds
+the partner and a tenth of the features. Matches are verified by refining the relative pose to the least Sampson
+distance (R. Hartley and A. Zisserman, Multiple View Geometry, 2nd ed., Cambridge 2004, section 11.4.3), from the known
+pose on. A pair that does not verify is matched without poses.
 """
 
 from __future__ import annotations

@@ -1,11 +1,10 @@
-"""From matches to cameras and sparse points: database.db in, sparse/ out, in metres where positions are known."""
+"""Structure from motion: database.db to a sparse model, filtered, adjusted, tested and aligned."""
 
 from __future__ import annotations
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,16 +25,14 @@ from wakewise.vision.reconstruction.quality.model_quality import (
 )
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 from wakewise.vision.reconstruction.sfm.colmap import (
-    call,
+    bundle_adjustment,
     checkpoint_database,
     database_folder,
-    no_stderr,
     open_database,
     pycolmap,
 )
-from wakewise.vision.reconstruction.sfm.colmap_mappers import BUNDLE_ITERATIONS, NEVER, solve, solve_again
+from wakewise.vision.reconstruction.sfm.colmap_mappers import BUNDLE_ITERATIONS, solve, solve_again
 from wakewise.vision.reconstruction.sfm.guided_matching import Poses
-from wakewise.vision.reconstruction.sfm.known_pose_triangulation import map_at_poses
 from wakewise.vision.reconstruction.sfm.per_photo_intrinsics import (
     LEAST_POINTS,
     PerPhotoIntrinsics,
@@ -43,7 +40,7 @@ from wakewise.vision.reconstruction.sfm.per_photo_intrinsics import (
     focal_clusters,
     set_cameras,
 )
-from wakewise.vision.reconstruction.sfm.prior_pose_mapping import SeededModel, map_from_poses
+from wakewise.vision.reconstruction.sfm.pose_mapping import SeededModel, map_at_poses, map_from_poses
 
 # Fewer registered photos are a failure; of fewer, lenses are not looked into.
 MIN_REGISTERED, LEAST_FOR_CHECK = 3, 5
@@ -286,14 +283,9 @@ def _tighten(model: pycolmap.Reconstruction, settings: ReconstructionSettings) -
         if model.compute_mean_reprojection_error() < settings.reprojection_px:
             return
         pycolmap.ObservationManager(model).filter_all_points3D(cut_px, MIN_ANGLE_DEG)
-        options = pycolmap.BundleAdjustmentOptions()
-        options.print_summary = False
-        options.refine_focal_length = options.refine_extra_params = settings.refine_camera
-        options.ceres.solver_options.max_num_iterations = BUNDLE_ITERATIONS
-        options.ceres.solver_options.num_threads = settings.threads
-        options.ceres.min_num_residuals_for_cpu_multi_threading = NEVER
-        with no_stderr():  # it announces itself whatever the level of logging
-            call(partial(pycolmap.bundle_adjustment, model, options), "bundle adjustment")
+        bundle_adjustment(
+            model, refine_intrinsics=settings.refine_camera, threads=settings.threads, iterations=BUNDLE_ITERATIONS
+        )
         model.update_point_3d_errors()
 
 

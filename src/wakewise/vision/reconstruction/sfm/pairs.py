@@ -1,10 +1,8 @@
-"""Which photos are worth matching: all, those next to each other in order of name, or those whose cameras are near.
+"""Which photos are matched: all pairs, neighbours by name, neighbours by pose, or similar ones by image retrieval.
 
-Which photographs look alike, by their features: whom to match where there are too many to match all with all.
-
-Each photograph becomes one vector: its descriptors' differences from a few typical ones, summed (H. Jegou et al.,
-Aggregating local descriptors into a compact image representation, CVPR 2010, doi 10.1109/CVPR.2010.5540039), evened out
-word by word (R. Arandjelovic and A. Zisserman, All about VLAD, CVPR 2013, doi 10.1109/CVPR.2013.207).
+Image retrieval: the residuals of a photo's descriptors from a few cluster centres, summed to one vector (VLAD: H. Jegou
+et al., CVPR 2010, doi 10.1109/CVPR.2010.5540039), normalised by centre (R. Arandjelovic and A. Zisserman, All about
+VLAD, CVPR 2013, doi 10.1109/CVPR.2013.207).
 """
 
 from __future__ import annotations

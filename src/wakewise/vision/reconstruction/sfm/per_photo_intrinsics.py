@@ -1,8 +1,8 @@
-"""Whether photographs that are taken to share a lens do: each is given a lens of its own, and their focal lengths told.
+"""Intrinsics of each photo by itself: whether photos that seem to share a lens do.
 
-Mapped with one lens, photographs of two of them give a model that looks sound and is bent. Mapped with a lens for each,
-they show two heaps of focal lengths: real photographs of one underwater lens scattered by 1 %, a crop of a tenth moved
-half of them by 11 % (31 photographs of a coral). The second mapping takes a fiftieth of what matching takes.
+Photos of two lenses, mapped with one, give a bent model that looks sound. Mapped with intrinsics for each photo, their
+focal lengths form two clusters: real photos of one underwater lens scattered by 1 %, a crop of a tenth moved half of
+them by 11 % (31 photos of a coral). The second mapping takes a fiftieth of the time of matching.
 """
 
 from __future__ import annotations

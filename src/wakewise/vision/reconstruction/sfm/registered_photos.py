@@ -1,4 +1,4 @@
-"""Posed photographs as stereo needs them: intrinsics, pose, what each looks at, and who its neighbours are."""
+"""Registered photos for the dense stages: intrinsics, pose, depth range, region, and stereo partners."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from wakewise.vision.reconstruction import ReconstructionSettings, read_photos
 from wakewise.vision.reconstruction.sfm.features import match_photos
 from wakewise.vision.reconstruction.sfm.mapping import MAPPINGS, map_photos
 from wakewise.vision.reconstruction.sfm.pairs import choose_pairs
-from wakewise.vision.reconstruction.sfm.prior_pose_mapping import map_from_poses
+from wakewise.vision.reconstruction.sfm.pose_mapping import map_from_poses
 
 SETTINGS = ReconstructionSettings(detector="opencv", max_features=1000, first_octave=0)
 
