@@ -12,7 +12,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from wakewise.simulation.lattice import CASES, find_case, meanfield
+from wakewise.simulation.lattice import meanfield
 from wakewise.ui.cli.console import ProgressBars
 from wakewise_paper.lattice_reference.crossing_jets import DATA, crossing_field, is_crossing, save_crossing
 from wakewise_paper.lattice_reference.jet_past_box import is_past_box, past_field, save_past_box
@@ -23,6 +23,7 @@ from wakewise_paper.lattice_reference.mean_field import (
     convergence,
     save_mean_field,
 )
+from wakewise_paper.lattice_reference.reference_cases import CASES, find_case
 
 
 def main() -> None:

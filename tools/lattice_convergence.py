@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.core.errors import WakewiseError
-from wakewise.simulation.lattice import CASES, find_case
 from wakewise.ui.cli.console import ProgressBars
 from wakewise_paper.lattice_reference.crossing_jets import crossing_figures, is_crossing
 from wakewise_paper.lattice_reference.engines import DEVICES
 from wakewise_paper.lattice_reference.mean_field import compute_run, figures, mean_field
+from wakewise_paper.lattice_reference.reference_cases import CASES, find_case
 from wakewise_paper.lattice_reference.run import LatticeRun
 
 

@@ -309,8 +309,7 @@ def global_minimum(
     - `budget`: most boxes to look at.
     - Shapes: `G` (2 n, 2 n); `lower`, `upper`, `previous` (n,); `weights` (3,).
 
-    Returns the gap is absolute, in the units of the cost: no thrusts of this wrench cost less than the result's cost -
-    gap.
+    The gap is absolute, in the units of the cost.
     """
     n, k = null.shape
     best, value = starts[0].copy(), np.inf

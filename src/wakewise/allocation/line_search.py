@@ -125,18 +125,18 @@ def _bound(
     left_ok, right_ok = abs(left[2]) < _STEEP, abs(right[2]) < _STEEP
     if not left_ok and not right_ok:
         return 0.5 * (a + b), -np.inf
-    meet = 0.5 * (a + b)
+    crossing = 0.5 * (a + b)
     if left_ok and right_ok and right[2] - left[2] > 1e-14 * (abs(left[2]) + abs(right[2])):
-        meet = (left[1] - left[2] * a - right[1] + right[2] * b) / (right[2] - left[2])
-        meet = min(max(meet, a), b)
+        crossing = (left[1] - left[2] * a - right[1] + right[2] * b) / (right[2] - left[2])
+        crossing = min(max(crossing, a), b)
     elif left_ok != right_ok:
-        meet = b if left_ok else a
+        crossing = b if left_ok else a
     t_best, best = a, np.inf
-    if left_ok and meet > a:
-        t, value = _lowest(slope + left[2], square, a, meet)
+    if left_ok and crossing > a:
+        t, value = _lowest(slope + left[2], square, a, crossing)
         t_best, best = t, value + offset + left[1] - left[2] * a
-    if right_ok and meet < b:
-        t, value = _lowest(slope + right[2], square, meet, b)
+    if right_ok and crossing < b:
+        t, value = _lowest(slope + right[2], square, crossing, b)
         value += offset + right[1] - right[2] * b
         if value < best:
             t_best, best = t, value

@@ -38,31 +38,30 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.jit.njit import njit
 
 KEPT = 0.95
-"""Share of the extra power of a whole flight that the bound of a step hands out: with a bound of 1.3 two flights cost
-1.307 and 1.299 times the energy of `dp`."""
+"""Share of the extra power of a flight that the bound of a step allows: with 1.3 two flights cost 1.307 and 1.299
+times the energy of `dp`."""
 CALM, TROUBLE = 1.0 + KEPT * 0.05, 1.0 + KEPT * 0.3
-"""Most power over that of the least thrusts, where these leave the target's water calm, and where they do not."""
+"""beta where the least thrusts leave the target's water calm, and where they do not."""
 CALM_M_S, TROUBLE_M_S, MOST_M_S = 0.005, 0.010, 0.025
 MOST = 1.5
-"""The least bound that costs no wash: 1.7, about what the gentlest thrusts of a heavy vehicle need, left 33 % of `dp`'s
-in 18 flights in trouble for 1.28 times its energy, 1.5 leaves 32 for 1.27, 1.4 leaves 34 for 1.25
-(docs/research-log/0079)."""
+"""Least bound without more wash. Share of `dp`'s wash and energy over `dp`'s, 18 flights in trouble: 1.7: 33 %, 1.28;
+1.5: 32 %, 1.27; 1.4: 34 %, 1.25 (docs/research-log/0079)."""
 MODEL_BIAS = 2.6
-"""How many times too fast the wake model has the target's water under the least thrusts: twice in the median of 14
-flights in trouble (1 to 3.7), 3.2 times in 35 calm ones. With 2.6 all but one of the first lie above `TROUBLE_M_S` and
-all but one of the others below (docs/research-log/0078)."""
+"""Modelled over true speed at the target under the least thrusts: median 2 in 14 flights in trouble (1 to 3.7), 3.2 in
+35 calm ones. With 2.6 all but one of the first lie above `TROUBLE_M_S` and all but one of the others below
+(docs/research-log/0078)."""
 _PARTS = 3
-"""Most parts of the null space gone along by themselves; what a layout has beyond goes with the last of them."""
+"""Most blocks of the null space scaled by themselves; further ones are scaled with the last."""
 _STEPS = {0: 1, 1: 32, 2: 16, 3: 8}
-"""Steps on the way along each part, by the number of parts."""
+"""Grid steps along each block, by the number of blocks."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PowerLaw:
     """Electrical power of thrusters: `forward`, `reverse`, shape (n,), in W/N^1.5, and their least thrusts in N.
 
-    Below a least thrust a thruster is run at it for a part of the time, so there power goes with |T|. `standing_W` is
-    reckoned beside that of the thrusters where shares are held against each other.
+    Below a least thrust a thruster is pulsed at it, so power is linear in |T|. `standing_W` is added where thrusts are
+    compared.
     """
 
     forward: Array
@@ -75,7 +74,7 @@ class PowerLaw:
         freeze(self, forward=(None,), reverse=(None,))
 
     def power_W(self, thrusts_N: Array) -> Array:
-        """Sum over thrusters, shape (...), for thrusts of shape (..., n); nothing of what stands beside."""
+        """Sum over thrusters, shape (...), for thrusts of shape (..., n); without `standing_W`."""
         T = np.array(thrusts_N, dtype=np.float64)
         rows = T.reshape(-1, T.shape[-1])
         power = _power_of(rows, self.forward, self.reverse, self.least_forward_N, self.least_reverse_N)
@@ -129,7 +128,7 @@ def _best_by_power(
 
 
 def power_adjusted_cost(cost_: float, power_W: float, calm: float) -> float:
-    """What shares are compared by: cost over what is calm times power with what stands beside; less is better."""
+    """(cost + calm) times power, including `standing_W`; less is better."""
     return (cost_ + calm) * power_W
 
 
@@ -144,7 +143,7 @@ def best_by_power(
     weights: Weights,
     previous_N: Array | None = None,
 ) -> Allocation:
-    """Of what lies between the least thrusts and the gentlest found: the shares that are worth their power most.
+    """Thrusts between the least ones and those of least disturbance, with the least power-adjusted cost.
 
     - `least_N`, shape (n,): thrusts of the same wrench; where they alone need more than `most_W`, they are the answer.
     - `most_W`: bound on the thrusters' power.
@@ -152,7 +151,7 @@ def best_by_power(
     - `previous_N`, shape (n,): as `min_wash_allocation`.
     - Shapes: `gram` (2 n, 2 n).
 
-    With the gap of `found`, which is that of the minimum of cost alone.
+    The gap is that of `found`, of the minimum of the cost alone.
     """
     G, base = np.array(gram), np.array(least_N, dtype=np.float64)
     previous = np.zeros(len(base)) if previous_N is None else np.array(previous_N, dtype=np.float64)
@@ -169,7 +168,7 @@ def best_by_power(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PowerBoundedAllocator:
-    """Gentle thrusts for a wrench within the bound on their power, if there is a power law."""
+    """Allocation of least disturbance within the power bound, if there is a power law."""
 
     layout: Layout
     law: PowerLaw | None = None
@@ -178,27 +177,27 @@ class PowerBoundedAllocator:
         self,
         wrench_B: Array,
         gram: Array,
-        sent: Array,
+        actual: Array,
         weights: Weights,
         total_weight: float,
         previous_N: Array | None = None,
     ) -> Allocation:
         """Thrusts of least cost; arguments as for `min_wash_allocation`, `total_weight` that of the points behind D.
 
-        Thrusts are chosen by `gram`; the bound asks by `sent`, shape (2 n, 2 n), what the least thrusts do as sent.
+        `gram` is that of the cost; `actual`, shape (2 n, 2 n), gives v0 of the bound.
         """
         found = min_wash_allocation(self.layout, wrench_B, gram, weights, previous_N)
         if self.law is None:
             return found
         least_N, _ = largest_feasible_share(self.layout, self.layout.inverse @ wrench_B)
-        speed_m_s = math.sqrt(max(disturbance_of(sent, least_N), 0.0) / total_weight) / MODEL_BIAS
+        speed_m_s = math.sqrt(max(disturbance_of(actual, least_N), 0.0) / total_weight) / MODEL_BIAS
         share = power_limit(speed_m_s)
         most_W = share * float(self.law.power_W(least_N)) + (share - CALM) * self.law.standing_W
         calm = _calm(weights, total_weight)
         return best_by_power(self.layout, found, least_N, self.law, most_W, calm, gram, weights, previous_N)
 
     def adjusted_cost(self, cost: float, thrusts_N: Array, weights: Weights, total_weight: float) -> float:
-        """What thrusts of one wrench, shape (n,), are compared by; the cost alone if no power law is known."""
+        """Power-adjusted cost of thrusts, shape (n,); the cost alone without a power law."""
         if self.law is None:
             return cost
         drawn_W = float(self.law.power_W(thrusts_N)) + self.law.standing_W
@@ -206,7 +205,7 @@ class PowerBoundedAllocator:
 
 
 def power_limit(speed_m_s: float) -> float:
-    """Most power over that of the least thrusts, if these leave a mean speed at the target."""
+    """Beta of a mean speed v0 at the target."""
     return float(np.interp(speed_m_s, (CALM_M_S, TROUBLE_M_S, MOST_M_S), (CALM, TROUBLE, MOST)))
 
 

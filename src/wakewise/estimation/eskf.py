@@ -70,10 +70,6 @@ class FilterState:
         )
 
     @property
-    def unmodelled_force_W_N(self) -> Array:
-        """Unmodelled force at rest in the world, shape (3,), including the drag of the current."""
-        return self.mean[13:16]
-
     @property
     def gyro_bias_rad_s(self) -> Array:
         """Estimated bias of the gyro, shape (3,)."""

@@ -1,1 +1,1 @@
-"""Scene: targets (`targets/`), missions and coverage (`missions/`)."""
+"""Scene: targets that must stay undisturbed (`targets/`), missions and photographic coverage (`missions/`)."""

@@ -1,4 +1,4 @@
-"""Simulation: the truth. Water (`water/`), lattice Boltzmann reference (`lattice/`), the tank (`tank/`).
+"""Simulation of the world: water (`water/`), lattice Boltzmann reference (`lattice/`), tank with vehicle (`tank/`).
 
-It never imports wake, planning or control.
+It never imports `wake`, `planning` or `control`.
 """

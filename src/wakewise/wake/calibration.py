@@ -383,7 +383,7 @@ class MomentumLaw:
     """Momentum flux over thrust: `measured`, of a Gaussian jet through all points, and `fitted`, of the fitted model.
 
     Both are medians over the planes in which points lie, from `nearest_m` to `farthest_m`. `measured` is None where no
-    point lies off the axis, so that the flux cannot be told.
+    point lies off the axis, so that the flux cannot be determined.
     """
 
     measured: float | None
@@ -428,8 +428,8 @@ def momentum_law(samples: JetSamples, model: AxialJet) -> MomentumLaw:
     area = samples.disk_area_m2
     gaussian = family("jet-fitted")
     values, held = calibrated_values(gaussian, samples)
-    told = not any(p.shapes == "angle" and p.name in held for p in gaussian.parameters)
-    measured = float(np.median(flux_over_thrust(gaussian.model(values), planes, area))) if told else None
+    reported = not any(p.shapes == "angle" and p.name in held for p in gaussian.parameters)
+    measured = float(np.median(flux_over_thrust(gaussian.model(values), planes, area))) if reported else None
     if measured is not None and not POSSIBLE[0] <= measured <= POSSIBLE[1]:
         raise InputError(
             f"{samples.title}: units? the points' momentum flux in water is {measured:.2g} times the thrust, a jet has "

@@ -124,8 +124,8 @@ def read_point_table(path: Path) -> PointTable:
         dropped["exactly 0, as programs write masked ones,"] += int(still.sum())
         named, lines = _kept(named, ~still), [line for line, out in zip(lines, still, strict=True) if not out]
     if not lines:
-        told = ", ".join(f"{count} {reason}" for reason, count in dropped.items() if count)
-        raise InputError(f"{path}: no velocity is left: {told or 'there are no rows'}")
+        reported = ", ".join(f"{count} {reason}" for reason, count in dropped.items() if count)
+        raise InputError(f"{path}: no velocity is left: {reported or 'there are no rows'}")
     return PointTable(
         columns=named,
         lines=np.array(lines),
@@ -244,8 +244,10 @@ def _column(path: Path, label: str, of_a_program: bool) -> _Column:
             f"{path}: column '{label}' is in pixels; calibrate it where it was made, needed is one of {_SPOKEN[kind]}"
         )
     if unit not in _UNITS[kind]:
-        told = f"has the unit '{unit}'" if unit else "says no unit"
-        raise InputError(f"{path}: column '{label}' {told}, needs one of {_SPOKEN[kind]} in brackets behind its name")
+        reported = f"has the unit '{unit}'" if unit else "says no unit"
+        raise InputError(
+            f"{path}: column '{label}' {reported}, needs one of {_SPOKEN[kind]} in brackets behind its name"
+        )
     return _Column(label, holds, _UNITS[kind][unit])
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.simulation.lattice import LatticeFlow, MeanField, case_hash, find_case, load_mean_field
+from wakewise.simulation.lattice import SHIPPED_CASES, LatticeFlow, MeanField, case_hash, load_mean_field
 from wakewise.simulation.lattice.meanfield import read_mean_field
 from wakewise_paper.lattice_reference.engines import around_axis
 from wakewise_paper.lattice_reference.mean_field import save_mean_field
@@ -30,7 +30,7 @@ def _table(**changes):
         "radial_rms": 0.1 * shape,
         "swirl_rms": 0.1 * shape,
     }
-    words = {"case": "free", "hash": case_hash(find_case("free")), "cells_per_D": 10}
+    words = {"case": "free", "hash": case_hash(SHIPPED_CASES["free"]), "cells_per_D": 10}
     times = {"axis_times": np.arange(3.0), "axis_speeds": np.zeros((3, len(x)))}
     return MeanField(**{**words, **fields, **times, "x_D": x, "r_D": r, "figures": {"a": 1.0}, **changes})
 
@@ -100,7 +100,7 @@ def test_missing_or_broken_files_are_refused_in_one_line(tmp_path):
 
 def test_hash_changes_with_everything_that_decides_the_flow():
     """Another grid, another constant or another jet is another case."""
-    case = find_case("free")
+    case = SHIPPED_CASES["free"]
     others = [case.resolved(8), replace(case, smagorinsky=0.1), replace(case, jets=case.jets * 2)]
     assert len({case_hash(c) for c in [case, *others]}) == 4
 
@@ -109,7 +109,7 @@ def test_hash_changes_with_everything_that_decides_the_flow():
 def test_shipped_tables_load(name):
     """The tables in the package are those of the cases as they are."""
     table = load_mean_field(name)
-    assert table.cells_per_D == find_case(name).cells_per_D
+    assert table.cells_per_D == SHIPPED_CASES[name].cells_per_D
     assert np.abs(table.axial).max() < 2
 
 

@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 
 from wakewise.scene.targets import Mesh, Target, coral, place_on_bed
-from wakewise.simulation.lattice import find_case
 from wakewise.simulation.water.blockage import Blockage, _surface
 from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.simulation.water.water import Water
 from wakewise_paper.lattice_reference.jet_past_box import load_past_box, momentum, past_figures
+from wakewise_paper.lattice_reference.reference_cases import find_case
 
 D_M = 0.06
 AREA_M2 = math.pi * D_M**2 / 4

@@ -21,7 +21,6 @@ from bodies_in_jets import (
 )
 
 from wakewise.scene.targets import Mesh, coral, place_on_bed
-from wakewise.simulation.lattice import find_case
 from wakewise.simulation.tank.grains import friction_velocity_m_s
 from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M
 from wakewise.simulation.tank.validation_limits import ABSENT, LIMITS, limits_table
@@ -29,6 +28,7 @@ from wakewise.simulation.water.blockage import Blockage, _surface
 from wakewise.simulation.water.hullwake import HullPush, first_wake
 from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise_paper.lattice_reference.crossing_jets import DATA, crossing_place, load_crossing
+from wakewise_paper.lattice_reference.reference_cases import find_case
 
 Span = tuple[float, float]
 MEASURES: dict[str, Callable[[], Span]] = {}

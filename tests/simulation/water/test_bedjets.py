@@ -5,15 +5,8 @@ import math
 import numpy as np
 import pytest
 from scipy.special import erf, i0, i1
-
-from wakewise.simulation.water import induction
-from wakewise.simulation.water.bedjets import (
-    LOG_WIDTH,
-    WALL_JET_SPEED,
-    WALL_JET_SPREAD,
-    WallJetRings,
+from wall_jet_reference import (
     grown,
-    layer_speed,
     merged_rings,
     packed_rings,
     planes_velocity,
@@ -21,6 +14,9 @@ from wakewise.simulation.water.bedjets import (
     ring_velocity,
     rings_from_strikes,
 )
+
+from wakewise.simulation.water import induction
+from wakewise.simulation.water.bedjets import LOG_WIDTH, WALL_JET_SPEED, WALL_JET_SPREAD, WallJetRings, layer_speed
 from wakewise.simulation.water.bedjets_sums import HIGHEST, REACH, leaning, log_i0, log_overlap
 
 BED_Z_M = 1.5

@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.simulation.lattice import find_case, load_mean_field
+from wakewise.simulation.lattice import load_mean_field
 from wakewise.simulation.water.colliding_jets import RAYS, ray_azimuths, spread_crossing_jets
 from wakewise.simulation.water.parcels import Parcels
 from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.simulation.water.water import Water
 from wakewise_paper.lattice_reference.crossing_jets import DATA, crossing_place, load_crossing
+from wakewise_paper.lattice_reference.reference_cases import find_case
 
 D_M = 0.06
 AREA_M2 = math.pi * D_M**2 / 4

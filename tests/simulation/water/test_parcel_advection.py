@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from round_jet_reference import across_row_m_s, bent_spread, carried_share, share_left, travel
 
 from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.parcel_advection import (
@@ -17,17 +18,7 @@ from wakewise.simulation.water.parcel_advection import (
     slugs,
 )
 from wakewise.simulation.water.parcels import Parcels
-from wakewise.simulation.water.round_jet_closure import (
-    PLAIN,
-    PUFF_SPREAD,
-    SWIRLING,
-    across_row_m_s,
-    bent_spread,
-    carried_share,
-    disk_share,
-    share_left,
-    travel,
-)
+from wakewise.simulation.water.round_jet_closure import PLAIN, PUFF_SPREAD, SWIRLING, disk_share
 
 
 def _parcels(rng, n=200):

@@ -4,18 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from round_jet_reference import lasting_spread, travel, wake_sigma_m
 
 from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.parcel_advection import advect_parcels
-from wakewise.simulation.water.round_jet_closure import (
-    CORE_END_D,
-    PLAIN,
-    SWIRLING,
-    JetSpreading,
-    lasting_spread,
-    travel,
-    wake_sigma_m,
-)
+from wakewise.simulation.water.round_jet_closure import CORE_END_D, PLAIN, SWIRLING, JetSpreading
 from wakewise.simulation.water.water import Water
 
 D_M = 0.06

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from wall_jet_reference import planes_velocity
 
-from wakewise.simulation.water.bedjets import RingBuffers, planes_velocity
+from wakewise.simulation.water.bedjets import RingBuffers
 from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.induction import impulse_velocity
 from wakewise.simulation.water.water import Water, _with_room

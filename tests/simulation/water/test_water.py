@@ -9,12 +9,12 @@ import math
 
 import numpy as np
 import pytest
+from round_jet_reference import travel
 
 from wakewise.simulation.tank.grains import friction_velocity_m_s
 from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M
 from wakewise.simulation.water import induction
 from wakewise.simulation.water.parcels import Parcels, merged
-from wakewise.simulation.water.round_jet_closure import travel
 from wakewise.simulation.water.water import Water
 
 D_M = 0.06

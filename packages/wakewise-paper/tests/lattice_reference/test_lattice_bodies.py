@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.simulation.lattice import DiskJet, LatticeCase, case_hash, find_case
+from wakewise.simulation.lattice import DiskJet, LatticeCase, case_hash
 from wakewise.simulation.lattice.stencil import OPPOSITE, VELOCITIES, WALL, WEIGHTS, box, still_water
 from wakewise_paper.lattice_reference.engines import BounceBackLinks, make_engine, solid_cells
+from wakewise_paper.lattice_reference.reference_cases import find_case
 from wakewise_paper.lattice_reference.run import Disk, LatticeRun
 
 BESIDE = LatticeCase(

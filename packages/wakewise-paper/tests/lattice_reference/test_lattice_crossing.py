@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.simulation.lattice import find_case
 from wakewise_paper.lattice_reference.crossing_jets import (
     DATA,
     crossing_field,
@@ -15,6 +14,7 @@ from wakewise_paper.lattice_reference.crossing_jets import (
     load_crossing,
     save_crossing,
 )
+from wakewise_paper.lattice_reference.reference_cases import find_case
 from wakewise_paper.lattice_reference.run import LatticeRun
 
 SHIPPED = ("crossing", "crossing-40", "crossing-110")

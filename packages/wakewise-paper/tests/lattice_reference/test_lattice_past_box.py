@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.simulation.lattice import find_case, load_mean_field
+from wakewise.simulation.lattice import load_mean_field
 from wakewise_paper.lattice_reference.jet_past_box import load_past_box, past_field, past_figures, save_past_box
+from wakewise_paper.lattice_reference.reference_cases import find_case
 from wakewise_paper.lattice_reference.run import LatticeRun
 
 SHIPPED = ("past-box", "grazing-box", "grazing-target")

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.simulation.lattice import DiskJet, LatticeCase, case_hash, find_case
+from wakewise.simulation.lattice import DiskJet, LatticeCase, case_hash
 from wakewise_paper.lattice_reference.crossing_jets import crossing_figures
 from wakewise_paper.lattice_reference.mean_field import compute_mean_field, compute_run, momentum_flux
+from wakewise_paper.lattice_reference.reference_cases import find_case
 from wakewise_paper.lattice_reference.run import Disk, LatticeRun
 
 SMALL = LatticeCase(

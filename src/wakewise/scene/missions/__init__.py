@@ -1,10 +1,10 @@
-"""What to look at, from where, in what order and when: viewpoints, layered orbits, timed routes.
+"""Missions: viewpoints, orbits, timed routes, camera aim, and coverage of a target by photographs.
 
-Start reading in `route.py` (legs, shutter, the pilot that follows them) and `orbit.py` (viewpoints on layered
-hemispheres), `orbit.py` (which of them is the first); `aim.py` is what points the camera there (pitch, tilt joint or
-both), `clearance.py` refuses what would touch and tilts that the joint cannot follow, `orbit.py` is what a user may
-say. `coverage.py` says what of the target photographs have seen well (`visibility.py`, `visibility.py`) and where
-to go next (`reachability.py`), `coverage.py` why a part was not seen.
+- `orbit.py`: settings of a mission; viewpoints on hemispheres, and where each orbit starts.
+- `route.py`: timed routes with shutter instants, and the pilot that follows them.
+- `aim.py`: camera aim by pitch, tilt joint or both. `clearance.py`: collisions and tilts that the joint cannot follow.
+- `coverage.py`: coverage of the target by photographs and its gaps; `visibility.py`: what one photograph shows well;
+  `reachability.py`: next views that the hull can reach.
 """
 
 from wakewise.scene.missions.aim import CameraAim, aim_of

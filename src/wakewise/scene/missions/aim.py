@@ -1,4 +1,4 @@
-"""How a mission aims its camera: by the pitch of the whole vehicle, by the camera's tilt joint, or by both."""
+"""Camera aim of a mission: by the pitch of the vehicle, by the camera's tilt joint, or by both."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class CameraAim:
     def tilt(self, pitch_rad: float, pitch_rate_rad_s: float = 0.0) -> tuple[float, float]:
         """Tilt, and its rate in rad/s, of a camera that is to look at a pitch above the horizon; zeros without a joint.
 
-        On an upright body, as far as the stops let it.
+        On an upright body, within the stops.
         """
         if self.joint is None:
             return 0.0, 0.0
@@ -37,7 +37,7 @@ class CameraAim:
         return tilt, pitch_rate_rad_s if tilt == reference else 0.0
 
     def level_tilt(self, pitch_rad: float) -> float:
-        """Tilt with which the camera of a level body looks at a pitch above the horizon, stops or no stops."""
+        """Tilt with which the camera of a level body looks at a pitch above the horizon, without stops."""
         return pitch_rad - self._mounted_at_rad
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Whether the vehicle can fly a route without touching floor, walls, surface or target, and its camera can follow."""
+"""Clearance of a route: collisions with floor, walls, surface and target, and rates of the camera's joint."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def check_clearance(
     - `aim`: what the camera is aimed with, or its fixed mount.
     - `size_m`, shape (3,): length, width and height of the hull.
     - `target_W_m`, shape (n, 3): points of the target, dense enough to stand for it (its mesh's vertices).
-    - `clearance_m`: what is asked for.
+    - `clearance_m`: required clearance.
 
     Raises InputError: naming the field of the mission to change, the leg, what it would touch and by how much.
     """

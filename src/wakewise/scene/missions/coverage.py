@@ -1,11 +1,8 @@
-"""The coverage guide: which parts of a target photographs have seen well enough to be in the model.
+"""Coverage of a target: parts of its surface that photographs show well enough for reconstruction; reasons for gaps.
 
-A place on the surface is seen well when three photographs show it well (`sight.py`), one of which makes a stereo pair
-with each of the other two. That is what our dense stage needs of it: a depth from one pair, and another pair that
-agrees (`agreeing_views` 2; COLMAP's fusion has the same 2 in `filter_min_num_consistent`). What is kept of a
-photograph is its place and which samples it shows well.
-
-Why parts of a target were not seen well: what no photograph can show, and what photographs showed too poorly.
+A place is covered when three photographs show it well (`visibility`), one of which makes a stereo pair with each of the
+other two. The dense stage needs one depth map and one that agrees (`agreeing_views` 2; COLMAP's fusion has the same 2
+in `filter_min_num_consistent`). Of each photograph its pose and the samples that it shows well are kept.
 """
 
 from __future__ import annotations
@@ -168,7 +165,7 @@ class Coverage:
         return None if best is None else self.views.pose(best)
 
     def words(self, X_WC: Pose) -> str:
-        """The way to the next view, as it is said to a person who looks at the target from here."""
+        """Directions to the next view, in words for an operator at this pose."""
         view = self.next_view(X_WC)
         if view is None:
             return f"{100.0 * self.share:.0f} % is seen well, nothing within reach adds to it"

@@ -1,4 +1,4 @@
-"""From where a vehicle could photograph next: views on spheres about the target that its hull can be at."""
+"""Next views: poses on spheres about the target from which the vehicle can photograph without collision."""
 
 from __future__ import annotations
 

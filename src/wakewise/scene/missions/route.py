@@ -1,4 +1,4 @@
-"""When to be where: legs joined into a timed route, with the instants at which the shutter opens."""
+"""Timed routes: legs joined with limits of speed and acceleration, and the instants of the shutter."""
 
 from __future__ import annotations
 
@@ -143,15 +143,14 @@ class Route:
         return aim.tilt(-elevation, -elevation_rate)
 
     def body(self, time_s: float, aim: CameraAim | Pose) -> BodyState:
-        """Wished pose and twist of a body that aims its camera so, or carries it at a fixed mount X_BC."""
+        """Reference pose and twist of a body with this camera aim, or with a fixed mount X_BC."""
         X_WB, nu_B, _ = self.reference(time_s, CameraAim(X_BC=aim) if isinstance(aim, Pose) else aim)
         return BodyState(X_WB=X_WB, nu_B=nu_B)
 
     def reference(self, time_s: float, aim: CameraAim) -> tuple[Pose, Array, float]:
         """Wished pose of a body, its twist, shape (6,), and the angle of the camera's joint.
 
-        As `camera` and `tilt` say, which other routes may have their own of; in plain numbers, since control asks this
-        in each of its steps.
+        As `camera` and `tilt`, in plain numbers, because each control step calls it.
         """
         X_WC, v_WC, omega_W = self.camera(time_s)
         tilt, tilt_rate = self.tilt(time_s, aim)
@@ -260,8 +259,9 @@ class RoutePilot:
     aim: CameraAim | Pose
     max_tracking_deviation: float | None = None
 
-    def goal(self, time_s: float, estimate: BodyState) -> Goal:  # noqa: ARG002  (a clock needs no estimate)
-        """Wished body pose and twist now, and angle of the camera's joint."""
+    def goal(self, time_s: float, estimate: BodyState) -> Goal:
+        """Reference pose and twist of the body, and angle of the camera's joint; by the clock alone."""
+        del estimate
         X_WB, nu_B, tilt = self.route.reference(time_s, self._aim)
         return Goal(X_WB=X_WB, nu_B=nu_B, tilt_rad=tilt, max_tracking_deviation=self.max_tracking_deviation)
 

@@ -1,9 +1,7 @@
-"""What of a surface a photograph shows well enough to be reconstructed: in the picture, near, square on, not hidden.
+"""Visibility of a surface in a photograph: inside the picture, near, at a small angle, not hidden (depth buffer).
 
-A target's surface in patches, each held by a few samples: what a coverage guide keeps account of.
-
-The surface is the one that the crew believes in, where it is believed to be: the target that mission and controller
-are given, or a model that photographs have made so far. Nothing true is asked for.
+The surface is divided into patches with a few samples each. It is the surface at its estimated place: the target of
+mission and controller, or a model reconstructed so far. Ground truth is not used.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""What must stay undisturbed: meshes from files, procedural corals, a target on the bed, the region round it.
+"""Targets that must stay undisturbed: meshes, procedural corals, the region of water round them, what is delicate.
 
-Delicate features are found from the mesh or marked by a person, and may count more in the region than the rest.
-
-Start reading in `target.py` (a mesh on its bed), `target.py` (a target by name) and `region.py` (points that stand for
-its water). `corals.py` and `corals.py` with `fields.py` grow corals, `mesh.py` reads files, `region.py` spreads points,
-`distance.py` and `rays.py` measure, `fragility.py` and `fragility.py` say what is delicate. `elasticity.py` with
-`elasticity.py` says how a soft one bends, `elasticity.py` what it is made of.
+- `target.py`: a target by name, and a mesh on its bed. `mesh.py`: triangle meshes and their files.
+- `region.py`: weighted sample points of the region (quadrature of the disturbance).
+- `corals.py`: procedural corals and soft targets, from signed distance fields (`fields.py`).
+- `fragility.py`: delicate features, found from the mesh or marked by a person.
+- `elasticity.py`: bending of soft targets and their materials.
+- `distance.py`: exact distance to a mesh; `rays.py`: first face on a ray.
 """
 
 from wakewise.scene.targets.corals import coral, coral_kinds, soft_kinds, stony_kinds

@@ -1,9 +1,7 @@
-"""Procedural corals: branching, brain and plate, which are stony; the soft targets are in `soft.py`.
+"""Procedural targets: branching, brain and plate corals (stony); gorgonian, soft coral, anemone, seagrass (soft).
 
-Each is a closed mesh in a local frame with z up, in metres, 15 cm in its largest dimension above z = 0, and reaches a
-little below z = 0 so that no gap opens where it stands on the bed. The same kind and seed give the same bytes.
-
-Procedural soft targets: gorgonian, soft coral, anemone and seagrass, in a local frame with z up, in metres.
+Each is a closed mesh in a local frame with z up, in metres, 15 cm in its largest dimension above z = 0, and reaches
+below z = 0 so that no gap opens on the bed. The same kind and seed give the same bytes.
 """
 
 from __future__ import annotations

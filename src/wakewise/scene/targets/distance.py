@@ -1,4 +1,4 @@
-"""Exact distance from points to a triangle mesh: a bounding-box tree and the closest point of a triangle."""
+"""Exact distance from points to a triangle mesh, by a bounding-box tree."""
 
 from __future__ import annotations
 

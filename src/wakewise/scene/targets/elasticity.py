@@ -1,34 +1,26 @@
-"""How a soft target bends: cantilevers that stand on the bed, each in the two shapes into which a stream bends it.
+"""Bending of soft targets: cantilevers with two modes each, section properties from the mesh, materials by name.
 
-Every piece of the mesh that stands on the bed by itself is a cantilever, a *stem*: a whole colony, or one blade of
-grass. Its stiffness against bending follows from Young's modulus and the level sections of the mesh, section by
-section; branches cut by one section bend side by side. Each stem has two modes, along the axes in which it is softest
-and stiffest, whose shape is that into which a uniform stream bends it, so that the static deflection in a stream is
-that of beam theory and the natural frequency (Rayleigh's quotient) is 0.4 % high for an even beam. The mass is that of
-the tissue and of the water that moves along.
+Every piece of the mesh that stands on the bed is a cantilever (*stem*): a colony or a blade of grass. Its bending
+stiffness follows from Young's modulus and the horizontal sections of the mesh; branches cut by one section bend side by
+side. Each stem has two modes, along its softest and stiffest axes, with the shape of static bending in a uniform
+stream: the deflection is that of beam theory, the natural frequency (Rayleigh's quotient) 0.4 % high for a uniform
+beam. The mass includes that of the water that moves along.
 
-Bending keeps the length of the axis: what moves aside comes down, and the stiffness grows with the slope, to the third
-order (M. R. M. Crespo da Silva and C. C. Glynn 1978, J. Struct. Mech. 6, 437). Sections stay level. That holds while a
-tip moves by about half of the height, `MAX_DEFLECTION_SHARE`; higher modes, torsion, and branches that swing apart are
-left out.
+The length of the axis is kept: a deflected tip comes down, and the stiffness grows with the slope to third order (M. R.
+M. Crespo da Silva and C. C. Glynn 1978, J. Struct. Mech. 6, 437). Sections stay horizontal. Valid up to a deflection of
+about half the height, `MAX_DEFLECTION_SHARE`. Not modelled: higher modes, torsion, branches that swing apart.
 
-Level sections of a closed surface: area, stiffness against bending, and the water that moves along with it.
+Materials. Measured moduli spread over a decade between species, seasons and rates, so each is one plausible individual;
+`target.stiffness_Pa` and others override it. Estimates are marked with their reasoning.
 
-What soft targets are made of, by name, and where each number comes from.
+Drag. Branches of 3 to 20 mm in 0.04 to 0.2 m/s have Reynolds numbers of 100 to 4000, where a circular cylinder has 1.0
+to 1.4 (D. J. Tritton 1959, J. Fluid Mech. 6, 547, doi 10.1017/S0022112059000829, up to 100; plateau of 1.0 to 1.2
+beyond): 1.2. Blades are flat plates across the stream: 1.95 (M. Luhar and H. M. Nepf 2011, Limnol. Oceanogr. 56, 2003,
+doi 10.4319/lo.2011.56.6.2003). Branches do not shelter each other, which overstates the drag of a dense bush.
 
-Measured moduli of such tissue spread over a decade between species, seasons and rates of loading, so each is one
-plausible individual; `target.stiffness_Pa` and its like give another. Where a source gives no number that fits the
-mesh, the number is an estimate, and its reasoning is stated.
-
-Drag. Branches of 3 to 20 mm in 0.04 to 0.2 m/s have Reynolds numbers of 100 to 4000, where the coefficient of a
-circular cylinder is 1.0 to 1.4 (D. J. Tritton 1959, J. Fluid Mech. 6, 547, doi 10.1017/S0022112059000829, up to 100;
-the plateau of 1.0 to 1.2 beyond is in every textbook): 1.2. Blades are flat plates across the stream: 1.95, as M. Luhar
-and H. M. Nepf 2011 use it for seagrass (Limnol. Oceanogr. 56, 2003, doi 10.4319/lo.2011.56.6.2003). Branches do not
-shelter each other here, which overstates the drag of a dense bush.
-
-Damping. In tension tests of four seaweeds 42 to 52 % of the work of loading was lost (D. L. Harder, C. L. Hurd and T.
-Speck 2006, Am. J. Bot. 93, 1426). A linear tissue that is loaded and let go loses pi / 2 tan(delta) of it, so
-tan(delta) is about 0.3 and the damping half of that, 0.15 of critical: by analogy for all kinds, an estimate.
+Damping. Four seaweeds lost 42 to 52 % of the work of loading (D. L. Harder, C. L. Hurd and T. Speck 2006, Am. J. Bot.
+93, 1426). A linear tissue loses pi / 2 tan(delta), so tan(delta) is 0.3 and the damping ratio half of that, 0.15: an
+estimate by analogy for all kinds.
 """
 
 from __future__ import annotations
@@ -160,7 +152,7 @@ MAX_DEFLECTION_SHARE = 0.5
 NODES = 48
 """Heights at which a stem is cut."""
 FOOT_M = 0.002
-"""What stands on the bed by itself is told apart this far above it."""
+"""Height above the bed at which separate pieces are counted."""
 LEAST_SHARE = 0.3
 """Pieces lower than this share of the highest are stumps that do not move."""
 _TIP_SHARE = 0.92  # a rounded tip has no stiffness at its very end: above this it keeps what it has here

@@ -1,6 +1,6 @@
-"""Signed distance fields on a regular grid, and the closed surface where they are zero.
+"""Signed distance fields on a regular grid, and their zero surface as a closed mesh.
 
-Every kernel writes each grid value from one thread, so the result is the same bytes on any number of threads.
+Each grid value is written by one thread, so the result does not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def zero_surface(grid: DistanceGrid) -> Mesh:
     n = len(vertices)
     edges = coo_array((np.ones(2 * len(faces), dtype=np.int8), (faces[:, :2].ravel(), faces[:, 1:].ravel())), (n, n))
     _, piece = connected_components(edges, directed=False)
-    # A cave that is cut off inside the solid is a piece of its own, and nobody can see it.
+    # A cave that is cut off inside the solid is a piece of its own and invisible.
     faces = faces[piece[faces[:, 0]] == np.argmax(np.bincount(piece))]
     used, faces = np.unique(faces, return_inverse=True)
     mesh = Mesh(vertices[used].astype(np.float64) + grid.origin_m, faces.reshape(-1, 3))

@@ -1,16 +1,13 @@
 """Delicate features of a target: thin parts, tips and sharp edges found from its mesh, or marked by a person.
 
-Two figures are measured at every vertex. The thickness is the diameter of the largest ball within the flesh that
-touches there, found by shrinking it (J. Ma, S. W. Bae and S. Choi, Vis. Comput. 28 (2012) 7, doi
-10.1007/s00371-011-0594-7) from what a ray straight inward allows. The curvature is the mean of the two principal ones,
-positive where the surface is convex, from the cotangent Laplacian (M. Meyer et al., Visualization and Mathematics III,
-2003, 35, doi 10.1007/978-3-662-05105-4_2), averaged over 3 mm so that roughness and the steps of a mesh are no tips.
+Thickness at a vertex is the diameter of the largest inscribed ball that touches there, by the shrinking-ball method (J.
+Ma, S. W. Bae and S. Choi, Vis. Comput. 28 (2012) 7, doi 10.1007/s00371-011-0594-7). Curvature is the mean curvature,
+positive where convex, from the cotangent Laplacian (M. Meyer et al., Visualization and Mathematics III, 2003, 35, doi
+10.1007/978-3-662-05105-4_2), averaged over 3 mm.
 
-A score runs from 0 (robust) to 1 (delicate): thin is linear between `THIN_M`, sharp is linear between `SHARP_PER_M`,
-and the score is 1 - (1 - thin)(1 - sharp), so that either suffices. These bounds are a choice, not biology: they tell
-the twigs and rims of a hand-sized coral from its trunk.
-
-Delicate features that a person marked: balls listed in a CSV file, or a property of a PLY file's vertices.
+The score runs from 0 (robust) to 1 (delicate): thin is linear between `THIN_M`, sharp is linear between `SHARP_PER_M`,
+score = 1 - (1 - thin)(1 - sharp). These bounds are a choice, not biology: they separate twigs and rims of a hand-sized
+coral from its trunk. Marks are balls in a CSV file, or a property of a PLY file's vertices.
 """
 
 from __future__ import annotations
@@ -37,7 +34,7 @@ SHARP_PER_M = (100.0, 300.0)
 SMOOTHED_OVER_M = 0.003
 MOST_STEPS = 1000
 FRAGILE_FROM = 0.5
-"""Score from which on a place is called delicate when shares of the surface are told."""
+"""Least score of a delicate place in reported shares of the surface."""
 ROUGH_RAD = np.deg2rad(60.0)
 SHRINKS = 20
 COARSE = 3000
@@ -136,7 +133,7 @@ def _shrink(radius: Array, vertices: Array, normals: Array, obstacles: Array) ->
 
 def _seen_through(mesh: Mesh, normals: Array, farthest_m: float) -> Array:
     """How far a ray straight inward from every vertex goes before it leaves the flesh, shape (n,)."""
-    # A ray must start just inside, or it would meet the faces of its own vertex.
+    # A ray must start just inside, or it would hit the faces of its own vertex.
     inside_m = 2e-5 * farthest_m
     face, length = Rays(mesh).first(mesh.vertices_m - inside_m * normals, -normals)
     leaves = (face >= 0) & (np.einsum("nk,nk->n", normals, mesh.area_vectors_m2[face]) < 0.0)

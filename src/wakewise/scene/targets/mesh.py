@@ -113,7 +113,7 @@ def load_mesh(path: Path | str, size_m: float | None = None) -> Mesh:
     base = np.array([0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]])
     vertices = (vertices - base) * (1.0 if size_m is None else size_m / extent)
     mesh = Mesh(vertices, faces)
-    # A scan open at the bottom still has a signed volume about its base plane, and it tells which side is out.
+    # A scan open at the bottom still has a signed volume about its base plane, whose sign gives the outside.
     return Mesh(vertices, faces[:, ::-1]) if mesh.volume_m3 < 0 else mesh
 
 

@@ -1,11 +1,10 @@
-"""The first face that a ray meets: a tree of boxes over a mesh, and a test of triangles that lets nothing through.
+"""Ray casting on a triangle mesh: bounding-box tree and a watertight ray-triangle test.
 
-Faces are halved again and again across the longest side of their box and held, a few each, by the leaves of a complete
-binary tree, whose node i has the children 2 i + 1 and 2 i + 2. The test is that of S. Woop, C. Benthin and I. Wald
-(Watertight Ray/Triangle Intersection, Journal of Computer Graphics Techniques 2 (2013) 65): faces that share an edge
-compute the very same number there, so that a ray that strikes an edge strikes one of them. All in double precision and
-one order, so that the answers are the same bytes on any number of threads. Photographs, which cast far more rays, take
-Embree's (see `wakewise.vision.imaging`).
+Faces are halved across the longest side of their box; the leaves of a complete binary tree hold a few each, node i has
+the children 2 i + 1 and 2 i + 2. The test is that of S. Woop, C. Benthin and I. Wald (Watertight Ray/Triangle
+Intersection, Journal of Computer Graphics Techniques 2 (2013) 65): faces that share an edge compute the same number
+there. Double precision in one order, so results do not depend on the number of threads. Photographs use Embree
+(`wakewise.vision.imaging`).
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ _NEVER = 1e-300
 class Rays:
     """Casts rays at one mesh.
 
-    `mesh`: in any frame; faces of no area are never met.
+    `mesh`: in any frame; faces of no area are never hit.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -41,11 +40,11 @@ class Rays:
         self._high = _joined(high[self._faces].max(axis=1) + spare, np.maximum)
 
     def first(self, starts_m: Array, directions: Array) -> tuple[IntArray, Array]:
-        """The first face that each ray meets, and how far off.
+        """First face on each ray, and its distance.
 
         `starts_m`, `directions`, shape (n, 3): in the mesh's frame; distances are in lengths of the direction. Returns
-        `face`, shape (n,): number of the face, the lowest of several at one distance; -1 where nothing is met. Returns
-        `distance`, shape (n,): greater than 0; infinite where nothing is met.
+        `face`, shape (n,): number of the face, the lowest of several at one distance; -1 where nothing is hit. Returns
+        `distance`, shape (n,): greater than 0; infinite where nothing is hit.
         """
         face = np.full(len(starts_m), -1, dtype=np.int64)
         distance = np.full(len(starts_m), np.inf)
@@ -109,7 +108,7 @@ def _cast(
                 z = k
         x, y = (z + 1) % 3, (z + 2) % 3
         shear_x, shear_y, scale = ways[ray, x] / ways[ray, z], ways[ray, y] / ways[ray, z], 1.0 / ways[ray, z]
-        best, met = np.inf, -1
+        best, hit = np.inf, -1
         nodes, entries = np.empty(64, dtype=np.int64), np.empty(64)
         nodes[0], entries[0], held = 0, _entry(low[0], high[0], start, inverse, best), 1
         while held > 0:
@@ -143,6 +142,6 @@ def _cast(
                 if size == 0.0:
                     continue
                 way = scale * (u * az + v * bz + w * cz) / size
-                if way > 0.0 and (way < best or (way == best and faces[leaf, slot] < met)):
-                    best, met = way, faces[leaf, slot]
-        face[ray], distance[ray] = met, best
+                if way > 0.0 and (way < best or (way == best and faces[leaf, slot] < hit)):
+                    best, hit = way, faces[leaf, slot]
+        face[ray], distance[ray] = hit, best

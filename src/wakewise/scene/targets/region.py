@@ -1,40 +1,28 @@
-"""Sample points of the water that must stay still, with quadrature weights of the paper's integral.
+"""Region of the target: weighted sample points of the water that must stay still (quadrature of the disturbance).
 
-The paper sums over points on the target's surface and in the water round it, stratified, with weights exp(-d / 5 cm).
-Here the region is the surface above the bed and all water above the bed within 10 cm of it, which takes in the water
-between branches. What is summed stands for, at n points,
+The paper sums over points on the target's surface and in the water round it with weights exp(-d / 5 cm). Here the
+region is the surface above the bed and all water above the bed within 10 cm of it. At n points the sum stands for
 
     D = n/2 * mean of f over the surface  +  n/2 * mean of f exp(-d / 5 cm) over the water,   f = squared speed,
 
-which is what the paper's weights give in the mean when half of its points are spread evenly over the surface and half
-over the water. The surface carries the coral's tissue and the silt, so it counts as much as all of the water together,
-and more after weighting.
+the mean of the paper's sum with half of its points on the surface. A third of the points lies on the surface, two
+thirds in the water, each weighted by its neighbourhood: the same integrals with less error. D grows with n: compare it
+at equal n. Marked delicate features count 1 + gain * score times; gain 0 gives the paper's weights.
 
-The points drawn here are fewer where f is better known and carry weights to match: one third of them lies on the
-surface, two thirds in the water, which is larger, and each weighs what its neighbourhood weighs. Their sum estimates
-the same two integrals with the same total weight, with less error than bare exp(-d / 5 cm) at even points; see
-`wakewise.scene.targets.region`. D grows with the number of points: compare it at equal n only.
-
-With delicate features marked, what stands for a place counts 1 + gain * score times as much there; a gain of 0 is the
-paper's weights.
-
-Few weighted points that stand for many: cells, middles, and weights that are right for jets.
-
-D adds the squared speed of jets over a region. A jet is a tube: across it the squared speed falls off within a few
-centimetres, along it hardly at all. How alike the speeds at two points are, over tubes through random places in random
-directions, therefore falls with the square of their distance r once it exceeds the width, since that is the chance
-that a tube through the one reaches the other. The simplest such likeness is
+Quadrature for jets. Across a jet the squared speed falls off within a few centimetres, along it hardly at all. For
+tubes through random places in random directions the covariance of the squared speed at two points falls with the
+square of their distance r beyond the width:
 
     k(r) = 1 / (1 + r^2 / l^2).
 
-(Tubes with a Gaussian profile of standard deviation s have exactly F(a) / a with a = r / (2 s), F Dawson's integral:
-1 - r^2 / (6 s^2) near, 2 s^2 / r^2 far. So k is a mixture of widths, s = l / sqrt(2) in the mean square and
-l / sqrt(6) in the harmonic one.) The mean squared error of sum_j w_j f(x_j) over such f, for a region of measure m, is
+(Gaussian tubes of standard deviation s have exactly F(a) / a with a = r / (2 s), F Dawson's integral; k is a mixture of
+widths, s = l / sqrt(2) in the mean square and l / sqrt(6) in the harmonic mean.) For a region of measure m the mean
+squared error of sum_j w_j f(x_j) is
 
     e(x, w) = w' K w - 2 w' z + const,   K_ij = k(|x_i - x_j|),   z_i = integral of k(|x_i - y|) dm(y),
 
-and `relaxed` moves points and weights to make it small, as quadrature for the average case does (F.-X. Briol et al.,
-Stat. Sci. 34 (2019) 1, doi 10.1214/18-STS660). No jet model enters but its width.
+and `relaxed` moves points and weights to reduce it (Bayesian quadrature, F.-X. Briol et al., Stat. Sci. 34 (2019) 1,
+doi 10.1214/18-STS660). The jet model enters by its width only.
 """
 
 from __future__ import annotations
@@ -128,17 +116,17 @@ def relaxed(
     n, total = len(points), float(cell_weights.sum())
     unit = total / n
     moving = np.flatnonzero(free)
-    wished, _ = _likeness_sums(points, cells, cell_weights)
+    target_sums, _ = _likeness_sums(points, cells, cell_weights)
 
     def error(x: Array) -> tuple[float, Array]:
         w, place = x[:n] * unit, points.copy()
         place[moving] = x[n:].reshape(-1, 3) * LIKENESS_M
         own, own_slope = _likeness_sums(place, place, w)
-        wished[moving], slope = _likeness_sums(place[moving], cells, cell_weights)
+        target_sums[moving], slope = _likeness_sums(place[moving], cells, cell_weights)
         # A constant added to the likeness makes the sum of any constant right too.
         excess = w.sum() - total
-        value = w @ own - 2.0 * w @ wished + excess**2
-        by_weight = 2.0 * (own - wished + excess) * unit
+        value = w @ own - 2.0 * w @ target_sums + excess**2
+        by_weight = 2.0 * (own - target_sums + excess) * unit
         by_place = 2.0 * w[moving, None] * (own_slope[moving] - slope) * LIKENESS_M
         return float(value) / unit**2, np.concatenate([by_weight, by_place.ravel()]) / unit**2
 
@@ -183,7 +171,7 @@ def sampling_error_pct(sample: Array, reference: Array, negligible: float = NEGL
     """Error in percent of disturbances D of a sample against those of a reference, pose by pose.
 
     Relative to the reference where it matters; where the reference is below `negligible` times the largest of all, the
-    error is relative to that bound instead, since nobody cares by what factor nothing differs from nothing.
+    error is relative to that bound instead, because a ratio of two vanishing errors means nothing.
 
     `sample`, `reference`, shape (n,): D of the same poses and thrusts, each divided by the total weight of its points.
     Returns shape (n,).

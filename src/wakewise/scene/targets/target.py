@@ -1,7 +1,4 @@
-"""A target standing on the bed of the world.
-
-A target by name: a procedural coral, a mesh file, or one from outside.
-"""
+"""Target on the bed of the world, by name: a procedural coral, a mesh file, or one of a plug-in."""
 
 from __future__ import annotations
 

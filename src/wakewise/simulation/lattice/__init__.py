@@ -7,20 +7,19 @@ compared with it. The reference computations themselves are in `wakewise_paper.l
 - `collision.py`: regularised collision with a Smagorinsky eddy viscosity; `faces.py`: open and solid boundaries.
 - `streaming_stores.py`: store instructions that bypass the cache.
 - `forced_lattice.py`: the solver as the water of a flight, forced by the thrusters' actuator disks.
-- `cases.py`: records of the reference cases; `meanfield.py`: the stored time average of a case.
-- `meanfield.py`: steady velocity of several thrusters' jets from that average.
+- `cases.py`: records of the reference cases; `meanfield.py`: the stored time average of a case, and the steady velocity
+  of several thrusters' jets made from it.
 """
 
-from wakewise.simulation.lattice.cases import CASES, DiskJet, LatticeCase, case_hash, find_case
+from wakewise.simulation.lattice.cases import SHIPPED_CASES, DiskJet, LatticeCase, case_hash
 from wakewise.simulation.lattice.meanfield import LatticeFlow, MeanField, load_mean_field
 
 __all__ = [
-    "CASES",
+    "SHIPPED_CASES",
     "DiskJet",
     "LatticeCase",
     "LatticeFlow",
     "MeanField",
     "case_hash",
-    "find_case",
     "load_mean_field",
 ]

@@ -1,15 +1,14 @@
-"""The collision of the D3Q19 lattice-Boltzmann fluid: regularised, with Smagorinsky's eddies.
+"""Collision of the D3Q19 lattice Boltzmann fluid: regularised, with a Smagorinsky eddy viscosity.
 
-Of what deviates from equilibrium only the stress Pi survives, with the share 1 - 1/tau (Latt and Chopard 2006,
-doi:10.1016/j.matcom.2006.05.017). The relaxation time follows from the stress itself (Smagorinsky 1963 in the closed
-form of Hou et al. 1996, arXiv:comp-gas/9401004): tau = [tau0 + sqrt(tau0^2 + 18 sqrt(2) Cs^2 |Pi| / rho)] / 2, where
-the filter is one cell.
+Of the non-equilibrium only the stress Pi is kept, with the share 1 - 1/tau (Latt and Chopard 2006,
+doi:10.1016/j.matcom.2006.05.017). The relaxation time follows from the stress (Smagorinsky 1963 in the closed form of
+Hou et al. 1996, arXiv:comp-gas/9401004): tau = [tau0 + sqrt(tau0^2 + 18 sqrt(2) Cs^2 |Pi| / rho)] / 2, filter width one
+cell.
 
-Populations are made of density, momentum j and second moments alone,
 f_i = w_i [rho + 3 c_i.j + H_i : rho u u + (1 - 1/tau) 4.5 Q_i : Pi] with Q_i = c_i c_i - 1/3. The usual H_i = 4.5 Q_i
-gives the nineteen velocities a fourth moment <cx cx cy cy> that depends on the motion along z; round jets then grow
-four arms along the lattice's diagonals. `SHAPES` holds the H_i of Bauer and Ruede (2018, arXiv:1803.04937) without that
-fault. The stress keeps the usual Q_i: with H_i in its place the scheme is unstable at small viscosity.
+gives a fourth moment <cx cx cy cy> that depends on the motion along z, and round jets then grow four arms along the
+lattice's diagonals. `SHAPES` holds the H_i of Bauer and Ruede (2018, arXiv:1803.04937) without that fault. The stress
+keeps the usual Q_i, because with H_i the scheme is unstable at small viscosity.
 """
 
 from __future__ import annotations
@@ -108,7 +107,7 @@ def collide_forced(
     - `g`, shape (19,): populations that came.
     - `tau0`, `eddies`: as in `collide`.
     - `force`, shape (3,): over the density of rest, cells per step squared.
-    - `u`, `stress`, `drift`, shapes (3,), (3, 3) and (3, 3): room to work.
+    - `u`, `stress`, `drift`, shapes (3,), (3, 3) and (3, 3): work arrays.
     - `went`, shape (19,): the result.
     """
     excess = 0.0

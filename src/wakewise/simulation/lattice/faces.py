@@ -1,16 +1,14 @@
-"""What cells beside the faces of the box pull from beyond them.
+"""Boundary conditions on the faces of the lattice's box: walls, open faces, periodic faces.
 
-It is made of the cell's own populations when its piece is about to be pulled (see `kernel`), and written into the slot
-of the halo that it will be pulled from. Every slot is read and written for one cell only, so that planes of cells do
-not get in each other's way:
+The populations that a cell beside a face pulls from outside are written into the halo slots that it pulls from, just
+before its piece is pulled (see `kernel`). Every slot belongs to one cell only, so planes do not conflict.
 
-- beyond a wall lies the population that left, turned back half-way (the wall is on the face itself);
-- beyond an open face lies equilibrium with the cell's own velocity: at the pressure of rest where water leaves, and
-  where it comes in, at right angles to the face, at the pressure that water from rest has at that speed, -rho u^2 / 2
-  (Bernoulli; at the pressure of rest an inflow would have nothing to stop its growth);
-- beyond a periodic face lies the halo, which `wrap` fills.
+- Wall: half-way bounce-back; the wall is on the face.
+- Open: equilibrium at the cell's velocity; outflow at rest pressure, normal inflow at -rho u^2 / 2 (Bernoulli), since
+  at rest pressure an inflow would grow without bound.
+- Periodic: the halo, which `wrap` fills.
 
-Whole rows of cells beside one face are worked on together; edges, corners and the ends of rows one by one.
+Rows of cells beside one face are processed together; edges, corners and ends of rows one by one.
 """
 
 from __future__ import annotations

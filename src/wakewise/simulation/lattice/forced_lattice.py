@@ -1,11 +1,7 @@
-"""A box of water in the lattice that anything may push while it goes on: the second judge of a flight.
+"""Lattice Boltzmann box as the water of a flight: moving point forces, bodies at rest, a steady current.
 
-World axes, z down: the high z face is the bed, the low one the water's surface (a mirror), the sides are open. Forces
-come as points that may move from step to step, each shared out between the eight cells about it; solid bodies that
-stand still are cells in which the water is at rest. A steady current enters by the faces that it comes through. Nothing
-here knows a law of jets.
-
-What a live box of water needs beside the step itself: forces at points, bodies at rest, velocity at points.
+World axes, z down: the high z face is the bed, the low one the surface (a mirror), the sides are open. Forces at moving
+points are shared between their eight cells; bodies are cells at rest; the current enters through the faces.
 """
 
 from __future__ import annotations
@@ -83,7 +79,7 @@ def at_rest(src: Lattice, dst: Lattice, nz: int, cells: IntArray) -> None:
 def interpolated(field: Lattice, solid: BoolArray, at: Array) -> Array:
     """A field of vectors, shape (3, nx, ny, nz), at places in cells, shape (k, 3): linear between, level outside.
 
-    Cells of solid bodies, shape (nx, ny, nz), have no say: beside a wall it is the water there that is told of. Where
+    Cells of solid bodies, shape (nx, ny, nz), do not count: beside a wall the value is that of the water. Where
     all cells about a place are solid it is zero.
     """
     out = np.zeros((at.shape[0], 3))
@@ -131,7 +127,7 @@ def still_populations(velocity_cells: Array) -> Array:
 
 
 class ForcedLattice:
-    """Water in a box; `advance` moves it on, `velocity` looks at it.
+    """Water in a box; `advance` steps it, `velocity` samples it.
 
     - `low_W_m`, shape (3,): its low corner; z is that of the water's surface.
     - `cells`: along north, east and down.

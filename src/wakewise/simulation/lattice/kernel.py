@@ -1,8 +1,7 @@
-"""One step of the D3Q19 lattice on processors: pull populations from neighbours, collide, write.
+"""Compiled time step of the D3Q19 lattice: pull populations from neighbours, collide, write.
 
-A plane is worked through in pieces of `PIECE` cells: they are pulled and collide into nineteen rows of one small array,
-which are then written line by line past the caches, unless all of the lattice stays in them. So the writes are one row
-after another and not nineteen streams at once, and it matters little how far apart the nineteen lie.
+A plane is processed in pieces of `PIECE` cells: they are pulled and collide in a small array of nineteen rows, which is
+written line by line past the caches unless the whole lattice fits in them.
 """
 
 from __future__ import annotations

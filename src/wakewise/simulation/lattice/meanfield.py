@@ -13,7 +13,7 @@ import numpy as np
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.simulation.lattice.cases import case_hash, find_case
+from wakewise.simulation.lattice.cases import SHIPPED_CASES, case_hash
 
 DATA = Path(__file__).parent / "data"
 """Where the tables that ship with the package lie."""
@@ -98,12 +98,14 @@ def read_mean_field(path: Path) -> MeanField:
 
 
 def load_mean_field(case: str = "swirl", folder: Path = DATA) -> MeanField:
-    """Mean field of a case by name, from the package's own data unless told otherwise.
+    """Mean field of a case by name, by default from the package's own data.
 
     Raises InputError if there is no such case or file, or if the file was computed for other parameters or by another
     solver.
     """
-    wanted = find_case(case)
+    if case not in SHIPPED_CASES:
+        raise InputError(f"lattice case {case!r}: no such case, allowed {', '.join(SHIPPED_CASES)}")
+    wanted = SHIPPED_CASES[case]
     table = read_mean_field(folder / f"{case}.npz")
     if table.hash != case_hash(wanted):
         raise InputError(

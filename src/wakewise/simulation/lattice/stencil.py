@@ -1,10 +1,9 @@
-"""The nineteen velocities of the lattice, what goes with them, and how its populations lie in memory.
+"""D3Q19 stencil: velocities, weights, Hermite tensors, and the memory layout of the populations.
 
-A lattice holds g_i = f_i - w_i, the deviation of each population from fluid at rest, in float32: rest is exactly zero,
-so slow water keeps its digits. Its shape is (19, nx + 2, size): one layer of halo cells on every face, and each plane
-of constant x in one row with z running fastest. Cell (y, z) of a plane, halo included, lies at `origin` + y (nz + 2) +
-z. The origin puts the first cell inside at the beginning of a line of cache, and what is left over at a plane's end
-lets the kernel work on whole pieces.
+A lattice holds g_i = f_i - w_i, the deviation from fluid at rest, in float32, so slow flow keeps its digits. Its shape
+is (19, nx + 2, size): one halo layer on every face, each plane of constant x in one row with z fastest. Cell (y, z) of
+a plane, halo included, is at `origin` + y (nz + 2) + z. The origin aligns the first inner cell with a cache line, and
+the remainder of a plane makes whole pieces.
 """
 
 from __future__ import annotations

@@ -1,12 +1,10 @@
-"""Reading and writing long rows of float32 as fast as memory allows: five small words for kernels.
+"""Vectorised loads and non-temporal stores of float32 rows, for memory-bound kernels.
 
-A loop that reads nineteen rows and writes others is worked on several cells at a time only if the compiler knows that
-no write falls on a row still to be read. Rows whose places are known when the program runs leave it hundreds of pairs
-to prove and it gives up, or tests them all before each short row. `load_element` and `store_element` promise it (LLVM's
-scoped `noalias`): *what is peeked in a function is not poked there*.
+`load_element` and `store_element` carry LLVM's scoped `noalias`, so that a loop over nineteen rows is vectorised
+without run-time checks: within one function, loaded rows are never stored to.
 
-An ordinary store first fetches the line of cache that it will overwrite, a third of the lattice's traffic;
-`stream_line` passes the caches by. A processor without such stores stores as always.
+`stream_line` stores past the caches, because an ordinary store first fetches the line that it overwrites, a third of
+the lattice's memory traffic. Processors without such stores use ordinary ones.
 """
 
 from __future__ import annotations

@@ -1,16 +1,17 @@
-"""The simulated world: a vehicle with its true parameters in its water, silt on the bed, and sensors, on one clock.
+"""Simulated tank: a vehicle with its true parameters in its water, silt on the bed, and sensors, on one clock.
 
-A controller sees only what `Tank.step` returns. Everything else on `Tank` is the truth of a trial, for its record and
-for the photographs; the water itself is the room `wakewise.simulation.water`.
+A controller sees only what `Tank.step` returns. Everything else on `Tank` is ground truth for the record and the
+photographs.
 
-Start reading in `tank.py` (the clock; `ambient.py` makes its water, `tank.py` moves water and silt
-beside the vehicle), `settings.py` (what a world is) and `tank.py` (how a flight begins in it; `ambient.py` is its
-current). `plant.py` is the vehicle with `tether.py`, `plant.py` and `contact.py`; `sensors.py` and
-`sensors.py` what it senses, `sensors.py` the joint of its camera; `sediment*.py`, `grains.py` and `grains.py`
-silt and its laws, `settings.py` beds by name; `soft_body.py` moves a soft or loose target, `flakes.py` what drifts
-before the camera; `water_truth.py` and `water_truth.py` are what a flight is judged by, `station_keeping.py` what is
-refused beforehand, `validation_limits.py` what the water gets wrong; `probe.py` and `probe.py` the truth for outsiders
-(`wakewise tank probe`).
+- `tank.py`: clock, water and silt beside the vehicle; the tank as a world. `settings.py`: settings and beds by name.
+- `ambient.py`: current and waves from the settings.
+- `plant.py`: true vehicle with thrust losses; `tether.py`: cable; `contact.py`: hull against walls and target.
+- `sensors.py`: camera pose, tracking, inertial unit, pressure; the camera's joint.
+- `sediment.py`, `sediment_motion.py`, `grains.py`: silt, its compiled motion, its laws.
+- `soft_body.py`: bending and sliding targets. `flakes.py`: drifting flakes before the camera.
+- `water_truth.py`: water speeds, pressure and shear at the target. `probe.py`: true flow at given points (`wakewise
+  tank probe`).
+- `station_keeping.py`: loads that exceed the vehicle. `validation_limits.py`: accuracy of the water by law.
 """
 
 from wakewise.simulation.tank.ambient import build_ambient

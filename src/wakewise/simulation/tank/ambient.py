@@ -1,7 +1,4 @@
-"""The water's own motion as a tank's settings ask for it, put together from `wakewise.simulation.water`.
-
-A tank's water as its settings say, before anything has moved in it.
-"""
+"""Ambient flow and still water of a tank from its settings."""
 
 from __future__ import annotations
 
@@ -32,7 +29,7 @@ from wakewise.simulation.water.water import Water
 
 
 def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum:
-    """Put together what the settings ask for; the generator draws the background turbulence only.
+    """Ambient flow of the settings; the generator draws the background turbulence only.
 
     Raises InputError if the series' file is not usable, or the pump's outlet is outside the water.
     """

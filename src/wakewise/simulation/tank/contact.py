@@ -1,4 +1,4 @@
-"""What a hull, taken as a box, touches in the tank: floor, walls, the target; and how it is stopped there."""
+"""Contact of a box-shaped hull with floor, walls and target, and the stop there."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class CollisionGeometry:
 
     - `hull_m`, shape (3,): size of the box in body axes, centred on the body origin.
     - `size_m`: length, width and depth of the tank.
-    - `target_W_m`, shape (n, 3): points on the target's surface, dense enough that the hull meets one.
+    - `target_W_m`, shape (n, 3): points on the target's surface, dense enough that the hull touches one.
     """
 
     def __init__(self, hull_m: Array, size_m: tuple[float, float, float], target_W_m: Array) -> None:
@@ -35,7 +35,7 @@ class CollisionGeometry:
         ball = float(np.linalg.norm(self._half)) + 2 * _TOUCH_M
         room = (size_m[0] / 2, size_m[1] / 2, size_m[2])
         self.packed: Array = np.array([*self._half, *room, *self._middle, self._radius, ball])
-        """What `surely_clear` must know."""
+        """Inputs of `surely_clear`."""
 
     def touches(self, p_W_m: Array, R_WB: Array) -> str:
         """Name what the hull is in or on: the floor, a wall, the target, or nothing (an empty string)."""

@@ -1,8 +1,8 @@
-"""Visible flakes that drift with the water, the same ones from photograph to photograph.
+"""Visible flakes that drift with the water, the same ones in all photographs.
 
-They fill a box about the target evenly and come in again on its other side where they leave it. The water's own motion
-carries them in short steps; what jets add is looked at only when somebody asks, and held until the next time: flakes
-between two photographs are a few centimetres off in a jet, and right in a current or a swell.
+They fill a box about the target evenly and re-enter on its other side. Ambient flow moves them in short steps; jets are
+evaluated only when flakes are read, and held until the next time: between two photographs flakes are a few centimetres
+off in a jet, and right in a current or swell.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ PER_M3 = 1500.0
 """How many there are; of a murkier water the rest is drawn anew for each photograph."""
 HALF_M, HEIGHT_M = 1.0, 1.1
 DEPTH_M, SLOPES = 0.62, (1.05, 0.8)
-"""Which of them are told: before the camera, within a view of 93 by 77 degrees."""
+"""Field of view in which flakes are reported: 93 by 77 degrees."""
 _STEP_S = 0.25
 
 
 class FlakeAdvector(Protocol):
-    """Water that knows which part of its motion the thrusters made."""
+    """Water with its velocity split into ambient flow and the thrusters' part."""
 
     def excess_velocity(self, points_W_m: Array) -> Array:
         """Velocity less that of the same water without thrusters, both shape (n, 3)."""
@@ -65,7 +65,7 @@ class Flakes:
         return velocity
 
     def before(self, X_WC: Pose, time_s: float, water: FlakeAdvector) -> FlakeCloud:
-        """Carry them on to a time and tell which are before a camera."""
+        """Advect to a time; returns the flakes before a camera."""
         velocity = self.move(time_s, water)
         whole = FlakeCloud(
             p_W_m=self.p_W_m,

@@ -1,13 +1,10 @@
-"""What a grain does in water: settling, first motion, the stress that water puts on a bed, and the light it takes.
+"""Sediment grains: settling velocity, threshold of motion, bed shear stress of flow and waves, beam attenuation.
 
 R. L. Soulsby, Dynamics of Marine Sands, Thomas Telford 1997: dimensionless grain size (eq. 98), threshold (SC 77),
 settling velocity (SC 102), bed roughness of flat beds.
 
-What a swell does to the bed: its orbital motion there and the drag of its thin boundary layer.
-
-R. L. Soulsby, Dynamics of Marine Sands, Thomas Telford 1997, chapter 4: tau_w = rho f_w U_w^2 / 2, with the larger of
-the rough f_w = 1.39 (A / z0)^-0.52, z0 = d / 12, and the smooth f_w = 2 Re^-0.5 (0.0521 Re^-0.187 above Re = 5e5),
-where A is the orbit's half width at the bed and Re = U_w A / nu.
+Waves (chapter 4): tau_w = rho f_w U_w^2 / 2, with the larger of the rough f_w = 1.39 (A / z0)^-0.52, z0 = d / 12, and
+the smooth f_w = 2 Re^-0.5 (0.0521 Re^-0.187 above Re = 5e5), A the orbit's half width at the bed, Re = U_w A / nu.
 """
 
 from __future__ import annotations

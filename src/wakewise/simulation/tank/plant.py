@@ -1,7 +1,4 @@
-"""The true vehicle in the tank: thruster lag, limits, failures and losses, motion, cable, and what it touches.
-
-What takes thrust from a thruster: a failure, or water that already runs through its disk.
-"""
+"""True vehicle of the tank: thruster lag, limits, failures, inflow losses, motion, tether and contact."""
 
 from __future__ import annotations
 
@@ -147,7 +144,7 @@ class VehiclePlant:
         self._steps = vehicle.thrust_steps
         self._asked, self._turned_N = b"", np.zeros(n)
         self._follows = _following(vehicle, self._body.added_mass, density_kg_m3)
-        self._calm = self._still and tether is None and not failures  # so that nothing is asked of between two events
+        self._calm = self._still and tether is None and not failures  # so that nothing is key of between two events
         # Velocity in the world before the last step, that step, and 1 if the hull was surely clear of everything then.
         self._last = np.zeros(5)
         self._water_W = ambient.velocity(start.X_WB.p_m[None], 0.0)[0]
@@ -175,7 +172,7 @@ class VehiclePlant:
         return self._motors_N * self._gains * self._factors
 
     def take_impulse_N_s(self) -> Array:
-        """Integral of forward and of reverse thrust since this was last asked for, both positive, shape (n, 2)."""
+        """Integral of forward and of reverse thrust since this was last key for, both positive, shape (n, 2)."""
         taken, self._impulse_N_s = self._impulse_N_s, np.zeros_like(self._impulse_N_s)
         return taken
 
@@ -297,9 +294,9 @@ class VehiclePlant:
         """What the speed controllers make of commands, shape (n,); looked up once for each new command."""
         if self._steps is None:
             return commands_N
-        asked = commands_N.tobytes()  # told apart in a tenth of the time that a comparison of arrays takes
-        if asked != self._asked:
-            self._asked, self._turned_N = asked, self._steps.delivered_N(commands_N)
+        key = commands_N.tobytes()  # ten times faster to compare than arrays
+        if key != self._asked:
+            self._asked, self._turned_N = key, self._steps.delivered_N(commands_N)
         return self._turned_N
 
     def _push_of_water(self, dt_s: float) -> Array:
@@ -350,9 +347,9 @@ def _lag_and_move(
     for k in range(3):
         inputs[6 + k] = water_W[k]
     for i in range(motors_N.shape[0]):
-        wish = min(max(wanted_N[i], lower_N[i]), upper_N[i])
+        reference = min(max(wanted_N[i], lower_N[i]), upper_N[i])
         kept = math.exp(-dt_s / lags_s[i]) if lags_s[i] > 0.0 else 0.0
-        after = wish + kept * (motors_N[i] - wish)
+        after = reference + kept * (motors_N[i] - reference)
         # The mean of both ends keeps the step's impulse right to second order.
         thrust = gains[i] * 0.5 * (motors_N[i] + after) * factors[i]
         motors_N[i] = after

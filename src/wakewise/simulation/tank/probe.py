@@ -1,7 +1,4 @@
-"""The truth flow at any points, for a vehicle held in place and given thrusts, to be held against other flows.
-
-What a probe is given: a history of thrusts and points of the world, read from tables and refused where doubtful.
-"""
+"""True flow at given points for a vehicle held in place with a given thrust history; readers of these tables."""
 
 from __future__ import annotations
 
@@ -238,7 +235,7 @@ def probe(
     density_kg_m3: float = TRIM_WATER_KG_M3,
     seed: int = 0,
 ) -> ProbeResult:
-    """Find the flow of a vehicle that is held at one pose while its thrusters push as told, in water at rest before.
+    """Flow of a vehicle that is held at one pose under a thrust history, in water at rest before.
 
     Thrusts are what the thrusters give: there is no lag, no limit and no loss. Water is without walls and surface;
     the floor is a plane through which nothing flows and along which jets that strike it run out.

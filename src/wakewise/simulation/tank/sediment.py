@@ -1,10 +1,10 @@
-"""Silt on the bed and in the water: lifted by jets, carried, mixed, settled; no gram is lost.
+"""Silt on the bed and in the water: erosion, advection, diffusion, settling, with exact mass balance.
 
-The bed is a grid of cells with a load in kg/m2. Where the water's shear stress exceeds the grains' threshold, they
-leave their cell at Partheniades' rate (silt) or van Rijn's (sand) as particles, each standing for many grains.
-Particles move with the water, sink, and walk at random with the eddy diffusivity K = K0 + 0.40 u* min(h, H), h the
-height above the bed and u* the friction velocity of the cell below (mixing length theory next to a wall), including
-the drift grad K that keeps well-mixed silt mixed (Visser 1997, doi 10.3354/meps158275).
+The bed is a grid of cells with a load in kg/m2. Above the grains' threshold stress they leave their cell at
+Partheniades' rate (silt) or van Rijn's (sand) as particles, each of many grains. Particles move with the water, settle,
+and walk at random with the eddy diffusivity K = K0 + 0.40 u* min(h, H), h the height above the bed and u* the friction
+velocity below (mixing length theory), with the drift grad K that keeps a uniform suspension uniform (Visser 1997, doi
+10.3354/meps158275).
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Compiled loops of the silt: which cells jets stir, how particles move and settle, and what they make of a grid.
-
-The laws are those told in `wakewise.simulation.tank.sediment`.
-"""
+"""Compiled loops of the silt (`sediment`): erosion by cells, motion and settling of particles, concentration."""
 
 from __future__ import annotations
 
@@ -110,7 +107,7 @@ def entrain(cells: IntArray, particles: Array, birth_kg: float, area_m2: float, 
 
 @njit(nogil=True)
 def particles_to_sample(u: Array, age: Array, dt_s: float, held_m: float, held_s: float) -> IntArray:
-    """Particles at which the water must be looked at before a step; the ages of what the others know go on."""
+    """Particles whose water velocity must be evaluated before a step; the ages of the others' velocities grow."""
     found, count = np.empty(age.shape[0], np.int64), 0
     for k in range(age.shape[0]):
         age[k] += dt_s

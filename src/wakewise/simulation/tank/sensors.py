@@ -1,23 +1,17 @@
-"""Sensors of the simulated vehicle: camera-based pose, optical tracking, inertial unit and pressure, on one clock.
+"""Sensors of the simulated vehicle: camera pose, optical tracking, inertial unit, pressure, on one clock.
 
-Rates, noise, latency, errors that last, poses that are far off and poses that fail in turbid water.
+Each has a rate, noise, latency, slow errors, and for poses outliers and failures in turbid water.
 
-What lasts for a while is a stationary first-order Gauss-Markov process per axis (`lasting`), the usual model of a
-sensor's slow error (P. S. Maybeck, Stochastic Models, Estimation, and Control 1, Academic Press 1979, section 4.11).
-Inertial biases walk as those of two sport cameras and of a stereo rig that were carried under water do, by their
-calibrations: 1e-4 and 1.7e-5 rad/s, 6 to 9e-4 and 3e-4 m/s2 per root second (calibration files of SVIn2, S. Rahman,
-A. Quattrini Li, I. Rekleitis, arXiv:1810.03200). Poses that are far off come from marks that are taken for others or
-seen nearly face on, where a flat one has two poses (G. Schweighofer, A. Pinz, IEEE TPAMI 28 (2006) 2024, doi
-10.1109/TPAMI.2006.252); their sizes are estimates.
+Slow errors are stationary first-order Gauss-Markov processes per axis (P. S. Maybeck, Stochastic Models, Estimation,
+and Control 1, Academic Press 1979, section 4.11). Inertial biases walk as those of two sport cameras and a stereo rig
+under water: 1e-4 and 1.7e-5 rad/s, 6 to 9e-4 and 3e-4 m/s2 per root second (calibration files of SVIn2, S. Rahman, A.
+Quattrini Li, I. Rekleitis, arXiv:1810.03200). Outliers of poses are confused markers or flat markers seen face on,
+which have two poses (G. Schweighofer, A. Pinz, IEEE TPAMI 28 (2006) 2024, doi 10.1109/TPAMI.2006.252); their sizes are
+estimates.
 
-A camera sees its marks by their contrast, which over
-a path d in water of beam attenuation c falls as exp(-c d) (S. Q. Duntley, Light in the sea, J. Opt. Soc. Am. 53 (1963)
-214, doi 10.1364/JOSA.53.000214); poses begin to fail where less than `LEAST_CONTRAST` of it is left and are lost for
-good at half of that.
-
-An error that lasts for a while: a stationary first-order Gauss-Markov process per axis.
-
-The joint of the simulated camera: it turns towards what is wished at its own rate, and says where it stands.
+Contrast of markers falls as exp(-c d) over a path d in water of beam attenuation c (S. Q. Duntley, Light in the sea, J.
+Opt. Soc. Am. 53 (1963) 214, doi 10.1364/JOSA.53.000214). Poses begin to fail below `LEAST_CONTRAST` and all fail at
+half of it.
 """
 
 from __future__ import annotations
@@ -36,7 +30,7 @@ from wakewise.simulation.tank.settings import SensorSettings, Span
 
 
 class GaussMarkovProcess:
-    """Three independent processes of standard deviation `sigma` whose values forget themselves within `lasts_s`.
+    """Three independent processes of standard deviation `sigma` with correlation time `lasts_s`.
 
     Exact between any two times: x(t + dt) = a x(t) + sigma sqrt(1 - a^2) n with a = exp(-dt / lasts_s), so that the
     spread is `sigma` from the first value on, however often it is asked for.
@@ -211,7 +205,7 @@ class CameraJoint:
         self._wished_rad = self.tilt_rad
 
     def aim(self, tilt_rad: float) -> None:
-        """Wish an angle; one that is not finite leaves the wish as it was."""
+        """Set the reference angle; one that is not finite is ignored."""
         if np.isfinite(tilt_rad):
             self._wished_rad = tilt_rad
 

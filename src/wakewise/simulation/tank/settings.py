@@ -1,22 +1,19 @@
-"""What a user may say about the simulated tank.
+"""Settings of the simulated tank, and beds by name with the ranges from which a world may draw their parameters.
 
-Beds by name: what lies on them, what moves it, and from which range a world may draw each figure.
+- `silt`: a thin layer of loose 20 um carbonate grains without cohesion.
+- `fresh-mud`: harbour mud that settled hours to days ago. Threshold 0.037 to 0.305 Pa at 1050 to 1250 kg/m3 (Witt,
+  Patzke, Nehlsen and Froehle 2024, Front. Mar. Sci. 11, doi 10.3389/fmars.2024.1386081), geometric mean. Load:
+  estimate, 2 cm at 250 kg/m3 dry, more than any flight lifts.
+- `fluff`: recent deposits on firmer mud, threshold 0.025 to 0.05 Pa, about ten times that below (Schaaff, Boyer, El
+  Ganaoui, Amielh and Anselmet 2007, J. Hydraul. Eng. 133, 1087). Load: estimate, 2 mm (1 to 5) at 50 kg/m3 dry (30 to
+  60).
+- `sand`: carbonate sand; threshold, settling and pickup follow from its grain (Soulsby 1997; van Rijn 1984). Grains:
+  estimate, fine to medium sand.
 
-- `silt` is what it was from the start: a thin layer of loose 20 um carbonate grains without cohesion. - `fresh-mud` is
-  harbour mud that settled hours to days ago. Its threshold grows with its bulk density, 0.037 to 0.305 Pa at 1050 to
-  1250 kg/m3 (Witt, Patzke, Nehlsen and Froehle 2024, Front. Mar. Sci. 11, doi 10.3389/fmars.2024.1386081); the value is
-  the geometric mean. Load: estimate, 2 cm of it at 250 kg/m3 dry, more than any flight lifts.
-- `fluff` is a loose layer of recent deposits on firmer mud: it goes at 0.025 to 0.05 Pa, what lies below it at about
-  ten times that (Schaaff, Boyer, El Ganaoui, Amielh and Anselmet 2007, J. Hydraul. Eng. 133, 1087). Load of the fluff:
-  estimate, 2 mm (1 to 5) at 50 kg/m3 dry (30 to 60).
-- `sand` is carbonate sand, whose threshold, settling and pickup follow from its grain (Soulsby 1997; van Rijn 1984).
-  Grains: estimate, fine to medium sand; load: more than any flight lifts.
-
-Mud's grains: estimate, 8 um (5 to 15) quartz and clay, which makes 0.14 m2 of beam attenuation per gram. They settle as
-aggregates, which sink six times as fast as the single particles of the same water (Christiansen et al. 2002, J. Marine
-Syst. 35, 133, south-western Baltic); a range reaches from single grains, since jets break aggregates, to a millimetre
-per second (estimate). Partheniades' M of mud: estimate, within the 1e-5 to 1e-4 kg/m2/s usually taken for silts, and up
-to five times that for the softest.
+Mud's grains: estimate, 8 um (5 to 15) quartz and clay, 0.14 m2 of beam attenuation per gram. They settle as aggregates,
+six times as fast as single particles (Christiansen et al. 2002, J. Marine Syst. 35, 133); the range reaches from single
+grains, since jets break aggregates, to 1 mm/s (estimate). Partheniades' M of mud: estimate, within the 1e-5 to 1e-4
+kg/m2/s usual for silts, up to five times that for the softest.
 """
 
 from __future__ import annotations
@@ -319,7 +316,7 @@ class SensorSettings(Settings):
 
 
 class MismatchSettings(Settings):
-    """How far the plant is from what its controller believes."""
+    """Deviation of the plant from the controller's model."""
 
     trim_N: float | None = Field(None, ge=-50.0, le=50.0, description="buoyancy beyond the believed one; null draws it")
     trim_range_N: float = Field(1.0, ge=0.0, le=50.0, description="a drawn trim lies between minus and plus this")
@@ -336,7 +333,7 @@ class MismatchSettings(Settings):
 
 
 class TankSettings(Settings):
-    """The world of a trial: water, silt, sensors, and how far the plant is from what its controller believes."""
+    """The world of a trial: water, silt, sensors, and the plant's deviation from the controller's model."""
 
     size_m: tuple[Length, Length, Length] = Field((6.0, 5.0, 1.5), description="length, width and depth of the water")
     density_kg_m3: float = Field(1000.0, gt=900.0, lt=1100.0, description="of the water; vehicles are trimmed in 1000")

@@ -1,18 +1,14 @@
-"""A soft or a loose target in the tank's water: how it bends and swings, and when it slides.
+"""Soft or loose target in the tank's water: bending, swinging, sliding.
 
-The load is the drag of the whole water, current, waves and jets, less the surface's own motion, at points spread over
-the surface: for a piece of area vector S in water that passes at r it is 1/4 rho Cd |S . r| r, which for a branch or a
-blade sums to 1/2 rho Cd times the area that it turns to the stream (every area vector has a partner on the lee side).
-The stream is taken as it would be without the target, as drag coefficients are stated. Water that speeds up adds the
-force of its pressure and of the added mass (J. R. Morison et al. 1950, Trans. AIME 189, 149, doi 10.2118/950149-G), for
-currents and waves; of jets it is left out.
+Load: drag of the whole water (current, waves, jets) relative to the surface, 1/4 rho Cd |S . r| r for a piece of area
+vector S in water that passes at r; over a branch or blade this sums to 1/2 rho Cd times its frontal area. The flow is
+that without the target, as drag coefficients are stated. Accelerated water adds pressure force and added mass (J. R.
+Morison et al. 1950, Trans. AIME 189, 149, doi 10.2118/950149-G), for currents and waves only.
 
-Each step is exact for a load that changes with the velocity alone: drag is made linear in the tip's velocity, the
-restoring force in its way, and the linear oscillator is solved in closed form, so that no stiffness and no drag makes
-it unstable. The vehicle's water does not feel that the target moves.
+Integration: drag is linearised in the tip's velocity, the restoring force in its deflection, and the linear oscillator
+is solved in closed form, so it is stable for any stiffness and drag. The water does not react to the target's motion.
 
-A second set of stems stands in the water's own motion alone. What lies between the two is what the vehicle did, and all
-that a controller can change: most of a soft target's sway may be the current's and the swell's.
+A second set of stems moves in the ambient flow alone; the difference is the vehicle's effect.
 """
 
 from __future__ import annotations

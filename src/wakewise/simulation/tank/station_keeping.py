@@ -1,4 +1,4 @@
-"""What is refused before a flight: a current that the vehicle cannot hold, failures and a cable that do not fit it."""
+"""Checks before a flight: currents, failures and tethers that exceed the vehicle's thrust."""
 
 from __future__ import annotations
 

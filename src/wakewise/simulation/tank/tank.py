@@ -1,8 +1,6 @@
-"""The simulated tank: vehicle, water, silt and sensors on one clock, and what the water does at the target.
+"""Simulated tank: vehicle, water, silt and sensors on one clock, and the water's speeds at the target; as a world.
 
-Work done beside the one who asked for it, on a second core where there is one.
-
-The tank as a world that a flight can begin in.
+Water and silt may advance on a second thread beside the vehicle.
 """
 
 from __future__ import annotations
@@ -93,7 +91,7 @@ GRID_SPACING_M = 0.05
 _GRID_HALF_M = 0.8
 _GRID_HEIGHT_M = 1.0
 _OUTER_SPACING_M, _OUTER_NODES = 0.2, 8000
-_CONTACT_POINTS = 1500  # on the target, besides its vertices, so that a hull meets one
+_CONTACT_POINTS = 1500  # on the target, besides its vertices, so that a hull touches one
 _SILT_STEP_S = 0.1  # longest step of the silt: a few cm of travel in the fastest wall jets
 _STIRRING_SHARE = 0.4  # jets slower than this share of the threshold's speed are left out of the search for erosion
 _TURBIDITY_EVERY_S = 1.0  # how often the camera's water is looked at for the loss of poses
@@ -106,7 +104,7 @@ log = logging.getLogger(__name__)
 class Tank:
     """The simulated world of a trial (a `Plant`); its truth is for the record and never for the controller.
 
-    - `vehicle`: the plant's own parameters, which differ from what the controller believes.
+    - `vehicle`: the plant's own parameters, which differ from the controller's model.
     - `target`: standing on the bed, at the tank's depth.
     - `rng`: its children serve water, silt, sensors and probes.
     - `tilt_rad`: where the joint of the camera, if it has one, stands at the start.
@@ -471,7 +469,7 @@ class TankTruth:
 class TankWorld:
     """A tank that begins alike each time; implements `wakewise.core.interfaces.World`."""
 
-    vehicle: Vehicle  # true parameters, known to nobody else
+    vehicle: Vehicle  # true parameters
     target: Target
     settings: TankSettings
     start: BodyState  # where the vehicle really is when the flight begins
@@ -482,7 +480,7 @@ class TankWorld:
     yielding: TargetCompliance | None = None  # how the target gives way; None of one that nothing moves
 
     def tank(self, beside: bool = True) -> Tank:
-        """A fresh tank at its start, with all that it knows; its water moves `beside` the vehicle, or after it."""
+        """A new tank at its start; its water moves on a second thread if `beside`."""
         return Tank(
             self.vehicle,
             self.target,

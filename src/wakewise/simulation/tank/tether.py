@@ -1,4 +1,4 @@
-"""A cable from a fixed point to the vehicle: what its drag and its end do to the vehicle."""
+"""Tether: drag and end force of a cable from a fixed point to the vehicle."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Tether:
 
     @classmethod
     def of(cls, settings: TankSettings) -> Tether | None:
-        """The cable that a tank's settings ask for, if any."""
+        """The cable of a tank's settings, if any."""
         asked = settings.tether
         if asked.diameter_m == 0.0:
             return None

@@ -1,7 +1,7 @@
-"""What the tank gets wrong: each law that its water is asked for, what it reaches, and what that means for a claim.
+"""Accuracy of the tank's water: each law, the value reached, and its consequence for a claim.
 
-`reached` is what is measured in the tank's water now; tests/simulation/tank/test_validation_limits.py measures each of
-them anew and fails when the table says something else.
+`reached` is the present measurement; tests/simulation/tank/test_validation_limits.py repeats every one and fails when
+the table differs.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class ValidationLimit:
 
     @property
     def met(self) -> bool:
-        """Whether all that is reached lies within what is asked."""
+        """Whether all reached values lie within the limits."""
         return self.asked[0] <= self.reached[0] and self.reached[1] <= self.asked[1]
 
 

@@ -1,6 +1,6 @@
-"""What a trial is told about its water: speeds, pressure and shear at the target, silt in the camera's way.
+"""Ground truth of the water for a trial: speeds, pressure and shear at the target, silt in the camera's view.
 
-Fixed places at which a trial's water is judged: the target's surface, the bed beside it, the water round it.
+It is evaluated at fixed places: on the target's surface, on the bed beside it, in the water round it.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ _RAY_STEPS = 24
 
 
 class ExcessFlow(Flow, Protocol):
-    """Water that knows which part of its motion the thrusters made."""
+    """Water with its velocity split into ambient flow and the thrusters' part."""
 
     def excess_velocity(self, points_W_m: Array) -> Array:
         """Velocity less that of the same water without thrusters, shape (n, 3), at points, shape (n, 3)."""

@@ -1,16 +1,15 @@
-"""The true water of the tank: turbulent jets as vortex parcels, walls, target, currents. Arrays and targets only.
+"""Water of the simulated tank: turbulent jets as vortex impulse parcels, walls, solid target, currents.
 
-The controllers' wake models (`wakewise.wake`) are not used here, nor is this room there: a planner that knew the
-truth would prove nothing. Jets are made of impulse parcels that take time to travel, entrain, merge, strike the bed
-and run out along it.
+It depends on arrays and targets only and does not use the controllers' wake models (`wakewise.wake`).
 
-Start reading in `water.py` (what callers see), `stepping.py` (one compiled step of all of it) and `water_snapshot.py`
-(the velocity at any points, now). `parcels.py`, `round_jet_closure.py` and `parcel_advection.py` are a free jet,
-`colliding_jets.py` and `colliding_jets.py` jets that cross and meet, `hullwake.py` what a hull leaves, `bedjets.py` and
-`bedjets*.py` jets on the bed, `blockage.py` and `blockage.py` the target and jets that come up to it, `faces.py`
-walls, `clusters.py`, `induction.py`, `induction.py` and `induction.py` fast sums, `currents.py` (its turbulence
-summed by `currents.py`) and `current_series.py` what moves without thrusters. Laws and their sources stand
-beside the equations.
+- `water.py`: the water as callers see it. `stepping.py`: one compiled step; `water_snapshot.py`: velocity at any points
+  of one instant.
+- `parcels.py`, `round_jet_closure.py`, `parcel_advection.py`: free jets. `colliding_jets.py`: opposed and crossing
+  jets.
+- `bedjets.py`, `bedjets_sums.py`: wall jets on bed, walls and surface. `faces.py`: those faces. `blockage.py`: solid
+  target, and jets that flow round or strike it. `hullwake.py`: wake of the hull.
+- `induction.py`: induced velocity of impulses; `clusters.py`: treecode for many impulses.
+- `currents.py`: steady current, waves, pump jet, turbulence; `current_series.py`: measured currents.
 """
 
 from wakewise.simulation.water.current_series import read_current_series

@@ -1,20 +1,18 @@
-"""Radial wall jets on the bed and the other faces: where a free jet goes after it has struck one.
+"""Radial wall jets on bed, walls and surface, after a free jet strikes one of them.
 
-A free jet that strikes a floor turns within about 0.14 of its height and runs out along the floor in a thin layer with
-u_max = 1.16 sqrt(M) / r and a half thickness of 0.09 r, r from the strike point, M = thrust / density (Beltaos and
-Rajaratnam 1974, J. Hydraul. Div. ASCE 100 HY10; Rajaratnam 1976, Turbulent Jets). Impulse parcels cannot
-form that layer, so each one that strikes becomes a *ring*: a stretch of the layer that carries the parcel's impulse
-outward at the layer's mean speed. Rings of one jet add up to the law when thrust is steady, and start, swell and fade
-with it otherwise.
+A jet that strikes a floor turns within 0.14 of its height and spreads in a thin layer with u_max = 1.16 sqrt(M) / r and
+half thickness 0.09 r, r from the strike point, M = thrust / density (Beltaos and Rajaratnam 1974, J. Hydraul. Div. ASCE
+100 HY10; Rajaratnam 1976, Turbulent Jets). Impulse parcels cannot form that layer, so each parcel that strikes becomes
+a *ring*: a part of the layer that carries the parcel's impulse outward at the layer's mean speed.
 
-One ring's velocity in the sector at azimuth phi (height h above the bed, distance r from its centre) is
+Velocity of a ring in the sector at azimuth phi (height h above the bed, distance r from its centre):
+
     u_r = (A/r) g dF/dh,   u_up = -(A/r) dg/dr F,   g = exp(-ln(r/R)^2 / (2 L^2)),
-    F = delta sqrt(pi/2) erf(h / (sqrt 2 delta)) exp(-h/R),   delta = 0.093 R,
-which is free of divergence, runs along the bed at h = 0 and takes its water from above. A jet that comes in at a slant
-sends the share w(phi) = exp(kappa cos(phi - phi0)) / I0(kappa) of its momentum towards phi, with kappa such that the
-horizontal momentum is the jet's own; in that sector R becomes R w^(1/4) and A becomes A sqrt(w), as the law asks.
+    F = delta sqrt(pi/2) erf(h / (sqrt 2 delta)) exp(-h/R),   delta = 0.093 R
 
-All wall jets of the tank: rings on every face, and on the planes in which jets meet head-on.
+It is free of divergence, parallel to the bed at h = 0, and entrains from above. At oblique incidence the share
+w(phi) = exp(kappa cos(phi - phi0)) / I0(kappa) of the momentum goes towards phi, kappa such that the horizontal
+momentum is the jet's; in that sector R becomes R w^(1/4) and A becomes A sqrt(w).
 """
 
 from __future__ import annotations
@@ -36,11 +34,9 @@ from wakewise.simulation.water.bedjets_sums import (
     leaning,
     log_i0s,
     log_overlap,
-    sum_planes,
     with_images,
 )
 from wakewise.simulation.water.faces import TankFace, TankFaces, with_capacity
-from wakewise.simulation.water.induction import over_points
 
 WALL_JET_SPEED = 1.16  # u_max r / sqrt(M), Rajaratnam 1976
 STRIKE_HEIGHT = 1.75  # of the parcel's sigma: 0.14 H, where the bed's pressure begins to turn the jet (Beltaos 1974)
@@ -120,41 +116,6 @@ class WallJetRings:
         )
 
 
-def rings_from_strikes(position_m: Array, impulse_m4_s: Array, sigma_m: Array) -> WallJetRings:
-    """Rings that take over from parcels (arrays as in `Parcels`, in the plane's frame) which have come down to it."""
-    size = np.linalg.norm(impulse_m4_s, axis=1)
-    lean = impulse_m4_s[:, :2] / np.where(size > 0, size, 1.0)[:, None]
-    return WallJetRings(position_m[:, :2].copy(), STRIKE_HEIGHT * sigma_m, size, lean)
-
-
-def ring_velocity(
-    points_W_m: Array, rings: WallJetRings, bed_z_m: float, least_m: float = 0.0, *, exact: bool = False
-) -> Array:
-    """Velocity of the rings, shape (n, 3), at points, shape (n, 3); zero if there are none.
-
-    `least_m` is the least thickness delta of a layer, whose momentum stays; see `packed_rings`. `exact` sums in double
-    precision.
-    """
-    return packed_velocity(points_W_m, packed_rings(rings, least_m), bed_z_m, exact=exact)
-
-
-def packed_rings(rings: WallJetRings, least_m: float = 0.0, per_height: float = 0.0, stretch: float = 1.0) -> Array:
-    """One row per ring, as the kernel reads it, for several calls of `packed_velocity`, shape (n, 15).
-
-    A layer has the thickness hypot(0.093 R, least_m), or `stretch` times 0.093 R in that. It is slower in proportion to
-    what that is more than the law's: each ring then carries its impulse, and the jet of many its momentum, which makes
-    the whole slower by the square root. `per_height` is one over the distance to the opposite face, where F ends with a
-    factor 1 - h per_height; 0 for none.
-    """
-    heading, kappa = rings.heading_kappa
-    rows = np.empty((rings.count, COLUMNS))
-    for j in range(rings.count):
-        sizes = rings.radius_m[j], rings.impulse_m4_s[j]
-        fill_row(rows[j], rings.centre_m[j], *sizes, heading[j], kappa[j], least_m, per_height, stretch)
-    finish_rows(rows)
-    return rows
-
-
 @njit(nogil=True)
 def fill_row(
     row: Array,
@@ -174,38 +135,6 @@ def fill_row(
     row[11], row[12] = least / stretch, per_height
 
 
-def packed_velocity(points_W_m: Array, packed: Array, bed_z_m: float, *, exact: bool = False) -> Array:
-    """Velocity of packed rings, shape (n, 3), at points, shape (n, 3)."""
-    flat = np.concatenate([np.zeros(3), np.eye(3).ravel(), [bed_z_m, 0.0]])
-    return planes_velocity(points_W_m, flat[None], np.array([0, len(packed)]), packed, exact=exact)
-
-
-def planes_velocity(points_W_m: Array, planes: Array, starts: IntArray, packed: Array, *, exact: bool = False) -> Array:
-    """Velocity of packed rings on several planes, shape (n, 3), at points, shape (n, 3).
-
-    - `planes`, shape (k, 14): of each: origin, the three rows of the turn from the world into its frame, depth there,
-      and 0 if its rings are those of a wall jet; if it has the same rings on both sides, how many times higher than a
-      wall jet's they are.
-    - `starts`, shape (k + 1,): plane i has the rings from starts[i] to starts[i + 1].
-    - `packed`, shape (m, 15): see `packed_rings`; each in its plane's frame.
-    - `exact`: sum in double precision.
-    - Shapes: `points_W_m` (n, 3).
-    """
-    out = np.zeros((len(points_W_m), 3))
-    if len(packed) and len(points_W_m):
-        points = np.ascontiguousarray(points_W_m, dtype=np.float64)
-        cost = 4 * len(points) * len(packed)  # a ring takes as long as four parcels
-        kind = np.zeros(0, np.float64 if exact else np.float32)
-        over_points(lambda some, result: sum_planes(some, planes, starts, packed, kind, result), points, out, cost)
-    return out
-
-
-def ring_strength(rings: WallJetRings) -> Array:
-    """A of each ring in m2/s, shape (n,): such that rings sent at a steady rate add up to u_max = 1.16 sqrt(M) / r."""
-    strength: Array = STRENGTH * rings.impulse_m4_s / rings.radius_m**2
-    return strength
-
-
 def layer_speed(rings: WallJetRings) -> Array:
     """Speed at the bed under each ring's crest, shape (n,), from all rings that lie on the same ground.
 
@@ -215,25 +144,6 @@ def layer_speed(rings: WallJetRings) -> Array:
     """
     speed: Array = layer_speeds(rings.layers(), rings.count)
     return speed
-
-
-def grown(
-    rings: WallJetRings, current_m_s: Array, dt_s: float, least_m: float = 0.0, stretch: float = 1.0
-) -> tuple[WallJetRings, Array]:
-    """Rings of one plane after dt_s, and the layer speed they had, shape (n,); see `grow_layers`.
-
-    The current is a velocity in the plane's frame, shape (3,) or (n, 3).
-    """
-    layers, speed = rings.layers(), np.empty(rings.count)
-    current = np.ascontiguousarray(np.broadcast_to(current_m_s, (rings.count, 3)))
-    grow_layers(layers, rings.count, current, np.array([least_m]), np.array([stretch]), dt_s, speed)
-    return WallJetRings.of(layers, rings.count, 0), speed
-
-
-def merged_rings(rings: WallJetRings) -> WallJetRings:
-    """Rings of one plane that are near each other made one; see `merge_layers`."""
-    layers = rings.layers()
-    return WallJetRings.of(layers, merge_layers(layers, rings.count), 0)
 
 
 @njit(apart=True, nogil=True)
@@ -351,14 +261,14 @@ SPREADS_FASTER = 3.0
 """How many times as fast as a wall jet the radial jet of a meeting spreads: see
 `wakewise.simulation.water.colliding_jets`.
 """
-_SHEETS = 128  # room for planes in which jets meet: those remembered, and those whose rings still run
+_SHEETS = 128  # capacity for planes of opposed jets: those stored, and those whose rings still move
 
 
 class JetPlanes(NamedTuple):
-    """What rings run along: the faces first, then room for the planes in which jets meet.
+    """Planes of the rings: the faces first, then spare rows for the planes of opposed jets.
 
     `frames`, shape (p, 14), are as in `bedjets.planes_velocity`; `thickness` and `stretch` the `least_m` and `stretch`
-    of `bedjets.packed_rings`, and `per_height` its own; `key`, shape (p, 2), tells which two jets meet there, and
+    of `bedjets.packed_rings`, and `per_height` its own; `key`, shape (p, 2), are the two jets that meet there, and
     `used` when that was last looked up, 0 if it is forgotten. `walls`, shape (f, 4), are the faces as
     `TankFaces.walls`.
     """
@@ -477,7 +387,7 @@ def grow_rings(
 
 @njit(apart=True, nogil=True)
 def thin_rings(layers: RingBuffers, count: int) -> int:
-    """Make neighbouring rings of a plane one; of too many, let the slowest go. How many are left."""
+    """Merge neighbouring rings of a plane; of too many, drop the slowest. Returns the count."""
     count = merge_layers(layers, count)
     if count > _MOST:
         speeds = layer_speeds(layers, count)

@@ -1,10 +1,9 @@
-"""Compiled sums over the rings of wall jets, and their images in walls; the formulas are told in `bedjets`.
+"""Compiled velocity sums over the rings of wall jets (`bedjets`) and their images in walls.
 
 Columns of a packed ring: centre (0, 1), R, A, heading (4, 5), kappa, weight 1/I0(kappa), squares of the least and
-greatest distance and the greatest height at which it is felt (8 to 10), least thickness, one over the distance to the
-opposite face, the logarithm of the weight, and that of the greatest speed over the least that matters. Points are taken
-in blocks; of each block the rings that cannot reach it at such a speed are left out, and the rest are summed in single
-precision at all of its points side by side.
+greatest distance and the greatest height of its influence (8 to 10), least thickness, one over the distance to the
+opposite face, logarithm of the weight, logarithm of the greatest speed over the least that counts. Points are processed
+in blocks; rings out of reach of a block are left out, the others are summed in single precision.
 """
 
 from __future__ import annotations
@@ -211,7 +210,7 @@ def _erf_rest(x: Any) -> Any:
 
 @njit(inline="always")
 def _reaches(rings: Array) -> np.ndarray:
-    """What `_feel` must know of each ring, shape (10, n): one row for each quantity, so that several go at once."""
+    """Constants of each ring for `_feel`, shape (10, n): one row for each quantity, for vector instructions."""
     out = np.empty((10, rings.shape[0]), np.float32)
     for j in range(rings.shape[0]):
         kappa = 0.25 * rings[j, 6]

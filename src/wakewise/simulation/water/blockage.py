@@ -1,33 +1,24 @@
-"""A solid body in the water: sources in its surface that turn the flow aside.
+"""Solid body in the water: potential flow by sources under its surface, and jets that flow round it or strike it.
 
-Potential flow about a body of any shape by sources on its surface (J. L. Hess and A. M. O. Smith 1967, Prog. Aerosp.
-Sci. 8, 1, doi 10.1016/0376-0421(67)90003-6), here as a few smooth sources a little below the surface whose strengths
-make the velocity across the surface least, in the mean square, at points spread over it. Together they give out no
-water. Shapes finer than the distance between sources are blocked in part only: `leakage` says how much passes. What it
-has not: a boundary layer, separation, or a wake behind the body.
+*Potential flow* (J. L. Hess and A. M. O. Smith 1967, Prog. Aerosp. Sci. 8, 1, doi 10.1016/0376-0421(67)90003-6): a few
+smooth sources below the surface, of zero total strength, minimise the mean square normal velocity at points on the
+surface. Shapes finer than the distance between sources are blocked in part only; `leakage` is the share that passes.
+Not modelled: boundary layer, separation, wake.
 
-Jets that come up to a solid body: they go round it at their own speed, and what strikes it turns aside.
+*Jets round a body.* In potential flow parcels would stop at stagnation points and accumulate impulse without bound. A
+jet's outer streamlines are at ambient pressure, so a turned jet keeps its speed (G. I. Taylor 1960, Proc. R. Soc. A
+259, 1, for jets on plates, from memory), and behind the widest place of a blunt body the flow separates. A parcel
+therefore moves at the speed of the jets' own water, in the direction of the whole water, without attraction to the
+body.
 
-A body answers the jets' water with sources (`wakewise.simulation.water.blockage`), as if the flow were a potential one.
-Parcels that were simply carried by the sum of both would come to rest where it stagnates, with all their impulse, and
-the next ones with them: what the body is answered with would grow without a bound. No water does that, for two reasons.
-
-*Round it.* A jet's outer streamlines lie in water at rest and keep its pressure, so a jet that is turned keeps its
-speed (G. I. Taylor 1960, Proc. R. Soc. A 259, 1, for jets on plates, from memory). And water that has passed the
-widest place of a blunt body does not close in behind it: it separates. So a parcel goes at the speed of the jets' own
-water, in the direction of the whole water, less what of the answer would draw it to the body.
-
-*Strikes.* Of a slipstream that is wider than the body only a part meets it. Each piece of the surface that faces a
-parcel's impulse, of area dA and normal n, lies in the share
+*Jets that strike it.* A piece of the surface that faces a parcel's impulse m, of area dA and normal n, intercepts
 
     dA (-n . m/|m|) exp(-r^2 / 2 sigma^2) / (2 pi sigma^2)
 
-of it, r its distance from the line along the impulse. What has come up to the surface, within 1.7 to 0.3 sigma of it as
-on the bed (`bedjets.STRIKE_HEIGHT`), is lost to the body's pressure, and as much goes off sideways, where the parcel is
-going. Shapes with hollows have more surface than meets a jet: each piece counts for the hull's area over the shape's.
-
-What it has not: friction on the surface, a jet that clings to it, or a sheet that runs out to all sides at once: a
-parcel stays one. What that comes to is held against the lattice in `wakewise.simulation.tank.validation_limits`.
+of it, r its distance from the line along the impulse. Within 1.7 to 0.3 sigma of the surface
+(`bedjets.STRIKE_HEIGHT`) that share is lost to the body's pressure and as much leaves sideways. On shapes with hollows
+each piece counts by the hull's area over the shape's. Not modelled: friction, attached jets, sheets to all sides.
+`wakewise.simulation.tank.validation_limits` compares this with the lattice.
 """
 
 from __future__ import annotations

@@ -1,13 +1,10 @@
-"""Velocity of many impulses at many points at once: near ones one by one, far ones by the cluster.
+"""Treecode for the velocity of many impulses: near impulses one by one, far clusters by their dipole moment.
 
-Impulses in one cell of a coarse grid, alike in size, form a cluster. From far off it acts as one dipole: the sum of its
-impulses, at their centre weighted with their sizes, which is right to first order in the cluster's size over the
-distance where they are parallel, as along a jet. Points are taken in groups of blocks of neighbours. For a group or a
-block a cluster is far if it lies beyond `_OPENING` of its radii and beyond `_DIPOLE` sigma of its largest impulse (a
-Gaussian impulse is a dipole to 1e-3 there); of one that is not, each impulse is looked at alone. Dipoles that are
-farther off than `_SERIES` of the group's or block's own radii are not summed at every point either: their velocity
-there is a power series about the middle, of second order, which has no divergence and no curl, as the whole has none.
-What a sum comes to depends on the list of points only, never on the number of threads.
+Impulses of similar size in one cell of a coarse grid form a cluster. Far away it is one dipole at their weighted
+centre (exact to first order in its size over the distance for parallel impulses, as in a jet). A cluster is far from a
+group or block of points beyond `_OPENING` of its radii and `_DIPOLE` sigma of its largest impulse (a Gaussian impulse
+is a dipole to 1e-3 there). Beyond `_SERIES` radii of the group or block the velocity of dipoles is a local expansion of
+second order, free of divergence and curl. The result depends on the points only, not on the number of threads.
 """
 
 from __future__ import annotations

@@ -1,39 +1,23 @@
-"""Jets that meet head-on: they turn aside and run out in the plane where they met.
+"""Opposed and crossing jets: turned aside in their plane of symmetry, or spread as a fan across their common plane.
 
-By symmetry two equal jets that blow at each other are each a jet that strikes a wall without friction, so what they
-lose on meeting becomes rings of a radial jet (`wakewise.simulation.water.bedjets`) on both sides of that plane (those
-that cross at 20 to 120 degrees: `wakewise.simulation.water.colliding_jets`). Of unequal jets the weaker one's share
-turns aside and the rest goes on. The radial jet of two that strike each other spreads about three times as fast as one
-that is led out between walls: P. O. Witze and H. A. Dwyer 1976, J. Fluid Mech. 75, 401, doi 10.1017/S0022112076000293
-(from memory, not looked up again).
+*Opposed jets.* By symmetry each of two equal jets strikes a frictionless wall, so their lost impulse becomes rings of a
+radial jet (`bedjets`) on both sides of that plane. Of unequal jets the weaker one's share turns aside. The radial jet
+spreads about three times as fast as one led out between walls (P. O. Witze and H. A. Dwyer 1976, J. Fluid Mech. 75,
+401, doi 10.1017/S0022112076000293, from memory). The sheet is as thick as the jets' sigma, because the plane of two
+turbulent jets oscillates by about that; in the lattice case `head-on` it is 5 to 6 cm thick 7 cm from the axis of jets
+of sigma 2.7 cm.
 
-The plane, a sheet, is as thick as the jets' sigma where they met: the plane of two turbulent jets swings to and fro by
-about as much, so their radial jet is no thinner on average. In the lattice (`head-on` case) it is 5 to 6 cm thick 7 cm
-from the axis of jets with sigma 2.7 cm.
+*Crossing jets* (20 to 120 deg). Momentum along the bisector adds up. The opposed components are stopped by a pressure
+that drives water out of the common plane. For equal round jets at the angle 2 alpha without friction the azimuth phi
+from the bisector gets the share
 
-Jets that cross: what of them is opposed turns into a fan across their plane.
+    w(phi) = sin^3 alpha / (1 - cos alpha cos phi)^2        (mean 1, mean cosine cos alpha)
 
-Where two jets meet at an angle, what they carry along the bisector of their directions adds up. What they carry
-against each other is stopped by the pressure between them, and that pressure drives water out of the plane that both
-lie in: by symmetry each jet strikes the plane midway between them at a slant, and runs out in it. Of two equal round
-jets that meet at the angle 2 alpha, free of friction, the azimuth phi from the bisector takes the share
-
-    w(phi) = sin^3 alpha / (1 - cos alpha cos phi)^2        (its mean over all azimuths is 1)
-
-(D. Hasson and R. E. Peck 1964, AIChE J. 10, 752, doi 10.1002/aic.690100533, for sheets of colliding liquid jets, as
-G. I. Taylor 1960, Proc. R. Soc. A 259, 1, had measured them; both from memory). Mass and momentum agree with it: its
-mean is 1 and its mean cosine cos alpha, so what runs out has just the momentum of the two. That is for jets in air; a
-jet in water goes on to entrain, which the parcels' own closure does.
-
-So two parcels of different thrusters that meet become `RAYS` parcels with equal shares of their impulse. They begin as
-far from the place between the two as a wall jet does from where a jet strikes, each in a direction within its own equal
-share of w, another one at every second meeting (steps of the golden section cover a share evenly), so that the mean is
-smooth; a correction, the same for all, keeps momentum exact. Each ray is a jet of its own, which spreads, bends,
-strikes and merges as any other. Equal shares of w are equal areas swept about the focus of an ellipse of eccentricity
-cos alpha: Kepler's equation gives the directions.
-
-What it does not hold: of unequal jets the weaker one's share fans out, in the plane midway between both directions, and
-the rest of the stronger goes straight on. What has met once does not meet again. The two jets' plane does not sway.
+(D. Hasson and R. E. Peck 1964, AIChE J. 10, 752, doi 10.1002/aic.690100533; G. I. Taylor 1960, Proc. R. Soc. A 259, 1;
+both from memory). Two parcels of different thrusters become `RAYS` parcels of equal impulse, each in a direction within
+an equal share of w (golden-section steps from meeting to meeting); a common correction keeps momentum exact. Equal
+shares of w are equal areas about the focus of an ellipse of eccentricity cos alpha: Kepler's equation gives the
+directions. Of unequal jets the excess of the stronger goes straight on. A parcel collides once. The plane is steady.
 """
 
 from __future__ import annotations
@@ -52,9 +36,9 @@ RAYS = 4
 HELD = 2
 """For so many meetings each ray keeps its direction, so that its parcels may become one: fewer to carry."""
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-WIDEST = -0.5  # cosine of 120 degrees: wider ones meet head-on, see `wakewise.simulation.water.colliding_jets`
+WIDEST = -0.5  # cosine of 120 degrees: wider ones are opposed
 NARROWEST = math.cos(math.radians(20))  # jets that cross at less merge
-LEAST_SPEED_M_S = 0.03  # of a parcel alone at its centre; meetings of weaker ones are let be
+LEAST_SPEED_M_S = 0.03  # of a parcel alone at its centre; collisions of weaker ones are ignored
 
 
 @njit(nogil=True)

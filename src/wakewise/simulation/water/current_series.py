@@ -1,4 +1,4 @@
-"""Currents measured elsewhere, read from a file: uniform in space, linear between samples, refused where doubtful."""
+"""Measured currents from a file: uniform in space, linear between samples."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def read_current_series(
       looked at.
 
     Raises InputError: naming file and place: no such file, another format, missing columns, times that do not rise,
-    gaps, values that are missing or not finite, magnitudes that tell of another unit.
+    gaps, values that are missing or not finite, magnitudes of another unit.
     """
     readers = {".csv": _read_csv, ".json": _read_noaa}
     if path.suffix.lower() not in readers:

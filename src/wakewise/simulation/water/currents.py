@@ -1,10 +1,7 @@
-"""The water's own motion, which no thruster made: steady current, a series, waves, a pump's jet, background turbulence.
+"""Ambient flow: steady current, series, Airy waves, jet of a pump, background turbulence as Fourier modes.
 
-Each is a velocity field `velocity(points_W_m, time_s)`; they add up. The vehicle feels the field at its place, the
-water carries jets and silt with it, and what is called "excess" leaves it out. None of them feels the vehicle, the
-target or another one.
-
-Sums of Fourier modes at points, compiled: the water's turbulence is asked for by all that the water carries.
+Each is a velocity field `velocity(points_W_m, time_s)`; they add up. Ambient flow moves vehicle, jets and silt;
+"excess" velocities leave it out. It is not disturbed by vehicle or target.
 """
 
 from __future__ import annotations
@@ -87,8 +84,9 @@ class SteadyCurrent:
     def __post_init__(self) -> None:
         freeze(self, velocity_W_m_s=(3,))
 
-    def velocity(self, points_W_m: Array, time_s: float) -> Array:  # noqa: ARG002
-        """Velocity of the water, shape (n, 3)."""
+    def velocity(self, points_W_m: Array, time_s: float) -> Array:
+        """Velocity of the water, shape (n, 3), the same at all times."""
+        del time_s
         out = np.empty((len(points_W_m), 3))
         out[:] = self.velocity_W_m_s
         return out
@@ -167,10 +165,10 @@ class PumpJet:
             widening = PLAIN.core_spread if core else PLAIN.spread
             sigma = (self.diameter_m / math.sqrt(8) if core else 0.0) + widening * x
             speed = self.speed_m_s * min(1.0, core_m / max(x, 1e-9))
-            carried = (self.diameter_m / math.sqrt(8) / sigma) ** 2 if core else 0.5
+            advected = (self.diameter_m / math.sqrt(8) / sigma) ** 2 if core else 0.5
             step = _ROW_SPACING * sigma
             # A parcel stays in its stretch of the row for step / (carried speed) and holds the jet's impulse of then.
-            impulses.append(momentum * step / (carried * speed))
+            impulses.append(momentum * step / (advected * speed))
             places.append(x + step / 2)
             sigmas.append(sigma + widening * step / 2)
             x += step
@@ -184,8 +182,9 @@ class PumpJet:
         object.__setattr__(self, "_row", (row, size))
         object.__setattr__(self, "_sources", room.with_images(row, impulse, size))
 
-    def velocity(self, points_W_m: Array, time_s: float) -> Array:  # noqa: ARG002
-        """Velocity of the water, shape (n, 3)."""
+    def velocity(self, points_W_m: Array, time_s: float) -> Array:
+        """Velocity of the water, shape (n, 3), the same at all times."""
+        del time_s
         u = impulse_velocity(points_W_m, *self._sources)
         u[points_W_m[:, 2] == self.bed_z_m, 2] = 0.0  # there is only rounding
         return u

@@ -1,8 +1,7 @@
-"""The flat faces of the tank: bed, surface and walls, through which no water flows.
+"""Flat faces of the tank (bed, surface, walls): mirror images of the jets, and coordinates of their wall jets.
 
-A face lends every jet a mirror image behind it; image and original together have no velocity across the face. Water
-that strikes a face runs out along it as a wall jet (`wakewise.simulation.water.bedjets`), told in the face's own
-coordinates: two along the face, and the third counted out of the tank, as depth is for the bed.
+Image and original together have no normal velocity on the face. The coordinates of a face are two along it and the
+third outwards, as depth is for the bed.
 """
 
 from __future__ import annotations

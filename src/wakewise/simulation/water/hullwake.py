@@ -1,14 +1,9 @@
-"""The wake of a hull: what drag takes from the water's motion past the hull, given back to the water behind it.
+"""Wake of the hull: the momentum that drag takes from the flow past the hull, as impulse parcels.
 
-A hull that moves through the water drags some of it along. The force that this costs, F, is the water's loss: parcels
-of impulse -F dt / rho, sent from the lee of the hull, carry it on (`wakewise.simulation.water.round_jet_closure`,
-*Wakes*). A vehicle that hovers in a current so leaves no momentum in the mean: its jets carry what its wake lacks.
-
-The wake begins as wide as the hull: as a Gaussian whose middle is as fast as a top hat's of the hull's frontal area
-would be, sigma = sqrt(A / 2 pi), the relation of a jet's sigma and its disk. A hull whose drag coefficient is above 2
-would so lose more than all of the speed of the water behind it, and its wake begins wider, with the momentum thickness
-as sigma, where the deficit on the axis is all of that speed. A moment on the hull leaves no impulse and is left out, as
-is what an added mass borrows from the water and gives back.
+Parcels of impulse -F dt / rho start at the lee of the hull, F the drag (`round_jet_closure`, *Wakes*). In hover in a
+current the jets supply the impulse that the wake lacks. The initial width is sigma = sqrt(A / 2 pi), A the frontal
+area: a Gaussian whose centre is as fast as a top hat of that area. For a drag coefficient above 2 sigma is the momentum
+thickness, so that the deficit on the axis does not exceed the speed. Moments and added mass leave no impulse.
 """
 
 from __future__ import annotations

@@ -1,28 +1,21 @@
-"""Velocity that many smoothed impulses and sources induce at many points: the inner loop of the simulated water.
+"""Induced velocity of many smoothed impulses and sources at many points: the inner loop of the simulated water.
 
 An impulse m (m4/s) spread as a Gaussian of size sigma about X induces, with d = (x - X)/sigma and q = d.d,
 
     u = [2 (A + q A') m - 2 A' d (m.d)] / sigma^3,        A(q) = P(3/2, q/2) / (4 pi q^(3/2)),   A' = dA/dq,
 
 P the regularised incomplete gamma function: the divergence-free part of the impulse density (impulse, or
-"magnetisation", variables: Chorin 1994, Vorticity and Turbulence). Whatever the function A(q) is, this u has no
-divergence, so A may be replaced by something that is quick to compute. Here, with w = 1/(1 + q/12),
+"magnetisation", variables: Chorin 1994, Vorticity and Turbulence). u is free of divergence for any A(q), so A is
+approximated, with w = 1/(1 + q/12):
 
     A = w^(3/2) p(w),        p a polynomial of degree 9,
 
-whose first two terms make the far field that of a dipole. The other coefficients were fitted to the Gaussian's A and
-A' for least greatest error: 1.2e-4 of the speed at the parcel's centre, and 1.7e-4 of A anywhere. A source of strength
-Q (m3/s) of the same shape induces u = Q A d / sigma^2.
+whose first two terms give the dipole's far field. The other coefficients minimise the largest error: 1.2e-4 of the
+speed at the parcel's centre, 1.7e-4 of A. A source of strength Q (m3/s) of the same shape induces u = Q A d / sigma^2.
 
-The sums run in single precision over one array per quantity, so that the compiler works on several terms at once; each
-point is summed by one thread in one order.
-
-Long sums over points, split among threads without changing a byte.
-
-In which order points are taken, so that those that follow each other are mostly neighbours in space.
-
-Along Hilbert's curve through the cells of a cube: J. Skilling 2004, Programming the Hilbert curve, AIP Conf. Proc. 707,
-381, doi 10.1063/1.1751381. Where on the curve each cell lies is worked out once.
+Sums run in single precision over one array per quantity; each point is summed by one thread in one order, so results do
+not depend on the number of threads. Points are sorted along Hilbert's curve so that blocks hold neighbours (J. Skilling
+2004, Programming the Hilbert curve, AIP Conf. Proc. 707, 381, doi 10.1063/1.1751381).
 """
 
 from __future__ import annotations

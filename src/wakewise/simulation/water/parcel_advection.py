@@ -1,8 +1,4 @@
-"""What is compiled of a step of the free jets: their parcels' motion, and when and where they are sent.
-
-The motion is `wakewise.simulation.water.round_jet_closure` written out for one parcel after another; the closure's own
-functions are the readable twin of the loops.
-"""
+"""Compiled motion and emission of the parcels of free jets: `round_jet_closure` for one parcel after another."""
 
 from __future__ import annotations
 
@@ -164,7 +160,7 @@ def travelled(
 
 @njit(nogil=True)
 def fade_gusts(gust: Array, sigma: Array, speed: Array, noise: Array, dt_s: float) -> None:
-    """Let the parcels' turbulence forget, shape (n, 3), in place, and renew it with standard normal noise."""
+    """Step of the parcels' Markov turbulence, shape (n, 3), in place, with standard normal noise."""
     for i in range(sigma.shape[0]):
         memory = math.exp(-dt_s * max(speed[i], 1e-3) / (GUST_MEMORY * sigma[i]))
         fresh = math.sqrt(1.0 - memory * memory)
@@ -217,8 +213,8 @@ def emit_parcels(
         for k in range(3):
             axis, disk = towards * disks[2, i, k], disks[1, i, k]
             # Its water leaves with the disk's velocity and takes on the current's.
-            carried = ambient[i, k] + jets.share[n] * (disk - ambient[i, k])
-            jets.position[n, k] = disks[0, i, k] + (carried - disk) * age[j] + path * axis
+            advected = ambient[i, k] + jets.share[n] * (disk - ambient[i, k])
+            jets.position[n, k] = disks[0, i, k] + (advected - disk) * age[j] + path * axis
             jets.impulse[n, k], jets.gust[n, k] = sent[j] * axis, noise[j, k]
             jets.disk[n, k], jets.flow[n, k] = disk, 0.0
         for f in range(walls.shape[0]):

@@ -1,8 +1,4 @@
-"""Impulse parcels: what the free jets of the simulated water are made of, and the velocity that they induce.
-
-The sum itself, and what a parcel is, are in `wakewise.simulation.water.induction`; how parcels move and grow in
-`wakewise.simulation.water.round_jet_closure`.
-"""
+"""Impulse parcels: arrays of the free jets and the velocity that they induce (`induction`, `round_jet_closure`)."""
 
 from __future__ import annotations
 

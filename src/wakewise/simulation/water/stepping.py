@@ -1,7 +1,7 @@
-"""One step of all of the water, compiled: drift, sending, meeting, striking, merging.
+"""Compiled step of the whole water: advection, emission, collisions, strikes, merging of parcels.
 
-The state lies in arrays with room to spare, of which the first so many rows are in use, and is written in place. What
-the ambient water does at the places of a step is asked for before it, since a current may be any Python object.
+The state is in arrays with spare rows, of which the first `count` are in use, written in place. Ambient velocities are
+evaluated before the step, since a current may be any Python object.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def flow_at(
 
 @njit(nogil=True)
 def places_of(jets: ParcelBuffers, layers: RingBuffers, planes: JetPlanes, rows: IntArray, disks: Array) -> Array:
-    """Where a step must know the ambient water: at the parcels, the rings and the disks, one after another."""
+    """Places where a step needs the ambient flow: the parcels, the rings, the disks."""
     n, r = rows[0], rows[1]
     out = np.empty((n + r + disks.shape[0], 3))
     assign_rows(out[:n], jets.position[:n])
@@ -191,7 +191,7 @@ def _drift(
     ambient: Array,
     noise: Array,
 ) -> int:
-    """Carry parcels, let them grow, and retire what has come to rest; how many are left."""
+    """Advect and grow parcels and remove those at rest; returns the count."""
     sigma, impulse, dt_s = jets.sigma[:n], jets.impulse[:n], laws.drift[3]
     look = parcels_to_sample(jets.flow[:n], jets.held[:n], sigma, dt_s)
     if look.shape[0]:

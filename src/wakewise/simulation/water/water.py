@@ -1,18 +1,15 @@
-"""The simulated water: jets of impulse parcels, wall jets where they strike, a solid target, and the water's motion.
+"""Simulated water: jets of impulse parcels, wall jets, solid target, hull wake and ambient flow.
 
-Every thruster sends parcels of impulse (thrust x time / density) along its jet, from its disk;
-`wakewise.simulation.water.round_jet_closure` says how they grow and travel. Travel time, merging of neighbouring jets,
-bending in a current and wakes that linger follow from the parcels' motion; nothing is prescribed for them. Bed, surface
-and walls mirror the jets (`faces`), turn what strikes them into wall jets (`bedjets`), jets that cross fan out
-(`fans`), jets that meet head-on turn aside (`meeting`), the target turns water (`blockage`) and jets (`bodyjets`)
-aside, and a hull leaves a wake (`hullwake`).
+Every thruster emits parcels of impulse (thrust x time / density) at its disk (`round_jet_closure`). Travel time,
+merging of neighbouring jets, bending in a current and lingering wakes follow from the parcels' motion. Faces mirror the
+jets (`faces`) and turn them into wall jets (`bedjets`); opposed and crossing jets turn aside (`colliding_jets`); the
+target turns water and jets (`blockage`); a hull leaves a wake (`hullwake`).
 
-What it does not hold: swirl shows in the width of a jet only; wall jets carry no turbulence of their own and do not
-collide (those on the same ground add their momentum); there is no boundary layer of hull and target, nor a wake of the
-target; the bed right below a jet is struck in pulses (mean stress right, fluctuation about half of the mean). After a
-thruster has stopped, its wake dies sooner than the lattice's: the speed lasts 16 to 22 % less, the volume flux 10 to
-14 %, the half-time at six diameters is 29 % and the energy's life 34 to 46 % shorter. How far each law is met is told
-in `wakewise.simulation.tank.validation_limits`.
+Limits: swirl appears only in the width of a jet; wall jets have no turbulence of their own and do not collide; no
+boundary layer of hull and target, no wake of the target; the bed below a jet is struck in pulses (mean stress right,
+fluctuation half of the mean). After a thruster stops, its wake decays sooner than the lattice's: speed lasts 16 to 22 %
+less, volume flux 10 to 14 %, the half-time at six diameters is 29 % and the energy's life 34 to 46 % shorter. All laws:
+`wakewise.simulation.tank.validation_limits`.
 """
 
 from __future__ import annotations
@@ -28,6 +25,7 @@ from wakewise.core.interfaces import Current
 from wakewise.simulation.water.bedjets import JetPlanes, PackedRings, RingBuffers, WallJetRings, wall_rows
 from wakewise.simulation.water.blockage import Blockage, PackedBlockage
 from wakewise.simulation.water.colliding_jets import RAYS
+from wakewise.simulation.water.currents import SteadyCurrent
 from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.hullwake import HullPush, HullWake
 from wakewise.simulation.water.induction import SINGLE, curve
@@ -44,7 +42,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class WaterCounts:
-    """How much water the model carries, and what it has let go of, in N s."""
+    """Counts and impulses of the model's elements, and the impulse removed, in N s."""
 
     parcels: int
     rings: int
@@ -52,16 +50,6 @@ class WaterCounts:
     struck_N_s: float
     met_N_s: float
     forced_merges: int
-
-
-@dataclass(frozen=True)
-class _Uniform:
-    velocity_W_m_s: Array
-    steady = True
-    uniform = True
-
-    def velocity(self, points_W_m: Array, time_s: float) -> Array:  # noqa: ARG002
-        return np.tile(self.velocity_W_m_s, (len(points_W_m), 1))
 
 
 class Water:
@@ -77,9 +65,9 @@ class Water:
     - `rest_speed_m_s`: parcels are retired once neither they nor their neighbours move water faster than this at their
       centre.
     - `max_parcels`: above this, rows are made coarser until they fit, which is logged.
-    - `spreading`: `closure.PLAIN`, or `closure.SWIRLING` for a propeller's wide jet.
+    - `spreading`: `PLAIN`, or `SWIRLING` for a propeller's wide jet.
     - `body`: a solid body on the bed.
-    - `wake_life`: how much longer what is left of a jet lives once it is no longer fed: see `closure`, *Life*.
+    - `wake_life`: lifetime factor of a jet that is no longer fed, see `round_jet_closure`, *Life*.
     """
 
     def __init__(
@@ -102,7 +90,8 @@ class Water:
         areas = np.array(disk_areas_m2, dtype=np.float64)
         self._density = density_kg_m3
         self._bed = bed_z_m
-        self._ambient = ambient or _Uniform(np.zeros(3) if current_W_m_s is None else np.array(current_W_m_s, float))
+        steady = np.zeros(3) if current_W_m_s is None else np.array(current_W_m_s, float)
+        self._ambient = ambient or SteadyCurrent(velocity_W_m_s=steady)
         self._room = TankFaces.of(bed_z_m, half_size_m, surface=math.isfinite(bed_z_m))
         self._gust_scale = turbulence * GUST_PER_TURBULENCE
         self._rest_speed = rest_speed_m_s
@@ -298,7 +287,7 @@ class Water:
         while parcels.count > self._max_parcels:
             spacing *= 1.5
             if spacing > 50.0:
-                # Nothing more to merge: let the weakest go, most of them long past mattering.
+                # Nothing more to merge: drop the weakest.
                 size = parcels.size_m4_s
                 strength = size / parcels.sigma_m**3
                 keep = np.sort(np.argsort(-strength, kind="stable")[: self._max_parcels])

@@ -1,7 +1,6 @@
-"""The water at one instant: its velocity at any points, and where it stirs the bed.
+"""Water at one instant: velocity at any points, and stress on the bed.
 
-An instant holds arrays that nobody changes, so it stays what it was while the water moves on, and several threads may
-look at it at once. What takes long to prepare is prepared when first asked for.
+Its arrays never change, so threads may share a snapshot while the water moves on. Derived tables are made on first use.
 """
 
 from __future__ import annotations

@@ -16,7 +16,8 @@ from scipy.ndimage import map_coordinates
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.simulation.lattice.cases import LatticeCase, case_hash, find_case
+from wakewise.simulation.lattice.cases import LatticeCase, case_hash
+from wakewise_paper.lattice_reference.reference_cases import find_case
 from wakewise_paper.lattice_reference.run import LatticeRun
 
 DATA = Path(__file__).parent / "data"

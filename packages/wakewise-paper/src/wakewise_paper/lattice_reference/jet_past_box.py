@@ -12,8 +12,9 @@ import numpy as np
 from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.simulation.lattice.cases import LatticeCase, case_hash, find_case
+from wakewise.simulation.lattice.cases import LatticeCase, case_hash
 from wakewise_paper.lattice_reference.crossing_jets import DATA, speeds_at
+from wakewise_paper.lattice_reference.reference_cases import find_case
 from wakewise_paper.lattice_reference.run import LatticeRun
 
 _X_D = np.arange(1.0, 11.01, 0.5)

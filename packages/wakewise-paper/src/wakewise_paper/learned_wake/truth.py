@@ -15,10 +15,11 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.simulation.lattice import CASES, DiskJet, LatticeCase, load_mean_field
+from wakewise.simulation.lattice import DiskJet, LatticeCase, load_mean_field
 from wakewise.simulation.water import Water
 from wakewise.simulation.water.round_jet_closure import JetSpreading
 from wakewise.wake.learned import EDGES, MEMORY_S, JetPoints, history_bins, remembered
+from wakewise_paper.lattice_reference.reference_cases import CASES
 from wakewise_paper.lattice_reference.run import LatticeRun
 
 DIAMETER_M = 0.06
