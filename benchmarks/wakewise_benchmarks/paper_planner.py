@@ -14,7 +14,7 @@ which miss, one OSQP problem whose numbers are updated).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
@@ -36,7 +36,7 @@ _STEP = 1e-5
 
 
 @njit
-def _turned(state, axis, step, moved):  # type: ignore[no-untyped-def]
+def _turned(state: Array, axis: int, step: float, moved: Array) -> None:
     """State moved by `step` along position (0 to 2) or rotation vector (3 to 5)."""
     moved[:] = state
     if axis < 3:
@@ -56,7 +56,7 @@ def _turned(state, axis, step, moved):  # type: ignore[no-untyped-def]
 
 
 @njit
-def taylor_block(wake, scratch, state, thrusts, central, block):  # type: ignore[no-untyped-def]
+def taylor_block(wake: Any, scratch: Any, state: Array, thrusts: Array, central: bool, block: Array) -> None:
     """Second derivatives of D of one stage by differences of its gradient: position, rotation vector, thrusts."""
     n = thrusts.shape[0]
     size = 6 + n
@@ -87,7 +87,7 @@ def taylor_block(wake, scratch, state, thrusts, central, block):  # type: ignore
 
 
 @njit
-def taylor_blocks(wake, scratch, states, thrusts, blocks):  # type: ignore[no-untyped-def]
+def taylor_blocks(wake: Any, scratch: Any, states: Array, thrusts: Array, blocks: Array) -> None:
     """One-sided `taylor_block` of every stage."""
     for k in range(thrusts.shape[0]):
         taylor_block(wake, scratch, states[k], thrusts[k], False, blocks[k])

@@ -1,16 +1,15 @@
-"""First what flies; then the planner against the paper's recipe and its plans against IPOPT, on the same problems.
+"""The planner: control steps as they are flown; then plans against the paper's recipe and IPOPT, on the same problems.
 
-`flown` is the control step of a default flight, which plans with free jets and shares out anew (see `flown_step.py`).
-The rest is the planner alone in the paper's own wake model. Scenario A floats (1.5 N), B sinks (3 N): an orbit of
-0.35 m radius at 0.2 m/s with the body 0.2 m above the top of a coral, in a current of 0.25 m/s, wake model
-`paper-calibrated` with a smooth edge of 3 deg. The plant that carries the problems on flies the commands of
-`mm_quality` with 15 % more drag and 10 % more current than the planner believes. Every solver starts from its own last
-plan. Times are the thread's CPU per plan after the first three.
+`flown` is the control step of a default flight, 50 steps a second, with the vehicle 3 N heavy, free jets in the plan,
+wall jets and merging jets in the allocation. The plant has 15 % more drag than is believed and tells its true state.
+Times are the thread's CPU after a second of warm-up; a `planning` step is one in ten that also plans or searches.
 
-Whether the planner's deadline holds on the wall's clock while every core is busy with something else.
-
-IPOPT on the planner's own objective: what a plan's quality is held against. Needs casadi, a development
-dependency.
+The rest is the planner alone in the paper's own wake model. Scenario A floats (1.5 N), B sinks (3 N): an orbit of 0.35
+m radius at 0.2 m/s with the body 0.2 m above the top of a coral, in a current of 0.25 m/s, wake model
+`paper-calibrated` with a smooth edge of 3 deg. The plant flies the commands of `mm_quality` with 15 % more drag and 10
+% more current than the planner believes. Every solver starts from its own last plan. Times are the thread's CPU per
+plan after the first three. IPOPT solves the planner's own objective (needs casadi, a development dependency). The
+deadline is measured on the wall's clock while every core is busy with something else.
 """
 
 from __future__ import annotations
@@ -19,15 +18,17 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
+from wakewise.control import ControlSettings, make_controller
 from wakewise.control.failsafe import PlanFailsafe
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, quat_from_euler
-from wakewise.core.interfaces import Goal
+from wakewise.core.interfaces import BodyState, Goal
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.planning.obstacles import Surroundings
 from wakewise.planning.planner import PlanModel, Planner, compile_plan
@@ -36,9 +37,44 @@ from wakewise.robot.thrusters import thruster_lag
 from wakewise.robot.vehicles import compile_body
 from wakewise.robot.vehicles.kernels import rk4_kernel
 from wakewise.wake import WakeSettings, wake_model
-from wakewise_benchmarks.control_step import METHODS, flown_step
 from wakewise_benchmarks.paper_planner import PaperPlanner
 from wakewise_benchmarks.registry import VEHICLE, bench_region, bench_target
+
+METHODS = ("wake-aware", "allocation-only", "mpc", "dp")
+SECONDS, WARM_UP_S, DT_S = 11.0, 1.0, 0.02
+ESTIMATED_CURRENT_M_S = np.array([0.05, 0.02, 0.0])
+"""What the estimate says of the water, so that points upstream are watched, too."""
+
+
+def flown_step(method: str, goal_at: Callable[[float], Goal], weight_N: float) -> dict[str, Any]:
+    """Times of a method's control steps in ms: median, 99th percentile, and that of the slowest tenth's median."""
+    settings = ControlSettings()
+    wake = wake_model(settings.wake, bench_target().bed_z_m)
+    controller = make_controller(method, VEHICLE, bench_region(), wake, settings)
+    plant = np.array(compile_body(VEHICLE).packed)
+    plant[12:19] *= 1.15
+    goal = goal_at(0.0)
+    x, thrusts = np.concatenate([goal.X_WB.p_m, goal.X_WB.q, goal.nu_B]), np.zeros(len(VEHICLE.thrusters))
+    state, spans = controller.init(), []
+    for k in range(round(SECONDS / DT_S)):
+        goal, X_WB = goal_at(k * DT_S), Pose(x[:3], x[3:7])
+        load_B = np.concatenate([X_WB.R.T @ [0.0, 0.0, weight_N], np.zeros(3)])
+        estimate = BodyState(X_WB=X_WB, nu_B=x[7:], load_B=load_B, current_W_m_s=ESTIMATED_CURRENT_M_S)
+        began = time.thread_time_ns()
+        state, command = controller.step(state, DT_S, estimate, goal)
+        spans.append((time.thread_time_ns() - began) / 1e6)
+        thrusts = thruster_lag(thrusts, command.thrusts_N, VEHICLE.time_constants_s, DT_S)
+        wrench = VEHICLE.allocation_matrix @ thrusts
+        wrench += load_B
+        rk4_kernel(plant, x, np.concatenate([wrench, ESTIMATED_CURRENT_M_S]), DT_S)
+    late = np.array(spans[round(WARM_UP_S / DT_S) :])
+    slow = np.sort(late)[-len(late) // 10 :]
+    return {
+        "ms_median": float(np.median(late)),
+        "ms_p99": float(np.percentile(late, 99)),
+        "ms_planning_median": float(np.median(slow)),
+    }
+
 
 PLANS = 100
 
@@ -82,7 +118,10 @@ class IpoptReference:
         size = stages * planner.model.thrusters
         shape = self._shape
 
-        class Gradient(casadi.Callback):  # type: ignore[misc]
+        class Callback(casadi.Callback):  # type: ignore[misc]  # casadi, which is optional, has no types
+            """Base of the three functions that IPOPT asks for."""
+
+        class Gradient(Callback):
             def __init__(self) -> None:
                 casadi.Callback.__init__(self)
                 self.construct("gradient", {})
@@ -103,7 +142,7 @@ class IpoptReference:
                 U = np.array(args[0]).reshape(shape)
                 return [casadi.DM(planner.gradient(U)).T]
 
-        class Cost(casadi.Callback):  # type: ignore[misc]
+        class Cost(Callback):
             def __init__(self) -> None:
                 casadi.Callback.__init__(self)
                 self._gradient = Gradient()
@@ -130,7 +169,7 @@ class IpoptReference:
             def get_jacobian(self, *_: object) -> object:
                 return self._gradient
 
-        class Hessian(casadi.Callback):  # type: ignore[misc]
+        class Hessian(Callback):
             def __init__(self) -> None:
                 casadi.Callback.__init__(self)
                 self.construct("hessian", {})

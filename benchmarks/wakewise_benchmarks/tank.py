@@ -41,8 +41,9 @@ def run(options: BenchOptions) -> dict[str, Any]:
     spent = {"water": 0.0, "silt": 0.0, "measures": 0.0, "flow_points": 0.0}
     # Water and silt run beside the rest, each wholly on one thread; the sum at many points is split among threads, but
     # nothing else runs then, since the measures before it have waited for water and silt.
-    tank.water.step = _timed(tank.water.step, spent, "water", time.thread_time)  # type: ignore[method-assign]
-    tank.silt.step = _timed(tank.silt.step, spent, "silt", time.thread_time)  # type: ignore[method-assign]
+    parts: dict[str, Any] = {"water": tank.water, "silt": tank.silt}
+    for name, part in parts.items():
+        part.step = _timed(part.step, spent, name, time.thread_time)
     measure = _timed(tank.measure, spent, "measures", time.thread_time)
     look = _timed(tank.excess_velocity, spent, "flow_points", time.process_time)
     times, memory, started = [], [], (0.0, 0.0)

@@ -81,8 +81,9 @@ class TransectRoute(Route):
         R_WC = np.stack([right, -ahead, np.array([0.0, 0.0, 1.0])], axis=1)  # x right, y down the picture, z ahead
         return Pose(self.centre_W_m + place, quat_from_matrix(R_WC)), velocity_W, np.zeros(3)
 
-    def tilt(self, time_s: float, aim: CameraAim | Pose) -> tuple[float, float]:  # noqa: ARG002
+    def tilt(self, time_s: float, aim: CameraAim | Pose) -> tuple[float, float]:
         """The camera is mounted looking down: its joint, if it has one, stays."""
+        del time_s, aim
         return 0.0, 0.0
 
 

@@ -1,13 +1,13 @@
-"""Campaigns: many trials, made on one computer or a cluster, each once, whatever is killed on the way.
+"""Campaigns: many trials, made on one computer or on many, each once, resumable after any interruption.
 
-What people write is a campaign file (`definition.py`, `definition.py`), whose trials fly scenarios (`flights.py`). A
-trial is plain values (`task.py`), its folder is the truth (`store.py`), and whoever makes it claims it
-(`trial_lock.py`) and notes each attempt (`attempt_log.py`). Start reading in `run.py`, the driver's loop. An attempt is
-made in a process (`worker.py`) that a slot minds (`worker_process.py`, `worker_process.py`); an engine says where slots
-are: in processes of this computer (`engines.py`) or on a Dask cluster (`engines.py`). `index.py` is a cache of the
-folders, `definition.py` what they were made for, `table.py` what came of them, `summary.py` what is compared with what
-and `summary.py` who won, with `pictures.py` for a page; `task.py` says which source made a trial, and `statistics/`
-what figures of many trials say.
+- `definition.py`: the campaign file; its trials; plan.json, which says what a folder was made for.
+- `flights.py`: what a trial does: a flight with setup functions and probes, or a whole scan. `pictures.py`: what it
+keeps. - `study.py`: a campaign whose trials a program lists. - `task.py`: one trial as plain values, its key and its
+outcome. `store.py`: the folder of a campaign. - `run.py`: the driver's loop. `engines.py`: processes of this computer,
+or a Dask cluster. - `worker.py`: the process that makes trials. `worker_process.py`: starts and watches it. -
+`trial_lock.py`: which process has a trial. `attempt_log.py`: how often it was tried, and how that ended. - `index.py`:
+a cache of all folders. `table.py`: means with intervals. `summary.py`: which method is best, and how sure. -
+`statistics.py`: intervals, paired tests, corrections, sample sizes.
 """
 
 from typing import TYPE_CHECKING

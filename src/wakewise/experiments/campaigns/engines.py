@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -37,17 +38,9 @@ MOST_WORKERS = 1024
 class WorkerPool:
     """Those who work.
 
-    Parameters
-    ----------
-    executor : Executor
-        Makes calls of `wakewise.experiments.campaigns.worker_process.attempt`.
-    threads : int
-        Of each attempt's libraries.
-    size : callable
-        How many attempts are made at once now. No more are handed over, so that what waits can still be stopped, or
-        taken by others.
-    check : callable
-        Raises if there is nobody left.
+    `executor` makes calls of `worker_process.attempt`; `threads` are those of each attempt's libraries; `size` says how
+    many attempts are made at once now, so that what waits can still be stopped or taken by others; `check` raises if
+    nobody is left.
     """
 
     executor: Executor
@@ -73,10 +66,7 @@ class TrialExecutor(Protocol):
 class ProcessExecutor:
     """Processes of this computer, started anew (no forks), each of which makes one trial after the other.
 
-    Parameters
-    ----------
-    workers : int
-        How many at once; as many as there are cores if not given.
+    As many as there are cores if `workers` is not given.
 
     Raises
     ------
@@ -139,13 +129,8 @@ CONNECT_S, WORKERS_S = 10.0, 60.0
 class DaskExecutor:
     """Workers of a Dask cluster.
 
-    Parameters
-    ----------
-    scheduler : str, optional
-        Address of a scheduler, or its scheduler file; a cluster on this computer is made if not given.
-    workers : int, optional
-        Trials at once: how many workers the cluster here has, one per core if not given; of a running cluster at most
-        so many are used.
+    `scheduler` is the address of a scheduler, or its scheduler file; a cluster on this computer is made if not given,
+    with `workers` workers, one per core if not given. Of a running cluster at most `workers` are used.
 
     Raises
     ------
@@ -170,7 +155,8 @@ class DaskExecutor:
             If the address does not answer, or a worker does not see the campaign's folder, or has other sources.
         """
         import dask
-        import distributed  # noqa: F401  (its defaults first: leaving the block would take them away again)
+
+        import_module("distributed")  # its defaults first: leaving the block would take them away again
 
         with dask.config.set(SETTINGS), self._client() as client:
             told = self._probed(client, driver)

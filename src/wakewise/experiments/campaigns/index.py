@@ -73,15 +73,19 @@ def _stamps(trials: Path) -> dict[str, _Stamp]:
         for entry in entries:
             if entry.name.startswith("."):
                 continue
-            ns = size = -1
-            with suppress(OSError):
-                figures = os.stat(f"{entry.path}/{FIGURES}")  # noqa: PTH116  (ten thousand of them)
-                ns, size = figures.st_mtime_ns, figures.st_size
-            length = -1
-            with suppress(OSError):
-                length = os.stat(f"{entry.path}/{ATTEMPTS}").st_size  # noqa: PTH116
+            ns, size = _stat(f"{entry.path}/{FIGURES}")
+            _, length = _stat(f"{entry.path}/{ATTEMPTS}")
             found[entry.name] = (ns, size, length)
     return found
+
+
+def _stat(path: str) -> tuple[int, int]:
+    """When a file was changed, in ns, and its length; -1 for both where there is none."""
+    try:
+        told = os.stat(path)  # noqa: PTH116  (of ten thousand files: a Path for each takes longer than the call)
+    except OSError:
+        return -1, -1
+    return told.st_mtime_ns, told.st_size
 
 
 def _look(place: Path) -> IndexEntry:

@@ -63,27 +63,12 @@ def run(
 ) -> list[TrialOutcome]:
     """Make what is missing of some trials.
 
-    Parameters
-    ----------
-    tasks : sequence of Task
-        One outcome each, in this order; those of one key are made once.
-    folder : Path
-        The campaign's, made if it is not there; with a Dask cluster, one that all of its computers see.
-    engine : TrialExecutor
-    timeout_s, memory_MB : float, optional
-        An attempt that takes longer, or whose processes take more memory, is ended.
-    retries : int
-        How often a trial is tried again whose process died, took too long or too much, or met a failure of the
-        computer; the latter is tried again by each run. An exception of the work is final: the same seed would raise
-        it again.
-    progress : callable
-        Called as `(done, total, note)`.
-    stop : callable
-        Asked a few times a second; true ends what is under way and returns.
-    until : float, optional
-        Instant of `time.monotonic`, s, after which it is the same; no more time than that is told to be left.
-    again : bool
-        Try trials anew that failed in an earlier run.
+    `tasks` have one outcome each, in this order; those of one key are made once. `folder` is made if it is not there;
+    with a Dask cluster, all of its computers see it. An attempt that takes longer than `timeout_s`, or whose processes
+    take more than `memory_MB`, is ended. A trial whose process died, took too long or too much is tried again `retries`
+    times, as is one that met a failure of the computer, which each run tries again; an exception of the work is final.
+    `stop` is asked a few times a second: true ends what is under way and returns, as does the instant `until`
+    (`time.monotonic`, s). `again` tries trials anew that failed in an earlier run.
 
     Raises
     ------

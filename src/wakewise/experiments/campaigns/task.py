@@ -85,16 +85,9 @@ _KEY = 32  # characters of a key; half of SHA-256
 class Task:
     """One trial to make.
 
-    Parameters
-    ----------
-    name : str
-        For people, such as "wake-aware/coral-1/payload/3".
-    work : str
-        ``package.module:function``, a function `(settings, folder, progress) -> figures`.
-    settings : mapping
-        Plain values, as JSON knows them; all that the function is told, its seed with it.
-    sources : tuple of str
-        Parts of the package whose source can change the figures (see `wakewise.experiments.campaigns.task`).
+    `work` is ``package.module:function``, a function `(settings, folder, progress) -> figures`; `settings` are plain
+    values, all that the function is told, its seed with it; `sources` are the parts whose source can change the
+    figures.
 
     Raises
     ------
@@ -139,20 +132,9 @@ class Task:
 class TrialOutcome:
     """What became of a trial: its figures, or the reason that there are none.
 
-    Parameters
-    ----------
-    task : Task
-    figures : dict or None
-    reason : str or None
-        Why there are no figures, in one line.
-    attempts : int
-        How often it was begun, in all runs of the campaign.
-    took_s : float
-        Wall time of the attempt that counts; 0 where it never ended.
-    known : bool
-        It was finished before this run began.
-    how : str or None
-        How the last attempt ended (`attempts.How`); None if none has.
+    `reason` says in one line why there are no figures; `attempts` counts all runs of the campaign; `took_s` is the wall
+    time of the attempt that counts, 0 where it never ended; `known`: it was finished before this run began; `how` the
+    last attempt ended (`attempt_log.How`).
     """
 
     task: Task

@@ -72,12 +72,8 @@ def renew_lock(folder: Path) -> None:
 def acquire_lock(folder: Path, abandoned_beat: int | None = None) -> bool:
     """Claim a trial's folder for this process; False if another has it.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the trial; its parent is the campaign's.
-    abandoned_beat : int or None
-        Heartbeat that was seen not to change for so long that its holder on another computer counts as gone.
+    `abandoned_beat` is a heartbeat that was seen not to change for so long that its holder on another computer counts
+    as gone.
     """
     mine = folder / (temporary_prefix(CLAIM) + os.urandom(4).hex() + ".json")
     mine.write_text(json.dumps(asdict(this_process())), encoding="utf-8")

@@ -37,22 +37,9 @@ _PACKAGES = ("wakewise", "numpy", "scipy", "numba", "pycolmap", "embreex", "smal
 class AttemptRequest:
     """One attempt to be made at a trial.
 
-    Parameters
-    ----------
-    place : str
-        The trial's folder.
-    trial : dict
-        `Task.plain()`.
-    timeout_s, memory_MB : float or None
-        Bounds; None for none.
-    driver : str
-        File that is there as long as the driver wants the attempt.
-    abandoned_beat : int or None
-        As in `claims.take`.
-    version : str
-        The sources that the trial is to be made with; others are refused.
-    cwd : str
-        Where the driver was started, for files and modules that a trial names from there.
+    `place` is the trial's folder; `trial` is `Task.plain()`; `driver` a file that is there as long as the driver wants
+    the attempt; `abandoned_beat` as in `trial_lock.acquire_lock`; `version` the sources that the trial is to be made
+    with, others are refused; `cwd` where the driver was started, for files and modules that a trial names from there.
     """
 
     place: str
@@ -166,7 +153,7 @@ def _logged(path: Path, timeout_s: float | None) -> Iterator[None]:
             with suppress(OSError):
                 sys.stdout.flush()
                 sys.stderr.flush()
-            with open(os.devnull, "wb") as nowhere:  # noqa: PTH123
+            with Path(os.devnull).open("wb") as nowhere:
                 os.dup2(nowhere.fileno(), 1)
                 os.dup2(nowhere.fileno(), 2)
 

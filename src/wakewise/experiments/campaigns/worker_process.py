@@ -73,10 +73,7 @@ class AttemptReport:
 class TrialProcess:
     """One process, started when there is something to do.
 
-    Parameters
-    ----------
-    threads : int
-        Of every library in it but OpenBLAS, which has one or as many as the user says.
+    `threads` are of every library in it but OpenBLAS, which has one or as many as the user says.
     """
 
     def __init__(self, threads: int) -> None:

@@ -31,19 +31,10 @@ def tam_yaml(
 ) -> str:
     """Text of the parameter file.
 
-    Parameters
-    ----------
-    vehicle : str
-        Goes into a comment.
-    names : sequence of str
-        Of the thrusters, in the order of the columns; joints and controllers are numbered from 1, as in the
-        project's demos: `thruster_1_joint`.
-    matrix_B : ndarray, shape (6, n)
-        Wrench about the body origin per newton of each thruster, in FRD.
-    limits_N : tuple of ndarray, shape (n,), optional
-        Lowest and highest thrust, which the controller does not know; they go into the comments.
-    frame : str
-        Axes of the matrix that is written, a key of `FRAMES`.
+    `names` are of the thrusters, in the order of the columns; joints and controllers are numbered from 1, as in the
+    project's demos (`thruster_1_joint`). `matrix_B`, shape (6, n), is the wrench about the body origin per newton of
+    each thruster, in FRD. `limits_N` are lowest and highest thrusts, shape (n,) each, which the controller does not
+    know: they go into the comments. `frame`, a key of `FRAMES`, are the axes of the matrix that is written.
 
     Raises
     ------

@@ -271,12 +271,7 @@ def _write_ply(path: Path, cloud: SparsePoints) -> None:
 def write_tum(path: Path, track: Trajectory, note: str) -> None:
     """Write a trajectory; the format states no axes, so they stay ours (NED), and the first line says so.
 
-    Parameters
-    ----------
-    path : Path
-    track : Trajectory
-    note : str
-        What moved, and its axes; goes into the first line.
+    `note` says what moved, and its axes.
     """
     rows = np.column_stack([track.times_s, track.p_W_m, track.q[:, [1, 2, 3, 0]]])
     lines = [" ".join(f"{value:.17g}" for value in row) for row in rows.tolist()]

@@ -56,16 +56,8 @@ class ThrustRecord:
 class Photographs:
     """Photographs, where they are, and the camera that took them.
 
-    Parameters
-    ----------
-    files : tuple of Path
-        One per pose of `track`; names differ.
-    track : Trajectory
-        Of the camera C with OpenCV axes: `q` is q_WC.
-    width, height : int
-        In pixels.
-    params : ndarray, shape (8,)
-        fx, fy, cx, cy in pixels (centres at +0.5), k1, k2, p1, p2 of OpenCV's distortion.
+    `files` are one per pose of `track`, of different names; `track` is of the camera C with OpenCV axes (`q` is q_WC).
+    `params`, shape (8,), are fx, fy, cx, cy in pixels (centres at +0.5), k1, k2, p1, p2 of OpenCV's distortion.
     """
 
     files: tuple[Path, ...]

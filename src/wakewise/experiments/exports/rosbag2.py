@@ -41,14 +41,7 @@ def write_bag(
 ) -> int:
     """Write a bag and return how many messages it holds.
 
-    Parameters
-    ----------
-    folder : Path
-        Must not exist; the file inside is named after it.
-    bodies, cameras : mapping of str to Track
-        Poses of body and camera, keyed by `WHO`.
-    telemetry : Telemetry, optional
-    photographs : Photographs, optional
+    `folder` must not exist; the file inside is named after it. `bodies` and `cameras` are keyed by `WHO`.
 
     Raises
     ------

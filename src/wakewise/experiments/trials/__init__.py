@@ -1,12 +1,13 @@
 """Trials: a scenario flown, photographed, reconstructed and judged, stage by stage, in one folder.
 
-Each stage takes files and leaves files, is skipped when done, and goes on where it was cut off.
+Each stage reads files and leaves files, is skipped when done, and goes on where it was cut off.
 
-Start reading in `trial.py` (a trial is a page). `stages.py` is who watches and what it cost, `surface.py` makes mesh
-and colours beside the report, `trial.py` how large the model came out, `metrics.py` every figure with its unit,
-definition and better side, `coverage.py` holds the guide of photographs against the model, `metrics.py` what a
-flight is held against, `timing.py` how benches and studies measure and what they are asked, `stages.py` what becomes
-of a report that fails, `export.py` hands a trial on to other tools, `dataset/` makes a data set of many.
+- `trial.py`: the stages of a trial; several methods side by side.
+- `stages.py`: who is told of progress, what a stage cost. `surface.py`: mesh and colours in a process of their own.
+- `metrics.py`: every figure with unit, definition and better side; reference values. `coverage.py`: the coverage guide
+  against the model.
+- `export.py`: a trial as files of other tools. `dataset/`: a data set of many trials.
+- `timing.py`: options and timing of benches.
 """
 
 from typing import TYPE_CHECKING

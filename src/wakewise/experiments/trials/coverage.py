@@ -36,14 +36,9 @@ Shot = tuple[Pose, float | None]
 class CoverageAgreement:
     """Patches as the guide saw them and as the model has them.
 
-    Parameters
-    ----------
-    complete_share : ndarray, shape (patches,)
-        Share of each patch's true surface within 3 mm of the model; -1 where no sample of the truth fell on it.
-    complete, well : ndarray of bool, shape (patches,)
-        Complete over more than half of its area, and seen well over more than half.
-    predicted_pct, completeness_pct : float
-        By area: what the guide expects, and what came of it.
+    `complete_share`, shape (patches,), is the share of each patch's true surface within 3 mm of the model, -1 where no
+    sample of the truth fell on it; `complete` and `well` say which patches are complete, and seen well, over more than
+    half of their area. `predicted_pct` and `completeness_pct` are by area: what the guide expects, and what came of it.
     """
 
     complete_share: Array
@@ -80,16 +75,8 @@ def coverage_of(
 ) -> Coverage:
     """The guide after a flight's photographs, in their order.
 
-    Parameters
-    ----------
-    target : Target
-        As it was found, which is what the crew believes.
-    lens : CameraIntrinsics
-        The camera.
-    shots : iterable
-        Estimated X_WC of each photograph and its sharpness, None where that is not known.
-    spent_ms : list, optional
-        Takes the thread CPU time of each photograph, in ms.
+    `target` is as it was found; `shots` are the estimated X_WC of each photograph and its sharpness, None where that is
+    not known; `spent_ms` takes the thread CPU time of each photograph.
     """
     coverage = Coverage.begin(patches_of(target.mesh, target.bed_z_m))
     for X_WC, sharpness in shots:
@@ -104,19 +91,14 @@ def coverage_of(
 def agreement_with(coverage: Coverage, parts: Parts, cloud_W_m: Array) -> CoverageAgreement:
     """Patch by patch, what the guide saw well and what of the truth a model has within 3 mm.
 
-    Parameters
-    ----------
-    coverage : Coverage
-        Of patches of `parts.found_target`.
-    parts : Parts
-    cloud_W_m : ndarray, shape (n, 3)
-        The model's points in the truth's frame, as `compare_surface` leaves them.
+    `coverage` is of patches of `parts.surveyed_target`; `cloud_W_m`, shape (n, 3), are the model's points in the
+    truth's frame, as `compare_surface` leaves them.
     """
     patches, target = coverage.patches, parts.target
     truth = sample_surface(target.mesh, Crop(bed_z_m=target.bed_z_m), np.random.default_rng(0))
     there = np.asarray(KDTree(cloud_W_m).query(truth.points_m)[0]) < REACH_M
     # The believed surface laid on the true one, so that what is compared is the same piece of it.
-    shift = parts.found_target.centre_W_m - target.centre_W_m
+    shift = parts.surveyed_target.centre_W_m - target.centre_W_m
     facing = NORMAL_SHARE * target.radius_m
     own = np.concatenate([patches.points_W_m - shift, facing * patches.normals], axis=1)
     asked = np.concatenate([truth.points_m, facing * truth.normals], axis=1)
@@ -134,7 +116,7 @@ def agreement_with(coverage: Coverage, parts: Parts, cloud_W_m: Array) -> Covera
 
 def coverage_figures(parts: Parts, photos: pl.DataFrame, cloud_W_m: Array | None) -> dict[str, float]:
     """What the guide expects of the model, and where there is one, in the truth's frame, how far the two agree."""
-    coverage = coverage_of(parts.found_target, parts.camera, shots_of(photos))
+    coverage = coverage_of(parts.surveyed_target, parts.camera, shots_of(photos))
     figures = {"coverage_predicted_pct": 100.0 * coverage.share, "coverage_sure_pct": 100.0 * coverage.sure}
     if cloud_W_m is None:
         return figures
@@ -163,7 +145,7 @@ def measure_coverage(folder: Path) -> dict[str, Any]:
     parts = read_scenario(folder / "scenario.yaml").parts()
     photos = pl.read_csv(folder / "images.csv")
     spent_ms: list[float] = []
-    coverage = coverage_of(parts.found_target, parts.camera, shots_of(photos), spent_ms)
+    coverage = coverage_of(parts.surveyed_target, parts.camera, shots_of(photos), spent_ms)
     crop = Crop(bed_z_m=parts.target.bed_z_m)
     compared = compare_surface(read_cloud(folder / "dense.ply").points_m, parts.target.mesh, crop=crop)
     both = agreement_with(coverage, parts, compared.points_W_m)
@@ -197,7 +179,7 @@ def measure_cost(parts: Parts) -> dict[str, float]:
     """
     spent_ms: list[float] = []
     shots: list[Shot] = [(X_WC, None) for X_WC in parts.route.X_WC_planned]
-    coverage = coverage_of(parts.found_target, parts.camera, shots, spent_ms)
+    coverage = coverage_of(parts.surveyed_target, parts.camera, shots, spent_ms)
     later_ms = spent_ms[1:] or spent_ms
     if not later_ms:
         raise InputError("mission: plans no photograph, the guide needs at least one")

@@ -68,23 +68,11 @@ def export_trial(
 ) -> ExportResult:
     """Export a trial.
 
-    Parameters
-    ----------
-    folder : Path
-        Of a trial that has been flown.
-    to : str
-        One of `EXPORTS`.
-    out : Path, optional
-        Folder to write (qgc-plan: file); `export/` in the trial's folder if not given. One that holds something is
-        refused, so that nothing is lost.
-    poses : str
-        nerfstudio and colmap: "true" ones with the true camera, or "estimated" ones with the camera as the crew
-        knows it. The others hold both, as far as they are there.
-    origin : GeodeticOrigin, optional
-        qgc-plan: where the world's origin lies.
-    held_out, seed : int, optional
-        nerfstudio and colmap: one photograph in `held_out` (8) is held out from training, drawn by `seed` (0); 0 holds
-        none out.
+    `out` is a folder (qgc-plan: a file), `export/` in the trial's folder if not given; one that holds something is
+    refused. `poses`, of nerfstudio and colmap, are "true" ones with the true camera or "estimated" ones with the camera
+    as the crew knows it; the others hold both, as far as they are there. `origin`, of qgc-plan, is where the world's
+    origin lies. Of nerfstudio and colmap, one photograph in `held_out` (8) is held out from training, drawn by `seed`
+    (0); 0 holds none out.
 
     Raises
     ------

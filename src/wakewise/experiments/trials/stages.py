@@ -38,8 +38,9 @@ class SilentProgress:
     """A `ProgressListener` that shows nothing."""
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[Callable[..., None]]:  # noqa: ARG002
+    def stage(self, name: str) -> Iterator[Callable[..., None]]:
         """Show nothing."""
+        del name
         yield no_progress
 
     def skipped(self, name: str) -> None:

@@ -37,15 +37,7 @@ from wakewise.vision.texturing.textured import write_textured
 
 
 class SurfaceMaker:
-    """Makes mesh.ply and mesh.glb of a trial's folder, of which its caller has the lock; use it in a `with` statement.
-
-    Parameters
-    ----------
-    folder : Path
-    settings : ReconstructionSettings
-    bed_z_m : float
-        Depth of the bed.
-    """
+    """Makes mesh.ply and mesh.glb of a trial's folder whose lock the caller has; use it in a `with` statement."""
 
     def __init__(self, folder: Path, settings: ReconstructionSettings, bed_z_m: float) -> None:
         self._folder, self._settings, self._bed_z_m = folder, settings, bed_z_m

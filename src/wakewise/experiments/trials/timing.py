@@ -18,33 +18,11 @@ from wakewise.core.interfaces import Progress, no_progress
 class BenchOptions:
     """What every bench is given.
 
-    Parameters
-    ----------
-    data : Path or None
-        Folder of reference data that the package does not contain; None where there is none.
-    progress : Progress
-    seeds : int
-        Flights per method of a bench that flies; seeds 1 to this.
-    methods, scenarios : tuple of str or None
-        Which of them such a bench flies; None for all.
-    mechanisms : tuple of str or None
-        Mechanisms that such a bench switches, one by one; None for none of them.
-    worlds : tuple of str or None
-        Which worlds such a bench flies in; None for all.
-    w_tracks : tuple of float or None
-        Weights, on the paper's scale, that a bench of an operator's velocity flies; None for all.
-    models : int
-        Seeds, from 1, for which a bench of worlds also scans and makes a model.
-    judge : int
-        Seeds, from 1, that such a bench also flies in the lattice.
-    bound : int
-        Seeds, from 1, of whose flights such a bench works out the most that sharing thrusts out could gain.
-    fresh : bool
-        Fly anew what an earlier run has flown.
-    workers : int
-        Processes that fly side by side.
-    store : Path or None
-        Folder where flights are kept; None for the user's cache folder.
+    `data` holds reference data that the package does not contain. Of benches that fly: `seeds`, flights per method,
+    seeds 1 to this; `methods`, `scenarios`, `worlds` and `w_tracks` (on the paper's scale), None for all; `mechanisms`,
+    switched one by one, None for none; `models`, seeds from 1 for which a scan and its model are made; `judge`, seeds
+    that are flown in the lattice as well; `bound`, seeds whose optimum is worked out; `fresh` flies anew what is known;
+    `workers` side by side; `store` keeps flights, the user's cache folder if None.
     """
 
     data: Path | None = None

@@ -57,16 +57,8 @@ def size_figures(
 ) -> dict[str, float]:
     """`scale_error_pct` and `rmse_scaled_mm` of a model.
 
-    Parameters
-    ----------
-    cloud_W_m : ndarray, shape (n, 3)
-        The model's points in its own frame.
-    mesh, crop
-        The truth and what counts of it.
-    model_centres, true_centres : mapping
-        Where each photograph was taken from, by the model in its own frame and in truth, shape (3,).
-    distance : MeshDistance, optional
-        That of the mesh, where it is there already.
+    `cloud_W_m`, shape (n, 3), are the model's points in its own frame; `mesh` and `crop` the truth and what counts of
+    it; the centres, shape (3,) each, where each photograph was taken from, by the model in its own frame and in truth.
 
     Returns
     -------
@@ -131,13 +123,9 @@ def run_trial(
 ) -> Figures:
     """Run what is left of a trial and return its figures, which are the content of metrics.json.
 
-    Parameters
-    ----------
-    told : callable, optional
-        Called with the figures as soon as they are known and written, before the mesh and its colours are made.
-    meanwhile : callable, optional
-        With it another process makes them: called with "mesh" while that makes the mesh, and with "colours" while it
-        makes its colours; not called where they are there already or there is no such process.
+    `told` is called with the figures as soon as they are known and written, before the mesh and its colours are made.
+    With `meanwhile` another process makes them: it is called with "mesh" and with "colours" while that is at work, not
+    where they are there already or there is no such process.
 
     Raises
     ------
@@ -153,7 +141,7 @@ def run_trial(
     parts = parts_of(flight)
     scenario = resolved_scenario(parts)
     check_place(folder, scenario)
-    _ = parts.from_outside  # a name that leads nowhere is refused before a kernel is compiled or a folder made
+    _ = parts.external_parts  # a name that leads nowhere is refused before a kernel is compiled or a folder made
     if not is_warm(JOBS):
         _ = parts.vehicle  # a file that cannot be used is refused before minutes of compiling
         if scenario.target.kind not in coral_kinds():
@@ -204,7 +192,7 @@ def _figures(
     figures = json.loads((folder / "score.json").read_text(encoding="utf-8"))
     gathering = MetricsCollector(figures=figures["figures"], reasons=figures["reasons"])
     gathering.add({"method": scenario.method, "seed": scenario.seed})
-    gathering.add({"from_outside": parts.from_outside})
+    gathering.add({"from_outside": parts.external_parts})
     gathering.add({"wall_s": ledger.total("wall_s"), "cpu_s": ledger.total("cpu_s")})
     result = gathering.finish()
     write_json(folder / "metrics.json", result)
@@ -298,7 +286,7 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
             lens=read_lens(folder),
             reference_positions=dict(zip(names, centres, strict=True)),
             reference_rotations=dict(zip(names, rotations, strict=True)),
-            region=(parts.found_target.centre_W_m, REGION_SHARE * parts.found_target.radius_m),
+            region=(parts.surveyed_target.centre_W_m, REGION_SHARE * parts.surveyed_target.radius_m),
             progress=progress,
         )
         summary: dict[str, Any] = model.summary()
@@ -349,7 +337,7 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
             gathering.add(_size(parts, folder, photos, cloud, distance))
         except StageError as fault:
             failure = str(fault)
-    if parts.yielding is None:
+    if parts.compliance is None:
         gathering.missing((*SWAY_FIGURES, "rmse_mean_shape_mm"), "the target is rigid and held")
     elif failure is not None:
         gathering.missing(("rmse_mean_shape_mm",), f"no model: {failure}")
@@ -361,7 +349,7 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
 
 def _rmse_mean_shape_mm(parts: Parts, folder: Path, cloud: Array) -> float | None:
     """`rmse_mm` against the mean of the shapes that were photographed; None of a target that does not yield."""
-    if parts.yielding is None:
+    if parts.compliance is None:
         return None
     from wakewise.operation.photography import moved_m
 

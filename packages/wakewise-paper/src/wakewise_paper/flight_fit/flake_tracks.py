@@ -237,7 +237,8 @@ class _Steady:
     steady = True
     uniform = True
 
-    def velocity(self, points_W_m: Array, time_s: float) -> Array:  # noqa: ARG002
+    def velocity(self, points_W_m: Array, time_s: float) -> Array:
+        del time_s
         return np.tile(self.velocity_W_m_s, (len(points_W_m), 1))
 
 

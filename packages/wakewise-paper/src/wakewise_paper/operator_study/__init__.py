@@ -1,5 +1,8 @@
-"""An operator's velocity in the tank's worlds: how closely it is obeyed, what that costs the water (research log 47).
+"""The study of operators: how closely an operator's velocity is followed, and what it costs the water.
 
-`worlds.py` says which world a seed is, `flight.py` what the pilots ask for, `flight.py` flies it, `bench.py` and
-`bench.py` say what it gave; `paper.py` is the same in the paper's own water, which is circular.
+- `bench.py`: which flights are made, and the answer of `wakewise bench operator`.
+- `worlds.py`: which world a seed is. `flight.py`: what the pilots ask for; setup and probe of a flight.
+- `paper.py`: the same in the paper's own water, which is circular.
+
+What is flown and judged was written down before the first flight (docs/research-log/0047).
 """

@@ -254,7 +254,7 @@ def operated(parts: Parts, world: str, pilot: str, seed: int, w_track: float) ->
     if pilot == "human":
         parts = parts.replace(route=look_route(target.centre_W_m, water.azimuth_rad, standoff_m))
         hands = SimulatedOperatorInput(
-            wish=RoutePilot(route=parts.route, aim=parts.aim),
+            reference=RoutePilot(route=parts.route, aim=parts.aim),
             X_BC=parts.vehicle.X_BC,
             target_W_m=target.centre_W_m,
             dt_s=dt_s,

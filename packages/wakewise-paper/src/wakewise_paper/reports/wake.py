@@ -5,7 +5,7 @@ Plots of wake models against flows: predicted against measured, angular profile,
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -124,7 +124,7 @@ def decays(result: WakeValidation) -> Figure | None:
     return _panels(result, draw, "distance from the disk (m)", "speed over exit speed")
 
 
-def _panels(result: WakeValidation, draw, x: str, y: str) -> Figure | None:  # type: ignore[no-untyped-def]
+def _panels(result: WakeValidation, draw: Callable[[Axes, MeasuredFlow], None], x: str, y: str) -> Figure | None:
     flows = result.flows
     if not flows:
         return None

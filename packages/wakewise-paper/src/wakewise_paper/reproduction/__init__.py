@@ -1,8 +1,7 @@
-"""The paper's tables beside ours, from trials that anyone can rerun (`wakewise reproduce`).
+"""The paper's tables beside ours, from trials that anyone can repeat (`wakewise reproduce`).
 
-`claim.py` says what a figure of the paper is, `published_tables.py` and its parts hold them as data; `worlds.py` says
-where trials are made; `table_trials.py` which trials a table is made of, `worlds.py` the missions that
-`success` draws. A trial is work for a campaign: `flights.py` with `piv_flights.py`, `scans.py`, `scans.py`.
-`rows.py` turns trials into rows of paper and ours, `run.py` into cells, `claim.py` says what a table is
-judged by; `run.py` makes a table, or all of them within a budget.
+- `published.yaml`: the paper's numbers with their section or table. `claim.py`: reads them; what a table is judged by.
+- `table_trials.py`: which trials a table is made of. `worlds.py`: where they are made, and the missions of `success`.
+- `scans.py`, `piv_flights.py`: work that is not a plain flight, and PIV in a flight.
+- `run.py`: makes tables, as many trials as a budget has room for. `rows.py`: from trials to rows of paper and ours.
 """

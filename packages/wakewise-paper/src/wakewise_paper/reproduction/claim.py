@@ -98,7 +98,7 @@ def _expanded(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _claim(entry: Mapping[str, Any], hows: Mapping[str, str], unquoted: str) -> PublishedFigure:
-    told = {"method": "wake-aware", "unit": "", "side": "none", "said": unquoted}
+    told: dict[str, Any] = {"method": "wake-aware", "unit": "", "side": "none", "said": unquoted, "paper": None}
     told |= {key: value for key, value in entry.items() if value is not None}
     told["how"] = hows.get(told["how"], told["how"])
     if (ratio := told.pop("ratio", None)) is not None:
@@ -107,7 +107,7 @@ def _claim(entry: Mapping[str, Any], hows: Mapping[str, str], unquoted: str) -> 
         told |= {"title": f"{told['title']}, less than {than}", "unit": "%", "reading": "less_pct"}
         told["how"] = f"{told['how']}; ratio of the means over pairs of one seed"
         told["side"] = "none" if told.get("paper") is None and told.get("asked") is None else "more"
-    return PublishedFigure(**{"paper": None} | told)
+    return PublishedFigure(**told)
 
 
 _PUBLISHED = read_yaml((resources.files("wakewise_paper.reproduction") / "published.yaml").read_text("utf-8"))

@@ -1,7 +1,9 @@
-"""What each method and each mechanism does to the target's water where users have the trouble (see `bench.py`).
+"""The study of wash: what each method and mechanism does to the target's water (`wakewise bench gentle`).
 
-`scenarios/` and `scenario_files.py` say what is flown, `scenario_files.py` which trim and current a seed has,
-`routes.py` how it is flown, `flight.py` flies it, `figures.py` and `summary_table.py` say what it gave.
-`energy_optimum.py` works out the most that sharing thrusts out could gain, with `energy_optimum.py` and
-`energy_optimum.py`; `figures.py` tells it.
+- `bench.py`: which flights are made, and the answer of the command.
+- `scenarios/`, `scenario_files.py`: the scenarios, and what a seed of one is (trim, side of the current).
+- `flight.py`: one flight: fields, setup and probes. `paper.py`: the same in the paper's own water, which is circular.
+- `headline.py`: the table that was chosen before anything was flown.
+- `energy_optimum.py`, `prescribed_motion.py`: the least wash that sharing thrusts can reach.
+- `optimum_figures.py`: its table.
 """

@@ -87,7 +87,8 @@ class TrueDisturbance(FlightProbe):
 
     def __init__(self, parts: Parts, folder: Path) -> None:
         super().__init__(parts, folder)
-        self._view = InfluenceModel.of(parts.vehicle, parts.region, wake_model(WakeSettings(**PAPER_WAKE)))
+        _, region = paper_place(parts.scenario.tank.size_m[2])  # about the true target, not where it is believed to be
+        self._view = InfluenceModel.of(parts.vehicle, region, wake_model(WakeSettings(**PAPER_WAKE)))
 
     def figures(self, steps: pl.DataFrame) -> Mapping[str, float]:
         """`disturbance` in (m/s)^2."""

@@ -151,16 +151,7 @@ def build_dataset(
 ) -> DatasetBuildResult:
     """Make a data set.
 
-    Parameters
-    ----------
-    folder : Path
-        Of a campaign, of trials, or of one trial.
-    out : Path
-        Folder that does not exist yet, or is empty.
-    words : DatasetStatement
-        What only a person can say.
-    progress : callable
-        Called as `(done, total, note)`.
+    `folder` is of a campaign, of trials, or of one trial; `out` does not exist yet, or is empty.
 
     Raises
     ------
