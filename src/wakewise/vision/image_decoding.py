@@ -14,11 +14,11 @@ from wakewise.core.size_limits import check_picture
 
 COLOUR = cv2.IMREAD_COLOR
 AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-"""Colour, not turned as EXIF says."""
+"""Colour, without EXIF's rotation."""
 
 
 class _Quiet:
-    """OpenCV's decoders say nothing of their own while any thread is in here."""
+    """Context in which OpenCV's decoders print nothing, in all threads."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

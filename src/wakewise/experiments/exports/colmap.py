@@ -32,6 +32,7 @@ from wakewise.core.files import write_text
 from wakewise.core.geometry import Pose
 from wakewise.experiments.exports.records import Photographs, SparsePoints, Trajectory, flu_of, opengl_camera
 from wakewise.experiments.exports.training_data import place_picture
+from wakewise.vision.reconstruction.photos.lenses import distort
 
 _POINT = struct.Struct("<Q3d3BdQ")
 _IMAGE = struct.Struct("<I7dI")
@@ -162,13 +163,7 @@ def _camera(photographs: Photographs) -> tuple[str, Array]:
 
 def _projected(points_C_m: Array, params: Array) -> Array:
     """Pixels, shape (n, 2), of points before a camera with OpenCV's distortion."""
-    fx, fy, cx, cy, k1, k2, p1, p2 = params
-    x, y = points_C_m[:, 0] / points_C_m[:, 2], points_C_m[:, 1] / points_C_m[:, 2]
-    square = x * x + y * y
-    radial = 1.0 + k1 * square + k2 * square * square
-    u = x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x)
-    v = y * radial + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y
-    return np.column_stack([fx * u + cx, fy * v + cy])
+    return distort(points_C_m[:, :2] / points_C_m[:, 2:], params[4:], fisheye=False) * params[:2] + params[2:4]
 
 
 def _write_binary(folder: Path, photographs: Photographs, model: _Model, cloud: SparsePoints | None) -> None:

@@ -60,7 +60,7 @@ def robust_similarity(
 ) -> tuple[Similarity, BoolArray]:
     """Similarity from paired points of which up to half may be wrong, and which pairs it rests on.
 
-    Least squares over all pairs unless some stick out of it; then least median of squares over random triples (P. J.
+    Least squares over all pairs unless some are outliers; then least median of squares over random triples (P. J.
     Rousseeuw and A. M. Leroy, Robust Regression and Outlier Detection, Wiley 1987, doi 10.1002/0471725382) and least
     squares over the pairs whose error is below what 999 in 1000 normally distributed ones keep to, the spread being
     told by the median: no threshold in metres has to be known.
@@ -70,7 +70,7 @@ def robust_similarity(
     n = len(points_B)
     fit = umeyama(points_B, points_A, with_scale)
     everything = np.ones(n, dtype=np.bool_)
-    # Below 7 pairs the median cannot tell a bad pair from a bad fit; without bad pairs nothing beats least squares.
+    # With fewer than 7 pairs the median does not separate bad pairs from a bad fit.
     if n < 7 or _near(fit, points_B, points_A).all():
         return fit, everything
     best, median = fit, float(np.median(_error(fit, points_B, points_A)))
@@ -111,7 +111,7 @@ def _near(similarity: Similarity, points_B: Array, points_A: Array) -> BoolArray
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IcpRefinement:
-    """What ICP did. `displacement_mm` is the mean way that the points moved: a large one means a bad first guess.
+    """Result of ICP. `displacement_mm`: mean displacement of the points, large after a bad initial alignment.
 
     `accepted` is False, and nothing moved, where the cloud fitted no better after than before. `matched_pct` is the
     share of the cloud within the last round's distance of the surface.

@@ -30,7 +30,7 @@ NORMAL_NEIGHBOURS = 20
 
 @dataclass(frozen=True, kw_only=True)
 class CloudScore:
-    """A model against a reference cloud; `CLOUD_DEFINITIONS` says what each figure is."""
+    """A model against a reference cloud; `CLOUD_DEFINITIONS` defines each figure."""
 
     accuracy_mean_mm: float
     accuracy_median_mm: float
@@ -96,14 +96,14 @@ def compare_clouds(
     bed_z_m: float | None = None,
     icp: bool = True,
 ) -> CloudComparison:
-    """Hold a cloud against a reference cloud in the same frame and scale; `CLOUD_DEFINITIONS` defines every figure.
+    """Compare a cloud with a reference cloud in the same frame and scale; `CLOUD_DEFINITIONS` defines every figure.
 
     Both are thinned to one mean point per cell of half the smallest threshold, or of the reference's spacing where that
     is wider, so that dense spots do not rule.
 
     `cloud_W_m`, `reference_W_m` have shape (n, 3). `bed_z_m`: height of the bed, world z down; what is near it does not
     count in either. Raises InputError if too little of the reference counts; StageError if too little of the model lies
-    near it, its scale is suspicious, or ICP says that the two do not belong together.
+    near it, its scale is suspicious, or ICP fails.
     """
     whole = extent_m(reference_W_m)
     suspicion = suspicious_extent(cloud_W_m, reference_W_m)
@@ -162,5 +162,5 @@ def _refined(kept: Array, truth: Array, whole_m: float) -> IcpRefinement:
 
 
 def _some(points: Array, most: int = 5000) -> Array:
-    """Every so manieth point."""
+    """An even subset of about `most` points."""
     return points[:: max(1, len(points) // most)]

@@ -24,7 +24,7 @@ from wakewise.vision.evaluation.alignment import IcpRefinement, refine_icp
 RELATIVE_PCT = (0.25, 0.5, 1.0)
 """Thresholds in percent of the diagonal of the truth's box where none are given: 1 to 4 mm of a thing of 0.4 m."""
 USEFUL_PCT = 2.0
-"""A threshold above this share of the object says little: nearly everything about it is within."""
+"""Largest useful threshold, in percent of the object's extent."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +98,7 @@ class MeshArrays(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Crop:
-    """What counts, for truth and cloud alike.
+    """Region that counts, for truth and cloud alike.
 
     Only what is higher than `clearance_m` above the bed at `bed_z_m` (world z points down): sand touches the foot of
     the target and is no part of it. The cloud is cut to the truth's box grown by `margin_m`. No bed: nothing is cut
@@ -188,7 +188,7 @@ def count_views(
 ) -> IntArray:
     """How many cameras saw each sample: nothing of the mesh in between, and not at a grazing angle.
 
-    `centres_W_m`, shape (k, 3): true camera centres; every camera is taken to look at the target. `min_cosine`:
+    `centres_W_m`, shape (k, 3): true camera centres; every camera is taken to face the target. `min_cosine`:
     smallest cosine between the outward normal and the way to the camera (0.2 is 78 degrees). `enough`: stop looking for
     more cameras where so many are found, which is most of the work.
     """
@@ -231,7 +231,7 @@ def voxel_downsample(points_m: Array, voxel_m: float) -> Array:
 class SurfaceComparison:
     """A score with what it was computed from: the aligned, thinned cloud, shape (n, 3), and its errors, shape (n,).
 
-    shares: at the thresholds that were asked for, of the cloud thinned to half the smallest where that is finer.
+    shares: at the requested thresholds, of the cloud thinned to half the smallest where that is finer.
     """
 
     score: SurfaceScore
@@ -350,7 +350,7 @@ def suspicious_extent(cloud_m: Array, truth_m: Array) -> str | None:
     cloud = np.asarray(cloud_m, dtype=np.float64).reshape(-1, 3)
     if len(cloud) < 2 or len(truth_m) == 0:
         return None
-    # The middle nine tenths: one stray point must not make a cloud look large.
+    # The middle nine tenths: a stray point must not enlarge the cloud.
     low, high = np.percentile(cloud, (5.0, 95.0), axis=0)
     extent = float(np.linalg.norm(high - low)) / 0.9
     boolean = float(np.linalg.norm(np.ptp(truth_m, axis=0)))
@@ -386,7 +386,7 @@ def area_and_volume(mesh: MeshArrays, crop: Crop) -> tuple[float, float]:
     divergence is 1 and the flux through the cut is zero, so a mesh that is open there needs no lid. A mesh that is
     closed is cut likewise. Faces are counter-clockwise seen from outside; without a bed z0 is the lowest corner.
 
-    `mesh`: in the world, z down. `crop`: its bed says what counts; its box does not cut.
+    `mesh`: in the world, z down. Only the bed of `crop` counts, not its box.
     """
     corners = mesh.vertices_m[mesh.faces]
     if crop.bed_z_m is None:

@@ -48,4 +48,4 @@ MESH_REFERENCE: dict[str, tuple[str, str]] = {
                          "faces without area, edges of one face (its rim)"),
     "model_faults": ("", "the same of the model, where it is a mesh"),
 }  # fmt: skip
-"""What `wakewise evaluate` says besides `SURFACE`."""
+"""What `wakewise evaluate` reports besides `SURFACE`."""

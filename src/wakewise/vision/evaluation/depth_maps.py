@@ -35,7 +35,7 @@ class DepthView:
 
 @dataclass(frozen=True, kw_only=True)
 class DepthScore:
-    """A cloud against depth maps; `DEPTH_DEFINITIONS` says what each figure is."""
+    """A cloud against depth maps; `DEPTH_DEFINITIONS` defines each figure."""
 
     accuracy_median_mm: float
     accuracy_p90_mm: float

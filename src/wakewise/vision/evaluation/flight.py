@@ -57,14 +57,14 @@ def path_distance(true_W_m: Array, goal_W_m: Array, time_s: Array, window_s: flo
 
 
 def velocity_deviation_pct(true_WB_q: Array, true_B_m_s: Array, goal_WB_q: Array, goal_B_m_s: Array) -> float | None:
-    """RMS of true minus wished velocity, both in the world, in percent of the RMS of the wished one; None if it is 0.
+    """RMS of true minus goal velocity, both in the world, in percent of the RMS of the goal's; None if that is 0.
 
     Quaternions (w, x, y, z) have shape (n, 4), velocities in their own body frame (n, 3).
     """
     true_W = np.einsum("nij,nj->ni", matrix_from_quat(true_WB_q), true_B_m_s)
     goal_W = np.einsum("nij,nj->ni", matrix_from_quat(goal_WB_q), goal_B_m_s)
-    wished = rms(np.linalg.norm(goal_W, axis=1))
-    return 100.0 * rms(np.linalg.norm(true_W - goal_W, axis=1)) / wished if wished > 1e-6 else None
+    goal = rms(np.linalg.norm(goal_W, axis=1))
+    return 100.0 * rms(np.linalg.norm(true_W - goal_W, axis=1)) / goal if goal > 1e-6 else None
 
 
 def roll_pitch_rms_deg(true_WB_q: Array, goal_WB_q: Array) -> float:
@@ -75,7 +75,7 @@ def roll_pitch_rms_deg(true_WB_q: Array, goal_WB_q: Array) -> float:
 
 
 def attitude_rmse_deg(true_WB_q: Array, goal_WB_q: Array) -> float:
-    """RMS in degrees of the angle between true and wished attitude; quaternions (w, x, y, z), shape (n, 4)."""
+    """RMS in degrees of the angle between true and goal attitude; quaternions (w, x, y, z), shape (n, 4)."""
     cosine = np.abs(np.einsum("ni,ni->n", true_WB_q, goal_WB_q))
     cosine /= np.linalg.norm(true_WB_q, axis=1) * np.linalg.norm(goal_WB_q, axis=1)
     return float(np.degrees(rms(2.0 * np.arccos(np.clip(cosine, -1.0, 1.0)))))

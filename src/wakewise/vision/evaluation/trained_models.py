@@ -142,8 +142,8 @@ def nerfstudio_frame(dataparser: Path | None) -> Similarity:
     if dataparser is None:
         return Similarity(scale=1.0, R_AB=_Z_UP, t_A_m=np.zeros(3))
     try:
-        told = json.loads(dataparser.read_text(encoding="utf-8"))
-        matrix, scale = np.array(told["transform"], dtype=np.float64)[:3], float(told["scale"])
+        values = json.loads(dataparser.read_text(encoding="utf-8"))
+        matrix, scale = np.array(values["transform"], dtype=np.float64)[:3], float(values["scale"])
         T, t = matrix[:, :3], matrix[:, 3]
     except (OSError, ValueError, KeyError, TypeError, IndexError):
         raise InputError(f"{dataparser}: is no dataparser_transforms.json of nerfstudio (transform, scale)") from None

@@ -93,7 +93,7 @@ def meet(
     iy = 1.0 / dy if dy != 0.0 else np.inf
     iz = 1.0 / dz if dz != 0.0 else np.inf
     t, last = 0.0, most
-    # Only between the planes of the highest and lowest point, a hair farther so that rounding loses nothing.
+    # Only between the planes of the highest and lowest point, slightly farther because of rounding.
     if dz > 0.0:
         t = max(t, (top - oz) * iz - 1e-7)
         last = min(last, (bottom - oz) * iz + 1e-7)
@@ -168,7 +168,7 @@ def meet(
                     if at > most:
                         return np.inf, 0, 0, 0.0, 0.0
                     u, v = (ox + at * dx - lines[i]) * per_cell[i], (oy + at * dy - lines[j]) * per_cell[j]
-                    # A hair beyond the cut would be in the other triangle.
+                    # Slightly beyond the cut is the other triangle.
                     if side > 0.0:
                         u = max(u, v)
                     else:
@@ -358,7 +358,7 @@ def _draw_cells(
                     if whole:
                         if u1 < 0.5 or u0 > width - 0.5 or v1 < first + 0.5 or v0 > last - 0.5:
                             continue
-                        # A hair wider than the pixels whose centres can be inside.
+                        # Slightly wider than the pixels whose centres can be inside.
                         x0, x1 = max(0, int(max(u0 - 0.501, 0.0))), int(min(u1 + 0.501, float(width)))
                         y0, y1 = max(first, int(max(v0 - 0.501, 0.0))), int(min(v1 + 0.501, float(last)))
                     elif _beside(crossings, i, j, left, right, up, down):

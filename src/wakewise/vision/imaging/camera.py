@@ -401,7 +401,7 @@ class OpenCVCamera:
         )
 
     def write(self, folder: Path) -> None:
-        """Write cameras.txt for COLMAP and camera.json, which says the same and how good it is."""
+        """Write cameras.txt for COLMAP and camera.json with the same parameters and residuals."""
         write_text(folder / "cameras.txt", self.cameras_txt())
         write_json(
             folder / "camera.json",

@@ -55,7 +55,7 @@ def sample_levels(
 
 
 NOTHING_M = 1e4
-"""Length of a ray that meets nothing: no light from beyond gets through."""
+"""Length of a ray that meets nothing; no light passes through more water."""
 BACKSCATTER_RATIO = 0.0183
 """Share of scattering that goes backward, of particles in sea water (Petzold 1972; Mobley 1994, table 3.11)."""
 
@@ -94,7 +94,7 @@ _TABLE: dict[str, tuple[tuple[float, float, float], ...]] = {
 
 
 def water_types() -> list[str]:
-    """Names of the Jerlov water types that `water_optics` knows."""
+    """Names of the Jerlov water types of `water_optics`."""
     return list(_TABLE)
 
 

@@ -98,7 +98,7 @@ class ImagingSettings(Settings):
     @model_validator(mode="before")
     @classmethod
     def _as_its_kind_has_it(cls, given: Any) -> Any:
-        """Fill in what the kind says and the user does not."""
+        """Fields of the kind that the user does not set."""
         if isinstance(given, dict) and isinstance(given.get("kind"), str):
             return CAMERAS.get(given["kind"], {}) | given
         return given

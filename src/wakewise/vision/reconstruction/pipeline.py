@@ -103,7 +103,7 @@ class ReconstructionRequest:
 def crop_cloud(path: Path, box: CropBox) -> int:
     """Crop a cloud on disk to a box; the number of points left.
 
-    Raises StageError if too little is left; the message says where the points are.
+    Raises StageError if too little is left, with the extent of the points.
     """
     cloud = read_cloud(path)
     kept = box.holds(cloud.points_m)
@@ -186,7 +186,7 @@ def _scale(job: _Inputs, sparse: Path, progress: Progress) -> dict[str, Any]:
 
 
 def _densify(job: _Inputs, sparse: Path, dense: Path, progress: Progress) -> dict[str, Any]:
-    """sparse/ to dense.ply, cut to the box that was asked for."""
+    """sparse/ to dense.ply, cut to the requested box."""
     region, folder, crop = job.region, job.store.folder, job.request.crop
     if job.fixed and region is None:
         region = common_region(pycolmap.Reconstruction(sparse))
@@ -198,7 +198,7 @@ def _densify(job: _Inputs, sparse: Path, dense: Path, progress: Progress) -> dic
 
 
 LATER = ("scale_bars", "scale_fixes", "dense_points", "depth_maps", "point_spacing_mm", *MESH_FIGURES)
-"""Figures of stages that may not be asked for."""
+"""Figures of optional stages."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -402,7 +402,7 @@ def reconstruct(
 
 
 def _run_stages(job: _Inputs, out: Path, progress: Progress) -> dict[str, StageResult]:
-    """Run the stages that were asked for, each unless it was done with the same input."""
+    """Run the requested stages, each unless it was done with the same input."""
     make_folder(out)
     settings, request, region = job.settings, job.request, job.region
     database, sparse, dense = out / "database.db", out / "sparse", out / "dense.ply"

@@ -27,7 +27,7 @@ def fingerprint(*parts: Any) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class StageResult:
-    """What a stage found (figures), how long it took when it ran, its fingerprint, and whether it was skipped now."""
+    """Figures of a stage, its duration when it ran, its fingerprint, and whether it was skipped now."""
 
     figures: dict[str, Any]
     wall_s: float
@@ -59,7 +59,7 @@ def run_stage(
     except (EnvironmentFailure, InputError):
         raise
     except (WakewiseError, RuntimeError) as fault:
-        # COLMAP and SQLite tell of a full disk in words of their own, or not at all.
+        # COLMAP and SQLite report a full disk in other messages, or not at all.
         free_MB = shutil.disk_usage(folder).free / 1e6
         if free_MB > LOW_DISK_MB and not is_full(fault):
             raise
@@ -69,7 +69,7 @@ def run_stage(
 
 
 def invalidate_stage(folder: Path, name: str, changed: str) -> None:
-    """Forget a stage that is no longer asked for; the stage whose files it changed is done again."""
+    """Remove the stamp of a stage that is not requested any more, and of the stage whose files it changed."""
     stamps = folder / "stages"
     if (stamps / f"{name}.json").exists():
         (stamps / f"{changed}.json").unlink(missing_ok=True)
@@ -91,7 +91,7 @@ def need_room(folder: Path, size_bytes: float, name: str) -> None:
 
 
 def no_room(fault: OSError, folder: Path) -> str:
-    """What a failed write means, in one line."""
+    """Reason of a failed write, in one line."""
     if is_full(fault):
         return f"the disk of {folder} is full"
     return f"{fault.filename or folder}: {fault.strerror or fault}"
@@ -109,7 +109,7 @@ def make_folder(folder: Path) -> None:
 
 
 def read_stamp(folder: Path, name: str) -> dict[str, Any]:
-    """What the stamp of a stage says: key, wall_s, figures; nothing if it is missing or damaged."""
+    """Stamp of a stage: key, wall_s, figures; empty if it is missing or damaged."""
     path = folder / "stages" / f"{name}.json"
     try:
         value = json.loads(path.read_text(encoding="utf-8"))
@@ -139,6 +139,6 @@ STAGES: dict[str, tuple[str, ...]] = {
 
 
 def stage_key(settings: ReconstructionSettings, stage: str, before: str, *parts: Any) -> str:
-    """Fingerprint of all that a stage's result hangs on; `before` is that of the stage before."""
+    """Fingerprint of all inputs of a stage; `before` is that of the stage before."""
     used = {field: getattr(settings, field) for field in STAGES[stage]}
     return fingerprint(VERSION, pycolmap.__version__, stage, before, used, parts)

@@ -23,6 +23,7 @@ from wakewise.core.errors import StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.vision.image_decoding import read_picture
+from wakewise.vision.reconstruction.outputs.clouds import read_surface
 from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto, read_views
 
 SIDES_PX = (512, 1024, 2048, 4096, 8192)
@@ -191,10 +192,7 @@ def write_atlas(model: Path, photos: Path, out: Path, progress: Progress = no_pr
     Raises StageError if there is no surface, no photograph sees it, or it has too many triangles.
     """
     path = model / "mesh.ply"
-    surface = trimesh.load(path, process=False) if path.is_file() else None
-    if not isinstance(surface, trimesh.Trimesh) or not len(surface.faces):
-        raise StageError(f"{path}: holds no triangles to put a texture on")
-    vertices, faces = np.asarray(surface.vertices, np.float64), np.asarray(surface.faces, np.int64)
+    vertices, faces = read_surface(path)
     views, _ = read_views(model / "sparse", None)
     layout = lay_out(len(faces))
     picture, seen = paint(layout, vertices, faces, views, photos, progress)

@@ -43,12 +43,12 @@ def write_orthophoto(
     cloud = read_cloud(model / "dense.ply")
     views, _ = read_views(model / "sparse", None)
     level = fit_ground_plane(cloud.points_m, np.array([view.p_WC_m for view in views]))
-    told = without_strays(level.to_plane(cloud.points_m))
-    extent = np.ptp(told[:, :2], axis=0)
+    in_plane = without_strays(level.to_plane(cloud.points_m))
+    extent = np.ptp(in_plane[:, :2], axis=0)
     if cell is None:
-        cell = CELL_SPACINGS * float(np.sqrt(extent.prod() / len(told)))
+        cell = CELL_SPACINGS * float(np.sqrt(extent.prod() / len(in_plane)))
     cell = max(cell, float(np.sqrt(extent.prod() / MOST_CELLS)))
-    grid, low = heights(told, cell)
+    grid, low = heights(in_plane, cell)
     grid = closed(grid, GAP_CELLS)
     known = np.isfinite(grid)
     rows, columns = grid.shape
@@ -90,11 +90,11 @@ def write_orthophoto(
     return facts
 
 
-def without_strays(told: Array) -> Array:
+def without_strays(in_plane: Array) -> Array:
     """Points less those that lie beyond nearly all others by a fifth of their extent, in any direction."""
-    low, high = np.quantile(told, STRAY_QUANTILES, axis=0)
+    low, high = np.quantile(in_plane, STRAY_QUANTILES, axis=0)
     wide = 0.2 * (high - low)
-    return np.asarray(told[((told >= low - wide) & (told <= high + wide)).all(axis=1)])
+    return np.asarray(in_plane[((in_plane >= low - wide) & (in_plane <= high + wide)).all(axis=1)])
 
 
 def closed(grid: Array, most: float) -> Array:

@@ -25,6 +25,7 @@ from wakewise.core.interfaces import no_progress
 from wakewise.core.size_limits import picture_depth
 from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import read_photos
+from wakewise.vision.reconstruction.outputs.clouds import read_surface
 from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto, read_views
 from wakewise.vision.texturing.colour import WaterFit, fit_water, remove_water, white_balanced
 
@@ -150,7 +151,7 @@ def estimate_water(photos: Path, names: Sequence[str], model: Path) -> tuple[Wat
 def _fitted(
     photos: Path, names: Sequence[str], depths: RangeMaps, progress: Callable[..., None]
 ) -> tuple[WaterFit | None, str | None]:
-    """`fit_water` of up to `FIT_PHOTOS` photographs that the model knows, spread over the set."""
+    """`fit_water` of up to `FIT_PHOTOS` registered photographs, spread over the set."""
     have = [name for name in names if name in depths.views]
     some = have[:: max(1, len(have) // FIT_PHOTOS)][:FIT_PHOTOS]
     pairs = []
@@ -168,7 +169,7 @@ def _fitted(
 def copy_names(names: Sequence[str]) -> dict[str, str]:
     """Name of each photograph's copy, a JPEG: its own with that ending, or its whole name and that where two meet.
 
-    Meeting is what a disk that does not tell large letters from small ones would say.
+    Two meet if they differ in upper and lower case only.
     """
     plain = {name: str(PurePosixPath(name).with_suffix(".jpg")) for name in names}
     often = Counter(copy.lower() for copy in plain.values())
@@ -192,14 +193,11 @@ class RangeMaps:
         """Read sparse/ and mesh.ply of a model."""
         views, points = read_views(model / "sparse", None)
         mesh, corners = None, np.zeros((0, 3))
-        if (model / "mesh.ply").is_file():
-            surface = trimesh.load(model / "mesh.ply", process=False)
-            if isinstance(surface, trimesh.Trimesh) and len(surface.faces):
-                mesh = EmbreeScene()
-                # Plain arrays: trimesh's own keep a record of every element that is read.
-                vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
-                TriangleMesh(mesh, vertices.astype(np.float32), faces.astype(np.int32))
-                corners = trimesh.bounds.corners(surface.bounds)
+        with suppress(StageError):  # without a surface there are the sparse points
+            vertices, faces = read_surface(model / "mesh.ply")
+            mesh = EmbreeScene()
+            TriangleMesh(mesh, vertices.astype(np.float32), faces.astype(np.int32))
+            corners = trimesh.bounds.corners([vertices.min(axis=0), vertices.max(axis=0)])
         return cls(views={view.name: view for view in views}, points_m=points, mesh=mesh, corners_m=corners)
 
     def knows(self, name: str, shape: tuple[int, int]) -> bool:
@@ -217,7 +215,7 @@ class RangeMaps:
         pixels, z = view.project(self.points_m[view.seen])
         grid = _coarse_grid(h, w)
         inverse = _between(pixels * scale, 1.0 / np.maximum(z, 1e-6), grid)
-        # Where the plane runs far beyond all that was seen there may be open water: nobody knows.
+        # Far beyond all observed points there may be open water: unknown.
         farthest = _FARTHER * float(np.quantile(z, 0.99))
         depth = 1.0 / np.maximum(_fine(inverse, h, w), 1e-6)
         depth[depth > farthest] = np.inf

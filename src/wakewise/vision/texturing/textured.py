@@ -22,6 +22,7 @@ from wakewise.core.errors import StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import no_progress
 from wakewise.vision.image_decoding import read_picture
+from wakewise.vision.reconstruction.outputs.clouds import read_surface
 from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto, read_views
 from wakewise.vision.texturing.colour import srgb_decode
 
@@ -44,10 +45,7 @@ def write_textured(
     y up, z south of a model in NED with the bed at `bed_z_m`; if that is None, the axes are the model's own. Raises
     StageError if the mesh holds no triangles or no photograph sees it.
     """
-    surface = trimesh.load(model / "mesh.ply", process=False)
-    if not isinstance(surface, trimesh.Trimesh) or not len(surface.faces):
-        raise StageError(f"{model / 'mesh.ply'}: holds no triangles")
-    vertices, faces = np.asarray(surface.vertices, np.float64), np.asarray(surface.faces, np.int64)
+    vertices, faces = read_surface(model / "mesh.ply")
     views, _ = read_views(model / "sparse", None)
     colours, seen = vertex_colours(vertices, faces, views, photos, progress)
     if not seen.any():
@@ -126,7 +124,7 @@ def vertex_colours(
         way = vertices_m - view.p_WC_m
         length = np.sqrt(np.einsum("ij,ij->i", way, way))
         facing = -np.einsum("ij,ij->i", normals, way) / np.maximum(length, 1e-12)
-        # What looks away is most of a mesh: it is left out before anything else is asked of it.
+        # Most of a mesh faces away; it is left out first.
         some = np.flatnonzero(facing > _STEEPEST_COS)
         pixels, depth = view.project(vertices_m[some])
         pixels = pixels * np.array([w / view.width, h / view.height])

@@ -166,7 +166,7 @@ def _all_depths(
     for i, best in enumerate(partners):
         good = [j for j in best if rectifiable(views[i], views[j])]
         jobs += [(i, j) for j in good[: settings.stereo_partners]]
-    # Whole multiples, so that large photos need not lie in memory at a size that stereo does not look at.
+    # Whole multiples, so that large photos are not kept at a size that stereo does not use.
     shrink = max(1, int(1.0 / scale))
     photos = list(in_order(lambda view: _load(store, view.name, shrink), views, settings.threads))
     small = tuple(_shrunk(view, shrink) for view in views)
@@ -238,7 +238,7 @@ def _fuse_all(
             k
             for k, other in enumerate(photos)
             if other[0] in voters
-            # The pair the other way round is no independent witness; of two photos it is the only one.
+            # The reversed pair is not independent; of two photos it is the only one.
             and (set(other) != {first, second} or (alone and other[0] != first))
         ]
         read = {k: maps.depths(k) for k in neighbours} | {index: maps.whole(index)}
@@ -295,7 +295,7 @@ def patch_match(
             "dense",
             lambda: progress(2, 3, "fusion"),
         )
-        need_room(out.parent, 0.0, "dense")  # on a full disk the points are cut short without a word
+        need_room(out.parent, 0.0, "dense")  # on a full disk the points are cut short without an error
         cloud = read_cloud(raw)
     keep = np.ones(len(cloud.points_m), dtype=np.bool_)
     if region is not None:

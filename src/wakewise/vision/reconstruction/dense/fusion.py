@@ -20,7 +20,7 @@ from wakewise.vision.reconstruction.photos.photo_folder import Image
 
 N = TypeVar("N", bound=np.generic)
 AT_ONCE = 250_000
-"""Points whose neighbours are looked for at once."""
+"""Points whose neighbours are searched at once."""
 
 
 @njit(nogil=True)
@@ -34,11 +34,11 @@ def _agree(
     relative: Array,
     tolerance_px: float,
 ) -> tuple[Array, IntArray, IntArray]:
-    """Depth averaged over the maps that agree, their number, and the number that look through.
+    """Depth averaged over the maps that agree, their number, and the number that sees through the point.
 
     `camera` is (focal, cx, cy, baseline, R_CW row by row, centre), shape (16,); `cameras` one row per other map, whose
-    depths lie in `others` from `places[k, 0]` on, `places[k, 1]` rows of `places[k, 2]` each: a list of arrays would be
-    counted up and down at every look, which took longer than the geometry. `relative` takes points of this camera's
+    depths lie in `others` from `places[k, 0]` on, `places[k, 1]` rows of `places[k, 2]` each: a list of arrays costs
+    reference counts at every access, which took longer than the geometry. `relative` takes points of this camera's
     frame into the others': rotation row by row and shift, shape (k, 12).
     """
     height, width = depth.shape
@@ -97,7 +97,7 @@ def _agree(
                         sum_z[i] += w * back
                         continue
                 if focal * cameras[k, 3] * (1.0 / away[i] - 1.0 / seen) > 3.0 * tolerance_px:
-                    against[v, columns[i]] += 1  # the other map sees something well behind: it looks through
+                    against[v, columns[i]] += 1  # the other map sees something well behind
         for i in range(count):
             mean[v, columns[i]] = sum_z[i] / total[i]
     return mean, votes, against
@@ -163,7 +163,7 @@ def fuse(
 
     `maps`: depth maps by number: `index` whole, the neighbours with their depths. `neighbours`: which maps may vote;
     the map of the same two photos the other way round is not independent and must not be among them. `agreeing`: votes
-    needed; a point is also dropped where more maps look through it than agree.
+    needed; a point is also dropped where more maps see through it than agree.
     """
     own = maps[index]
     if not neighbours:

@@ -32,8 +32,8 @@ MAX_SLOPE = 2.0
 class DepthMap:
     """Depth of a pinhole view: row direction along a baseline, pixel (i, j) has its centre at (j, i), 0 where unknown.
 
-    `first` and `second` say which views it came from; `baseline_m` times `focal_px` over depth is the disparity.
-    `wanted` marks the pixels that are to become points; the depth of the others still speaks for or against them.
+    `first` and `second` are the views of the pair; `baseline_m` times `focal_px` over depth is the disparity.
+    `wanted` marks the pixels that become points; the depths of the others still vote.
     """
 
     first: int
@@ -62,7 +62,7 @@ def rectify_axes(first: RegisteredPhoto, second: RegisteredPhoto, focus_W_m: Arr
 
 
 def rectifiable(first: RegisteredPhoto, second: RegisteredPhoto) -> bool:
-    """Whether neither view has to be turned far from where it looks, which would stretch it: motion forward does."""
+    """Whether neither view has to be rotated far, which would stretch it, as for forward motion."""
     baseline = second.p_WC_m - first.p_WC_m
     sight = first.focus_W_m - 0.5 * (first.p_WC_m + second.p_WC_m)
     along = abs(float(baseline @ sight))
@@ -84,7 +84,7 @@ def pair_depth(
     """Depth map of view i from the pair (i, j), which must be rectifiable; None if too little of it can be seen.
 
     `scale`: rectified pixels per pixel of the photo; less is taken where the range of disparities would be too wide.
-    `paths`: directions that smoothness is looked for along, 3 or 8.
+    `paths`: directions of the smoothness term, 3 or 8.
     """
     one, two = views[i], views[j]
     focus = one.focus_W_m

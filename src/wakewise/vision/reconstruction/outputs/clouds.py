@@ -15,7 +15,7 @@ import trimesh
 
 from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.core.checks import path_of
-from wakewise.core.errors import InputError
+from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_file
 from wakewise.core.size_limits import broken_ply
 
@@ -96,6 +96,15 @@ def _normals(loaded: object, count: int) -> Array:
 def _colours(loaded: object, count: int) -> Array:
     found = _raw(loaded, ("red", "green", "blue"), count)
     return found / 255.0 if found is not None else np.full((count, 3), 0.5)
+
+
+def read_surface(path: Path) -> tuple[Array, IntArray]:
+    """Vertices and faces of a mesh file. Raises StageError if it is missing or holds no triangles."""
+    mesh = trimesh.load(path, process=False) if path.is_file() else None
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        raise StageError(f"{path}: holds no triangles")
+    # Plain arrays: trimesh's own keep a record of every element that is read.
+    return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
 
 
 def write_mesh(path: Path, vertices_m: Array, faces: IntArray, colours: Array) -> None:

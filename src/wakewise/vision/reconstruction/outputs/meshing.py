@@ -37,9 +37,8 @@ def mesh_points(
     """Screened Poisson surface, cut back to where there are points, coloured from them.
 
     M. Kazhdan and H. Hoppe, Screened Poisson surface reconstruction, ACM TOG 32(3), 2013, doi 10.1145/2487228.2487237.
-    The surface closes every hole; what lies farther than 6 point spacings from a point is invented and is cut off.
-    So are crumbs, pieces that hang together with nothing and are next to nothing beside the largest. Points farther
-    from the subject than it is long are left out.
+    The surface closes every hole; parts farther than 6 point spacings from a point are cut off, and so are components
+    that are small beside the largest. Points farther from the subject than its length are left out.
 
     Returns mesh_vertices, mesh_faces, mesh_points_left_out. Raises StageError if no surface comes out;
     EnvironmentFailure if the disk is full.
@@ -59,7 +58,7 @@ def mesh_points(
             points = Path(scratch) / "points.ply"
             write_cloud(points, cloud)
         call_in_process("mesh", "poisson_meshing", points, raw, options, watch=lambda: progress(0, 1, "mesh"))
-        need_room(out.parent, 0.0, "mesh")  # on a full disk the surface is cut short without a word
+        need_room(out.parent, 0.0, "mesh")  # on a full disk the surface is cut short without an error
         if not raw.is_file() or raw.stat().st_size == 0:
             raise StageError("mesh: no surface came out of the dense points")
         loaded = trimesh.load(raw, process=False)

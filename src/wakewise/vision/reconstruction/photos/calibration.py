@@ -57,7 +57,7 @@ class CalibrationBoard:
 
 @dataclass(frozen=True, kw_only=True)
 class CameraCalibration:
-    """What the photographs say of the camera.
+    """Result of a calibration.
 
     residual_px: root mean square distance of board corners in the photographs from where the model puts them;
     residuals_px: the same of every lens model; photo_residual_px: by photograph; left_out: photographs with too few
@@ -167,7 +167,7 @@ def _colmaps(fit: Fit, width: int, height: int) -> dict[str, Any]:
 
 
 def seen(photos: dict[str, NDArray[np.uint8]], board: CalibrationBoard, name: str) -> str:
-    """What is seen of a board that is not found, in words."""
+    """Remark on the markers that are seen of a board that is not found."""
     plain = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name)))
     found = [ids for grey in photos.values() if (ids := plain.detectMarkers(grey)[1]) is not None]
     most, last = max(len(ids) for ids in found), max(int(ids.max()) for ids in found)

@@ -13,7 +13,7 @@ from wakewise.vision.reconstruction.photos.lenses import Lens
 from wakewise.vision.reconstruction.photos.photo_folder import Photo
 
 _Key = tuple[str, str, str, str]
-"""What the user says, folder, what EXIF says, size."""
+"""Name given by the user, folder, EXIF, size."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +34,7 @@ def group_photos(
 ) -> tuple[LensGroup, ...]:
     """Photographs by lens.
 
-    Two that differ in size, folder, or in what EXIF says of the camera are of two lenses, whatever else.
+    Photographs that differ in size, folder, or EXIF's camera are of different lenses.
 
     `patterns`: name of a lens to a shell pattern of its photos' names (`left_*`); a photo that fits several is of the
     first. `lenses`: one lens of them all, or those of groups by name. Raises InputError if no photo fits a pattern, a
@@ -43,11 +43,11 @@ def group_photos(
     patterns = dict(patterns or {})
     found: dict[_Key, list[Photo]] = {}
     for photo in photos:
-        said = next((name for name, pattern in patterns.items() if fnmatchcase(photo.name, pattern)), None)
+        given = next((name for name, pattern in patterns.items() if fnmatchcase(photo.name, pattern)), None)
         folder = str(PurePosixPath(photo.name).parent)
         size = f"{photo.width} x {photo.height}"
         read = ("", "" if folder == "." else folder, photo.camera, size)
-        key = read if said is None else (said, "", "", size)
+        key = read if given is None else (given, "", "", size)
         found.setdefault(key, []).append(photo)
     for name, pattern in patterns.items():
         if not any(key[0] == name for key in found):
@@ -97,10 +97,7 @@ def known_groups(photos: tuple[Photo, ...], lenses: Mapping[str, Lens]) -> tuple
 
 
 def named_lenses(lenses: Sequence[Mapping[str, Any]], groups: tuple[LensGroup, ...]) -> list[dict[str, Any]]:
-    """What a model says of its lenses, each with the name of the group that its photos are of.
-
-    Of a group that turned out to hold several lenses they are numbered: `left (1)`, `left (2)`.
-    """
+    """Lenses of a model, each with the name of its photos' group; numbered if a group has several: `left (1)`."""
     name_of = {photo: group.name for group in groups for photo in group.photos}
     names = [name_of[one["photos"][0]] for one in lenses]
     out = []
@@ -116,12 +113,12 @@ def _given(lenses: Mapping[str, Lens] | None, key: _Key, name: str) -> Lens | No
 
 
 def _names(keys: list[_Key]) -> dict[_Key, str]:
-    """Short names that differ: the user's, else what tells the groups apart."""
+    """Short unique names: the user's, else the parts in which groups differ."""
     found = [key for key in keys if not key[0]]
     varies = [k for k in (1, 2, 3) if len({key[k] for key in found}) > 1]
     out: dict[_Key, str] = {}
     for key in keys:
-        told = key[0] or ", ".join(key[k] for k in varies if key[k]) or key[2] or key[3]
-        twice = sum(other[0] == key[0] for other in keys) > 1 if key[0] else told in out.values()
-        out[key] = f"{told}, {key[3]}" if twice and not told.endswith(key[3]) else told
+        label = key[0] or ", ".join(key[k] for k in varies if key[k]) or key[2] or key[3]
+        twice = sum(other[0] == key[0] for other in keys) > 1 if key[0] else label in out.values()
+        out[key] = f"{label}, {key[3]}" if twice and not label.endswith(key[3]) else label
     return out

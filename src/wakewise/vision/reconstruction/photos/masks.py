@@ -34,7 +34,7 @@ class Masks:
     digests: Mapping[str, str]
 
     def of(self, name: str) -> BoolArray | None:
-        """Where a photo is to be looked at, shape (h, w); None for everywhere."""
+        """Pixels of a photo that are used, shape (h, w); None for all."""
         path = self.files.get(name)
         return None if path is None else _read(path)
 

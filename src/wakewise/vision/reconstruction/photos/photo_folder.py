@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from wakewise.vision.reconstruction.photos.masks import Masks
 
 
-# Tags of Exif 3.0 (CIPA DC-008-2023), tables 4 and 8: what tells one lens, or one state of a zoom, from another.
+# Tags of Exif 3.0 (CIPA DC-008-2023), tables 4 and 8, that distinguish lenses and states of a zoom.
 _MAKE, _MODEL, _EXIF, _FOCAL, _BODY_SERIAL, _LENS_MODEL = 0x010F, 0x0110, 0x8769, 0x920A, 0xA431, 0xA434
 
 
@@ -31,7 +31,7 @@ UNREADABLE = (OSError, SyntaxError, ValueError, LookupError, TypeError, ZeroDivi
 
 
 def exif_words(data: bytes) -> str:
-    """What an encoded image says of its camera: make, model, serial number, lens, focal length; empty if nothing."""
+    """Make, model, serial number, lens and focal length by an encoded image's EXIF; empty if there is none."""
     from PIL import Image
 
     try:
@@ -69,7 +69,7 @@ _OTHERS = {
     "RAW": (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".gpr", ".pef", ".srw", ".raw"),
     "other images": (".webp", ".gif", ".jp2", ".jxl", ".psd", ".exr", ".hdr"),
 }
-# How files begin, and the suffixes that say so: COLMAP goes by the suffix.
+# First bytes of files and their suffixes: COLMAP decodes by the suffix.
 _BEGINNINGS = {
     b"\xff\xd8\xff": ("JPEG", (".jpg", ".jpeg")),
     PNG: ("PNG", (".png",)),
@@ -81,7 +81,7 @@ _BEGINNINGS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Photo:
-    """One photograph: name below its folder, size in pixels, a digest of its bytes, what EXIF says of its camera."""
+    """One photograph: name below its folder, size in pixels, a digest of its bytes, EXIF's camera."""
 
     name: str
     width: int
@@ -93,7 +93,7 @@ class Photo:
 class PhotoStore:
     """Photos of a folder, decoded once: kept as long as they are small enough together, else decoded at every call.
 
-    `masks` say what of them is not to be looked at.
+    `masks` hide parts of them.
     """
 
     def __init__(self, folder: Path, most_bytes: int = KEPT_BYTES) -> None:
@@ -230,7 +230,7 @@ def without_duplicates(photos: tuple[Photo, ...]) -> tuple[tuple[Photo, ...], in
 
 
 def jpeg_is_whole(data: bytes) -> bool:
-    """Whether a JPEG's coded image comes to its end marker; decoders paint what is missing grey and say nothing.
+    """Whether a JPEG's coded image reaches its end marker; decoders fill what is missing with grey, without an error.
 
     ITU-T T.81, annex B: segments of a marker and a length; after a start of scan, coded bytes in which a marker is an
     0xFF that is followed neither by 0 nor by a restart marker.
@@ -252,7 +252,7 @@ def jpeg_is_whole(data: bytes) -> bool:
 
 
 def png_is_whole(data: bytes) -> bool:
-    """Whether a PNG's chunks come to its end with the checksums they carry; its decoder complains past all handling.
+    """Whether a PNG's chunks reach its end with right checksums; its decoder's error cannot be handled.
 
     W3C, Portable Network Graphics, section 5: length, type, data, CRC-32 of type and data.
     """

@@ -37,7 +37,7 @@ BLURRED_SHARE = 0.5
 NEAR_S = 2.0
 READOUT_S = 0.02
 """Rows of small sensors are read one after the other, all in 15 to 30 ms: O. Saurer et al., ICCV 2013, doi
-10.1109/ICCV.2013.64, measured such cameras; the film does not say."""
+10.1109/ICCV.2013.64, measured such cameras."""
 _POINTS, _LEAST_POINTS, _QUALITY = 300, 20, 96
 
 
@@ -113,9 +113,9 @@ def _take(film: Path, folder: Path, progress: Progress) -> VideoFrames:
         }
         rate = float(reader.get(cv2.CAP_PROP_FPS))
         rate = rate if np.isfinite(rate) and 0.1 < rate < 1000.0 else 30.0
-        told = max(int(reader.get(cv2.CAP_PROP_FRAME_COUNT)), 1)
+        expected = max(int(reader.get(cv2.CAP_PROP_FRAME_COUNT)), 1)
         stride = max(1, round(rate / ANALYSED_PER_S))
-        analysed, frames = _analyse_frames(reader, stride, told, progress)
+        analysed, frames = _analyse_frames(reader, stride, expected, progress)
     if len(analysed.numbers) == 0:
         raise InputError(f"{film}: none of its frames can be decoded; convert it, for example to H.264 in MP4")
     step = max(STEP_SHARE, float(analysed.way[-1]) / MOST_FRAMES)
@@ -198,7 +198,7 @@ def movement(before: Image, after: Image) -> float | None:
 
 
 def _analyse_frames(
-    reader: cv2.VideoCapture, stride: int, told: int, progress: Progress
+    reader: cv2.VideoCapture, stride: int, expected: int, progress: Progress
 ) -> tuple[_FrameStatistics, int]:
     """Every `stride`th frame, and how many frames there are."""
     numbers, sharp, way = [], [], []
@@ -206,7 +206,7 @@ def _analyse_frames(
     total, frame, usual = 0.0, 0, 0.0
     while reader.grab():
         if frame % stride == 0:
-            progress(min(frame, told), 2 * told, "film")
+            progress(min(frame, expected), 2 * expected, "film")
             ok, image = reader.retrieve()
             if ok and image is not None:
                 grey = _small(image)

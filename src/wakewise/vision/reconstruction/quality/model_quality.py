@@ -19,19 +19,19 @@ from wakewise.vision.reconstruction.sfm.colmap import open_database, pycolmap
 GRID = (8, 6)
 """Cells across and down that a photograph is divided into for its coverage."""
 PAIR_MATCHES, PAIR_PX, PAIR_SHARE = 30, 4.0, 0.5
-"""A verified pair with so many matches speaks; it agrees if such a share of them lies so near their epipolar lines."""
+"""Least matches of a verified pair that counts; it agrees if this share of them lies this near their epipolar lines."""
 MOST_RAYS = 12
-"""Observations of a point that its widest angle is looked for among."""
+"""Most observations of a point that its widest angle is computed from."""
 
 LEAST_OBSERVATIONS, LEAST_COVERAGE_PCT, LEAST_ANGLE_DEG = 50.0, 10.0, 2.0
 LEAST_AGREEING_PCT, MOST_HELD_OUT_PX, MOST_UNCUT_PX, MOST_CUT_PCT = 90.0, 1.5, 1.2, 30.0
 LEAST_KEPT_PCT, LEAST_REGISTERED = 40.0, 0.5
-"""What a model that is trusted has, at least and at most; the bench `traps` shows what each catches."""
+"""Bounds of a sound model; the bench `traps` measures what each detects."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelEvidence:
-    """What the photographs say of a model.
+    """Figures of a model by the photographs.
 
     observations_per_photo: median number of sparse points that a registered photo sees. coverage_pct: median share of
     a photo's cells with features that hold a sparse point. angle_deg: median over points of the widest angle between
@@ -49,7 +49,7 @@ class ModelEvidence:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Observations:
-    """Every observation: row of its point, row of its photo, place in px; all in order of the points."""
+    """Every observation: row of its point, row of its photo, pixel; in order of the points."""
 
     point: IntArray
     photo: IntArray
@@ -59,7 +59,7 @@ class _Observations:
 
 
 def evidence(model: pycolmap.Reconstruction, database: Path) -> ModelEvidence:
-    """Hold a model against the photographs' features and the verified matches in the database."""
+    """Compare a model with the photographs' features and the verified matches in the database."""
     images = sorted((image for image in model.images.values() if image.has_pose), key=lambda one: one.name)
     seen = _observations(model, images)
     count = np.bincount(seen.photo, minlength=len(images))
@@ -73,7 +73,7 @@ def evidence(model: pycolmap.Reconstruction, database: Path) -> ModelEvidence:
 
 
 def quality_warnings(found: ModelEvidence, *, uncut_px: float, cut_pct: float) -> list[str]:
-    """Each reason not to trust a model, in words with its figure; none if it may be trusted."""
+    """Reasons against a model, each with its figure; none for a sound one."""
     out = []
     if found.observations_per_photo < LEAST_OBSERVATIONS:
         out.append(f"a photo sees {found.observations_per_photo:.0f} points (median), {LEAST_OBSERVATIONS:g} are safe")
@@ -105,7 +105,7 @@ def quality_warnings(found: ModelEvidence, *, uncut_px: float, cut_pct: float) -
 
 
 def registration_warnings(registered: int, photos: int) -> list[str]:
-    """The reason not to trust a model that leaves most photographs out, if it does."""
+    """The reason against a model that registers less than half of the photographs, if it does."""
     if registered >= LEAST_REGISTERED * photos:
         return []
     return [
@@ -114,7 +114,7 @@ def registration_warnings(registered: int, photos: int) -> list[str]:
 
 
 def known_pose_warnings(found: ModelEvidence, *, error_px: float, kept_pct: float | None) -> list[str]:
-    """Reasons not to trust cameras that were given and kept: what the photographs' features say of them."""
+    """Reasons against given, fixed cameras, by the photographs' features."""
     if kept_pct is None or (found.agreeing_pairs_pct is None and kept_pct < LEAST_KEPT_PCT):
         return ["nothing in the photos confirms the cameras that were given: hardly any features match between them"]
     out = []
@@ -184,7 +184,7 @@ def _angle_deg(seen: _Observations) -> float:
 
 
 def _held_out_px(images: list[pycolmap.Image], seen: _Observations) -> float | None:
-    """Each observation of a track of three or more against the point that its others alone give.
+    """Median distance of observations, of tracks of three and more, from the point that the other observations give.
 
     The point nearest to a bundle of rays in the sense of least squares solves sum(I - d d') x = sum(I - d d') c; to
     leave a ray out its own term is taken away.
@@ -204,7 +204,7 @@ def _held_out_px(images: list[pycolmap.Image], seen: _Observations) -> float | N
             direction[mine] = ray / np.linalg.norm(ray, axis=1, keepdims=True)
     known = np.isfinite(direction).all(axis=1)
     direction[~known] = 0.0
-    # Near rays tell more than far ones: an angle is an error in proportion to the distance.
+    # An angle is an error in proportion to the distance.
     weight = 1.0 / np.maximum(((seen.points_W[point] - seen.centres_W[photo]) ** 2).sum(axis=1), 1e-300)
     normal = (np.eye(3) - direction[:, :, None] * direction[:, None, :]) * (weight * known)[:, None, None]
     side = np.einsum("nij,nj->ni", normal, seen.centres_W[photo])

@@ -28,9 +28,9 @@ from wakewise.vision.reconstruction.sfm.features import Features, photo_features
 ANALYSED_PX, MATCHED_PX, FEATURES = 1600, 640, 700
 """Longest side for sharpness and exposure, for matching, and features matched of each photo."""
 MOST_PAIRS, ORDER_NEIGHBOURS = 1600, 4
-"""Pairs that are matched: all of them where they are no more, else neighbours in order and those that look alike."""
+"""Most pairs that are matched: all pairs up to this number, else neighbours in order and similar photographs."""
 LEAST_MATCHES, LEAST_PARTNERS = 16, 2
-"""Matches that agree on a geometry before two photos are held for partners, and partners that a photo needs."""
+"""Least matches of partners that fit one geometry, and least partners of a photo."""
 BLURRED_SHARE, DARK, BRIGHT = 0.4, 8, 250
 MOST_DARK_PCT, MOST_BRIGHT_PCT, LEAST_COVERED_PCT = 40.0, 8.0, 25.0
 CELLS = (8, 6)
@@ -38,7 +38,7 @@ CELLS = (8, 6)
 THUMBS_PX = ((60, 640), (200, 400), (10**9, 240))
 """Longest side of small copies for up to so many photographs, so that a page holds them all."""
 _LEAST_SIDE_PX = 4
-"""Narrower in the copy that is matched, a picture has no detail that could be measured."""
+"""Least side of the copy that is matched."""
 _RATIO, _GEOMETRY_PX = 0.8, 2.0
 
 
@@ -65,7 +65,7 @@ class PhotoQuality:
 
 @dataclass(frozen=True, kw_only=True)
 class PhotoPreview:
-    """All photos, in order; groups: how many hang together, largest set first; advice: what to shoot again."""
+    """All photos, in order; groups: sizes of the connected sets, largest first; advice: what to photograph again."""
 
     photos: tuple[PhotoQuality, ...]
     groups: tuple[int, ...]
@@ -95,7 +95,7 @@ class _Seen:
 def preview_photos(
     folder: Path, threads: int = 2, progress: Progress = no_progress
 ) -> tuple[PhotoPreview, dict[str, bytes]]:
-    """Look at a folder of photographs; also small JPEG copies of them, by name.
+    """Preview of a folder of photographs, and small JPEG copies of them by name.
 
     Raises InputError if they cannot be read, see `read_photos`; if one is so narrow that nothing of it is left in a
     small copy.
@@ -124,8 +124,10 @@ def preview_photos(
                 matched[pair] = rows
     finally:
         cv2.setNumThreads(before)
-    look = _judged(names, [(p.width, p.height) for p in found], seen, matched, len(pairs), unsupported_files(folder))
-    return look, {name: one.thumb for name, one in zip(names, seen, strict=True)}
+    preview = _preview(
+        names, [(p.width, p.height) for p in found], seen, matched, len(pairs), unsupported_files(folder)
+    )
+    return preview, {name: one.thumb for name, one in zip(names, seen, strict=True)}
 
 
 def preview_pairs(tiny: Array) -> list[tuple[int, int]]:
@@ -134,9 +136,9 @@ def preview_pairs(tiny: Array) -> list[tuple[int, int]]:
     if count * (count - 1) // 2 <= MOST_PAIRS:
         return [(i, j) for i in range(count) for j in range(i + 1, count)]
     pairs = {(i, j) for i in range(count) for j in range(i + 1, min(i + ORDER_NEIGHBOURS + 1, count))}
-    alike = tiny @ tiny.T
-    np.fill_diagonal(alike, -1.0)
-    order = np.argsort(-alike, axis=1)
+    similarity = tiny @ tiny.T
+    np.fill_diagonal(similarity, -1.0)
+    order = np.argsort(-similarity, axis=1)
     for rank in range(count - 1):
         for i in range(count):
             if len(pairs) >= MOST_PAIRS:
@@ -147,23 +149,23 @@ def preview_pairs(tiny: Array) -> list[tuple[int, int]]:
 
 
 def matches(one: Features, two: Features) -> IntArray:
-    """Rows of features that are each other's best and fit one geometry, shape (n, 2); none where too few do."""
+    """Mutual nearest features that fit one fundamental matrix, as rows, shape (n, 2); none where too few do."""
     nothing = np.zeros((0, 2), dtype=np.int64)
     if min(len(one.keypoints), len(two.keypoints)) < LEAST_MATCHES:
         return nothing
     a, b = (each.descriptors.astype(np.float32) for each in (one, two))
     a /= np.maximum(np.linalg.norm(a, axis=1, keepdims=True), 1e-9)
     b /= np.maximum(np.linalg.norm(b, axis=1, keepdims=True), 1e-9)
-    alike = a @ b.T
-    best = alike.argmax(axis=1)
+    similarity = a @ b.T
+    best = similarity.argmax(axis=1)
     rows = np.arange(len(a))
-    top = alike[rows, best]
-    alike_without = alike.copy()
-    alike_without[rows, best] = -1.0
-    second = alike_without.max(axis=1)
+    top = similarity[rows, best]
+    others = similarity.copy()
+    others[rows, best] = -1.0
+    second = others.max(axis=1)
     # Of unit vectors the squared distance is 2 - 2 times the product.
     clear = 2.0 - 2.0 * top < _RATIO**2 * (2.0 - 2.0 * second)
-    good = np.flatnonzero(clear & (alike.argmax(axis=0)[best] == rows))
+    good = np.flatnonzero(clear & (similarity.argmax(axis=0)[best] == rows))
     if len(good) < LEAST_MATCHES:
         return nothing
     pairs = np.stack([good, best[good]], axis=1)
@@ -200,7 +202,7 @@ def _within(image: Image, most: int) -> Image:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
-def _judged(
+def _preview(
     names: list[str],
     sizes: list[tuple[int, int]],
     seen: list[_Seen],

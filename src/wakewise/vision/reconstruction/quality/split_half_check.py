@@ -12,12 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import write_json
-from wakewise.vision.reconstruction.outputs.clouds import read_cloud
+from wakewise.vision.reconstruction.outputs.clouds import read_cloud, read_surface
 from wakewise.vision.reconstruction.sfm.registered_photos import camera_centres
 
 ROUNDS, FAR = 12, 2.0
@@ -25,7 +24,7 @@ ROUNDS, FAR = 12, 2.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GroundPlane:
-    """A plane in the model's frame: a place in it, and axes as rows: across, along, up (towards the cameras)."""
+    """A plane in the model's frame: a point of it, and axes as rows: across, along, up (towards the cameras)."""
 
     origin: Array
     axes: Array
@@ -37,13 +36,13 @@ class GroundPlane:
         """Across, along and above, shape (n, 3)."""
         return np.asarray((np.asarray(points) - self.origin) @ self.axes.T)
 
-    def to_model(self, told: Array) -> Array:
+    def to_model(self, in_plane: Array) -> Array:
         """Points of the model, shape (n, 3)."""
-        return np.asarray(np.asarray(told) @ self.axes + self.origin)
+        return np.asarray(np.asarray(in_plane) @ self.axes + self.origin)
 
 
 def fit_ground_plane(points: Array, eyes: Array) -> GroundPlane:
-    """Plane of least squares of points, less those far above or below it, which are the subject's relief.
+    """Robust plane of least squares of points: those far above or below it, the relief, are left out.
 
     `points` has shape (n, 3). `eyes`, shape (k, 3): cameras: they are above. Raises StageError if the points lie on a
     line.
@@ -62,17 +61,17 @@ def fit_ground_plane(points: Array, eyes: Array) -> GroundPlane:
     return GroundPlane(origin=middle, axes=np.stack([across, np.cross(up, across), up]))
 
 
-def heights(told: Array, cell: float) -> tuple[Array, Array]:
+def heights(in_plane: Array, cell: float) -> tuple[Array, Array]:
     """Mean height of points in square cells, shape (rows, columns), NaN where none is, and the corner of the first.
 
     Rows run along, columns across, both growing; the corner is (across, along).
     """
-    low = np.floor(told[:, :2].min(axis=0) / cell) * cell
-    place: IntArray = np.floor((told[:, :2] - low) / cell).astype(np.int64)
+    low = np.floor(in_plane[:, :2].min(axis=0) / cell) * cell
+    place: IntArray = np.floor((in_plane[:, :2] - low) / cell).astype(np.int64)
     columns, rows = place.max(axis=0) + 1
     flat = place[:, 1] * columns + place[:, 0]
     count = np.bincount(flat, minlength=rows * columns)
-    total = np.bincount(flat, told[:, 2], minlength=rows * columns)
+    total = np.bincount(flat, in_plane[:, 2], minlength=rows * columns)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
     return mean.reshape(rows, columns), low
 
@@ -80,7 +79,7 @@ def heights(told: Array, cell: float) -> tuple[Array, Array]:
 FIGURES = ("area", "plan_area", "rugosity", "volume")
 CELL_SPACINGS = 4.0
 LEAST_PHOTOS = 12
-"""Fewer, and their halves are too few for a model."""
+"""Least photographs: fewer have halves too small for a model."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,17 +95,6 @@ class SurfaceExtent:
     volume: float
 
 
-def surface_of(path: Path) -> tuple[Array, IntArray]:
-    """Vertices and faces of a mesh on disk.
-
-    Raises StageError if it holds no triangles.
-    """
-    mesh = trimesh.load(path, process=False) if path.is_file() else None
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        raise StageError(f"{path}: holds no triangles to measure")
-    return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-
-
 def cells_of(vertices: Array, faces: IntArray, level: GroundPlane, cell: float) -> set[tuple[int, int]]:
     """Cells of the plane that middles of triangles lie over."""
     place = np.floor(level.to_plane(vertices[faces].mean(axis=1))[:, :2] / cell).astype(np.int64)
@@ -118,8 +106,7 @@ def extent_over(
 ) -> SurfaceExtent:
     """Extent of the part of a surface over these cells.
 
-    Volume is the flux of (0, 0, height) through what looks up or down of it: what lies above the plane less what lies
-    below it, as for a hill on a field.
+    Volume is the flux of (0, 0, height) through the surface: volume above the plane less volume below it.
     """
     corners = level.to_plane(vertices)[faces]
     place = np.floor(corners.mean(axis=1)[:, :2] / cell).astype(np.int64)
@@ -151,11 +138,11 @@ def measure_halves(
     if len(names) < LEAST_PHOTOS:
         raise InputError(f"halves: {len(names)} photos have a place, two models need at least {LEAST_PHOTOS} together")
     centres = camera_centres(model / "sparse")
-    surfaces = [surface_of(model / "mesh.ply")]
+    surfaces = [read_surface(model / "mesh.ply")]
     for k in (0, 1):
         folder = model / "halves" / "ab"[k]
         make(names[k::2], folder, {name: centres[name] for name in names[k::2]})
-        surfaces.append(surface_of(folder / "mesh.ply"))
+        surfaces.append(read_surface(folder / "mesh.ply"))
     cloud = read_cloud(model / "dense.ply").points_m
     level = fit_ground_plane(cloud, np.array(list(centres.values())))
     plan = level.to_plane(cloud)[:, :2]

@@ -16,7 +16,7 @@ from wakewise.core.settings import Settings, describe_faults
 from wakewise.vision.reconstruction.photos.calibration import CalibrationBoard
 
 SIGMA_SHARE = 1e-3
-"""Standard deviation of a length whose uncertainty nobody says, as a share of it: a steel rule read to half a mm."""
+"""Default relative standard deviation of a length: a steel rule read to half a mm."""
 FAMILIES = {
     "apriltag_36h11": "DICT_APRILTAG_36h11",
     "apriltag_36h10": "DICT_APRILTAG_36h10",
@@ -60,7 +60,7 @@ class ScaleBar:
 
 @dataclass(frozen=True, kw_only=True)
 class ScaleBars:
-    """All that is known of lengths. family: of the targets, found out if None; tag_m: side of their black square."""
+    """Known lengths. family: of the targets, detected if None; tag_m: side of their black square."""
 
     bars: tuple[ScaleBar, ...] = ()
     family: str | None = None
@@ -86,7 +86,7 @@ class ScaleBars:
         return tuple(sorted({end for bar in self.bars for end in bar.ends}))
 
     def key(self) -> list[Any]:
-        """Plain values that tell these bars from others."""
+        """Plain values for a fingerprint."""
         board = self.board
         size = None if board is None else [board.columns, board.rows, board.square_m, board.marker_m, self.board_sigma]
         return [[[*bar.ends, bar.length_m, bar.sigma_m] for bar in self.bars], self.family, self.tag_m, size]
@@ -135,16 +135,16 @@ class _BarsFile(Settings):
 def read_bars(path: Path) -> ScaleBars:
     """Bars of a YAML file: `bars` (ends, length_m, sigma_m), `targets`, `tag_m`, `board`.
 
-    Raises InputError if it cannot be read or says something else.
+    Raises InputError if it cannot be read or has other contents.
     """
     value = yaml_file(path)
     if not isinstance(value, dict):
         raise InputError(f"{path}: must hold bars: a list of ends: [3, 7], length_m: 0.5, sigma_m: 0.0002")
     try:
-        said = _BarsFile.model_validate(value)
+        entries = _BarsFile.model_validate(value)
     except ValidationError as fault:
-        told = describe_faults(fault, _BarsFile, "bars")
-        raise InputError(f"{path}: {told}; a bar has ends: [3, 7], length_m, sigma_m") from None
+        faults = describe_faults(fault, _BarsFile, "bars")
+        raise InputError(f"{path}: {faults}; a bar has ends: [3, 7], length_m, sigma_m") from None
     try:
         return ScaleBars(
             bars=tuple(
@@ -153,26 +153,26 @@ def read_bars(path: Path) -> ScaleBars:
                     length_m=one.length_m,
                     sigma_m=SIGMA_SHARE * one.length_m if one.sigma_m is None else one.sigma_m,
                 )
-                for one in said.bars
+                for one in entries.bars
             ),
-            family=said.targets,
-            tag_m=said.tag_m,
+            family=entries.targets,
+            tag_m=entries.tag_m,
             board=None
-            if said.board is None
+            if entries.board is None
             else CalibrationBoard(
-                columns=said.board.columns,
-                rows=said.board.rows,
-                square_m=said.board.square_m,
-                marker_m=said.board.marker_m,
+                columns=entries.board.columns,
+                rows=entries.board.rows,
+                square_m=entries.board.square_m,
+                marker_m=entries.board.marker_m,
             ),
-            board_sigma=SIGMA_SHARE if said.board is None else said.board.sigma,
+            board_sigma=SIGMA_SHARE if entries.board is None else entries.board.sigma,
         )
     except InputError as fault:
         raise InputError(f"{path}: {fault}") from None
 
 
 MOST_OFF_PCT, MOST_OFF_SIGMAS = 1.0, 3.0
-"""A bar that differs from the others by more than both is refused: a wrong length, or ends that were mixed up."""
+"""A bar that differs from the others by more than both is refused: a wrong length, or mixed-up ends."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,8 +199,8 @@ class BarMeasurement:
 
 @dataclass(frozen=True, kw_only=True)
 class BarResidual:
-    """What a bar is in the scaled model. off_*: its length there less the stated one; check_pct: the same if the scale
-    came from the other bars alone, None for the only one; photos: fewest that one of its ends is seen in.
+    """A bar in the scaled model. off_*: its length there less the stated one; check_pct: the same at the scale of the
+    other bars, None for the only one; photos: least number that sees one of its ends.
     """
 
     name: str
@@ -229,10 +229,10 @@ class ScaleFit:
 def fit_scale(bars: list[BarMeasurement], keep: bool = False) -> ScaleFit:
     """Weighted mean of the bars' scales; residuals are those at that scale, or if it is to `keep` its own, at that.
 
-    The uncertainty is that of the mean, enlarged where bars scatter by more than they say (R. T. Birge, Physical Review
+    The uncertainty is that of the mean, enlarged if bars scatter by more than their own (R. T. Birge, Physical Review
     40, 1932, doi 10.1103/PhysRev.40.207).
 
-    Raises InputError if a bar differs from what the others say by more than can be believed.
+    Raises InputError if a bar differs too much from the scale of the others.
     """
     scales = np.array([bar.scale for bar in bars])
     weights = np.array([1.0 / (bar.share * bar.scale) ** 2 for bar in bars])

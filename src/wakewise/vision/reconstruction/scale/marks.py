@@ -27,8 +27,7 @@ from wakewise.vision.reconstruction.sfm.registered_photos import RegisteredPhoto
 Sightings = dict[int, dict[str, Array]]
 """By target and photograph, its corners in pixels, shape (4, 2), clockwise from its first, centres at +0.5."""
 TRIED, TRIED_PX = 12, 1600
-"""Photographs, spread over the set, that the family of the targets is told by, and the longest side they are looked at
-with: ten families are tried on each."""
+"""Photographs, spread over the set, in which ten families of targets are tried, and their longest side."""
 
 
 def find_targets(
@@ -50,7 +49,7 @@ def find_targets(
 
 
 def _told(store: PhotoStore, names: list[str], wanted: tuple[int, ...], threads: int, progress: Progress) -> str:
-    """The family that most of the wanted targets are seen of, over photographs from all of the set."""
+    """The family with most of the wanted targets, over photographs spread over the set."""
     some = names[:: max(1, -(-len(names) // TRIED))]
     count = dict.fromkeys(FAMILIES, 0)
     for done, found in enumerate(in_order(lambda name: _found(_small(store.image(name)), FAMILIES), some, threads)):
@@ -81,7 +80,7 @@ def _small(image: Image) -> Image:
 def find_squares(grey: Image, family: str) -> dict[int, Array]:
     """Corners in pixels (centres at +0.5), shape (4, 2), of the targets in a grey photograph by number.
 
-    A target that a photograph shows twice is none that could be told apart, and is left out.
+    A target that a photograph shows twice is ambiguous and left out.
     """
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
@@ -102,7 +101,7 @@ def find_board(
 ) -> tuple[Mapping[int, Array], dict[int, dict[str, Array]]]:
     """A ChArUco board's inner corners: places on it in m, shape (3,), and by photograph in pixels, shape (1, 2).
 
-    Raises StageError if no marker of a known dictionary is in the photographs that are looked at first.
+    Raises StageError if no marker of a known dictionary is found.
     """
     some = names[:: max(1, -(-len(names) // TRIED))]
     _, detector = board_detector([_grey(store.image(name)) for name in some], board)
@@ -113,7 +112,7 @@ def find_board(
         return ([], []) if numbers is None else (np.asarray(corners).reshape(-1, 1, 2), np.ravel(numbers))
 
     out: dict[int, dict[str, Array]] = {}
-    # One at a time: the detector is one.
+    # One photograph at a time: there is one detector.
     for done, name in enumerate(names):
         progress(done, len(names), "board")
         for corner, number in zip(*one(name), strict=True):
@@ -126,7 +125,7 @@ def _grey(image: Image) -> Image:
 
 
 MOST_ERROR_PX = 3.0
-"""Farther from where the others put it, a photograph shows something else: a misread target, or a moved one."""
+"""Largest error of an observation; beyond, the target was misread or moved."""
 LEAST_SIGMA_PX = 0.1
 """Of a corner in a photograph, however well the photographs agree (refined corners in sharp pictures reach this)."""
 LEAST_ANGLE_DEG = 2.0
@@ -150,7 +149,7 @@ class TriangulatedPoint:
 def place(views: Mapping[str, RegisteredPhoto], seen: Mapping[str, Array]) -> TriangulatedPoint | None:
     """The point that photographs show at these pixels, each of shape (2,); None where fewer than two agree on one.
 
-    Photographs that stick out are left out one after the other, the worst first.
+    Outliers are removed one after the other, the worst first.
     """
     names = [name for name in sorted(seen) if name in views]
     while len(names) >= 2:

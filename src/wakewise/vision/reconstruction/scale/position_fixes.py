@@ -31,9 +31,9 @@ GPS_SIGMA_M, GPS_HEIGHT_SIGMA_M = 8.0 / 2.448, 13.0 / 1.96
 """Of each of two horizontal axes, and of the height: 8 m and 13 m at 95 %, in the mean over the globe (GPS Standard
 Positioning Service Performance Standard, 5th edition, 2020, table 3.8-3)."""
 DEPTH_SIGMA_M = 0.1
-"""Of a depth of which nobody says how sure it is: what divers' gauges show."""
+"""Default standard deviation of a depth: that of divers' gauges."""
 MOST_APART_M = 20e3
-"""Fixes farther apart are of two places, or have latitude and longitude mixed up."""
+"""Fixes farther apart are an error, such as mixed-up latitude and longitude."""
 _A_M, _E2 = 6_378_137.0, 6.694_379_990_14e-3  # WGS 84 (NGA.STND.0036, 2014): semi-major axis, squared eccentricity
 _GPS = 0x8825
 _LAT_REF, _LAT, _LON_REF, _LON, _ALT_REF, _ALT, _ERROR = 1, 2, 3, 4, 5, 6, 31  # Exif 3.0 (CIPA DC-008-2023), 4.6.7
@@ -71,7 +71,7 @@ class PositionFixes:
         return self.fixes.get(name) or self._by_stem.get(_stem(name))
 
     def key(self) -> list[Any]:
-        """Plain values that tell these from others, None for what is not known."""
+        """Plain values for a fingerprint, None for what is not known."""
         return [
             [name, [None if math.isnan(x) else x for x in fix.place_W_m.tolist()], fix.sigma_m.tolist()]
             for name, fix in sorted(self.fixes.items())
@@ -79,13 +79,13 @@ class PositionFixes:
 
 
 def _stem(name: str) -> str:
-    """A name without its suffix, with its folder: two cameras of a rig number their photos alike."""
+    """A name without its suffix, with its folder: two cameras of a rig may use the same numbers."""
     return Path(name).with_suffix("").as_posix()
 
 
 @dataclass(frozen=True, kw_only=True)
 class _RawFix:
-    """What is told of one photo: degrees or metres, and metres down; None where nothing is."""
+    """Fix of one photo as read: degrees or metres, and metres down; None where nothing is given."""
 
     flat: tuple[float, float] | None = None
     angles: tuple[float, float] | None = None
@@ -99,10 +99,10 @@ def read_fixes(path: Path) -> PositionFixes:
 
     `path`: columns `name` and `depth_m` (down from the surface), or these and `lat_deg`, `lon_deg` (WGS 84) or
     `north_m`, `east_m`; with `sigma_m` (of each horizontal axis) and `depth_sigma_m` where they are known. Empty cells
-    say nothing. Raises InputError if it cannot be read, or a row says what cannot be.
+    are unknown. Raises InputError if it cannot be read, or a row is not possible.
     """
     columns = "name, depth_m, lat_deg, lon_deg (or north_m, east_m), sigma_m, depth_sigma_m"
-    told: dict[str, _RawFix] = {}
+    raw: dict[str, _RawFix] = {}
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
@@ -115,16 +115,16 @@ def read_fixes(path: Path) -> PositionFixes:
                 name = (row["name"] or "").strip()
                 if not name:
                     raise InputError(f"{path}: line {reader.line_num}: has no name, must be a photo's")
-                if name in told:
+                if name in raw:
                     raise InputError(f"{path}: line {reader.line_num}: {name} is there twice")
-                told[name] = _row(f"{path}: line {reader.line_num}", row)
+                raw[name] = _row(f"{path}: line {reader.line_num}", row)
     except OSError as fault:
         raise InputError(f"{path}: {fault.strerror or fault}; needed is a CSV file with {columns}") from None
     except (UnicodeDecodeError, csv.Error):
         raise InputError(f"{path}: is no CSV text; needed is a table with {columns}") from None
-    if not told:
+    if not raw:
         raise InputError(f"{path}: holds no fixes, needs a row for each photo")
-    return _flattened(told, str(path))
+    return _flattened(raw, str(path))
 
 
 def exif_fixes(folder: Path) -> PositionFixes:
@@ -134,21 +134,21 @@ def exif_fixes(folder: Path) -> PositionFixes:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: is no folder of photos, only theirs hold fixes")
-    told: dict[str, _RawFix] = {}
+    raw: dict[str, _RawFix] = {}
     files = photo_files(folder)
     for path in files:
         try:
             found = exif_place(path.read_bytes())
         except OSError:
-            continue  # who decodes the photos says so
+            continue  # reported where the photos are decoded
         if found is not None:
-            told[path.relative_to(folder).as_posix()] = found
-    if not told:
+            raw[path.relative_to(folder).as_posix()] = found
+    if not raw:
         raise InputError(
             f"{folder}: none of {len(files)} photos holds latitude, longitude and height in its EXIF; a CSV with name "
             "and depth_m says it, too"
         )
-    return _flattened(told, str(folder))
+    return _flattened(raw, str(folder))
 
 
 def exif_place(data: bytes) -> _RawFix | None:
@@ -212,16 +212,16 @@ def _row(where: str, row: Mapping[str, str | None]) -> _RawFix:
     )
 
 
-def _flattened(told: Mapping[str, _RawFix], source: str) -> PositionFixes:
+def _flattened(raw: Mapping[str, _RawFix], source: str) -> PositionFixes:
     """All in metres, about the first that has degrees.
 
     Raises InputError if some are in degrees and some in metres, or they lie too far apart.
     """
-    origin = next((one.angles for one in told.values() if one.angles is not None), None)
-    if origin is not None and any(one.flat is not None for one in told.values()):
+    origin = next((one.angles for one in raw.values() if one.angles is not None), None)
+    if origin is not None and any(one.flat is not None for one in raw.values()):
         raise InputError(f"{source}: has places in degrees and in metres, must be one of them")
     fixes: dict[str, PositionFix] = {}
-    for name, one in told.items():
+    for name, one in raw.items():
         place = np.full(3, np.nan)
         if one.angles is not None and origin is not None:
             place[:2] = _on_map(one.angles, origin)
@@ -254,7 +254,7 @@ def _on_map(angles: tuple[float, float], origin: tuple[float, float]) -> tuple[f
 
 
 MOST_UNSURE_PCT = 20.0
-"""A scale less sure than this is told and not used."""
+"""A scale with a larger uncertainty is reported and not used."""
 LEAST_FIXES = 4
 FAR_SIGMAS = 4.0
 _BEND = 2.0  # sigmas from which residuals count linearly
@@ -265,7 +265,7 @@ class Georeference:
     """Similarity from the model to north, east, down in m: scale, R (3, 3), t (3,); and how well the fixes fit.
 
     uncertainty_pct: standard deviation of the scale, inf where it is open; off_m: of each photo with a fix, its fix
-    less its place, shape (3,), NaN where the fix says nothing; far: photos whose fix is far off by its own uncertainty;
+    less its place, shape (3,), NaN where unknown; far: photos whose fix is far off by its own uncertainty;
     turned: whether north is known.
     """
 
@@ -376,7 +376,7 @@ def _similar(points: Array, places: Array, sigmas: Array) -> tuple[float, Array,
     whole = known.all(axis=1)
     try:
         first = umeyama(points[whole], places[whole])
-    except InputError:  # on one line: the turn about it is open, so is what depths say of the scale
+    except InputError:  # on one line: the rotation about it is open, and so is the scale
         return 1.0, np.eye(3), np.zeros(3), float("inf")
     middle = points.mean(axis=0)
     spread = float(np.sqrt(((points - middle) ** 2).sum(axis=1).mean()))
@@ -400,7 +400,7 @@ def _similar(points: Array, places: Array, sigmas: Array) -> tuple[float, Array,
 
 
 def _covariance(fit: Any, count: int) -> Array | None:
-    """Covariance of a fit's numbers, larger where fixes scatter more than they say; None where one of them is open.
+    """Covariance of a fit's parameters, enlarged if fixes scatter more than stated; None if one is not determined.
 
     The scatter is that of the middle of the residuals, which a few wrong fixes do not move: the median of |r| is .6745
     sigma of a normal one.

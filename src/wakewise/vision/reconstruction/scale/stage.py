@@ -38,7 +38,7 @@ def scale_model(
     (False where the bars only check), model_off_pct (how much longer lengths of the model are than by the bars, 0 where
     they are used), uncertainty_pct, family, bars (each bar's residual), targets (photographs, error in px, sides in mm
     and middle in m of each). Raises InputError if a target is seen in fewer than two registered photographs, its size
-    is not what was said, or bars disagree.
+    differs from the stated one, or bars disagree.
     """
     views = {view.name: view for view in read_views(sparse, None)[0]}
     names = sorted(views)
@@ -57,14 +57,14 @@ def scale_model(
     if bars.board is not None:
         measured.append(_of_board(store, names, views, bars.board, bars.board_sigma, progress))
     fit = fit_scale(measured, keep)
-    said = [_said(number, corners, fit.scale) for number, corners in targets.items()]
-    _check_sizes(said, bars.tag_m, fit.uncertainty_pct)
-    told = {
+    target_figures = [_target_figures(number, corners, fit.scale) for number, corners in targets.items()]
+    _check_sizes(target_figures, bars.tag_m, fit.uncertainty_pct)
+    figures_of_bars = {
         "used": not keep,
         "model_off_pct": 100.0 * (1.0 / fit.scale - 1.0) if keep else 0.0,
         "family": family,
         **fit.figures(),
-        "targets": said,
+        "targets": target_figures,
     }
     if not keep:
         model = pycolmap.Reconstruction(sparse)
@@ -72,14 +72,14 @@ def scale_model(
         with whole_folder(sparse) as temporary:
             model.write_binary(temporary)
     progress(1, 1, "scale")
-    return {"scale_bars": told}
+    return {"scale_bars": figures_of_bars}
 
 
 def place_model(sparse: Path, fixes: PositionFixes, keep: bool = False) -> dict[str, Any]:
-    """Lay a sparse model where fixes say that its cameras were, in m, down along its third axis.
+    """Align a sparse model with the fixes of its cameras, in m, third axis down.
 
     `keep`: leave the model as it is: its scale comes from elsewhere, and the fixes check it. Returns scale_fixes: used,
-    why (not, in words), photos, uncertainty_pct (None where the scale is open), model_off_pct (how much longer lengths
+    why (not), photos, uncertainty_pct (None where the scale is open), model_off_pct (how much longer lengths
     of the model are than by the fixes; None where these give the scale), horizontal_rms_m and depth_rms_m (of what is
     left), far (photos whose fix does not fit), north_known, origin_deg (latitude and longitude of the frame's origin).
     Raises InputError if too few registered photos have a fix.
@@ -95,7 +95,7 @@ def place_model(sparse: Path, fixes: PositionFixes, keep: bool = False) -> dict[
     return {"scale_fixes": figures(placed, fixes, used, keep)}
 
 
-def _said(number: int, corners: list[TriangulatedPoint], scale: float) -> dict[str, Any]:
+def _target_figures(number: int, corners: list[TriangulatedPoint], scale: float) -> dict[str, Any]:
     """A target's figures."""
     sigma = float(np.sqrt(np.mean([np.trace(corner.covariance) / 3.0 for corner in corners])))
     return {
@@ -130,7 +130,7 @@ def _measured(
 ) -> BarMeasurement:
     way = _middle(two) - _middle(one)
     found = float(np.linalg.norm(way))
-    # A photograph's pose moves all four corners alike, so the middle is held for no surer than a corner.
+    # A pose error moves all four corners alike, so the middle has the uncertainty of a corner.
     spread = np.mean([corner.covariance for corner in one], axis=0) + np.mean([c.covariance for c in two], axis=0)
     sigma = float(np.sqrt(way @ spread @ way)) / found
     photos = min(len(corner.photos) for corner in (*one, *two))
@@ -186,12 +186,12 @@ def _unseen(number: int, family: str, sightings: Sightings, bars: ScaleBars) -> 
     )
 
 
-def _check_sizes(said: list[dict[str, Any]], tag_m: float | None, uncertainty_pct: float) -> None:
-    """Refuse targets that were printed at another size than was said, or that are no squares.
+def _check_sizes(target_figures: list[dict[str, Any]], tag_m: float | None, uncertainty_pct: float) -> None:
+    """Refuse targets whose size differs from the stated one, or that are not square.
 
     Raises InputError: names the first and what its sides are.
     """
-    for one in said:
+    for one in target_figures:
         sides = np.array(one["sides_mm"])
         across, down = sides[[0, 2]].mean(), sides[[1, 3]].mean()
         allowed = MOST_SIDE_PCT + 3.0 * (uncertainty_pct + 100.0 * one["corner_sigma_mm"] / float(sides.mean()))

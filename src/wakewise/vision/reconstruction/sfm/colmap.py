@@ -50,12 +50,12 @@ MEMORY, MOST_IN_MEMORY = Path("/dev/shm"), 200e6
 
 
 def silence_logging() -> None:
-    """Only fatal messages; everything else would land between the lines of a progress bar or of JSON."""
+    """Only fatal messages; others would mix with a progress bar or with JSON."""
     pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
 
 
 def keep_sigterm() -> None:
-    """Give SIGTERM back to who had it: COLMAP's log took it on import, to print a stack and end without tidying up."""
+    """Restore the handler of SIGTERM: COLMAP's log takes it on import, to print a stack and end without clean-up."""
     with suppress(ValueError):  # only the main thread may
         signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGTERM))
 
@@ -119,11 +119,11 @@ def call_in_process(what: str, function: str, *arguments: Any, watch: Callable[[
     order: bytes | None = pickle.dumps((function, arguments))
     # Its own session: a terminal's Ctrl-C goes to whoever waits for it, and that ends it.
     child = start_python("-c", _CALL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, new_session=True)
-    told = b""
+    errors = b""
     try:
         while True:
             try:
-                _, told = child.communicate(order, timeout=0.25)
+                _, errors = child.communicate(order, timeout=0.25)
                 break
             except subprocess.TimeoutExpired:
                 order = None  # it has it
@@ -131,7 +131,7 @@ def call_in_process(what: str, function: str, *arguments: Any, watch: Callable[[
     finally:
         end_process(child)
     if child.returncode != 0:
-        last = told.decode(errors="replace").strip().splitlines()[-1:] or [f"exit code {child.returncode}"]
+        last = errors.decode(errors="replace").strip().splitlines()[-1:] or [f"exit code {child.returncode}"]
         raise StageError(f"{what}: COLMAP stopped: {' '.join(last[0].split())[:200]}")
 
 
@@ -207,7 +207,7 @@ def database_folder(beside: Path, size_bytes: float) -> Iterator[Path]:
 
 
 def _sweep(where: Path) -> None:
-    """Remove the rooms of processes that were killed."""
+    """Remove the folders of processes that were killed."""
     for left in where.glob(".wakewise-*-*"):
         process = left.name.split("-")[1]
         if process.isdecimal() and not Path("/proc", process).exists():
@@ -216,7 +216,7 @@ def _sweep(where: Path) -> None:
 
 @contextmanager
 def no_stderr() -> Iterator[None]:
-    """Send what compiled code writes to standard error nowhere; for code that knows no other way to be quiet."""
+    """Discard what compiled code writes to standard error."""
     sys.stderr.flush()
     kept = os.dup(2)
     nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -230,7 +230,7 @@ def no_stderr() -> Iterator[None]:
 
 
 def checkpoint_database(database: Path) -> None:
-    """Fold the write-ahead log into the database, so that it is one file and can be renamed."""
+    """Merge the write-ahead log into the database, so that it is one file and can be renamed."""
     with closing(sqlite3.connect(database)) as link:
         link.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         link.execute("PRAGMA journal_mode=DELETE")

@@ -236,18 +236,18 @@ def _extract(
             reader.camera_model, reader.camera_params = group.lens.for_colmap()
         work = _by_opencv if settings.detector == "opencv" else _by_colmap
         here = settings.model_copy(update={"threads": threads_for(settings, group.width, group.height)})
-        work(store, list(group.photos), database, here, reader, partial(_tell, progress, done, total))
+        work(store, list(group.photos), database, here, reader, partial(_report, progress, done, total))
         done += len(group.photos)
     progress(done, total, "features")
 
 
 def threads_for(settings: ReconstructionSettings, width: int, height: int) -> int:
-    """Threads that may look for features in photos of this size, so that all of them fit into `ROOM_BYTES`."""
+    """Threads of feature extraction for photos of this size, within `ROOM_BYTES` of memory."""
     doubled = 4 if settings.first_octave == -1 else 1
     return max(1, min(settings.threads, int(ROOM_BYTES / (BYTES_PER_PX * doubled * width * height))))
 
 
-def _tell(progress: Progress, before: int, total: int, done: int) -> None:
+def _report(progress: Progress, before: int, total: int, done: int) -> None:
     progress(before + done, total, "features")
 
 
@@ -257,7 +257,7 @@ def _by_opencv(
     database: Path,
     settings: ReconstructionSettings,
     reader: pycolmap.ImageReaderOptions,
-    tell: Callable[[int], None],
+    report: Callable[[int], None],
 ) -> None:
     """List the photos in COLMAP's database and write OpenCV's features beside them."""
     call(
@@ -266,10 +266,10 @@ def _by_opencv(
         ),
         "features",
     )
-    # Found before the database is opened: two SQLite libraries must not meet in it, and an interrupt leaves it whole.
+    # Before the database is opened: two SQLite libraries must not use it together, and an interrupt leaves it whole.
     found = []
     for k, features in enumerate(folder_features(store, names, settings)):
-        tell(k)
+        report(k)
         found.append(features if store.masks is None else within(features, store.masks.of(names[k])))
     with open_database(database) as link:
         for name, features in zip(names, found, strict=True):
@@ -285,7 +285,7 @@ def _by_colmap(
     database: Path,
     settings: ReconstructionSettings,
     reader: pycolmap.ImageReaderOptions,
-    tell: Callable[[int], None],
+    report: Callable[[int], None],
 ) -> None:
     """COLMAP's own features."""
     options = pycolmap.FeatureExtractionOptions()
@@ -297,7 +297,7 @@ def _by_colmap(
     options.sift.peak_threshold = PEAK_THRESHOLD / options.sift.octave_resolution
     done = 0
     for batch in _batches(names, EXTRACTION_BATCHES):
-        tell(done)
+        report(done)
         call(
             partial(
                 pycolmap.extract_features,
@@ -375,8 +375,8 @@ def _renamed(database: Path, name: Callable[[pycolmap.Image], str]) -> dict[str,
 def _batches(items: list[T], count: int) -> list[list[T]]:
     """Split into at most `count` runs of nearly equal length.
 
-    COLMAP tells nothing on its way, and its database must not be looked at meanwhile: Python has an SQLite of its own,
-    and two in one process undo each other's locks (sqlite.org, How To Corrupt An SQLite Database File, section 2.2.1).
+    COLMAP reports no progress, and its database must not be read meanwhile: Python has an SQLite of its own, and two in
+    one process undo each other's locks (sqlite.org, How To Corrupt An SQLite Database File, section 2.2.1).
     """
     size = max(1, -(-len(items) // max(count, 1)))
     return [items[k : k + size] for k in range(0, len(items), size)]

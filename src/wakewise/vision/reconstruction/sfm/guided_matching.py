@@ -280,9 +280,6 @@ def _sampson(E: Array, one: Array, two: Array, products: Array, focal_px: float)
 
 
 def pose_supported(inliers: BoolArray, known: RelativePose, fitted: RelativePose) -> bool:
-    """Whether a pair's matches bear out its pose: enough of them, most of all, and to a turn that is near the known.
-
-    Far from it the band held a few matches by luck, and among all features there are more.
-    """
+    """Whether a pair's matches support its pose: enough inliers, a large share, and a rotation near the known one."""
     turn_rad = np.arccos(np.clip(0.5 * (np.trace(fitted.R_21 @ known.R_21.T) - 1.0), -1.0, 1.0))
     return bool(inliers.sum() >= MIN_VERIFIED and inliers.mean() >= MIN_SHARE and turn_rad <= MAX_TURN_RAD)

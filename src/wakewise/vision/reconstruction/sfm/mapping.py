@@ -42,10 +42,10 @@ from wakewise.vision.reconstruction.sfm.per_photo_intrinsics import (
 )
 from wakewise.vision.reconstruction.sfm.pose_mapping import SeededModel, map_at_poses, map_from_poses
 
-# Fewer registered photos are a failure; of fewer, lenses are not looked into.
+# Least registered photos, and least photos for the test of shared intrinsics.
 MIN_REGISTERED, LEAST_FOR_CHECK = 3, 5
 MOST_SHIFT_PCT, MOST_FOCAL_RATIO, MOST_FOCAL_SPREAD_PCT = 10.0, 1.05, 5.0
-"""What a lens of its own for each photo may change: camera places in percent of their spread, focal lengths."""
+"""Bounds for intrinsics of each photo: displacement of cameras in percent of their spread, focal lengths."""
 # Largest reprojection errors that are let pass, one after the other, until the mean is small enough (COLMAP's own: 4).
 CUTS_PX = (2.0, 1.5, 1.0, 0.75)
 MIN_ANGLE_DEG = 1.5
@@ -57,7 +57,7 @@ MAPPINGS = {
     "incremental": "photo by photo",
     "global": "all photos at once",
 }
-"""Ways to a sparse model, in words."""
+"""Ways to a sparse model, as figures name them."""
 # No photo sees sharply from nearer, and none of a scan from farther: beyond, the positions are hardly in metres.
 SENSIBLE_RANGE_M = (0.01, 1000.0)
 
@@ -181,9 +181,9 @@ def map_photos(
 
 
 def _by_own_lens(database: Path, own: PerPhotoIntrinsics) -> list[tuple[tuple[str, ...], pycolmap.Camera]] | None:
-    """Photos by lens where those that share one turn out to have several; None where they do not.
+    """Photos by lens where photos that seemed to share one have several; None where they do not.
 
-    Of a lens that was split, a photo that has no focal length of its own is of none of the parts: it gets its own.
+    A photo of a split lens without a focal length of its own gets intrinsics of its own.
     """
     with open_database(database) as link:
         cameras = {camera.camera_id: camera for camera in link.read_all_cameras()}
@@ -199,7 +199,7 @@ def _by_own_lens(database: Path, own: PerPhotoIntrinsics) -> list[tuple[tuple[st
 
 
 def _camera_shift_pct(model: pycolmap.Reconstruction, own: PerPhotoIntrinsics) -> float | None:
-    """How far cameras are from where they are with a lens for each photo, rms, in percent of their spread."""
+    """Rms displacement of cameras with intrinsics for each photo, in percent of their spread."""
     mine = {image.name: image.projection_center() for image in model.images.values() if image.has_pose}
     both = sorted(mine.keys() & own.centres.keys())
     if len(both) < LEAST_FOR_CHECK:
@@ -214,7 +214,7 @@ def _camera_shift_pct(model: pycolmap.Reconstruction, own: PerPhotoIntrinsics) -
 
 
 def lens_warnings(model: pycolmap.Reconstruction, own: PerPhotoIntrinsics | None, shift_pct: float | None) -> list[str]:
-    """Reasons not to trust a model that come from mapping with a lens for each photo."""
+    """Reasons against a model from mapping with intrinsics for each photo."""
     if own is None:
         return []
     out = []
@@ -249,7 +249,7 @@ def _lenses(model: pycolmap.Reconstruction) -> list[dict[str, Any]]:
 
 
 def unregistered_photos(model: pycolmap.Reconstruction, database: Path) -> list[dict[str, Any]]:
-    """Each photo that found no place, with the photo that it shares most verified matches with."""
+    """Each unregistered photo, with the photo that shares most verified matches with it."""
     placed = {image.name for image in model.images.values() if image.has_pose}
     with open_database(database) as link:
         names = {image.image_id: image.name for image in link.read_all_images()}
@@ -278,7 +278,7 @@ def _write_priors(database: Path, references: dict[str, Array], sigma_m: float) 
 
 
 def _tighten(model: pycolmap.Reconstruction, settings: ReconstructionSettings) -> None:
-    """Cut observations that stick out and adjust again, until the mean reprojection error is below what is wished."""
+    """Filter outliers and adjust again, until the mean reprojection error is below the bound of the settings."""
     for cut_px in CUTS_PX:
         if model.compute_mean_reprojection_error() < settings.reprojection_px:
             return
@@ -355,7 +355,7 @@ MAX_MISFIT = 0.25
 
 
 def _plausibility(model: pycolmap.Reconstruction) -> dict[str, Any]:
-    """How far the cameras are from what they see, and a word where that cannot be metres."""
+    """Median distance of the cameras from the points, and a remark where it cannot be in metres."""
     points = np.array([point.xyz for point in model.points3D.values()])
     if len(points) == 0:
         return {"surface_distance_m": None, "suspicion": None}

@@ -36,10 +36,10 @@ def choose_pairs(
     axes_W: dict[str, Array] | None = None,
     neighbours: int = POSE_NEIGHBOURS,
 ) -> Pairs:
-    """Pairs as the settings ask for them.
+    """Pairs by the settings.
 
     `names`: photo names in order. `centres_W_m`, `axes_W`: camera centres and optical axes, shape (3,) each, by name.
-    Without axes all are taken to look the same way. `neighbours`: how many each is matched with at least, by poses.
+    Without axes all have the same direction. `neighbours`: least number for each photo, by poses.
     Raises InputError if pairs by poses are asked for and not every photo has a known position.
     """
     known = centres_W_m is not None and all(name in centres_W_m for name in names)
@@ -57,7 +57,7 @@ def choose_pairs(
 
 
 def uses_retrieval(photos: int, settings: ReconstructionSettings) -> bool:
-    """Whether photos that look alike are matched as well, which is known only when they have features."""
+    """Whether similar photos are matched as well; image retrieval needs features."""
     return settings.matching == "look-alike" or (settings.matching == "auto" and photos > EXHAUSTIVE_UP_TO)
 
 
@@ -76,7 +76,7 @@ def sequence_pairs(names: list[str], overlap: int) -> Pairs:
 
 
 def pose_pairs(names: list[str], centres_W_m: Array, axes_W: Array | None, neighbours: int) -> Pairs:
-    """Each photo with the nearest others that look the same way, and what more it takes to hang all together.
+    """Each photo with the nearest others of about its direction, and a tree that connects all.
 
     `centres_W_m` has shape (n, 3). `axes_W`, shape (n, 3): unit optical axes; photos whose axes are more than 45 deg
     apart are no neighbours. `neighbours`: how many each is paired with at least, if there are so many.
@@ -94,7 +94,7 @@ def pose_pairs(names: list[str], centres_W_m: Array, axes_W: Array | None, neigh
     for i in range(n):
         order = np.argsort(near[i], kind="stable")[:neighbours]
         found |= {(min(i, int(j)), max(i, int(j))) for j in order if np.isfinite(near[i, j])}
-    # A tree over all photos, dear where axes differ, so that no group stays alone.
+    # A spanning tree, with high costs where axes differ, so that all photos are connected.
     span = float(distance.max()) + 1.0
     one, two = np.triu_indices(n, 1)
     tree = minimum_spanning_tree(
@@ -145,7 +145,7 @@ def read_descriptors(database: Path) -> ImageDescriptors:
 
 
 def retrieve_pairs(described: ImageDescriptors, most: int = RETRIEVED_NEIGHBOURS) -> Pairs:
-    """Each photograph with those that look most like it."""
+    """Each photograph with the most similar ones."""
     likeness = described.likeness()
     found = set()
     for i, row in enumerate(likeness):

@@ -23,9 +23,10 @@ from wakewise.vision.reconstruction.sfm.colmap_mappers import solve
 LEAST_POINTS, LEAST_PHOTOS = 40, 3
 """Sparse points from which on a photo's own focal length counts, and photos that make a lens of their own."""
 SEPARATION, LEAST_RATIO = 5.0, 1.02
-"""Between two heaps' means, in standard deviations within them, and their ratio. A uniform spread cut in half has 3.5,
-a normal one 2.7 (from their moments). Of n photos (1 + 8/n) times as much is asked, as a few lie in two heaps by
-chance: of 1,500 draws of 10 to 40 photos, less than 1 % of uniform and .1 % of normal ones were still taken for two."""
+"""Least distance of the means of two clusters, in standard deviations within them, and least ratio. A uniform spread
+cut in half has 3.5, a normal one 2.7 (from their moments). For n photos the bound is (1 + 8/n) times as large, because
+few form two clusters by chance: of 1,500 draws of 10 to 40 photos less than 1 % of uniform and 0.1 % of normal ones
+passed."""
 MOST_LENSES = 4
 
 
@@ -104,7 +105,7 @@ def _like(camera: pycolmap.Camera) -> pycolmap.Camera:
 
 
 def focal_clusters(own: dict[str, PhotoIntrinsics]) -> list[tuple[str, ...]]:
-    """Photos by lens: one group where focal lengths scatter, several where they lie in heaps well apart.
+    """Photos by lens: one group where focal lengths scatter, several where they form distant clusters.
 
     A photo that rests on few points goes where its focal length is nearest. The best cut of the sorted logarithms in
     two (least squares, as Otsu's) is made where the halves are far apart for how they scatter, and again in each half.
@@ -122,7 +123,7 @@ def focal_clusters(own: dict[str, PhotoIntrinsics]) -> list[tuple[str, ...]]:
 
 
 def _cuts(values: Array, most: int) -> list[int]:
-    """Edges of the heaps in sorted values, from 0 to their number."""
+    """Edges of the clusters in sorted values, from 0 to their number."""
     best = (0.0, 0)
     for k in range(LEAST_PHOTOS, len(values) - LEAST_PHOTOS + 1):
         low, high = values[:k], values[k:]

@@ -27,7 +27,7 @@ from wakewise.vision.reconstruction.sfm.registered_photos import MIN_SHARED, Reg
 LEAST_PAIR_MATCHES = 15
 """Verified matches of an image pair that is used, COLMAP's own."""
 ROUGH_ANGLE_DEG, ROUGH_PX = 3.0, 40.0
-"""How nearly rays must meet at first: at 0.5 m, poses off by 5 mm and 5 mrad leave 1 deg."""
+"""Largest errors of the first triangulation: at 0.5 m, poses off by 5 mm and 5 mrad leave 1 deg."""
 ITERATIONS = (25, 30)
 TOLERANCES = (1e-4, 1e-5)
 """Most iterations of the two adjustments, and the relative gain at which they end."""
@@ -162,7 +162,7 @@ def _register(
 
 
 def _refusal(model: pycolmap.Reconstruction, matched: dict[int, int]) -> str | None:
-    """Why a model is not to be trusted; None if it is."""
+    """Reason against a model; None if it passes the tests."""
     expected = sum(count >= LEAST_MATCHED for count in matched.values())
     if model.num_reg_images() < max(expected, 2) or model.num_points3D() < LEAST_POINTS:
         return f"{model.num_reg_images()} of {expected} photos with matches register at their poses, all must"
@@ -179,7 +179,7 @@ def _refusal(model: pycolmap.Reconstruction, matched: dict[int, int]) -> str | N
 
 
 def common_region(model: pycolmap.Reconstruction) -> RegionOfInterest | None:
-    """What all cameras look at, where most see too few sparse points to tell; None where they do, or look about.
+    """Common subject of all cameras, where photos see few sparse points; None where three in four see enough.
 
     Raises StageError if photos see too few points, and their lines of sight do not meet.
     """

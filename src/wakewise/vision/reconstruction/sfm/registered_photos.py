@@ -12,8 +12,8 @@ from wakewise.core.errors import StageError
 from wakewise.vision.reconstruction.photos.lenses import distort, lens_of, undistort
 from wakewise.vision.reconstruction.sfm.colmap import pycolmap
 
-# Stereo is best near this angle between two views: less is imprecise, more looks too different. The band is what was
-# measured to work on corals; photos of a flat wall would bear more.
+# Best angle between two views for stereo: less is imprecise, more changes the appearance. Measured on corals; a flat
+# wall allows more.
 BEST_ANGLE_DEG, ANGLE_SPREAD_DEG = 13.0, 8.0
 ANGLES_DEG = (3.0, 35.0)
 MIN_SHARED = 20
