@@ -150,7 +150,7 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
     from wakewise_ardusub.link.transports import MavlinkCodec, UdpTransport
     from wakewise_ardusub.session.link_join import SEA
     from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession
-    from wakewise_ardusub.sitl.scripted_ground_station import fly_piloted
+    from wakewise_ardusub.sitl.inprocess_session import fly_piloted
 
     compile_kernels(("plan", "fly"), options.progress)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:

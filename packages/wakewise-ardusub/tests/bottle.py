@@ -10,10 +10,10 @@ import numpy as np
 
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
-from wakewise_ardusub.link.buttons import BUTTON_PARAMETERS
 from wakewise_ardusub.link.engagement_fsm import EngagementLimits
 from wakewise_ardusub.link.message_state import MavlinkMessage
 from wakewise_ardusub.link.output_gate import TICK_S, OutputGate
+from wakewise_ardusub.link.parameters import BUTTON_PARAMETERS
 from wakewise_ardusub.link.protocol import RELEASE_GROUP, SCRIPT_VERSION
 from wakewise_ardusub.link.session_log import SessionLog
 

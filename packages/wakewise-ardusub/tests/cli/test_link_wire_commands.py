@@ -26,7 +26,7 @@ from wakewise_ardusub.link.parameters import read_parameter_file
 from wakewise_ardusub.link.protocol import SCRIPT_VERSION
 from wakewise_ardusub.link.script import parameters_text, script_text
 from wakewise_ardusub.physics.datagrams import PhysicsState
-from wakewise_ardusub.physics.pulses import PulseTable
+from wakewise_ardusub.physics.physics import PulseTable
 from wakewise_ardusub.physics.surface import FreeWater
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.frames import FRAMES, force_words, match_motors, pushes
+from wakewise_ardusub.link.checks import FRAMES, force_words, match_motors, pushes
 
 HEAVY = load_vehicle("bluerov2-heavy")
 SIX = load_vehicle("bluerov2")

@@ -12,7 +12,7 @@ import numpy as np
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link import protocol
 from wakewise_ardusub.link.script import script_text
-from wakewise_ardusub.physics.pulses import PulseTable
+from wakewise_ardusub.physics.physics import PulseTable
 from wakewise_ardusub.physics.surface import FreeWater
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics, UdpEndpoint, run

@@ -14,8 +14,8 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.cli.link_ardusub import _buttons
-from wakewise_ardusub.link.buttons import BUTTONS, button_faults, conflict, free_buttons
 from wakewise_ardusub.link.checks import CheckInputs, check, verdict
+from wakewise_ardusub.link.parameters import BUTTONS, button_faults, conflict, free_buttons
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 

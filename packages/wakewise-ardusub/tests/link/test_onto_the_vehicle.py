@@ -20,7 +20,7 @@ from wakewise_ardusub.link.parameters import read_all_parameters, read_parameter
 from wakewise_ardusub.link.script import script_text
 from wakewise_ardusub.link.upload import start_script, upload_script
 from wakewise_ardusub.link.vehicle_survey import survey
-from wakewise_ardusub.physics.pulses import PulseTable
+from wakewise_ardusub.physics.physics import PulseTable
 from wakewise_ardusub.physics.surface import FreeWater
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot

@@ -15,9 +15,9 @@ from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.transports import MavlinkCodec
 from wakewise_ardusub.physics import FreeWater, SimulatedBody
-from wakewise_ardusub.physics.depth_monitor import APART_M, DepthMonitor
 from wakewise_ardusub.physics.surface import LoweringBody
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+from wakewise_ardusub.sitl_plant import APART_M, DepthMonitor
 
 HEAVY = load_vehicle("bluerov2-heavy")
 START = BodyState(X_WB=Pose(np.array([0.0, 0.0, 1.4]), np.array([1.0, 0.0, 0.0, 0.0])))

@@ -6,7 +6,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.robot.thrusters.thrust_table import library_curve
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.physics.pulses import PulseTable
+from wakewise_ardusub.physics.physics import PulseTable
 
 HEAVY = load_vehicle("bluerov2-heavy")
 REST = (1500,) * 8

@@ -12,9 +12,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.protocol import ALT_HOLD, MANUAL, STABILIZE
-from wakewise_ardusub.sitl.inprocess_session import InProcessSession
-from wakewise_ardusub.sitl.mavlink_out import BUILDERS
-from wakewise_ardusub.sitl.scripted_ground_station import ScriptedGroundStation
+from wakewise_ardusub.sitl.inprocess_session import InProcessSession, ScriptedGroundStation
+from wakewise_ardusub.sitl.mavlink_messages import BUILDERS
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 
 HEAVY = load_vehicle("bluerov2-heavy")

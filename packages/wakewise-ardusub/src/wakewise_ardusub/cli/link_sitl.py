@@ -19,9 +19,9 @@ from wakewise.ui.cli.options import Json, Preset, ScenarioFile, Sets, Vehicle, W
 if TYPE_CHECKING:
     from wakewise.robot.vehicles import Vehicle as AnyVehicle
     from wakewise_ardusub.physics import PhysicsFigures
-    from wakewise_ardusub.physics.depth_monitor import DepthMonitor
     from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
     from wakewise_ardusub.sitl.udp_endpoints import PhysicsBackend
+    from wakewise_ardusub.sitl_plant import DepthMonitor
 
 DEFAULT_VEHICLE = "bluerov2-heavy"
 _STATION, _COMPANION, _WATCH = "127.0.0.1:14550", "127.0.0.1:14560", "127.0.0.1:14570"
@@ -189,8 +189,8 @@ def sitl_autopilot(
 
     need("wakewise link sitl-autopilot", "links", only=("pymavlink", "lupa"))
     from wakewise.robot.importers import any_vehicle
+    from wakewise_ardusub.sitl.inprocess_session import ScriptedGroundStation, route_messages
     from wakewise_ardusub.sitl.own_parameters import own_parameters, read_params
-    from wakewise_ardusub.sitl.scripted_ground_station import ScriptedGroundStation, route_messages
     from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
     from wakewise_ardusub.sitl.udp_endpoints import UdpEndpoint, UdpPhysics, run
 
@@ -258,7 +258,7 @@ def _depth_watch(stack: ExitStack, where: str) -> DepthMonitor | None:
     from wakewise.core.errors import EnvironmentFailure
     from wakewise_ardusub.link.connection import parse_connection
     from wakewise_ardusub.optional_dependencies import ARDUSUB
-    from wakewise_ardusub.physics.depth_monitor import DepthMonitor
+    from wakewise_ardusub.sitl_plant import DepthMonitor
 
     if where == "none":
         return None

@@ -17,9 +17,8 @@ import numpy as np
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.robot.vehicles import Vehicle
-from wakewise_ardusub.link.checks import Answer, MotorObservation, MotorResults
+from wakewise_ardusub.link.checks import Answer, MotorObservation, MotorResults, force_words
 from wakewise_ardusub.link.connection import MavlinkSession, send_command
-from wakewise_ardusub.link.frames import force_words
 from wakewise_ardusub.link.motor_interface import motor_output
 from wakewise_ardusub.link.protocol import MIDDLE_US
 from wakewise_ardusub.link.vehicle_survey import send_heartbeat

@@ -26,10 +26,10 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Measurement
 from wakewise_ardusub.link import protocol
-from wakewise_ardusub.link.buttons import BUTTON_PARAMETERS, button_faults
 from wakewise_ardusub.link.engagement_fsm import EngagementInputs, EngagementLimits, EngagementState, Transition, faults
 from wakewise_ardusub.link.message_state import REMEMBERED_S, LinkState, MavlinkMessage, tilt_of, update_link_state
 from wakewise_ardusub.link.motor_interface import MotorInterface
+from wakewise_ardusub.link.parameters import BUTTON_PARAMETERS, button_faults
 from wakewise_ardusub.link.protocol import AGAIN_S, MOST_PARAMETERS, PARAMETERS_S, interval_requests, parameter_request
 from wakewise_ardusub.link.session_log import SessionLog
 from wakewise_ardusub.link.telemetry_adapter import TelemetryAdapter, to_measurements

@@ -5,7 +5,7 @@ consents. While the pilot flies, the controller rests, the estimator is told wha
 the vehicle is; each engagement begins afresh from there. In which engagement a step is flown is settled once, when its
 goal is asked for, and thrusts of another are not sent (`wakewise_ardusub.link.output_gate`).
 
-Start reading in `session.py` (from a connection to a flight) and `link_join.py` (the parts); `control_handover.py` is
+Start reading in `session.py` (from a connection to a flight) and `link_join.py` (the parts); `link_join.py` is
 who flies now, `session.py` what is spared, `cameras.py` who takes the photographs, `link_join.py` what ground
 stations are told, `link_join.py` what is done before it counts.
 """

@@ -3,16 +3,27 @@
 What ground stations are told of a flight: D, what is saved of it, how much of the target photographs have seen.
 
 A rehearsal: the whole chain decides a few times for nobody, so that nothing is slow when thrusts count.
+
+The vehicle in the sea as a `Plant`: thrusts go to the warden, what was measured meanwhile comes back.
+
+A step holds its thrusts by waiting until shortly before the flight's clock has come to the step's end: the estimator
+takes in what it returns meanwhile, so that the next thrusts are decided on time, by what is nearly as fresh as can be.
+Whether thrusts go out is the warden's to say.
+
+The thread between a connection and its warden: takes what comes, and ticks whether anything comes or not.
+
+Who flies now: the pilot or the controller, settled once a step, and what each part of the loop makes of it.
 """
 
 from __future__ import annotations
 
 import math
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -22,27 +33,254 @@ from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import BodyState, Goal, Measurement, TruthProvider
+from wakewise.core.interfaces import BodyState, Command, Controller, Estimator, Goal, Measurement, TruthProvider
 from wakewise.operation.loop import Step
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.teleop.assisted import AssistedPilot, assisted
-from wakewise.operation.teleop.input.controls import Controls
+from wakewise.operation.teleop.input.controls import CENTRED, Controls
 from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
 from wakewise.planning import Surroundings, check_start, state_of
 from wakewise.scene.missions import Coverage, patches_of
 from wakewise.scene.targets import Region, Target
 from wakewise.wake import InfluenceModel
-from wakewise_ardusub.link.ardusub_plant import ArduSubPlant, ArduSubWorld, FlightClock
-from wakewise_ardusub.link.output_gate import OutputGate
+from wakewise_ardusub.link.message_state import MavlinkMessage
+from wakewise_ardusub.link.output_gate import RELEASES, TICK_S, OutputGate
 from wakewise_ardusub.link.protocol import COVERAGE_NAME, DISTURBANCE_NAME, SAVED_NAME
-from wakewise_ardusub.session.control_handover import (
-    EngagedController,
-    EngagedPilot,
-    FlightOwnership,
-    GroundStationInput,
-    ServoEstimator,
-)
+
+EARLY = 0.1
+"""Share of a step by which measurements are handed over before its end: 10 ms at 10 Hz, where a filter takes 4."""
+
+
+class FlightClock(Protocol):
+    """When moments of a flight are by the computer's clock, which is also the warden's."""
+
+    def due_s(self, time_s: float) -> float:
+        """The computer's time at which `time_s` of the flight has come."""
+        ...
+
+
+@dataclass(kw_only=True, eq=False)
+class ArduSubPlant:
+    """The vehicle of a warden; implements `wakewise.core.interfaces.Plant`.
+
+    Parameters
+    ----------
+    warden : OutputGate
+    clock : FlightClock
+    wait : callable
+        Waits so many seconds, or less where there is nothing to wait for any more.
+    entry : callable
+        In which engagement the controller decided what it hands over; None: in none, and nothing is sent.
+    """
+
+    gate: OutputGate
+    clock: FlightClock
+    wait: Callable[[float], object]
+    entry: Callable[[], int | None]
+    _time_s: float = 0.0
+
+    def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
+        """Send thrusts, shape (n,), if they may be, and return what was measured until they are nearly due again."""
+        entry = self.entry()
+        if entry is not None:
+            self.gate.command(thrusts_N, entry)
+        self._time_s += dt_s
+        left_s = self.clock.due_s(self._time_s) - EARLY * dt_s - self.gate.clock()
+        if left_s > 0.0:
+            self.wait(left_s)
+        begun_s = self.clock.due_s(0.0)
+        return tuple(replace(found, time_s=found.time_s - begun_s) for found in self.gate.measurements())
+
+
+@dataclass(kw_only=True, eq=False)
+class ArduSubWorld:
+    """Where a real vehicle flies; implements `wakewise.core.interfaces.World`. It does not wait, and nobody knows its
+    truth.
+
+    `plant` is what makes the plant when a flight begins.
+    """
+
+    plant: Callable[[], ArduSubPlant]
+    name: str = "sea"
+    waits: bool = field(default=False, init=False)
+
+    def begin(self) -> tuple[ArduSubPlant, TruthProvider | None]:
+        """The vehicle, and no witness."""
+        return self.plant(), None
+
+
+MOST_AT_ONCE = 50
+"""Messages taken between two looks at the clock, however many wait."""
+
+
+class MessageReceiver(Protocol):
+    """Where messages come in."""
+
+    def receive(self, timeout_s: float) -> tuple[Iterable[MavlinkMessage], int]:
+        """Messages that came, and bytes that are none; waits for the first at most so long."""
+        ...
+
+
+class LinkThread:
+    """Runs until it is stopped; what breaks it is kept in `fault`, after the warden has let go."""
+
+    def __init__(self, connection: MessageReceiver, gate: OutputGate) -> None:
+        self._connection, self._gate = connection, gate
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="link", daemon=True)
+        self.fault: BaseException | None = None
+
+    def start(self) -> None:
+        """Begin to listen."""
+        self._gate.begin()
+        self._thread.start()
+
+    def stop(self, why: str) -> None:
+        """Let go of the vehicle, say so as often as it takes, and end."""
+        self._gate.end(why)
+        self._over.set()
+        self._thread.join(timeout=2.0)
+
+    def _run(self) -> None:
+        gate = self._gate
+        try:
+            due_s, left = gate.clock(), RELEASES + 1
+            while left:
+                said, noise = self._connection.receive(max(due_s - gate.clock(), 0.0))
+                if noise:
+                    gate.noise(noise)
+                for k, message in enumerate(said):
+                    gate.take(message)
+                    if k % MOST_AT_ONCE == 0 and gate.clock() >= due_s:
+                        gate.tick()
+                        due_s = gate.clock() + TICK_S
+                if gate.clock() >= due_s:
+                    gate.tick()
+                    due_s = max(due_s + TICK_S, gate.clock())
+                    left -= self._over.is_set()
+        except BaseException as fault:  # whatever it is, the vehicle is let go first
+            self.fault = fault
+            gate.end(f"the link broke ({type(fault).__name__}: {fault})")
+
+
+@dataclass(kw_only=True, eq=False)
+class FlightOwnership:
+    """In which engagement the present step is flown, None in none, and when in the flight that began."""
+
+    entry: int | None = None
+    began_s: float = 0.0
+
+
+@dataclass(kw_only=True, eq=False)
+class GroundStationInput:
+    """A `ControlSource`: the sticks that the pilot moves at the ground station, and the buttons that mean something."""
+
+    gate: OutputGate
+    stale_s: float = 0.3
+
+    def read(self, time_s: float) -> Controls | None:  # noqa: ARG002  (as they are now)
+        """The sticks as last heard; None where nobody was heard for a while."""
+        sticks, pressed = self.gate.known.sticks, self.gate.pressed()
+        if sticks is None or self.gate.clock() - sticks.came_s > self.stale_s:
+            return Controls(axes=CENTRED.axes, pressed=pressed) if pressed else None
+        return Controls(axes=sticks.axes, pressed=pressed)
+
+
+@dataclass(kw_only=True, eq=False)
+class EngagedPilot:
+    """A `Pilot`: the assisted one while engaged, on its own clock; else the vehicle is wished to be where it is."""
+
+    inner: AssistedPilot
+    gate: OutputGate
+    turn: FlightOwnership
+    photographed: Callable[[], None]
+    _notes_told: int = 0
+
+    def goal(self, time_s: float, estimate: BodyState) -> Goal:
+        """What is wanted now; settles in which engagement this step is flown."""
+        self.gate.estimated(estimate)
+        entry, turn = self.gate.entry, self.turn
+        if entry is None:
+            turn.entry = None
+            return Goal(X_WB=estimate.X_WB, nu_B=estimate.nu_B)
+        if entry != turn.entry:
+            turn.entry, turn.began_s = entry, time_s
+        goal = self.inner.goal(time_s - turn.began_s, estimate)
+        for note in self.inner.notes():
+            if self.gate.journal is not None:
+                self.gate.journal.write("note", level=note.level, words=note.text)
+        return goal
+
+    def taken(self) -> tuple[str, ...]:
+        """Photographs and the end asked for since the last call."""
+        actions = self.inner.taken() if self.turn.entry is not None else self.gate.pressed()
+        found = tuple(what for what in actions if what in ("capture", "stop"))
+        for _ in range(found.count("capture")):
+            self.photographed()
+        return found
+
+    @property
+    def leg(self) -> str:
+        """What is flown now, as the record calls it."""
+        return self.inner.leg if self.turn.entry is not None else "the pilot flies"
+
+
+@dataclass(frozen=True, eq=False)
+class EngagedControllerState:
+    """State of a controller that rests while it is not engaged."""
+
+    entry: int | None
+    inner: Any
+
+
+@dataclass(kw_only=True, eq=False)
+class EngagedController:
+    """A `Controller` that begins afresh at each engagement and asks for nothing between them."""
+
+    inner: Controller[Any]
+    turn: FlightOwnership
+    thrusters: int
+
+    @property
+    def name(self) -> str:
+        """Name of the method."""
+        return self.inner.name
+
+    def init(self) -> EngagedControllerState:
+        """At rest."""
+        return EngagedControllerState(None, None)
+
+    def step(
+        self, state: EngagedControllerState, dt_s: float, estimate: BodyState, goal: Goal
+    ) -> tuple[EngagedControllerState, Command]:
+        """The method's thrusts while engaged, else none."""
+        entry = self.turn.entry
+        if entry is None:
+            return EngagedControllerState(None, None), Command(thrusts_N=np.zeros(self.thrusters), wrench_B=np.zeros(6))
+        inner = state.inner if entry == state.entry else self.inner.init()
+        inner, command = self.inner.step(inner, dt_s, estimate, goal)
+        return EngagedControllerState(entry, inner), command
+
+
+@dataclass(kw_only=True, eq=False)
+class ServoEstimator:
+    """An `Estimator` that is told what the servos do while the pilot flies."""
+
+    inner: Estimator[Any]
+    turn: FlightOwnership
+    flown_N: Callable[[], Array]
+
+    def init(self, start: BodyState) -> Any:
+        """State at the start."""
+        return self.inner.init(start)
+
+    def step(
+        self, state: Any, dt_s: float, measurements: tuple[Measurement, ...], thrusts_N: Array
+    ) -> tuple[Any, BodyState]:
+        """Advance under the thrusts that act."""
+        return self.inner.step(state, dt_s, measurements, self.flown_N() if self.turn.entry is None else thrusts_N)
+
 
 FIGURES_S = 0.5
 STILL_M_S = 1e-4

@@ -29,13 +29,12 @@ from wakewise.operation.scenario import Scenario
 from wakewise.operation.teleop.live import LiveFlight
 from wakewise.robot.importers import any_vehicle
 from wakewise.scene.targets import Mesh, Region, Target
-from wakewise_ardusub.link.ardusub_plant import LinkThread, MessageReceiver
 from wakewise_ardusub.link.message_state import attitude_of
 from wakewise_ardusub.link.motor_interface import VehicleMotors
 from wakewise_ardusub.link.output_gate import OutputGate, Send
 from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
 from wakewise_ardusub.session.cameras import MakeCamera, note_view
-from wakewise_ardusub.session.link_join import VehicleFlight, join_vehicle, run_warm_up
+from wakewise_ardusub.session.link_join import LinkThread, MessageReceiver, VehicleFlight, join_vehicle, run_warm_up
 
 BALL_M = 0.25
 

@@ -34,7 +34,16 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import euler_from_quat
 from wakewise.robot.vehicles.mixing import ARDUSUB_VECTORED, ARDUSUB_VECTORED_6DOF
-from wakewise_ardusub.link.buttons import ARM, ARM_TOGGLE, BUTTONS, DISARM, MODE_FUNCTIONS, NONE, SHIFT, parameters_of
+from wakewise_ardusub.link.parameters import (
+    ARM,
+    ARM_TOGGLE,
+    BUTTONS,
+    DISARM,
+    MODE_FUNCTIONS,
+    NONE,
+    SHIFT,
+    parameters_of,
+)
 from wakewise_ardusub.link.protocol import ALT_HOLD, FULL_US, MANUAL, MIDDLE_US, STABILIZE
 from wakewise_ardusub.physics.datagrams import PhysicsState
 from wakewise_ardusub.sitl.own_parameters import FRAME_VECTORED, ParameterTable

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.errors import InputError
-from wakewise_ardusub.link.buttons import DEFAULT, parameters_of
+from wakewise_ardusub.link.parameters import DEFAULT, parameters_of
 
 FRAME_VECTORED, FRAME_VECTORED_6DOF = 1, 2
 """FRAME_CONFIG of six and of eight motors."""

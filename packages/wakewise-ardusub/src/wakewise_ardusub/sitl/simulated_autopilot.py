@@ -20,8 +20,7 @@ from wakewise.core.errors import InputError
 from wakewise_ardusub.link.protocol import ALT_HOLD, AUTOPILOT_COMPONENT, DEFAULT_SYSTEM, MANUAL, MIDDLE_US
 from wakewise_ardusub.physics.datagrams import PhysicsState
 from wakewise_ardusub.sitl.files import MavftpServer
-from wakewise_ardusub.sitl.mavlink_in import handle_message
-from wakewise_ardusub.sitl.mavlink_out import BUILDERS, MessageSchedule, parameter
+from wakewise_ardusub.sitl.mavlink_messages import BUILDERS, MessageSchedule, handle_message, parameter
 from wakewise_ardusub.sitl.modes import (
     MODES,
     ButtonHandler,

@@ -14,8 +14,7 @@ from typing import Protocol
 
 from wakewise.core.errors import InputError
 from wakewise_ardusub.physics.datagrams import LARGEST_B, PhysicsState, ServoFrame, read_reply, write_request
-from wakewise_ardusub.physics.physics import SimulatedBody
-from wakewise_ardusub.physics.pulses import PulseTable
+from wakewise_ardusub.physics.physics import PulseTable, SimulatedBody
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 
 RESEND_S = 0.1
