@@ -41,7 +41,7 @@ def files_of(work: Any) -> set[str]:
 def test_a_step_of_wake_aware_touches_at_most_25_files_in_6_packages() -> None:
     """Plan, tracking, allocation and wake over half a second; as flown, failsafe and PWM add two files."""
     parts = ww.Scenario.preset("quick", **{"target.kind": "brain", "target.points": 60}).parts()
-    for controller, most in ((parts.controller, 25), (parts.flying, 27)):
+    for controller, most in ((parts.controller, 25), (parts.pipeline, 27)):
         files = files_of(half_a_second(controller, parts))
         packages = {name.split("/")[0] for name in files if "/" in name}
         assert {"allocation", "control", "planning", "wake"} <= packages

@@ -83,9 +83,9 @@ def test_each_kind_is_found_by_its_name(installed: Path, tmp_path: Path) -> None
     assert (parts.target.name, parts.wake.name, parts.world.name) == ("pyramid", "top-hat", "quiet-tank")
     flight = ww.fly(parts, duration_s=2.0)
     assert flight.parts.method == "stern-only" and flight.figures["fallbacks"] == 0
-    assert set(parts.from_outside) == {"controller", "wake", "world", "pilot", "target", "vehicle", "current"}
-    assert "reef-parts 1.0" in parts.from_outside["controller"]
-    assert "differences" in parts.from_outside["wake"]
+    assert set(parts.external_parts) == {"controller", "wake", "world", "pilot", "target", "vehicle", "current"}
+    assert "reef-parts 1.0" in parts.external_parts["controller"]
+    assert "differences" in parts.external_parts["wake"]
     goals = flight.steps.select("goal_x_m", "goal_y_m", "goal_z_m").to_numpy()
     assert np.ptp(goals, axis=0).max() == 0.0
     bow = flight.steps.select("command_1_N", "command_2_N", "command_3_N", "command_4_N").to_numpy()
@@ -102,7 +102,7 @@ def test_a_planner_that_believes_in_a_foreign_wake_keeps_it_off_the_target(insta
     flight = ww.fly(parts, duration_s=1.5)
     assert flight.parts.wake.name == "top-hat"
     assert flight.steps["fallback"].str.contains("raised").sum() == 0
-    assert "by central differences" in parts.from_outside["wake"]
+    assert "by central differences" in parts.external_parts["wake"]
 
 
 @pytest.mark.slow

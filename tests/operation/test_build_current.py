@@ -103,8 +103,9 @@ def test_a_float_costs_margin():
 )
 def test_a_start_faster_than_any_vehicle_is_refused(twist, words):
     parts = load_scenario("quick", None, {}).parts()
+    start = BodyState(X_WB=parts.start.X_WB, nu_B=np.array(twist, dtype=float))
     with pytest.raises(InputError, match=words):
-        preflight.check_begin(parts.replace(start=BodyState(X_WB=parts.start.X_WB, nu_B=np.array(twist, dtype=float))))
+        preflight.check_initial_state(parts.replace(start=start))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.operation import fly, load_scenario
-from wakewise.operation.preflight import surroundings_of
+from wakewise.operation.parts import surroundings_of
 from wakewise.operation.worlds.makers import true_start
 from wakewise.planning import Surroundings, check_start
 from wakewise.ui.cli.main import run
@@ -75,7 +75,7 @@ def test_the_planner_knows_the_tank_and_the_target():
     table = parts.controller.motion.model.table
     assert table.planes.shape == (6, 4)
     assert table.spheres[0].tolist() == [2.0, 0.0, 1.0, 0.1]
-    vertices = parts.found_target.mesh.vertices_m
+    vertices = parts.surveyed_target.mesh.vertices_m
     inside = [np.linalg.norm(vertices - sphere[:3], axis=1) <= sphere[3] + 1e-9 for sphere in table.spheres[1:]]
     assert np.all(np.any(inside, axis=0))
 

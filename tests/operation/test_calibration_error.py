@@ -5,7 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from wakewise.operation import Scenario
-from wakewise.operation.calibration_error import (
+from wakewise.operation.scenario.calibration_error import (
     CURRENT_DEG,
     CalibrationErrorSettings,
     calibration_with_error,
@@ -27,10 +27,10 @@ EXACT = {
 def test_the_target_is_taken_to_be_where_it_is_not():
     """Millimetres off, another place for each seed, the same for one; its shape stays, and the bed."""
     parts = [Scenario(seed=seed).parts() for seed in (1, 1, 2)]
-    places = [p.found_target.centre_W_m - p.target.centre_W_m for p in parts]
+    places = [p.surveyed_target.centre_W_m - p.target.centre_W_m for p in parts]
     assert np.array_equal(places[0], places[1]) and not np.array_equal(places[0], places[2])
     assert 1e-4 < np.abs(places[0]).max() < 0.025
-    true, found = parts[0].target, parts[0].found_target
+    true, found = parts[0].target, parts[0].surveyed_target
     np.testing.assert_allclose(
         found.mesh.vertices_m - true.mesh.vertices_m, np.tile(places[0], (len(true.mesh.vertices_m), 1)), atol=1e-12
     )
@@ -49,8 +49,8 @@ def test_its_error_has_the_stated_spread():
 def test_mission_and_controller_go_by_what_is_known_and_the_world_by_what_is():
     """Route, region and surroundings shift with the belief; the world's target does not."""
     known, exact = (Scenario(seed=3).replace(**{"target.points": 60}, **changes).parts() for changes in ({}, EXACT))
-    shift = known.found_target.centre_W_m - known.target.centre_W_m
-    assert exact.found_target is exact.target
+    shift = known.surveyed_target.centre_W_m - known.target.centre_W_m
+    assert exact.surveyed_target is exact.target
     for a, b in (
         (known.route.centre_W_m, exact.route.centre_W_m),
         (known.surroundings.spheres[:, :3].mean(axis=0), exact.surroundings.spheres[:, :3].mean(axis=0)),

@@ -10,7 +10,7 @@ def test_the_guide_knows_what_the_crew_knows() -> None:
     """Patches lie on the target where it was found, 5 mm or so from where it is, and nothing is seen yet."""
     parts = Scenario.preset("quick").parts()
     coverage = begin_coverage(parts)
-    found, true = parts.found_target, parts.target
+    found, true = parts.surveyed_target, parts.target
     off = found.centre_W_m - true.centre_W_m
     assert 0.0005 < np.linalg.norm(off) < 0.02
     low, high = found.mesh.vertices_m.min(axis=0), found.mesh.vertices_m.max(axis=0)

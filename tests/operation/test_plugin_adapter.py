@@ -154,15 +154,15 @@ def test_a_world_that_does_not_wait_has_the_deadline_enforced():
             pytest.fail("nothing is flown")
 
     own = parts().replace(method="dp")
-    assert own.replace(world=Sea()).flying.failsafe.enforce and not own.flying.failsafe.enforce
+    assert own.replace(world=Sea()).pipeline.failsafe.enforce and not own.pipeline.failsafe.enforce
 
 
 def test_our_own_are_flown_as_pipelines_and_a_stranger_as_a_foreign_stage_of_one():
     """Stages of our own stay as they are; both have one failsafe, which waits as the tank does."""
     own = parts().replace(method="dp")
-    assert own.flying.motion is own.controller.motion
-    assert not own.flying.failsafe.enforce and not own.flying.failsafe.foreign
-    assert own.replace(vehicle=own.vehicle.with_ideal_thrusters()).flying.name == own.controller.name
-    theirs = parts().replace(controller=Foreign(nan)).flying
+    assert own.pipeline.motion is own.controller.motion
+    assert not own.pipeline.failsafe.enforce and not own.pipeline.failsafe.foreign
+    assert own.replace(vehicle=own.vehicle.with_ideal_thrusters()).pipeline.name == own.controller.name
+    theirs = parts().replace(controller=Foreign(nan)).pipeline
     assert isinstance(theirs.motion, PluginStage) and theirs.failsafe.foreign
     assert described(Foreign(nan)) == "theirs (test_plugin_adapter.Foreign)"

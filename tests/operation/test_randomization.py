@@ -5,7 +5,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.operation import Scenario, load_scenario
-from wakewise.operation.randomization import FieldDistribution, sample_fields
+from wakewise.operation.scenario.randomization import FieldDistribution, sample_fields
 
 TRIM = "tank.mismatch.trim_N"
 
@@ -63,7 +63,7 @@ def test_parts_fly_what_the_seed_draws_and_another_seed_draws_anew():
     two = one.replace(seed=scenario.seed + 1)
     trims = [parts.scenario.tank.mismatch.trim_N for parts in (one, two)]
     assert all(-5.0 <= trim <= -2.0 for trim in trims) and trims[0] != trims[1]
-    assert not one.scenario.randomize and one.asked.randomize
+    assert not one.scenario.randomize and one.requested.randomize
     assert scenario.drawn() == one.scenario and one.scenario.drawn() is one.scenario
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from wakewise.operation import parts
-from wakewise.operation.parts import MOST_KEPT, region_of
-from wakewise.operation.randomization import Seeds
+from wakewise.operation.parts import CACHED_REGIONS, region_of
+from wakewise.operation.scenario.randomization import Seeds
 from wakewise.scene.targets import Mesh, place_on_bed, sample_region
 
 POINTS = 6
@@ -19,8 +19,8 @@ def pyramid(height_m=0.1, bed_z_m=1.0):
 
 
 @pytest.fixture(autouse=True)
-def nothing_kept(monkeypatch):
-    monkeypatch.setattr(parts, "_kept", {})
+def empty_cache(monkeypatch):
+    monkeypatch.setattr(parts, "_regions", {})
 
 
 def test_the_kept_region_is_the_one_that_would_be_drawn():
@@ -53,6 +53,6 @@ def test_the_oldest_goes_first(monkeypatch):
     """Memory is bounded; what was asked for again has become the youngest."""
     drawn = []
     monkeypatch.setattr(parts, "sample_region", lambda target, points, *_: drawn.append(points) or object())
-    for points in (*range(MOST_KEPT), 0, MOST_KEPT, 0, 1):
+    for points in (*range(CACHED_REGIONS), 0, CACHED_REGIONS, 0, 1):
         region_of(pyramid(), points, Seeds(0))
-    assert drawn == [*range(MOST_KEPT), MOST_KEPT, 1]
+    assert drawn == [*range(CACHED_REGIONS), CACHED_REGIONS, 1]

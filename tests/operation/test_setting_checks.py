@@ -5,7 +5,7 @@ import pytest
 import wakewise as ww
 from wakewise.control import METHODS
 from wakewise.core.errors import InputError
-from wakewise.operation.preflight import MITIGATION_METHODS, PLANNING, ineffective_settings
+from wakewise.operation.scenario.setting_checks import MITIGATION_METHODS, PLANNING, ineffective_settings
 
 
 def said(method, **changes):

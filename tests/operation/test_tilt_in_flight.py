@@ -74,7 +74,7 @@ def test_ideal_thrusters_are_for_controller_and_tank_alike() -> None:
     parts = ww.Scenario.preset("quick", **TILTING, **{"tank.ideal_thrusters": True}).parts()
     assert parts.vehicle.thrust_steps is None
     assert parts.world.vehicle.thrust_steps is None
-    assert parts.flying.pwm is None and parts.flying.motion is parts.controller.motion
+    assert parts.pipeline.pwm is None and parts.pipeline.motion is parts.controller.motion
 
 
 def test_the_true_drag_is_the_case_that_is_asked_for() -> None:

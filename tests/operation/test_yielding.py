@@ -38,7 +38,7 @@ def parts():
 def test_soft_kinds_bend_by_themselves_and_others_are_rigid():
     """By-kind: a gorgonian is of its tissue, a stony coral of none, and `none` makes any rigid."""
     assert scenario().target.tissue is None
-    assert scenario().parts().yielding is None
+    assert scenario().parts().compliance is None
     assert scenario(kind="gorgonian").target.tissue == TISSUES["gorgonian"]
     assert scenario(kind="gorgonian", elasticity="none").target.tissue is None
     assert scenario(kind="brain", elasticity="soft-coral").target.tissue == TISSUES["soft-coral"]

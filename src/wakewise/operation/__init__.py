@@ -1,19 +1,22 @@
-"""One vehicle doing one mission: scenario, parts, the fixed-rate loop, the recorder; the same code for tank and sea.
+"""Flights: from a scenario to the parts of a flight, the fixed-rate loop, its record, and photographs.
 
-Start reading in `parts.py` (what a flight is built from, and the one place where the controller's world and the true
-one meet) and `loop.py` (the loop itself). `scenario.py` with `scenario.py` is a maker of parts, read from YAML
-with `randomization.py` (what its seed draws), `randomization.py` its
-random streams, `parts.py` keeps what takes long to draw; `worlds/` and `pilot_makers.py` are worlds and pilots by name,
-`instant_water.py` and `lattice_water.py` worlds other than the tank, `calibration_error.py` what is known of target and
-camera beforehand; `preflight.py` is what a planner is told to keep clear of, `preflight.py` refuses what does not fit,
-`preflight.py` says what is set and cannot act, `plugin_adapter.py` guards what comes from outside; `flying.py` flies,
-`recorder.py` and `telemetry.py` keep what was, `flight_trim.py` reads from it what ballast is lacking, `photography.py`
-renders what the camera saw, `background_renderer.py` while the flight goes on, `guide.py` begins the guide of what
-photographs have seen.
+The same loop flies a simulated tank and a real vehicle. Start reading in `parts.py` and `loop.py`.
 
-By hand (`teleop/`): what an operator asks for, and flights that go on until somebody ends them. What was lies in the
-parts of `flight_log.py` until it is a trial's folder (`trial_folder.py`, `flight_log.py`). With a real vehicle
-(`at_sea/`): who has the thrusters when. `behind_firmware.py` is the scenario's vehicle behind an autopilot's.
+- `scenario/`: fields of a scenario, layers of YAML, randomization, errors of survey and calibration.
+- `parts.py`: the parts of a flight, each made from the scenario at first use and replaceable.
+- `worlds/`: named worlds, and the water models that a flight can take place in.
+- `pilot_makers.py`: pilots by name, the sources of a flight's goals.
+- `plugin_adapter.py`: parts from outside this project, and the failsafe around a controller.
+- `preflight.py`: checks before a flight.
+- `loop.py`: the fixed-rate loop of pilot, controller, plant and estimator.
+- `flying.py`: one flight of the parts, and its figures.
+- `recorder.py`, `flight_log.py`: rows per control step and exposures, in memory or in chunks on disk.
+- `telemetry.py`: the record as MCAP.
+- `trial_folder.py`: scenario.yaml, truth.ply and planned.csv of a trial.
+- `flight_trim.py`: ballast from the hovers of a flight.
+- `guide.py`: coverage before the first photograph.
+- `photography.py`, `background_renderer.py`: photographs of the exposures, after or during the flight.
+- `teleop/`: flight by hand, with assists, in real time.
 """
 
 from typing import TYPE_CHECKING

@@ -17,14 +17,12 @@ import warnings
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
 from wakewise.core.run_lock import remove_stale
 from wakewise.core.subprocesses import ignore_interrupt, read_message, start_python, write_message
 from wakewise.operation.flight_log import ExposureRecord, packed, unpacked
-
-if TYPE_CHECKING:
-    from wakewise.operation.parts import Parts
+from wakewise.operation.parts import Parts
 
 MOST_WAITING = 16
 """Exposures that wait for the other process at most, each with its grid of silt."""
@@ -140,7 +138,7 @@ def render_from_pipe(pipe: IO[bytes]) -> None:
         return
     scenario, folder = pickle.loads(first)
     parts = scenario.parts()
-    _ = parts.scene, parts.yielding, parts.route  # made while the vehicle is still on its way to the first view
+    _ = parts.scene, parts.compliance, parts.route  # made while the vehicle is still on its way to the first view
     while (message := read_message(pipe)) is not None:
         take_photograph(parts, folder, *unpacked(message))
 

@@ -22,7 +22,7 @@ from wakewise.core.optional_dependencies import has
 from wakewise.operation.flight_log import ExposureRecord
 from wakewise.operation.loop import Step, run_loop
 from wakewise.operation.parts import Parts
-from wakewise.operation.preflight import check_begin
+from wakewise.operation.preflight import check_initial_state
 from wakewise.operation.recorder import FlightRecorder, PhotoSchedule
 from wakewise.operation.scenario import Scenario
 from wakewise.scene.missions import SETTLING
@@ -206,7 +206,7 @@ def fly(
     if checked:
         _ = parts.preflight
     else:
-        check_begin(parts)
+        check_initial_state(parts)
     progress(0, 1, "at the start")
     plant, witness = parts.world.begin()
     recorder = recorder_of(parts, witness, route, water_every_s=water_every_s, exposed=exposed)
@@ -278,7 +278,7 @@ def loop_of(
     return partial(
         run_loop,
         pilot=parts.pilot,
-        controller=parts.flying,
+        controller=parts.pipeline,
         estimator=parts.estimator,
         plant=plant,
         witness=witness,
@@ -304,7 +304,7 @@ def name_external_parts(parts: Parts, recorder: FlightRecorder) -> Iterator[None
     except (WakewiseError, MemoryError):  # for memory that ran out no part is to blame
         raise
     except Exception as fault:
-        foreign = parts.from_outside
+        foreign = parts.external_parts
         if not foreign:
             raise
         words = ", ".join(f"{name} {what}" for name, what in foreign.items())

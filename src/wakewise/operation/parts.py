@@ -1,9 +1,9 @@
-"""What a flight is built from: parts, each made from the scenario when first asked for, each replaceable.
+"""Parts of a flight: made from the scenario at first use, each replaceable. `build` is the entry.
 
-Here, and nowhere below, the controller's world and the true one are made side by side: the world gets its own,
-perturbed vehicle parameters and its own water; the controller gets the nominal vehicle and a wake model.
+This is the one place where the controller's model and the simulated world meet. The world gets the perturbed vehicle
+and its own water; the controller gets the nominal vehicle and a wake model. No module below sees both.
 
-The region of a flight, kept: drawing its points takes seconds, and flights that are compared share them.
+Sampling a region takes seconds, so the regions of the last flights are cached.
 """
 
 from __future__ import annotations
@@ -24,13 +24,11 @@ from wakewise.core.checks import has_methods, instance_of, quoted
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
 from wakewise.estimation import ErrorStateFilter
-from wakewise.operation.calibration_error import current_with_error, target_with_error
-from wakewise.operation.pilot_makers import make_pilot
 from wakewise.operation.plugin_adapter import described, external_parts, flown_controller
-from wakewise.operation.preflight import PreflightResult, preflight, surroundings_of, tank_bounds
-from wakewise.operation.randomization import Seeds
-from wakewise.operation.worlds.makers import make_world
-from wakewise.planning import Surroundings
+from wakewise.operation.scenario.calibration_error import current_with_error, target_with_error
+from wakewise.operation.scenario.randomization import Seeds
+from wakewise.operation.scenario.settings import Scenario
+from wakewise.planning import Surroundings, covering_spheres
 from wakewise.robot.importers import any_vehicle
 from wakewise.robot.vehicles import Vehicle
 from wakewise.robot.vehicles.ballast import with_blocks
@@ -40,61 +38,27 @@ from wakewise.simulation.tank import build_ambient
 from wakewise.simulation.tank.soft_body import DRAG, TargetCompliance, UnanchoredTarget
 from wakewise.wake import wake_model
 
-if TYPE_CHECKING:
-    from wakewise.operation.scenario import Scenario
+if TYPE_CHECKING:  # imported at first use: rendering and flight checks are not needed to fly
+    from wakewise.operation.preflight import PreflightResult
     from wakewise.vision.imaging import LensCamera, PinholeCamera, Scene
-
-
-MOST_KEPT = 16
-"""Regions that are kept, the last ones asked for: 300 points are 12 kB."""
-
-_kept: dict[bytes, Region] = {}
-_one_at_a_time = Lock()
-
-
-def region_of(target: Target, points: int, seeds: Seeds, fragility_gain: float = 0.0) -> Region:
-    """Points that stand for the water round a target; asking again for the same is answered from memory.
-
-    Parameters
-    ----------
-    target : Target
-        What counts is its shape and place, not which object it is.
-    points : int
-    seeds : Seeds
-    fragility_gain : float
-        Above 0 the target's delicate features are found and weighted, see `sample_region`.
-
-    Raises
-    ------
-    InputError
-        As `sample_region`.
-    """
-    key = _fingerprint(target, points, seeds, fragility_gain)
-    with _one_at_a_time:
-        found = _kept.pop(key, None)
-        if found is None:
-            marks = find_fragility(target.mesh) if fragility_gain > 0.0 else None
-            found = sample_region(target, points, seeds.region(), marks, fragility_gain)
-        _kept[key] = found  # the last one asked for is the last to go
-        while len(_kept) > MOST_KEPT:
-            del _kept[next(iter(_kept))]
-        return found
-
-
-def _fingerprint(target: Target, points: int, seeds: Seeds, fragility_gain: float) -> bytes:
-    """Of all that the points follow from; the name stands in errors only, of which nothing is kept."""
-    told = blake2b(repr((points, seeds.seed, float(fragility_gain), target.bed_z_m, target.radius_m)).encode())
-    for values in (target.mesh.vertices_m, target.mesh.faces, target.centre_W_m):
-        told.update(repr(values.shape).encode())
-        told.update(np.ascontiguousarray(values).data)
-    return told.digest()
-
 
 T = TypeVar("T")
 
 
-class part(cached_property[T]):  # noqa: N801  (a decorator, like cached_property)
-    """A part that is made when first asked for, unless another one was given in its place."""
+def build(scenario: Scenario, replaced: Mapping[str, Any] | None = None) -> Parts:
+    """The parts of a scenario's flight, with some of them replaced, by name (see `PARTS`).
+
+    Raises InputError if there is no such part, or the value cannot be that part.
+    """
+    for name, value in (replaced or {}).items():
+        if name not in PARTS:
+            raise InputError(f"parts: {quoted(name)} is unknown, allowed are {', '.join(PARTS)}")
+        check_part(name, value)
+    return Parts(scenario, replaced)
+
+
+class ReplaceablePart(cached_property[T]):
+    """A part that is made at first use, unless another one was given in Python."""
 
     @overload
     def __get__(self, instance: None, owner: type[Any] | None = None) -> Self: ...
@@ -103,14 +67,14 @@ class part(cached_property[T]):  # noqa: N801  (a decorator, like cached_propert
     def __get__(self, instance: object, owner: type[Any] | None = None) -> T: ...
 
     def __get__(self, instance: Any, owner: type[Any] | None = None) -> Self | T:
-        """The part that was given, or the scenario's own, made once."""
+        """The part that was given, or the scenario's own."""
         if instance is None:
             return self
         if self.attrname in instance.given:
             given: T = instance.given[self.attrname]
             return given
         once = instance.scenario.overrides.get(self.attrname or "")
-        if once is not None:  # the scenario of a trial that was flown with another part than it can name
+        if once is not None:  # the scenario of a trial in which this part was given in Python
             raise InputError(
                 f"{self.attrname}: was given in Python ({once}), which a scenario's file cannot hold; "
                 f"give it again with replace({self.attrname}=...)"
@@ -118,48 +82,16 @@ class part(cached_property[T]):  # noqa: N801  (a decorator, like cached_propert
         return super().__get__(instance, owner)
 
     def __repr__(self) -> str:
-        """What `help(Parts)` shows of it: its type, and what it is."""
+        """The part's type and the first sentence of its docstring, for `help(Parts)`."""
         return f"<part, {self.func.__annotations__.get('return', '')}: {(self.__doc__ or '').partition('.')[0]}>"
 
 
 class Parts:
-    """The parts of one flight: what its scenario says, with what was put in its place.
+    """The parts of one flight, made from its scenario or given in Python.
 
-    Parts are made when they are first asked for (no planner is compiled to look at the water), from the scenario and
-    from each other: another vehicle is also what the controller is made for and what the tank perturbs.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        What it leaves to be drawn is drawn here: `asked` is the scenario as given, `scenario` the one world of it that
-        is flown.
-    given : mapping
-        Names of parts and what stands in their place; see `replace`.
-
-    Attributes
-    ----------
-    vehicle : Vehicle
-        As the controller believes it to be, with its ballast.
-    target : Target
-        What is looked at.
-    region : Region
-        Points and weights that stand for the water to spare.
-    route : Route
-        Camera poses over time, and when the shutter opens.
-    pilot : Pilot
-        Where goals come from: by default the route.
-    wake : WakeModel
-        What the controller believes its jets do.
-    surroundings : Surroundings
-        What a planner keeps clear of.
-    controller : Controller
-        From an estimate and a goal to thrusts.
-    estimator : Estimator
-        From measurements to an estimate.
-    world : World
-        Where the vehicle really flies.
-    start : BodyState
-        Where the mission begins.
+    Each part is made at first use, from the scenario and from other parts: a replaced vehicle is also the vehicle of
+    the controller, and the one that the tank perturbs. `requested` is the scenario as given; `scenario` has the values
+    that its seed draws for randomized fields. `given` holds the replaced parts by name.
 
     Examples
     --------
@@ -172,51 +104,44 @@ class Parts:
     """
 
     def __init__(self, scenario: Scenario, given: Mapping[str, Any] | None = None) -> None:
-        self.asked = scenario
+        self.requested = scenario
         self.scenario = scenario.drawn()
         self.given: Mapping[str, Any] = MappingProxyType(dict(given or {}))
         if "vehicle" in self.given and scenario.ballast:
             raise InputError("ballast: the vehicle was given in Python, take it with its blocks (vehicles.ballast)")
 
     def replace(self, **given: Any) -> Parts:
-        """The same parts with others in place of some; what depends on them is made anew.
+        """The same parts with some replaced; what depends on them is made anew.
 
-        Parameters
-        ----------
-        **given
-            `vehicle`, `target`, `region`, `route`, `start`, `pilot`, `wake`, `controller`, `estimator`, `world`,
-            `surroundings`; or `scenario`, and fields of the scenario by their first name such as `method="dp"` or
-            `seed=3`.
-
-        Raises
-        ------
-        InputError
-            If there is no such part or field, or what is given cannot be that part.
+        Names are `vehicle`, `target`, `region`, `route`, `start`, `pilot`, `wake`, `controller`, `estimator`, `world`,
+        `surroundings`; or `scenario`, and fields of the scenario such as `method="dp"` or `seed=3`. A method removes a
+        controller that was given. Raises InputError if there is no such part or field, or the value cannot be that
+        part.
         """
-        scenario = given.pop("scenario", self.asked)
-        if not (hasattr(scenario, "drawn") and hasattr(scenario, "parts")):
+        scenario = given.pop("scenario", self.requested)
+        if not isinstance(scenario, Scenario):
             raise InputError(f"scenario: {quoted(scenario)}, must be a Scenario")
         for name in given.keys() & set(PARTS):
             check_part(name, given[name])
         fields = {name: given.pop(name) for name in list(given) if name not in PARTS}
         if fields:
             scenario = scenario.replace(**fields)
-        kept = {name: value for name, value in self.given.items() if name not in _MADE_BY.get("method", ())}
-        return Parts(scenario, {**(kept if "method" in fields else self.given), **given})
+        kept = {name: value for name, value in self.given.items() if name != "controller" or "method" not in fields}
+        return Parts(scenario, {**kept, **given})
 
     @property
     def overrides(self) -> dict[str, str]:
-        """What was put in place of the scenario's own parts, in words, by name."""
+        """The replaced parts in words, by name."""
         return {name: described(value) for name, value in self.given.items()}
 
     @cached_property
-    def from_outside(self) -> dict[str, str]:
-        """Parts that are not this package's own, by name, in words; scenario, report and comparison name them."""
-        return external_parts(self)
+    def external_parts(self) -> dict[str, str]:
+        """Parts that are not of this project, in words, by name; record, report and comparison list them."""
+        return external_parts(self.scenario, self.given)
 
     @property
     def method(self) -> str:
-        """What the flight is called in tables: the scenario's method, or the name of the controller given."""
+        """Name of the flight in tables: the scenario's method, or the name of the given controller."""
         return str(self.controller.name) if "controller" in self.given else self.scenario.method
 
     @cached_property
@@ -224,27 +149,27 @@ class Parts:
         """Random streams of the trial, one for each use."""
         return Seeds(self.scenario.seed)
 
-    @part
+    @ReplaceablePart
     def vehicle(self) -> Vehicle:
-        """The vehicle as it is believed to be, with its ballast."""
+        """The nominal vehicle, as the controller has it, with its ballast."""
         vehicle = with_blocks(any_vehicle(self.scenario.vehicle), self.scenario.ballast)
         return vehicle.with_ideal_thrusters() if self.scenario.tank.ideal_thrusters else vehicle
 
-    @part
+    @ReplaceablePart
     def target(self) -> Target:
-        """What is looked at, standing on the bed, where it truly is."""
+        """The target at its true place on the bed."""
         settings = self.scenario.target
         return find_target(settings.kind, self.scenario.tank.size_m[2], settings.seed, settings.size_m)
 
     @cached_property
-    def found_target(self) -> Target:
-        """The target where mission, controller and reconstruction take it to be (see `operation.survey`)."""
+    def surveyed_target(self) -> Target:
+        """The target at its surveyed place, which mission, controller and reconstruction use."""
         place_rng, _ = self.seeds.survey()
         return target_with_error(self.target, self.scenario.calibration_error, place_rng)
 
     @cached_property
-    def yielding(self) -> TargetCompliance | None:
-        """How the target gives way to the water; None of one that nothing moves."""
+    def compliance(self) -> TargetCompliance | None:
+        """How the target bends and slides in flow; None if it is rigid and fixed."""
         settings = self.scenario.target
         tissue = settings.tissue
         weight_N = settings.unanchored.weight_N
@@ -255,116 +180,115 @@ class Parts:
         sway = None if tissue is None else BendingModes.of(self.target, tissue, self.scenario.tank.density_kg_m3)
         return TargetCompliance(drag=drag, sway=sway, loose=loose)
 
-    @part
+    @ReplaceablePart
     def region(self) -> Region:
-        """Points that stand for the water round the target, where it is taken to be."""
+        """Weighted sample points in the water around the surveyed target, in which D is computed."""
         settings = self.scenario.target
-        return region_of(self.found_target, settings.points, self.seeds, settings.fragility_gain)
+        return region_of(self.surveyed_target, settings.points, self.seeds, settings.fragility_gain)
 
-    @part
+    @ReplaceablePart
     def route(self) -> Route:
-        """Where the camera is wished to be, when, and when the shutter opens."""
-        centre, mission = self.found_target.centre_W_m, self.scenario.mission
+        """Camera poses over time, and the times of the exposures."""
+        centre, mission = self.surveyed_target.centre_W_m, self.scenario.mission
         return plan_route(centre, mission, None if mission.order == "plain" else self.surveyed_current_W_m_s)
 
     @cached_property
     def surveyed_current_W_m_s(self) -> Array:
-        """The current at the target, shape (3,), as it is known before the flight."""
+        """Current at the target, shape (3,), as surveyed before the flight."""
         water_rng, error_rng = self.seeds.current()
         water = build_ambient(self.scenario.tank, water_rng)
-        return current_with_error(water, self.found_target.centre_W_m, error_rng)
+        return current_with_error(water, self.surveyed_target.centre_W_m, error_rng)
 
-    @part
+    @ReplaceablePart
     def pilot(self) -> Pilot:
-        """Where goals come from: by default the route, by the clock."""
+        """Source of the goals; by default it follows the route by the clock."""
+        from wakewise.operation.pilot_makers import make_pilot
+
         return make_pilot(self)
 
     @cached_property
     def control(self) -> ControlSettings:
-        """What the controllers are told: the scenario's settings and who flies, nothing of the water flown in."""
-        told = flown_by(self.scenario.control, int(self.seeds.person().integers(2**32)))
-        return told if self._leans else told.without_attitude_optimization()
+        """Settings of the controllers: the scenario's, with the simulated operator's seed."""
+        settings = flown_by(self.scenario.control, int(self.seeds.operator().integers(2**32)))
+        return settings if self._attitude_is_free() else settings.without_attitude_optimization()
 
-    @property
-    def _leans(self) -> bool:
-        """Whether a controller may choose the body's attitude: where the mission leaves it open, and no pilot flies by
-        the body's own place.
+    def _attitude_is_free(self) -> bool:
+        """Whether the controller may choose the body's attitude: neither mission nor pilot prescribes it.
 
-        Raises
-        ------
-        InputError
-            If that is asked for and the mission says what aims the camera.
+        Raises InputError if the optimization is set and the mission prescribes what aims the camera.
         """
         aim, wanted = self.scenario.mission.aim, self.scenario.control.allocation.optimize_attitude
         if wanted and aim != "auto":
             raise InputError(
-                f"control.allocation.optimize_attitude: true, but mission.aim is {aim}, which says how the body "
-                "stands: leave "
-                "mission.aim at auto, or posture at null"
+                f"control.allocation.optimize_attitude: true, but mission.aim is {aim}, which prescribes the attitude; "
+                "leave mission.aim at auto, or optimize_attitude at null"
             )
         return aim == "auto" and (bool(wanted) or (self.scenario.pilot == "route" and "pilot" not in self.given))
 
-    @part
+    @ReplaceablePart
     def wake(self) -> WakeModel:
-        """What the controller believes its jets do."""
+        """The controller's model of its jets."""
         return wake_model(self.scenario.control.wake, self.scenario.tank.size_m[2])
 
-    @part
+    @ReplaceablePart
     def surroundings(self) -> Surroundings:
-        """What a planner keeps clear of."""
-        return surroundings_of(self.scenario, self.found_target)
+        """Obstacles of the planner: bed, walls, surface, stated obstacles, surveyed target."""
+        return surroundings_of(self.scenario, self.surveyed_target)
 
-    @part
+    @ReplaceablePart
     def controller(self) -> Controller[Any]:
         """From an estimate and a goal to thrusts."""
         return make_controller(
-            self.scenario.method,
-            self.vehicle,
-            self.region,
-            self.wake,
-            self.control,
-            self.surroundings,
+            self.scenario.method, self.vehicle, self.region, self.wake, self.control, self.surroundings
         )
 
-    @part
+    @cached_property
+    def pipeline(self) -> Pipeline:
+        """The controller with its failsafe and thruster model, as it is flown.
+
+        The deadline is enforced in a world that does not wait for its controller (see `World`).
+        """
+        enforce = not getattr(self.world, "waits", True)
+        return flown_controller(self.controller, self.vehicle, self.region, self.wake, self.control, enforce)
+
+    @ReplaceablePart
     def estimator(self) -> Estimator[Any]:
-        """From measurements to an estimate."""
+        """From measurements to an estimate of pose, twist, load and current: an error-state Kalman filter."""
         return ErrorStateFilter(self.vehicle, self.scenario.estimation)
 
-    @part
+    @ReplaceablePart
     def world(self) -> World:
-        """Plant and witness: where the vehicle really flies."""
+        """The simulated or real world: plant and, if simulated, its truth."""
+        from wakewise.operation.worlds.makers import make_world
+
         return make_world(self)
 
     @property
     def bounds(self) -> TankBounds:
-        """The water that the vehicle may be in."""
+        """Box of water that the vehicle may be in."""
         return tank_bounds(self.scenario)
 
-    @part
+    @ReplaceablePart
     def start(self) -> BodyState:
-        """Where the mission begins, which is all that the estimator is told."""
+        """Start of the mission, and the first estimate."""
         return self.route.body(0.0, self.aim)
 
     @cached_property
     def aim(self) -> CameraAim:
-        """What the camera is aimed with; raises InputError where the mission asks for a joint that is not there."""
+        """How the camera is aimed; raises InputError if the mission asks for a joint that the vehicle has not."""
         return aim_of(self.vehicle, self.scenario.mission.aim)
 
     @property
     def start_tilt_rad(self) -> float:
-        """Angle of the camera's joint when the mission begins."""
+        """Angle of the camera's joint at the start of the mission."""
         return self.route.tilt(0.0, self.aim)[0]
 
     @cached_property
     def preflight(self) -> PreflightResult:
-        """What was found when the parts were held against each other; raises InputError where they do not fit."""
-        return preflight(self)
+        """Result of the checks before a flight; raises InputError if the parts do not fit each other."""
+        from wakewise.operation.preflight import preflight
 
-    @cached_property
-    def flying(self) -> Pipeline:
-        """The controller as it is flown, with failsafe and thruster model."""
-        return flown_controller(self)
+        return preflight(self)
 
     @cached_property
     def camera(self) -> PinholeCamera | LensCamera:
@@ -373,18 +297,15 @@ class Parts:
 
     @cached_property
     def scene(self) -> Scene:
-        """The target on its bed, textured, as the camera finds it."""
+        """The textured target on its bed, for rendering."""
         from wakewise.vision.imaging import LedPanels, Scene
 
         length, width, _ = self.scenario.tank.size_m
         return Scene.build(self.target, self.scenario.target.seed, panels=LedPanels.over_tank(length, width))
 
 
-PARTS: tuple[str, ...] = tuple(name for name, value in vars(Parts).items() if isinstance(value, part))
+PARTS: tuple[str, ...] = tuple(name for name, value in vars(Parts).items() if isinstance(value, ReplaceablePart))
 """Names of the parts that can be replaced."""
-
-_MADE_BY = {"method": ("controller",)}
-"""Parts that give way when this field of the scenario is replaced."""
 
 _RECORDS: dict[str, type] = {
     "vehicle": Vehicle,
@@ -401,18 +322,65 @@ _METHODS: dict[str, tuple[str, ...]] = {
     "estimator": ("init", "step"),
     "world": ("begin",),
 }
-"""What a part of a kind that is a Protocol must have at least (see `wakewise.core.interfaces`)."""
+"""Methods that a part of a Protocol must have (see `wakewise.core.interfaces`)."""
 
 
 def check_part(name: str, given: object) -> None:
-    """Refuse what cannot be the part of that name.
-
-    Raises
-    ------
-    InputError
-        Naming what it is instead, or the methods that it lacks.
-    """
+    """Raise InputError if a value cannot be the part of that name; its type or the missing methods are named."""
     if name in _RECORDS:
         instance_of(given, _RECORDS[name], name)
     else:
         has_methods(given, _METHODS[name], name, name)
+
+
+def tank_bounds(scenario: Scenario) -> TankBounds:
+    """The box of the tank's water."""
+    length, width, depth = scenario.tank.size_m
+    return TankBounds(
+        low_W_m=np.array([-length / 2, -width / 2, 0.0]), high_W_m=np.array([length / 2, width / 2, depth])
+    )
+
+
+def surroundings_of(scenario: Scenario, target: Target | None = None) -> Surroundings:
+    """Obstacles of a planner: bed, walls and surface of the tank, stated obstacles, the target if given."""
+    bounds = tank_bounds(scenario)
+    obstacles = np.array(scenario.control.obstacles).reshape(-1, 4)
+    names = tuple(f"obstacle {k + 1} (control.obstacles)" for k in range(len(obstacles)))
+    around = np.zeros((0, 4)) if target is None else covering_spheres(target.mesh.vertices_m)
+    return Surroundings.tank(
+        bounds.low_W_m, bounds.high_W_m, np.vstack([obstacles, around]), (*names, *("the target",) * len(around))
+    )
+
+
+CACHED_REGIONS = 16
+"""Regions in the cache, the last ones used; 300 points are 12 kB."""
+
+_regions: dict[bytes, Region] = {}
+_regions_lock = Lock()
+
+
+def region_of(target: Target, points: int, seeds: Seeds, fragility_gain: float = 0.0) -> Region:
+    """Sample points around a target, cached by its shape and place, the number of points, the seed and the gain.
+
+    With `fragility_gain` above 0 thin and sharp features of the target weigh more. Raises InputError as
+    `sample_region`.
+    """
+    key = _fingerprint(target, points, seeds, fragility_gain)
+    with _regions_lock:
+        found = _regions.pop(key, None)
+        if found is None:
+            marks = find_fragility(target.mesh) if fragility_gain > 0.0 else None
+            found = sample_region(target, points, seeds.region(), marks, fragility_gain)
+        _regions[key] = found  # the last used is dropped last
+        while len(_regions) > CACHED_REGIONS:
+            del _regions[next(iter(_regions))]
+        return found
+
+
+def _fingerprint(target: Target, points: int, seeds: Seeds, fragility_gain: float) -> bytes:
+    """Digest of the inputs of a region; the target's name is not one of them."""
+    digest = blake2b(repr((points, seeds.seed, float(fragility_gain), target.bed_z_m, target.radius_m)).encode())
+    for values in (target.mesh.vertices_m, target.mesh.faces, target.centre_W_m):
+        digest.update(repr(values.shape).encode())
+        digest.update(np.ascontiguousarray(values).data)
+    return digest.digest()

@@ -19,10 +19,10 @@ from wakewise.core.arrays import Array
 from wakewise.core.files import whole_file, write_text
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import no_progress
-from wakewise.operation.calibration_error import calibration_with_error
 from wakewise.operation.flight_log import ExposureRecord, read_exposures
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario
+from wakewise.operation.scenario.calibration_error import calibration_with_error
 from wakewise.scene.targets import turned_normals
 from wakewise.vision.imaging import Scene, SiltOptics, calibrate, photograph
 
@@ -136,7 +136,7 @@ def scenes_of(parts: Parts, exposure: ExposureRecord) -> list[Scene]:
 
 def moved_m(parts: Parts, exposure: ExposureRecord) -> Array:
     """How far each vertex of a target that yields was from its place at rest when the shutter opened, shape (n, 3)."""
-    yielding, mesh = parts.yielding, parts.target.mesh
+    yielding, mesh = parts.compliance, parts.target.mesh
     moved = np.zeros_like(mesh.vertices_m)
     if exposure.shift_m is not None:
         moved += np.append(exposure.shift_m, 0.0)
@@ -147,7 +147,7 @@ def moved_m(parts: Parts, exposure: ExposureRecord) -> Array:
 
 def _posed(parts: Parts, tips_m: Array, shift_m: Array) -> Scene:
     """The scene with its target's tips moved and the whole of it shifted."""
-    yielding, scene = parts.yielding, parts.scene
+    yielding, scene = parts.compliance, parts.scene
     moved, normals = np.zeros((scene.first_bed_vertex, 3)), scene.target_normals.astype(np.float64)
     if yielding is not None and yielding.sway is not None:
         moved, tilt = yielding.sway.bent(tips_m)

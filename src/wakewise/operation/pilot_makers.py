@@ -1,20 +1,19 @@
-"""Pilots by name: where the goals of a flight come from."""
+"""Pilots by name: the sources of a flight's goals."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Pilot
 from wakewise.core.plugins import find
-from wakewise.operation.teleop.human_pilot import HumanPilot
+from wakewise.operation.parts import Parts
+from wakewise.operation.teleop.assisted import assisted_pilot
+from wakewise.operation.teleop.human_pilot import HumanPilot, SimulatedOperatorInput
 from wakewise.operation.teleop.input.script import read_input
+from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
 from wakewise.scene.missions import RoutePilot
-
-if TYPE_CHECKING:
-    from wakewise.operation.parts import Parts
 
 
 def route_pilot(parts: Parts) -> RoutePilot:
@@ -25,9 +24,9 @@ def route_pilot(parts: Parts) -> RoutePilot:
 
 
 def human_pilot(parts: Parts) -> HumanPilot:
-    """`human`: a person who flies the route by eye, and whose sticks ask any method for velocities."""
+    """`human`: a simulated operator who flies the route by eye; the sticks ask any method for velocities."""
     return HumanPilot(
-        wish=route_pilot(parts),
+        reference=route_pilot(parts),
         X_BC=parts.vehicle.X_BC,
         target_W_m=parts.target.centre_W_m,
         dt_s=1.0 / parts.control.rate_hz,
@@ -35,54 +34,35 @@ def human_pilot(parts: Parts) -> HumanPilot:
     )
 
 
-def operator_pilot(parts: Parts) -> Pilot:
-    """`operator`: hands at the desk's sticks, as a file tells of them.
-
-    Raises
-    ------
-    InputError
-        If the scenario names no such file: a person's own hands no scenario can hold.
-    """
-    from wakewise.operation.teleop.assisted import assisted_pilot
-    from wakewise.operation.teleop.operator_state import OperatorState
-
-    if parts.scenario.control_log is None:
-        raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or name a record in controls")
-    return assisted_pilot(parts, read_input(Path(parts.scenario.control_log)), OperatorState())
-
-
-def assisted_person(parts: Parts) -> Pilot:
-    """`assisted`: the person of `human` at the desk's sticks, camera kept on the target, brakes and all."""
-    from wakewise.operation.teleop.assisted import assisted_pilot
-    from wakewise.operation.teleop.human_pilot import SimulatedOperatorInput
-    from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
-
-    hands = SimulatedOperatorInput(
-        wish=route_pilot(parts),
+def assisted_human_pilot(parts: Parts) -> Pilot:
+    """`assisted`: the same operator with the assists: camera kept on the target, collision limits, braking."""
+    source = SimulatedOperatorInput(
+        reference=route_pilot(parts),
         X_BC=parts.vehicle.X_BC,
         target_W_m=parts.target.centre_W_m,
         dt_s=1.0 / parts.control.rate_hz,
         seed=parts.control.operator_seed or 0,
     )
     begin = OperatorSettings(mode="operator")
-    return assisted_pilot(parts, hands, OperatorState(begin), begin)
+    return assisted_pilot(parts, source, OperatorState(begin), begin)
+
+
+def operator_pilot(parts: Parts) -> Pilot:
+    """`operator`: assisted flight with the inputs of a file; raises InputError if the scenario names none."""
+    if parts.scenario.control_log is None:
+        raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or name a record in control_log")
+    return assisted_pilot(parts, read_input(Path(parts.scenario.control_log)), OperatorState())
 
 
 PILOTS: dict[str, Callable[[Parts], Pilot]] = {
     "route": route_pilot,
     "human": human_pilot,
-    "assisted": assisted_person,
+    "assisted": assisted_human_pilot,
     "operator": operator_pilot,
 }
-"""Our own pilots: what makes each from the parts of a flight."""
+"""Our own pilots by name."""
 
 
 def make_pilot(parts: Parts) -> Pilot:
-    """The pilot that the scenario names, ours or one from outside.
-
-    Raises
-    ------
-    InputError
-        If there is no such pilot.
-    """
+    """The pilot that the scenario names, ours or one from outside; raises InputError if there is none."""
     return find("pilot", parts.scenario.pilot, PILOTS).maker(parts)

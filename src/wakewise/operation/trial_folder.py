@@ -1,4 +1,4 @@
-"""What a flight leaves in its folder beside its record: the scenario, the truth, where photographs were to be taken."""
+"""Files of a trial beside the flight's record: scenario.yaml, truth.ply, planned.csv."""
 
 from __future__ import annotations
 
@@ -8,45 +8,35 @@ import platform
 from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.core.files import write_text
 from wakewise.core.geometry import Pose
+from wakewise.operation.parts import Parts, build
 from wakewise.operation.photography import photo_name
 from wakewise.operation.plugin_adapter import is_builtin
 from wakewise.operation.scenario import Scenario, differences, read_scenario, write_scenario
 from wakewise.scene.targets import write_mesh
 
-if TYPE_CHECKING:
-    from wakewise.operation.parts import Parts
-
 BY_HAND = "operator"
-"""The pilot that a scenario names where a person flew."""
+"""Name of the pilot in the scenario of a flight by hand."""
 
 
 def resolved_scenario(parts: Parts) -> Scenario:
-    """The scenario that a trial leaves behind: what was given in Python in place of its own parts is named in it."""
+    """The scenario that a trial writes; parts that were given in Python are named in `overrides`."""
     if not parts.given:
         return parts.scenario
     scenario, given = parts.scenario, parts.given
-    told: dict[str, Any] = {"method": parts.method, "overrides": parts.overrides}
-    told |= {name: given[name].name for name in ("vehicle", "world") if name in given}
+    update: dict[str, Any] = {"method": parts.method, "overrides": parts.overrides}
+    update |= {name: given[name].name for name in ("vehicle", "world") if name in given}
     if "target" in given:
-        told["target"] = scenario.target.model_copy(update={"kind": given["target"].name})
-    return scenario.model_copy(update=told)
+        update["target"] = scenario.target.model_copy(update={"kind": given["target"].name})
+    return scenario.model_copy(update=update)
 
 
 def check_place(folder: Path, scenario: Scenario) -> None:
-    """Refuse a folder in which the trial cannot be, before seconds are spent on whether it can be flown.
-
-    Raises
-    ------
-    InputError
-        If the folder holds another trial, or is a file.
-    EnvironmentFailure
-        If it would lie below a file.
-    """
+    """Refuse a folder of another trial and a file (InputError), and a folder below a file (EnvironmentFailure)."""
     path = folder / "scenario.yaml"
     above = next((place for place in folder.parents if place.exists()), None)
     if above is not None and not above.is_dir():
@@ -73,26 +63,24 @@ def write_or_check_scenario(folder: Path, scenario: Scenario) -> None:
 
 
 def flown_by_hand(parts: Parts) -> Scenario:
-    """The scenario of a flight by hand: its pilot is a person, and what served the hands is not named.
+    """The scenario of a flight by hand: its pilot is `BY_HAND`.
 
-    Pilot and controller that `assisted` put in place come back with the pilot's name; others are named as ever.
+    Pilot and controller of `assisted` follow from that name, so they are not in `overrides`; other given parts are.
     """
     ours = {name for name in ("pilot", "controller") if name in parts.given and is_builtin(parts.given[name])}
-    scenario = resolved_scenario(
-        type(parts)(parts.scenario, {k: part for k, part in parts.given.items() if k not in ours})
-    )
+    scenario = resolved_scenario(build(parts.scenario, {k: v for k, v in parts.given.items() if k not in ours}))
     return scenario.model_copy(update={"pilot": BY_HAND}) if "pilot" in ours else scenario
 
 
 def write_plan(parts: Parts, folder: Path) -> None:
-    """Write the truth (truth.ply) and where the photographs are to be taken from (planned.csv)."""
+    """Write truth.ply and planned.csv."""
     write_truth(parts, folder)
     route = parts.route
     write_views(parts, folder, zip(route.exposure_names, route.exposures_s, route.X_WC_planned, strict=True))
 
 
 def write_views(parts: Parts, folder: Path, views: Iterable[tuple[str, float, Pose]]) -> None:
-    """Write planned.csv: names, times and wished poses of photographs."""
+    """Write planned.csv: names, times and reference poses of photographs."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("name", "time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"))
@@ -104,5 +92,5 @@ def write_views(parts: Parts, folder: Path, views: Iterable[tuple[str, float, Po
 
 
 def write_truth(parts: Parts, folder: Path) -> None:
-    """Write the target as it truly is (truth.ply)."""
+    """Write the target at its true place (truth.ply)."""
     write_mesh(folder / "truth.ply", parts.target.mesh)

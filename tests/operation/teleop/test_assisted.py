@@ -181,7 +181,7 @@ def test_the_camera_stays_on_the_target(parts, tilting, vehicle):
     flown = Flown(some, Hands(lambda t: sticks(right=0.8, down=-0.4)), mode="operator").until(5.0)
     goal, aim = flown.goals[-1], flown.pilot.aim
     X_WC = goal.X_WB @ aim.mount(goal.tilt_rad)
-    sight = some.found_target.centre_W_m - X_WC.p_m
+    sight = some.surveyed_target.centre_W_m - X_WC.p_m
     assert X_WC.R[:, 2] @ sight / np.linalg.norm(sight) > np.cos(np.radians(1.0))
     pitch = np.degrees(np.arcsin(-goal.X_WB.R[2, 0]))
     assert abs(pitch) < 0.1 and abs(goal.tilt_rad) > 0.1 if vehicle == "tilting" else abs(pitch) > 5.0
@@ -193,7 +193,7 @@ def test_an_orbit_keeps_its_range(parts, tilting, vehicle):
     some = tilting if vehicle == "tilting" else parts
     now = [sticks(right=1.0, down=-0.5)]
     flown = Flown(some, Hands(lambda _: now[0]), mode="operator", orbit=True)
-    centre = some.found_target.centre_W_m
+    centre = some.surveyed_target.centre_W_m
 
     def ranges(until_s):
         begins = flown.step
@@ -260,7 +260,7 @@ def test_a_flight_without_a_mission_holds_instead(parts):
     """`scan` where there is nothing to scan is said and held."""
     from wakewise.scene.missions import open_route
 
-    some = parts.replace(route=open_route(parts.found_target.centre_W_m, 10.0), start=parts.start)
+    some = parts.replace(route=open_route(parts.surveyed_target.centre_W_m, 10.0), start=parts.start)
     flown = Flown(some, mode="scan").until(0.1)
     assert flown.desk.state.mode == "hold" and "no mission" in flown.pilot.notes()[0].text
 

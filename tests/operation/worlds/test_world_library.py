@@ -8,7 +8,6 @@ from wakewise.core.errors import InputError
 from wakewise.operation import Scenario, load_scenario, read_scenario
 from wakewise.operation.scenario import dump_scenario
 from wakewise.operation.worlds.library import load_world, parse_world, world_names
-from wakewise.operation.worlds.makers import flow_name
 from wakewise.ui.cli.main import run
 
 
@@ -68,7 +67,7 @@ def test_a_trial_holds_the_world_that_was_flown_in_numbers(tmp_path):
 def test_the_water_of_a_world_can_be_another():
     """`flow` takes the place of the world's own water and leaves the rest."""
     scenario = Scenario.preset("quick", world="payload", **{"target.elasticity": "none"})
-    assert flow_name(scenario) == "tank" and flow_name(scenario.replace(flow="paper")) == "paper"
+    assert scenario.flow_name == "tank" and scenario.replace(flow="paper").flow_name == "paper"
     assert scenario.replace(flow="paper").parts().world.name == "paper"
     with pytest.raises(InputError, match="flow: 'paper' holds its target still"):
         _ = Scenario.preset("quick", world="payload", flow="paper").parts().world

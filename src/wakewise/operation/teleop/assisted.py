@@ -12,7 +12,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from wakewise.control.pipeline import Pipeline, pipeline_of
 from wakewise.control.velocity_reference import PAPER_W_TRACK, deviation_limit
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Controller, Goal
+from wakewise.operation.parts import Parts
 from wakewise.operation.teleop.arbitration import (
     BRAKING_M_S2,
     CollisionLimiter,
@@ -35,9 +36,6 @@ from wakewise.operation.teleop.motion import MotionReference
 from wakewise.operation.teleop.operator_state import WAYS, OperatorSettings, OperatorState
 from wakewise.operation.teleop.resumable_mission import ResumableMission, ScanState
 from wakewise.scene.missions import CameraAim
-
-if TYPE_CHECKING:
-    from wakewise.operation.parts import Parts
 
 DIAL_PER_S = 2.0
 """How fast the tracking weight follows its dial, in natural logarithms a second: from end to end in 2.3 s."""
@@ -308,7 +306,7 @@ def assisted_pilot(
             acceleration_m_s2=mission.acceleration_m_s2,
             braking_m_s2=BRAKING_M_S2,
         ),
-        target_W_m=parts.found_target.centre_W_m,
+        target_W_m=parts.surveyed_target.centre_W_m,
         dt_s=1.0 / parts.control.rate_hz,
         begin=begin,
         keep_off=CollisionLimiter(

@@ -61,7 +61,7 @@ class HumanPilot:
         Which person it is.
     """
 
-    wish: Pilot
+    reference: Pilot
     X_BC: Pose
     target_W_m: Array
     dt_s: float
@@ -84,7 +84,7 @@ class HumanPilot:
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
         """Where the sticks have led to, moving as they ask, at the wished roll and pitch."""
-        wished = self.wish.goal(time_s, estimate)
+        wished = self.reference.goal(time_s, estimate)
         roll_rad, pitch_rad, _ = euler_from_quat(wished.X_WB.q)
         if time_s <= 0.0:
             self._begin(np.array(estimate.X_WB.p_m), float(euler_from_quat(estimate.X_WB.q)[2]))
@@ -138,7 +138,7 @@ class SimulatedOperatorInput:
         What the person presses on taking the sticks.
     """
 
-    wish: Pilot
+    reference: Pilot
     X_BC: Pose
     target_W_m: Array
     dt_s: float
@@ -156,7 +156,7 @@ class SimulatedOperatorInput:
         """See where the vehicle is, and move the sticks; `share` is what full stick asks for, of the fastest."""
         if time_s <= 0.0:
             self._state = begin(self.person)
-        wished = self.wish.goal(time_s, estimate)
+        wished = self.reference.goal(time_s, estimate)
         view = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
         wish = CameraMotion.of(wished.X_WB, wished.nu_B, self.X_BC)
         seen = viewed_point(wished, self.X_BC, self.target_W_m)

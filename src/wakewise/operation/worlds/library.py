@@ -17,7 +17,7 @@ from pydantic import Field, ValidationError, model_validator
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import read_yaml
 from wakewise.core.settings import Settings, describe_faults, guess
-from wakewise.operation.randomization import FieldDistribution
+from wakewise.operation.scenario.randomization import FieldDistribution
 
 
 class WorldField(Settings):

@@ -41,7 +41,7 @@ def show(name: Name, seed: Seed = None, json: Json = False) -> None:
     """Show a world: why it is flown, its fields, from where a seed draws them, and the source of each number."""
     from rich.table import Table
 
-    from wakewise.operation.randomization import sample_fields
+    from wakewise.operation.scenario.randomization import sample_fields
     from wakewise.operation.worlds.library import load_world
 
     world = load_world(name)

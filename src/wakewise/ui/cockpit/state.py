@@ -58,7 +58,7 @@ class WakeReadout:
     def of(cls, parts: Parts) -> WakeReadout:
         """The gauges of a flight."""
         true = surface_points(parts.target, POINTS, np.random.default_rng(parts.scenario.seed))
-        off_m = parts.found_target.centre_W_m - parts.target.centre_W_m
+        off_m = parts.surveyed_target.centre_W_m - parts.target.centre_W_m
         made_of = (parts.vehicle, parts.region, parts.wake)
         return cls(
             view=InfluenceModel.of(*made_of, parts.control.superposition),
@@ -104,7 +104,7 @@ POINTS_EVERY, GAUGES_EVERY = 5, 2
 
 def static_description(parts: Parts, gauges: WakeReadout) -> dict[str, Any]:
     """Scenario, vehicle and target, as a client is told when it comes."""
-    scenario, vehicle, target = parts.scenario, parts.vehicle, parts.found_target
+    scenario, vehicle, target = parts.scenario, parts.vehicle, parts.surveyed_target
     return {
         "scenario": scenario_description(parts),
         "vehicle": {

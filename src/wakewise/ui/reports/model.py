@@ -12,8 +12,8 @@ from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError
 from wakewise.experiments.trials.coverage import Shot, coverage_of
 from wakewise.operation import Scenario
-from wakewise.operation.calibration_error import target_with_error
-from wakewise.operation.randomization import Seeds
+from wakewise.operation.scenario.calibration_error import target_with_error
+from wakewise.operation.scenario.randomization import Seeds
 from wakewise.scene.missions import Coverage, find_coverage_gaps
 from wakewise.scene.targets import Mesh, Target
 from wakewise.ui.reports import figures

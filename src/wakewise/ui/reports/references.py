@@ -17,7 +17,7 @@ import numpy as np
 from wakewise.core.errors import InputError
 from wakewise.operation import differences, read_scenario
 from wakewise.operation.worlds.lattice_world import CELL_M
-from wakewise.operation.worlds.makers import WORLDS, flow_name
+from wakewise.operation.worlds.makers import WORLDS
 from wakewise.scene.missions import SETTLING
 from wakewise.simulation.tank.validation_limits import ABSENT, limits_table
 from wakewise.ui.reports.page import collapsible_section, missing, parts, prose, section, template
@@ -248,7 +248,7 @@ def _water_html(trial: Trial) -> str:
         return _from_outside(str(replaced["world"]))
     if trial.settings is None:
         return missing("what its water gets wrong", "no scenario that can be read says in which water it was flown")
-    flow = flow_name(trial.settings)
+    flow = trial.settings.flow_name
     if flow == "tank":
         return _tank_html()
     return _paragraph(prose(_OTHERS[flow])) if flow in WORLDS else _from_outside(flow)

@@ -1,4 +1,4 @@
-"""What the crew knows of target, camera and current before the flight, and how wrong that is."""
+"""Errors of the surveyed target, the camera calibration and the surveyed current."""
 
 from __future__ import annotations
 
@@ -18,22 +18,21 @@ if TYPE_CHECKING:
     from wakewise.vision.imaging import OpenCVCamera
 
 CURRENT_DEG = 15.0
-"""Error of the surveyed current's direction, one sigma: what a streamer's swing and a compass beside thrusters leave
-together, an estimate. Its speed is not asked for: only the direction orders the views."""
-WATCHED_S, WATCHED_EVERY_S = 60.0, 0.5
-"""How long the water at the target is watched for it, and how often: several periods of any swell, and many eddies."""
+"""Error of the surveyed current's direction, one sigma, deg: a streamer's swing and a compass beside thrusters, an
+estimate. The speed has no error because only the direction orders the views."""
+SURVEY_S, SURVEY_STEP_S = 60.0, 0.5
+"""Length of the current survey and its sampling period: several periods of any swell, and many eddies."""
 
 
 class CalibrationErrorSettings(Settings):
-    """How well target and camera are known to mission, controller and reconstruction; drawn once for a flight.
+    """Errors of target and camera as mission, controller and reconstruction have them; drawn once for a flight.
 
-    The target is found by the camera that the vehicle flies by, whose poses are off by 3 to 5 mm per axis for as long
-    as a look takes: 5 mm. A calibration under water is as good as it can be repeated. Those of two sport cameras of one
-    make in one make of housing lie 0.07 % apart in focal length, 2.0 and 1.6 px of 960 in principal point, 0.005 and
-    0.010 in k1 and k2, 0.00002 and 0.002 in p1 and p2 (calibration files of SVIn2, S. Rahman, A. Quattrini Li, I.
-    Rekleitis, arXiv:1810.03200), from which the spreads here are rounded; a focal length is less well known than that
-    once the housing was opened or the water is another (M. Shortis, Sensors 15 (2015) 30810, doi 10.3390/s151229831):
-    0.2 %, an estimate.
+    The vehicle's camera finds the target. The error of its poses is 3 to 5 mm per axis for the duration of a survey:
+    5 mm. The calibrations of two sport cameras of one make in one make of housing differ by 0.07 % in focal length, 2.0
+    and 1.6 px of 960 in principal point, 0.005 and 0.010 in k1 and k2, 0.00002 and 0.002 in p1 and p2 (calibration
+    files of SVIn2, S. Rahman, A. Quattrini Li, I. Rekleitis, arXiv:1810.03200); the defaults are these, rounded. The
+    focal length is less certain after the housing was opened or in other water (M. Shortis, Sensors 15 (2015) 30810,
+    doi 10.3390/s151229831): 0.2 %, an estimate.
     """
 
     target_position_m: float = Field(
@@ -49,14 +48,14 @@ class CalibrationErrorSettings(Settings):
 
 
 def target_with_error(target: Target, errors: CalibrationErrorSettings, rng: np.random.Generator) -> Target:
-    """The target where the crew takes it to be; its shape, and the bed, are known."""
+    """The target at its surveyed place; its shape, and the bed, have no error."""
     return target.moved(rng.normal(0.0, errors.target_position_m, 3))
 
 
 def calibration_with_error(
     true: OpenCVCamera, errors: CalibrationErrorSettings, rng: np.random.Generator
 ) -> OpenCVCamera:
-    """The calibration that the crew has of a camera; its true one is in camera.json alone."""
+    """The camera model with errors of calibration; the true one is in camera.json alone."""
     focal, centre = (
         rng.normal(0.0, 0.01 * errors.focal_length_pct),
         rng.normal(0.0, 0.01 * errors.principal_point_pct * true.width, 2),
@@ -67,16 +66,8 @@ def calibration_with_error(
 
 
 def current_with_error(water: Current, place_W_m: Array, rng: np.random.Generator) -> Array:
-    """Current at a place, shape (3,), as the crew knows it before the flight: the mean of a minute, turned by an error.
-
-    Parameters
-    ----------
-    water : Current
-        The water's own motion.
-    place_W_m : ndarray, shape (3,)
-    rng : numpy Generator
-    """
-    times_s = np.arange(0.0, WATCHED_S, WATCHED_EVERY_S)
+    """Surveyed current at a place, both shape (3,): the mean over `SURVEY_S`, turned about the vertical by an error."""
+    times_s = np.arange(0.0, SURVEY_S, SURVEY_STEP_S)
     north, east, down = np.mean([water.velocity(place_W_m[None], float(t))[0] for t in times_s], axis=0)
     turn = math.radians(rng.normal(0.0, CURRENT_DEG))
     c, s = math.cos(turn), math.sin(turn)

@@ -1,9 +1,7 @@
-"""Fields of a scenario that its seed draws, so that many seeds are many worlds.
+"""Domain randomization: distributions of scenario fields, and the random streams of a trial.
 
-A draw says from where; what it gives follows from the seed and the field's name alone, so that one more draw leaves the
-others what they were, and all methods on one seed meet the same world.
-
-The random streams of a trial.
+A drawn value depends on the seed and the field's name alone. So another randomized field leaves the other values as
+they are, and all methods with one seed fly in the same world.
 """
 
 from __future__ import annotations
@@ -19,11 +17,11 @@ from pydantic import Field, model_validator
 from wakewise.core.settings import Settings
 
 _STREAM = 23
-_SIGNIFICANT = 6  # digits that a drawn number keeps, so that a file holds what was flown
+_SIGNIFICANT = 6  # digits of a drawn number, so that a scenario file holds the number exactly
 
 
 class FieldDistribution(Settings):
-    """Where a field's value comes from; written as one of these keys, or as a list of two numbers for `between`."""
+    """Distribution of a field: one of these keys, or a list of two numbers for `uniform`."""
 
     uniform: tuple[float, float] | None = Field(None, description="evenly between two numbers")
     log_uniform: tuple[float, float] | None = Field(
@@ -44,7 +42,7 @@ class FieldDistribution(Settings):
         given = [name for name in type(self).model_fields if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(
-                f"gives {', '.join(given) or 'nothing'}, must give one of between, log_uniform, choice, level"
+                f"gives {', '.join(given) or 'nothing'}, must give one of {', '.join(type(self).model_fields)}"
             )
         for name in ("uniform", "log_uniform", "horizontal"):
             ends = getattr(self, name)
@@ -57,7 +55,7 @@ class FieldDistribution(Settings):
         return self
 
     def value(self, rng: np.random.Generator) -> Any:
-        """A value from here: a number, a list of three numbers, or one of those listed."""
+        """A random value: a number, a list of three numbers, or one of `choice`."""
         if self.uniform is not None:
             return _rounded(rng.uniform(*self.uniform))
         if self.log_uniform is not None:
@@ -69,7 +67,7 @@ class FieldDistribution(Settings):
         return listed[int(rng.integers(len(listed)))]
 
     def __str__(self) -> str:
-        """The draw in words."""
+        """The distribution in words."""
         if self.uniform is not None:
             return f"{self.uniform[0]:g} to {self.uniform[1]:g}"
         if self.log_uniform is not None:
@@ -80,7 +78,7 @@ class FieldDistribution(Settings):
 
 
 def sample_fields(draws: dict[str, FieldDistribution], seed: int) -> dict[str, Any]:
-    """What a seed draws, by field."""
+    """A value of each field for this seed."""
     return {
         name: draw.value(np.random.default_rng([seed, _STREAM, zlib.crc32(name.encode())]))
         for name, draw in draws.items()
@@ -93,7 +91,7 @@ def _rounded(value: float) -> float:
 
 @dataclass(frozen=True)
 class Seeds:
-    """One random stream for each part of a trial, so that a change in one leaves the draws of the others alone.
+    """One random stream for each use in a trial; a change in one use leaves the values of the others.
 
     Each call gives a fresh generator at the beginning of its stream.
     """
@@ -101,7 +99,7 @@ class Seeds:
     seed: int
 
     def plant(self) -> np.random.Generator:
-        """How the true vehicle differs from the believed one."""
+        """Differences between the true vehicle and its model."""
         return self._child(0)
 
     def tank(self) -> np.random.Generator:
@@ -109,11 +107,11 @@ class Seeds:
         return self._child(1)
 
     def region(self) -> np.random.Generator:
-        """Points that stand for the target's water."""
+        """Sample points around the target."""
         return self._child(2)
 
     def start(self) -> np.random.Generator:
-        """Where the vehicle really is when the mission begins."""
+        """Error of the vehicle's initial pose."""
         return self._child(3)
 
     def imaging(self) -> np.random.Generator:
@@ -121,21 +119,21 @@ class Seeds:
         return self._child(4)
 
     def drag(self) -> np.random.Generator:
-        """Which of its cases the true vehicle's drag is."""
+        """The case of the true vehicle's drag."""
         return np.random.default_rng([self.seed, 12])
 
     def survey(self) -> tuple[np.random.Generator, np.random.Generator]:
-        """What the crew takes the target's place, and its camera, for."""
+        """Error of the surveyed target, and of the camera calibration."""
         place, camera = self._child(5).spawn(2)
         return place, camera
 
     def current(self) -> tuple[np.random.Generator, np.random.Generator]:
-        """What the crew sees of the current before the flight: the water's eddies then, and the error."""
+        """Eddies of the water during the survey, and the error of the surveyed current."""
         water, error = np.random.default_rng([self.seed, 13]).spawn(2)
         return water, error
 
-    def person(self) -> np.random.Generator:
-        """Who flies by hand."""
+    def operator(self) -> np.random.Generator:
+        """Properties of a simulated operator."""
         return self._child(6)
 
     def _child(self, k: int) -> np.random.Generator:
