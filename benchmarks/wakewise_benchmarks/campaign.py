@@ -77,7 +77,7 @@ def between_trials_s(folder: Path, engine: TrialExecutor) -> float:
     From the end of the first trial to that of the last, so that the engine's start does not count.
     """
     tasks = [
-        Task(name=f"{number}", work=f"{__name__}:nothing", settings={"number": number}, sources=("files.py",))
+        Task(name=f"{number}", work=f"{__name__}:nothing", settings={"number": number}, sources=("core/files.py",))
         for number in range(EMPTY + 1)
     ]
     ends: dict[float, float] = {}

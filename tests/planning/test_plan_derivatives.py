@@ -54,7 +54,7 @@ def test_the_stage_kernel_equals_its_twin(wake, superposition):
 
 
 @pytest.mark.parametrize(
-    "levers",
+    "mechanisms",
     [
         {},
         {"superposition": "incoherent"},
@@ -63,9 +63,9 @@ def test_the_stage_kernel_equals_its_twin(wake, superposition):
         {"w_disturbance": 0.0},
     ],
 )
-def test_the_gradient_is_that_of_the_cost(levers):
+def test_the_gradient_is_that_of_the_cost(mechanisms):
     """Commands to cost, through lag, motion, wake, barrier and tracking: central differences agree to 1e-6."""
-    planner = Planner(model(**levers))
+    planner = Planner(model(**mechanisms))
     planner.load(problem())
     rng = np.random.default_rng(1)
     # Steps of some 20 N break the rate limit here and there, so that its hinges take part.

@@ -131,14 +131,19 @@ def _tries(folder: Path) -> int:
 def adding(count: int, takes_s: float = 0.0) -> list[Task]:
     """So many trials of `add`."""
     return [
-        Task(name=f"add/{seed}", work="cheap:add", settings={"seed": seed, "takes_s": takes_s}, sources=("files.py",))
+        Task(
+            name=f"add/{seed}",
+            work="cheap:add",
+            settings={"seed": seed, "takes_s": takes_s},
+            sources=("core/files.py",),
+        )
         for seed in range(count)
     ]
 
 
 def one(work: str, **settings: Any) -> Task:
     """A trial of another of these."""
-    return Task(name=work, work=f"cheap:{work}", settings=settings, sources=("files.py",))
+    return Task(name=work, work=f"cheap:{work}", settings=settings, sources=("core/files.py",))
 
 
 if __name__ == "__main__":

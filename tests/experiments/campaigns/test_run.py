@@ -217,7 +217,7 @@ def test_tasks_of_one_key_are_made_once(tmp_path: Path) -> None:
     """And each has the outcome."""
     task, other = (
         cheap.adding(1)[0],
-        Task(name="b", work="cheap:add", settings={"takes_s": 0.0, "seed": 0}, sources=("files.py",)),
+        Task(name="b", work="cheap:add", settings={"takes_s": 0.0, "seed": 0}, sources=("core/files.py",)),
     )
     outcomes = run([task, other], tmp_path / "c", ProcessExecutor(2))
     assert [outcome.figures for outcome in outcomes] == [{"twice": 0.0}] * 2

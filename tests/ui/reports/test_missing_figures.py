@@ -44,7 +44,7 @@ SAID = re.compile(r"\bNone\b|\bnan\b|\binf\b")
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Figures are put together, but not drawn, and 3D scenes are left out: neither has a figure in words."""
-    monkeypatch.setattr("wakewise.ui.reports.page.inline_svg", lambda *_: "<svg></svg>")
+    monkeypatch.setattr("wakewise.ui.reports.svg_style.inline_svg", lambda *_: "<svg></svg>")
     monkeypatch.setattr("wakewise.ui.reports.model.scene_html", lambda *_: None)
     monkeypatch.setattr("wakewise.ui.reports.photo_model.page.match_figure", lambda _: None)
     for drawn in ("plan_and_side", "water_over_time", "thrust_strip", "overlaid_speeds"):

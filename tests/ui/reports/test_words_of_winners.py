@@ -28,7 +28,7 @@ def judged(low=5.0, high=15.0, trials=12, less=10.0, ours=0.9, theirs=1.0, rival
 def test_best_is_who_is_surely_better():
     """With enough pairs and an interval that holds no zero."""
     assert winner_text(judged()) == (
-        "wake-aware is best with 0.900 mm RMSE, 10 % (5 to 15) better than smooth; "
+        "wake-aware is best with 0.900 mm RMSE, 10 % (5 to 15) better than mpc-smooth; "
         "sure, the interval does not hold zero."
     )
 
@@ -45,14 +45,14 @@ def test_best_is_who_is_surely_better():
 def test_no_difference_is_shown_where_it_may_be_chance(one, why):
     """Both figures stand there, and nobody is called best."""
     said = winner_text(one)
-    assert said.startswith("no difference shown: wake-aware 0.900, smooth 1 mm RMSE") and said.endswith(f"{why}.")
+    assert said.startswith("no difference shown: wake-aware 0.900, mpc-smooth 1 mm RMSE") and said.endswith(f"{why}.")
     assert "best" not in said
 
 
 def test_few_pairs_that_agree_are_told_as_what_came_out():
     """An interval without zero of a few pairs: who came out better, and that it is not sure."""
     assert winner_text(judged(trials=3)) == (
-        "wake-aware came out better: wake-aware 0.900, smooth 1 mm RMSE, 10 % (5 to 15) apart; "
+        "wake-aware came out better: wake-aware 0.900, mpc-smooth 1 mm RMSE, 10 % (5 to 15) apart; "
         "3 pairs are too few to be sure."
     )
 
@@ -60,7 +60,8 @@ def test_few_pairs_that_agree_are_told_as_what_came_out():
 def test_the_price_of_less_wash_counts_silt():
     """Silt between camera and target stands beside energy; what is alike, or was not measured, is left out."""
     assert cost_text(replace(judged(), silt_ratio=1.81)) == (
-        "It takes as much energy as smooth. Silt between camera and target: 1.81 times that of smooth. No trial failed."
+        "It takes as much energy as mpc-smooth. Silt between camera and target: 1.81 times that of mpc-smooth. "
+        "No trial failed."
     )
     assert "Silt" not in cost_text(judged()) + cost_text(replace(judged(), silt_ratio=1.0))
     places = [
@@ -142,7 +143,7 @@ def test_code_between_backticks_is_code():
 
 def test_a_chip_has_its_colour_wherever_it_stands_and_scenes_follow_the_page(tmp_path):
     """The style does not ask in what it stands; a 3D scene is dark where the page is."""
-    style = resources.files("wakewise.ui.reports").joinpath("page.css").read_text(encoding="utf-8")
+    style = resources.files("wakewise.ui.reports").joinpath("templates", "page.css").read_text(encoding="utf-8")
     assert re.search(r"^\.chip i \{", style, re.MULTILINE) and ".legend .chip" not in style
     assert '<i style="background:#123456">' in legend_entry("#123456", "seen well")
     config = "window.__VISER_EMBED_CONFIG__={darkMode:false}"

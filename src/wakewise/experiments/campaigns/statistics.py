@@ -16,6 +16,7 @@ Arrays in, plain records out. Nothing is drawn but from a given seed.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, sqrt
@@ -100,9 +101,11 @@ def stratified_bootstrap(
         del axis  # the last: SciPy hands over row numbers of shape (draws, rows of a stratum)
         return statistic(values[np.atleast_2d(np.concatenate(picked, axis=-1))])
 
-    drawn = stats.bootstrap(
-        groups, drawn_statistic, n_resamples=resamples, vectorized=True, method="percentile", rng=seed
-    ).bootstrap_distribution
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)  # draws that are not finite are left out below
+        drawn = stats.bootstrap(
+            groups, drawn_statistic, n_resamples=resamples, vectorized=True, method="percentile", rng=seed
+        ).bootstrap_distribution
     drawn = drawn[np.isfinite(drawn)]
     if len(drawn) == 0:
         return value, None

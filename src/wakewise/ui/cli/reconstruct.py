@@ -30,8 +30,8 @@ from wakewise.ui.cli.reconstruct_options import (
     check_kinds,
     frames_of,
     look_first,
-    scale_lines,
     request_of,
+    scale_lines,
     write_outputs,
     write_report_of,
 )

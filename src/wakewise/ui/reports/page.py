@@ -64,9 +64,10 @@ def html(sections: Iterable[str]) -> Markup:
     return Markup("").join(map(Markup, sections))
 
 
-def whole_page(title: str, body: str) -> str:
-    """One HTML file with style and script inside; `body` is HTML."""
-    return environment().get_template("base.html").render(title=title, body=Markup(body))
+def whole_page(title: str, body: str, *, interactive: bool = True) -> str:
+    """One HTML file with style and, if `interactive`, script inside; `body` is HTML."""
+    page = environment().get_template("base.html")
+    return page.render(title=title, body=Markup(body), interactive=interactive)
 
 
 def framed_page(title: str, header: str, links: Sequence[tuple[str, str]], sections: Sequence[str], footer: str) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from html import escape
 from pathlib import Path
 
+from markupsafe import Markup
+
 from wakewise.core.files import write_text
-from wakewise.ui.reports.page import collapsible_section, section, tile, whole_page
+from wakewise.ui.reports.page import collapsible_section, framed_page, parts, section, template, tile
 from wakewise.ui.reports.svg_style import data_uri
 from wakewise.ui.reports.text import fixed, shown
 from wakewise.vision.reconstruction.quality.photo_preview import PhotoPreview, PhotoQuality
@@ -17,18 +18,12 @@ MOST_BAD = 0.1
 
 
 def write_look(look: PhotoPreview, thumbs: Mapping[str, bytes], path: Path, title: str) -> None:
-    """Write a look as one HTML file that opens with no network.
-
-    Parameters
-    ----------
-    thumbs : mapping
-        JPEG bytes by photo's name.
-    """
+    """Write the preview as one HTML file that opens without a network; `thumbs` are JPEG bytes by photo name."""
     write_text(path, look_page(look, thumbs, title))
 
 
 def look_page(look: PhotoPreview, thumbs: Mapping[str, bytes], title: str) -> str:
-    """HTML of a look."""
+    """HTML of the preview."""
     bad = [photo for photo in look.photos if photo.faults]
     good = [photo for photo in look.photos if not photo.faults]
     count = len(look.photos)
@@ -47,50 +42,40 @@ def look_page(look: PhotoPreview, thumbs: Mapping[str, bytes], title: str) -> st
     blurred = sum(any("blurred" in fault for fault in photo.faults) for photo in look.photos)
     light = sum(any("dark" in f or "burnt" in f for f in photo.faults) for photo in look.photos)
     first = look.photos[0]
-    tiles = (
-        tile("photographs", str(count), "", f"{shown(first.width)} x {shown(first.height)} px")
-        + tile("hang together", shown(together), f"of {count}", "by their overlap", "ok" if whole else "off")
-        + tile("partners each", str(partners), "", "photos that overlap it, median", "ok" if partners >= 4 else "off")
-        + tile("covered", fixed(covered, 0), "%", "of a photo is in two others, median")
-        + tile("blurred", str(blurred), "", "of them", "ok" if blurred == 0 else "off")
-        + tile("light", str(light), "", "too dark or burnt out", "ok" if light == 0 else "off")
-    )
-    advice = "".join(f"<li>{escape(line)}</li>" for line in look.advice)
-    again = f"<ul>{advice}</ul>" if advice else "<p>Nothing stands out. Go on.</p>"
-    others = ", ".join(f"{shown(n)} of {kind}" for kind, n in look.passed_over.items())
-    if others:
-        again += f"<p>Files that are not read: {escape(others)}.</p>"
+    tiles = [
+        tile("photographs", str(count), "", f"{shown(first.width)} x {shown(first.height)} px"),
+        tile("hang together", shown(together), f"of {count}", "by their overlap", "ok" if whole else "off"),
+        tile("partners each", str(partners), "", "photos that overlap it, median", "ok" if partners >= 4 else "off"),
+        tile("covered", fixed(covered, 0), "%", "of a photo is in two others, median"),
+        tile("blurred", str(blurred), "", "of them", "ok" if blurred == 0 else "off"),
+        tile("light", str(light), "", "too dark or burnt out", "ok" if light == 0 else "off"),
+    ]
+    macros = template("photos.html")
     sheets = ""
-    if bad:
-        sheets += collapsible_section("To look at again", _sheet(bad, thumbs), f"{len(bad)} photographs")
-    if good:
-        sheets += collapsible_section("Nothing stands out", _sheet(good, thumbs), f"{len(good)} photographs")
-    body = (
-        f'<header class="top"><p class="eyebrow"><span>photographs <b>{escape(title)}</b></span></p>'
-        f'<h1 class="{state}"><span class="mark"></span>{escape(headline)}</h1><dl class="tiles">{tiles}</dl></header>'
-        '<main>'
-        + section("again", "What to shoot again", "Said of small copies, matched quickly: a model may do better or "
-                  "worse.", again)
-        + section("photos", "Every photograph", "Sharpness is in percent of the usual one of this set, and shared "
-                  "what two or more other photographs show too.", sheets)
-        + f"</main><footer><p>{shown(look.pairs)} pairs were compared.</p></footer>"
-    )  # fmt: skip
-    return whole_page(f"{title} · a look", body)
+    for name, photos in (("To look at again", bad), ("Nothing stands out", good)):
+        if photos:
+            sheet = parts().sheet([_photo(photo, thumbs[photo.name]) for photo in photos])
+            sheets += collapsible_section(name, sheet, f"{len(photos)} photographs")
+    others = ", ".join(f"{shown(n)} of {kind}" for kind, n in look.passed_over.items())
+    again_lead = "Said of small copies, matched quickly: a model may do better or worse."
+    photos_lead = (
+        "Sharpness is in percent of the usual one of this set, and shared what two or more other photographs show too."
+    )
+    sections = (
+        section("again", "What to shoot again", again_lead, macros.advice(look.advice, others)),
+        section("photos", "Every photograph", photos_lead, sheets),
+    )
+    header = parts().header([("photographs", title)], headline, state, tiles=[Markup(one) for one in tiles])
+    return framed_page(f"{title} · a look", header, (), sections, macros.preview_footer(shown(look.pairs)))
 
 
-def _sheet(photos: list[PhotoQuality], thumbs: Mapping[str, bytes]) -> str:
-    return f'<div class="sheet">{"".join(_photo(photo, thumbs[photo.name]) for photo in photos)}</div>'
-
-
-def _photo(photo: PhotoQuality, thumb: bytes) -> str:
-    source = data_uri(thumb, "image/jpeg")
-    short = photo.faults[0].split(":")[0] if photo.faults else ""
-    tag = f'<span class="tag worst">{escape(short)}</span>' if short else ""
+def _photo(photo: PhotoQuality, thumb: bytes) -> Markup:
+    tag = photo.faults[0].split(":")[0] if photo.faults else ""
     best = (
         f"best with {photo.partners[0][0]} ({shown(photo.partners[0][1])} matches)" if photo.partners else "no partner"
     )
     sharp, shared = fixed(photo.sharpness_pct, 0), fixed(photo.covered_pct, 0)
-    said = [
+    facts = [
         photo.name,
         f"sharpness {sharp} %",
         f"mean grey {fixed(photo.mean, 0)}",
@@ -99,13 +84,7 @@ def _photo(photo: PhotoQuality, thumb: bytes) -> str:
         f"{shared} % shared",
         *photo.faults,
     ]
-    facts = (
-        f"<b>{escape(photo.name)}</b><span>sharp {sharp} %</span>"
-        f"<span>{len(photo.partners)} partners</span><span>shared {shared} %</span>"
-    )
-    words = escape(" · ".join(said), quote=True)
-    return (
-        f'<button type="button" class="photo{" worst" if photo.faults else ""}" data-facts="{words}">'
-        f'<img src="{source}" alt="{escape(photo.name, quote=True)}">{tag}'
-        f'<span class="facts">{facts}</span></button>'
-    )
+    details = template("photos.html").preview_details(photo, sharp, shared)
+    source, kind = data_uri(thumb, "image/jpeg"), "worst" if tag else ""
+    made: Markup = parts().photo(source, photo.name, " · ".join(facts), kind, tag, details)
+    return made

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import base64
-from html import escape
 from pathlib import Path
 
 import cv2
 import numpy as np
 import trimesh
+from markupsafe import Markup
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -20,7 +20,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file, write_bytes, write_text
 from wakewise.scene.targets import Fragility, Region, Target
 from wakewise.scene.targets.fragility import FRAGILE_FROM, SHARP_PER_M, THIN_M
-from wakewise.ui.reports.page import plot, tile, whole_page
+from wakewise.ui.reports.page import framed_page, plot, section, template, tile
 from wakewise.ui.reports.svg_style import INK, LINE, MUTED, SLATE, TEAL, new_figure, style_axes
 from wakewise.ui.reports.trial import TrialMesh
 from wakewise.ui.reports.views import ViewBounds, Viewpoint, draw_surface
@@ -154,12 +154,12 @@ def target_page(target: Target, delicacy: Fragility, region: Region) -> str:
     mesh = target.mesh
     length, width, height = 1e3 * mesh.extent_m
     middle = 1e3 * float(np.median(delicacy.thickness_m))
-    tiles = "".join((
+    tiles = (
         tile("size", f"{length:.0f}×{width:.0f}×{height:.0f}", "mm", "box round the mesh, with what is buried"),
         tile("surface", f"{1e4 * mesh.face_areas_m2.sum():.0f}", "cm²", f"{len(mesh.faces):,} triangles"),
         tile("thickness", f"{middle:.1f}", "mm", "median over the vertices"),
         tile("delicate", f"{100 * delicacy.share(mesh):.0f}", "%", f"of the surface scores {FRAGILE_FROM:g} or more"),
-    ))  # fmt: skip
+    )
     thin, sharp = 1e3 * np.array(THIN_M), SHARP_PER_M
     seen = plot(
         picture(target, delicacy),
@@ -179,16 +179,13 @@ def target_page(target: Target, delicacy: Fragility, region: Region) -> str:
         f"{few} points on the surface and {len(region.weights) - few} in the water stand for all of it. Area of a dot: "
         "its weight in the disturbance D. Grey: the target.",
     )
-    body = (
-        f'<header class="top"><p class="eyebrow"><span>target <b>{escape(target.name)}</b></span></p>'
-        f'<h1>What is delicate, and what water must stay still</h1><dl class="tiles" '
-        f'style="grid-template-columns:repeat(auto-fit,minmax(13rem,1fr))">{tiles}</dl></header><main>'
-        f'<section><h2>Delicate features</h2><p class="lead">Dark parts are thin, pointed or marked; '
-        f"pale parts are robust.</p>{seen}{shares}"
-        f'</section><section><h2>Region</h2><p class="lead">The disturbance is summed over these points.</p>{points}'
-        "</section></main><footer>Made by Wakewise.</footer>"
+    features_lead = "Dark parts are thin, pointed or marked; pale parts are robust."
+    sections = (
+        section("", "Delicate features", features_lead, seen + shares),
+        section("", "Region", "The disturbance is summed over these points.", points),
     )
-    return whole_page(f"{target.name} · Wakewise", body)
+    header = template("target.html").header(target.name, [Markup(one) for one in tiles])
+    return framed_page(f"{target.name} · Wakewise", header, (), sections, "Made by Wakewise.")
 
 
 def _kept(target: Target) -> BoolArray:
