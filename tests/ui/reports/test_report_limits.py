@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from html import escape
 from pathlib import Path
 
 import pytest
 import yaml
+from markupsafe import escape
 
 from wakewise.operation.worlds.makers import WORLDS
 from wakewise.simulation.tank.validation_limits import ABSENT, LIMITS

@@ -52,7 +52,7 @@ def scale_tile(figures: dict[str, Any]) -> str:
     bars, fixes, scale = figures.get("scale_bars"), figures.get("scale_fixes"), figures.get("scale")
     if bars is not None and bars["used"]:
         count = len(bars["bars"])
-        return tile("scale", f"± {number(bars['uncertainty_pct'], 2)}", "%", f"by {count} bar{'s' * (count > 1)}")
+        return tile("scale", f"± {number(bars['uncertainty_pct'], 2)}", "%", f"by {_bars(count)}")
     if scale is not None:
         rms = figures.get("cameras_rmse_mm")
         if rms is None:
@@ -102,7 +102,7 @@ def _by_fixes(fixes: dict[str, Any]) -> list[tuple[str, str]]:
 
 def _by_bars(bars: dict[str, Any]) -> tuple[str, str]:
     lead = (
-        f"From {len(bars['bars'])} bars between coded targets, uncertain by {number(bars['uncertainty_pct'], 2)} %."
+        f"From {_bars(len(bars['bars']))} between coded targets, uncertain by {number(bars['uncertainty_pct'], 2)} %."
         if bars["used"]
         else f"From reference cameras; by the bars, lengths are {fixed(bars['model_off_pct'], 3, sign=True)} % off."
     )
@@ -133,6 +133,10 @@ def _by_bars(bars: dict[str, Any]) -> tuple[str, str]:
         table = parts().table("tnnnt", ("target", "photos", "error", "side", "middle, m"), targets)
         content += collapsible_section(f"Targets ({bars['family']})", table, f"{len(targets)}")
     return lead, content
+
+
+def _bars(count: int) -> str:
+    return f"{count} bar{'s' * (count > 1)}"
 
 
 def _mean(values: Sequence[float | None] | None) -> float | None:
@@ -403,7 +407,7 @@ def _photos(figures: dict[str, Any], facts: ModelStatistics) -> str:
             best = left.get(photo.name)
             found = best is not None and best["partner"]
             place = f"none; {_count(best['matches'])} matches with {best['partner']}" if best and found else "none"
-        error = f"{fixed(photo.error_px, 2)} px"
+        error = NONE if photo.error_px is None else f"{fixed(photo.error_px, 2)} px"
         cells = (photo.name, place, _count(photo.features), _count(photo.observations), error, str(partners),
                  f"{fixed(photo.focal_px, 0)} px")  # fmt: skip
         rows.append(cells)
