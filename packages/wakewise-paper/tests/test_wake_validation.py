@@ -94,7 +94,7 @@ def test_profile_and_decay_are_cuts_of_the_samples(quick):
 
 def test_virtual_piv_measures_a_law_it_was_not_told():
     """The propeller law through tracers, camera and correlation comes back within 3 % of its axis speed (two pairs)."""
-    samples = piv_samples(_Calm(), (1.0,), 1, np.random.default_rng(0), "in-house")
+    samples = piv_samples(_Calm(), (1.0,), 1, np.random.default_rng(0))
     truth = FUEHRER_ROEMISCH.mean_velocity(np.column_stack([samples.x_m, samples.r_m, np.zeros(len(samples))]), 1.0)[
         :, 0
     ]
