@@ -249,7 +249,7 @@ def ardusub(
     region: Region,
     wake: WakeModel,
     settings: ControlSettings,
-    around: Surroundings | None = None,  # noqa: ARG001
+    _: Surroundings | None = None,
 ) -> Pipeline:
     """`ardusub`: position hold as shipped; the wake model is only asked what D the thrusts cause.
 

@@ -89,17 +89,9 @@ class Hinge:
     def with_offset(self, goal: Goal, offset_rad: float, rate_rad_s: float = 0.0) -> Goal:
         """The goal with another attitude and tilt, the camera's pose and motion as they were.
 
-        Parameters
-        ----------
-        goal : Goal
-        offset_rad, rate_rad_s : float
-            By how much the joint stands above the goal's tilt, and how fast that grows.
-
-        Returns
-        -------
-        Goal
-            Its twist is the derivative of its pose: the old one seen from the new frame, and the turn of the body
-            about the hinge, against the joint's.
+        `offset_rad` is by how much the joint stands above the goal's tilt, `rate_rad_s` how fast that grows. The new
+        goal's twist is the derivative of its pose: the old one seen from the new frame, and the turn of the body about
+        the hinge, against the joint's.
         """
         if offset_rad == 0.0 and rate_rad_s == 0.0:
             return goal
@@ -186,11 +178,7 @@ def select(costs: Sequence[AttitudeCost], own: int, present: int) -> int:
     Thrusts are known well, what they do to the water roughly: a factor of two in cost decides, below that the power.
     The present one stays while it is about as good by both.
 
-    Parameters
-    ----------
-    costs : sequence of AttitudeCost
-    own, present : int
-        Numbers of the mission's own attitude and of the present one.
+    `own` and `present` are the numbers of the mission's own attitude and of the present one.
     """
     most = MOST_POWER * costs[own].power_W
     usable = [k for k, each in enumerate(costs) if each.power_W <= most and np.isfinite(each.cost)]

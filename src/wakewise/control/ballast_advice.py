@@ -114,21 +114,12 @@ def trim_advice(
 ) -> TrimAdvice:
     """Ballast of least effort that is heavy in no case and not worse by D, and the one of least D beside it.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    poses : tuple of Pose
-        X_WB of the mission.
-    region, wake, settings
-        As a controller has them; with the bed mechanism, points on the bed count.
-    net_weight_N : float
-        Weight less buoyancy that is known but not in the vehicle's numbers, positive: heavy.
-    unknown_N : float
-        The trim error, beside that, lies between minus and plus this; its ends and the middle are looked at.
-    current_N : ndarray, shape (3,), optional
-        Steady force of the current on the vehicle, in W.
-    floats_N, shifts_mm : tuple of float
-        Net buoyancies and shifts of the centre of gravity to compare; the vehicle's own are added.
+    - `poses`: X_WB of the mission. `region`, `wake` and `settings` are as a controller has them; with `include_bed`,
+      points on the bed count.
+    - `net_weight_N`: weight less buoyancy that is known but not in the vehicle's numbers, positive: heavy.
+    - `unknown_N`: the trim error beside that lies between minus and plus this; its ends and the middle are compared.
+    - `current_N`, shape (3,): steady force of the current on the vehicle, in W.
+    - `floats_N`, `shifts_mm`: net buoyancies and shifts of the centre of gravity to compare, beside the vehicle's own.
 
     Raises
     ------

@@ -45,30 +45,16 @@ _LOOKS = 200
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HoverTrim:
-    """What a hover said of the trim, and what follows.
+    """What a hover said of the trim, and what follows."""
 
-    Parameters
-    ----------
-    weight_N, weight_std_N : float
-        Weight less buoyancy that nobody believed, positive: heavy.
-    moment_Nm, moment_std_Nm : ndarray, shape (2,)
-        Weight times place, forward and to starboard of the middle (the body's origin).
-    own_N : float
-        Net buoyancy of the vehicle as believed.
-    light_N : float
-        Net buoyancy that is wanted.
-    p_BB_m, size_m : ndarray, shape (3,)
-        The believed centre of buoyancy and the hull's box.
-    """
-
-    weight_N: float
+    weight_N: float  # weight less buoyancy that nobody believed, positive: heavy
     weight_std_N: float
-    moment_Nm: Array
-    moment_std_Nm: Array
-    own_N: float
-    light_N: float
-    p_BB_m: Array
-    size_m: Array
+    moment_Nm: Array  # shape (2,): weight times place, forward and to starboard of the body's origin
+    moment_std_Nm: Array  # shape (2,)
+    own_N: float  # net buoyancy of the vehicle as believed
+    light_N: float  # net buoyancy that is wanted
+    p_BB_m: Array  # shape (3,): believed centre of buoyancy
+    size_m: Array  # shape (3,): the hull's box
 
     def __post_init__(self) -> None:
         freeze(self, moment_Nm=(2,), moment_std_Nm=(2,), p_BB_m=(3,), size_m=(3,))
@@ -135,18 +121,10 @@ class HoverTrim:
 def hover_trim(vehicle: Vehicle, q_WB: Array, loads_B: Array, thrusts_N: Array, light_N: float = LIGHT_N) -> HoverTrim:
     """Net weight and its place from the estimates of a hover.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        As it was believed to be.
-    q_WB : ndarray, shape (n, 4)
-        Estimated attitudes.
-    loads_B : ndarray, shape (n, 6)
-        Estimated loads, in N and N m.
-    thrusts_N : ndarray, shape (n, m)
-        Commanded thrusts; how well their gains are known is the larger part of the uncertainty.
-    light_N : float
-        Net buoyancy that is wanted.
+    - `q_WB`, shape (n, 4): estimated attitudes. `loads_B`, shape (n, 6): estimated loads, in N and N m.
+    - `thrusts_N`, shape (n, m): commanded thrusts; how well their gains are known is the larger part of the
+      uncertainty.
+    - `light_N`: net buoyancy that is wanted.
 
     Raises
     ------

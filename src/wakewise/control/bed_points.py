@@ -20,17 +20,8 @@ GOLDEN_RAD = float(np.pi * (3.0 - np.sqrt(5.0)))
 def with_bed_points(region: Region, settings: AllocationSettings, bed_z_m: float | None = None) -> Region:
     """The region and, if `include_bed` is on, a disk of points just above the bed around the target's foot.
 
-    Parameters
-    ----------
-    region : Region
-    settings : AllocationSettings
-    bed_z_m : float, optional
-        Depth of the bed; the lowest point of the region where it is not known.
-
-    Returns
-    -------
-    Region
-        The weights of the bed points add up to `BED_WEIGHT` times those of the region.
+    `bed_z_m` is the bed's depth; None: the lowest point of the region. The weights of the bed points add up to
+    `BED_WEIGHT` times those of the region.
     """
     if not settings.include_bed:
         return region

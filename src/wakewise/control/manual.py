@@ -134,7 +134,7 @@ def manual(
     region: Region,
     wake: WakeModel,
     settings: ControlSettings,
-    around: Surroundings | None = None,  # noqa: ARG001
+    _: Surroundings | None = None,
 ) -> Pipeline:
     """`manual`: the person whom the trial's seed draws; the wake model is only asked what D the thrusts cause."""
     pid, layout = make_pid(vehicle, settings), vehicle_layout(vehicle)

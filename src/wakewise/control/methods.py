@@ -58,26 +58,13 @@ that of `mpc` (docs/research-log/0036)."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ControlTask:
-    """What a controller is made for; a method from outside is made by a callable that takes this alone.
+    """What a controller is made for; a method from outside is made by a callable that takes this alone."""
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        As it is believed to be.
-    region : Region
-        The water to spare.
-    wake : WakeModel
-        What is believed of the jets.
-    settings : ControlSettings
-    surroundings : Surroundings or None
-        What to keep clear of.
-    """
-
-    vehicle: Vehicle
-    region: Region
-    wake: WakeModel
+    vehicle: Vehicle  # as it is believed to be
+    region: Region  # the water to spare
+    wake: WakeModel  # what is believed of the jets
     settings: ControlSettings
-    surroundings: Surroundings | None = None
+    surroundings: Surroundings | None = None  # what to keep clear of
 
 
 def tracking(
@@ -143,7 +130,7 @@ def mpc(
 def linear(
     vehicle: Vehicle,
     region: Region,
-    wake: WakeModel,  # noqa: ARG001
+    _: WakeModel,
     settings: ControlSettings,
     around: Surroundings | None = None,
 ) -> Pipeline:

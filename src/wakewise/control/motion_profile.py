@@ -12,13 +12,7 @@ def profile_step(
 
     The rate aimed at is the one from which the rest of the way just suffices to stop.
 
-    Parameters
-    ----------
-    value, rate, target : float
-        In any unit, and per second.
-    dt_s : float
-    max_rate, max_change : float
-        Largest rate, and the largest change of it per second.
+    `max_rate` is the largest rate, `max_change` the largest change of it per second; values are in any unit.
     """
     left = target - value
     most = max_change * dt_s

@@ -233,23 +233,10 @@ def steer(
 ) -> tuple[OperatorModelState, Array]:
     """One step of a person at the sticks.
 
-    Parameters
-    ----------
-    person : OperatorModel
-    state : OperatorModelState
-    dt_s : float
-    view : CameraMotion
-        The camera as it is now; the person sees it later.
-    wish : CameraMotion
-        Where the person would like to have it.
-    watch_W_m : ndarray, shape (3,), optional
-        What the camera is to be kept on; without it the wished heading is.
-
-    Returns
-    -------
-    tuple
-        The next state, and what the sticks ask for, shape (4,): N, m/s, rad/s as `StickDeflection` says, in the
-        vehicle's level frame (forward along its heading).
+    `view` is the camera as it is now, which the person sees later, `wish` where the person would like to have it, and
+    `watch_W_m`, shape (3,), what the camera is to be kept on; None: the wished heading. Gives the next state, and what
+    the sticks ask for, shape (4,): N, m/s, rad/s as `StickDeflection` says, in the vehicle's level frame (forward along
+    its heading).
     """
     late, later = round((person.delay_s - NEUROMUSCULAR_S) / dt_s), round(person.video_s / dt_s)
     seen = np.concatenate([view.row[None], state.seen])[: late + later + 1]

@@ -202,27 +202,11 @@ def _turn(q: Array, v: Array, inverse: bool) -> Array:
 
 
 @njit
-def _pid(  # type: ignore[no-untyped-def]
-    p,
-    q,
-    nu,
-    goal_p,
-    goal_q,
-    goal_nu,
-    force_W,
-    moment_B,
-    kp,
-    kd,
-    ki,
-    limit,
-    dt_s,
-    saturated,
-    feed_G,
-    wrench,
-    twist_B,
-    new_force_W,
-    new_moment_B,
-):
+def _pid(
+    p: Array, q: Array, nu: Array, goal_p: Array, goal_q: Array, goal_nu: Array, force_W: Array, moment_B: Array,
+    kp: Array, kd: Array, ki: Array, limit: Array, dt_s: float, saturated: bool, feed_G: Array, wrench: Array,
+    twist_B: Array, new_force_W: Array, new_moment_B: Array,
+) -> None:  # fmt: skip
     # q_BG = conj(q_WB) q_WG: the goal's attitude as seen from B, shorter way round.
     w = q[0] * goal_q[0] + q[1] * goal_q[1] + q[2] * goal_q[2] + q[3] * goal_q[3]
     x = q[0] * goal_q[1] - q[1] * goal_q[0] - q[2] * goal_q[3] + q[3] * goal_q[2]

@@ -149,12 +149,14 @@ class MotionStage:
         """Decide the wrench for the next `dt_s` seconds."""
         raise NotImplementedError
 
-    def allocated(self, state: PipelineState, found: Allocation, dt_s: float) -> PipelineState:  # noqa: ARG002
+    def allocated(self, state: PipelineState, found: Allocation, dt_s: float) -> PipelineState:
         """Take in how the stage's wrench was allocated."""
+        del dt_s
         return replace(state, saturated=found.scale < FULL)
 
-    def expected(self, state: PipelineState) -> Array | None:  # noqa: ARG002
+    def expected(self, state: PipelineState) -> Array | None:
         """State that the stage's plan expects now, shape (13,); None where there is no plan."""
+        del state
         return None
 
 

@@ -89,7 +89,10 @@ def pulsed(
 
 
 @njit
-def _pulses(running, owed, wished, dt, shortest, least_forward, least_reverse, levels):  # type: ignore[no-untyped-def]
+def _pulses(
+    running: Array, owed: Array, wished: Array, dt: float, shortest: Array, least_forward: float, least_reverse: float,
+    levels: Array,
+) -> tuple[Array, Array, Array]:  # fmt: skip
     """Which way each thruster runs, what it owes, and its thrust, shape (n,) each; arguments as for `pulsed`."""
     n = wished.size
     ways, owes, thrusts = np.zeros(n), np.empty(n), np.zeros(n)

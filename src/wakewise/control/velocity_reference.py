@@ -63,17 +63,9 @@ def advance_reference(place_W_m: Array, velocity_W_m_s: Array, estimate: BodySta
 def goal_of(command: VelocityCommand, place_W_m: Array) -> Goal:
     """Goal at a commanded place, moving as the operator asks, its forward axis on the point to watch.
 
-    Parameters
-    ----------
-    command : VelocityCommand
-        Without a point to watch the vehicle is level with its heading.
-    place_W_m : ndarray, shape (3,)
-        See `advance_reference`.
-
-    Returns
-    -------
-    Goal
-        Its twist, in its own body frame: the commanded velocity, and the turn that keeps the point in view.
+    `place_W_m`, shape (3,), is that of `advance_reference`. Without a point to watch the vehicle is level with its
+    heading. The goal's twist, in its own body frame, is the commanded velocity and the turn that keeps the point in
+    view.
 
     Raises
     ------

@@ -28,7 +28,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.jit.njit import assign, njit
 from wakewise.robot.vehicles.kernels import rk4_jacobian_kernel, rk4_kernel
-from wakewise.wake.plan_disturbance import stage_disturbance
+from wakewise.wake.plan_disturbance import PackedWakeModel, WakeScratch, stage_disturbance
 
 ROUNDED = 0.05
 """Sine of the tilt within which the corner nearest to a plane changes: |c| is rounded to sqrt(c^2 + 0.05^2), which
@@ -106,9 +106,10 @@ def sphere_gap(p: Array, R: Array, half: Array, sphere: Array, slope: Array) -> 
 
 
 @njit(apart=True)
-def add_barrier(  # type: ignore[no-untyped-def]
-    p, R, half, planes, spheres, reach, least, weight, gradient, hessian
-):
+def add_barrier(
+    p: Array, R: Array, half: Array, planes: Array, spheres: Array, reach: float, least: float, weight: float,
+    gradient: Array, hessian: Array,
+) -> tuple[float, float]:  # fmt: skip
     """Add weight phi of every clearance to the first six of `gradient` and `hessian` (Gauss-Newton).
 
     Returns the weighted sum of phi and the least clearance.
@@ -227,7 +228,7 @@ def plan_work(stages: int, thrusters: int) -> PlanWork:
 
 
 @njit
-def rotation(state, R):  # type: ignore[no-untyped-def]
+def rotation(state: Array, R: Array) -> None:
     """R_WB of a state's quaternion."""
     w, x, y, z = state[3], state[4], state[5], state[6]
     R[0, 0], R[0, 1], R[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
@@ -236,7 +237,7 @@ def rotation(state, R):  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True)
-def attitude_cost(state, wished, weight, tolerance, g, H):  # type: ignore[no-untyped-def]
+def attitude_cost(state: Array, wished: Array, weight: float, tolerance: float, g: Array, H: Array) -> float:
     """Add weight max(0, |e| - tolerance)^2, e = 2 vec(q_ref^-1 q), to gradient g and Gauss-Newton H by the turn."""
     w, x, y, z = state[3], state[4], state[5], state[6]
     a, b, c, d = wished[3], -wished[4], -wished[5], -wished[6]
@@ -274,7 +275,10 @@ def attitude_cost(state, wished, weight, tolerance, g, H):  # type: ignore[no-un
 
 
 @njit
-def horizon(table, wake, scratch, case, U, work, slopes):  # type: ignore[no-untyped-def]
+def horizon(
+    table: PlanTable, wake: PackedWakeModel, scratch: WakeScratch, case: PlanCase, U: Array, work: PlanWork,
+    slopes: bool,
+) -> float:  # fmt: skip
     """Cost of commands U, (N, n); fills `work` (derivatives only with `slopes`). For `parts` see `CLOSEST`."""
     N, n = U.shape
     h, weights = table.stage_s, table.weights
@@ -380,7 +384,7 @@ def horizon(table, wake, scratch, case, U, work, slopes):  # type: ignore[no-unt
 
 
 @njit(inline="always")
-def command_cost(table, before, U):  # type: ignore[no-untyped-def]
+def command_cost(table: PlanTable, before: Array, U: Array) -> float:
     """Effort, change and excess of rate of commands U, (N, n), after `before`, (n,)."""
     N, n = U.shape
     weights, total = table.weights, 0.0
@@ -394,7 +398,7 @@ def command_cost(table, before, U):  # type: ignore[no-untyped-def]
 
 
 @njit
-def set_reach(table, case):  # type: ignore[no-untyped-def]
+def set_reach(table: PlanTable, case: PlanCase) -> None:
     """Set the barrier's reach: where the reference itself is nearer than the settings' reach nothing is felt there.
 
     Otherwise a mission that was checked for clearance would be pushed off its path all along a low orbit. It never

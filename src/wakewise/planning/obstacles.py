@@ -19,14 +19,9 @@ TANK_FACES = ("the south wall", "the west wall", "the water surface", "the north
 class Surroundings:
     """What the hull must not touch.
 
-    Parameters
-    ----------
-    planes : ndarray, shape (n, 4)
-        Unit normal into the free water and offset: free where normal . p > offset.
-    spheres : ndarray, shape (n, 4)
-        Centre in W and radius: the target and other obstacles.
-    names : tuple of str
-        What planes and spheres are called, in this order; numbers for those that have none.
+    - `planes`, shape (n, 4): unit normal into the free water and offset: free where normal . p > offset.
+    - `spheres`, shape (n, 4): centre in W and radius, of the target and other obstacles.
+    - `names`: of planes and spheres, in this order; those that have none are called by number.
     """
 
     planes: Array = field(default_factory=lambda: np.zeros((0, 4)))

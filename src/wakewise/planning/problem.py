@@ -47,25 +47,13 @@ EDGE_DEG = 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class PlanTerms:
-    """What a plan weighs besides tracking, and when it is good enough: not for a scenario to set, or set elsewhere.
+    """What a plan weighs besides tracking, and when it is good enough: not for a scenario to set, or set elsewhere."""
 
-    Parameters
-    ----------
-    w_disturbance, w_effort : float
-        Of `ControlSettings`, which the allocators of one instant share.
-    superposition : "coherent" or "incoherent"
-        How jets add up.
-    tolerance : float
-        Relative decrease that ends the iterations.
-    second_start_every : int
-        Plans between tries of another sign pattern of the spare thrusts; 0 for none.
-    """
-
-    w_disturbance: float = DISTURBANCE_WEIGHT
+    w_disturbance: float = DISTURBANCE_WEIGHT  # of `ControlSettings`, shared with the allocators
     w_effort: float = EFFORT_WEIGHT
-    superposition: Superposition = "coherent"
-    tolerance: float = 1e-3
-    second_start_every: int = 10
+    superposition: Superposition = "coherent"  # how jets add up
+    tolerance: float = 1e-3  # relative decrease that ends the iterations
+    second_start_every: int = 10  # plans between tries of another sign pattern of the spare thrusts; 0: none
 
     def __post_init__(self) -> None:
         one_of(self.superposition, SUPERPOSITIONS, "superposition")
@@ -97,31 +85,17 @@ class PlanSettings(Settings):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlanProblem:
-    """One question to a planner.
+    """One question to a planner."""
 
-    Parameters
-    ----------
-    state : ndarray, shape (13,)
-        Position, quaternion (w, x, y, z) and twist now.
-    thrusts_N, command_N : ndarray, shape (n,)
-        What the thrusters give now, and what they were last told.
-    force_W_N, moment_B_Nm : ndarray, shape (3,)
-        Wrench that the vehicle's model does not explain; its force keeps its direction in the world.
-    current_W_m_s : ndarray, shape (3,)
-    reference : ndarray, shape (N + 1, 13)
-        Wished states at the ends of the stages, the first one for now.
-    tracking_weight_scale : float
-        What the weights of tracking (`w_track`, `w_path`, `w_twist`) are multiplied with, more than 0.
-    """
-
-    state: Array
-    thrusts_N: Array
-    command_N: Array
-    reference: Array
+    state: Array  # shape (13,): position, quaternion (w, x, y, z) and twist now
+    thrusts_N: Array  # shape (n,): what the thrusters give now
+    command_N: Array  # shape (n,): what they were last told
+    reference: Array  # shape (N + 1, 13): wished states at the ends of the stages, the first one for now
+    # Wrench that the vehicle's model does not explain, shape (3,) each; its force keeps its direction in the world.
     force_W_N: Array = field(default_factory=lambda: np.zeros(3))
     moment_B_Nm: Array = field(default_factory=lambda: np.zeros(3))
     current_W_m_s: Array = field(default_factory=lambda: np.zeros(3))
-    tracking_weight_scale: float = 1.0
+    tracking_weight_scale: float = 1.0  # factor of `w_track`, `w_path` and `w_twist`, more than 0
 
     def __post_init__(self) -> None:
         n = len(self.thrusts_N)
@@ -141,34 +115,17 @@ class PlanProblem:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Horizon:
-    """A plan.
+    """A plan."""
 
-    Parameters
-    ----------
-    states : ndarray, shape (N + 1, 13)
-        Predicted states, the first one being that of the problem.
-    commands_N, thrusts_N : ndarray, shape (N, n)
-        What to tell the thrusters, and the mean thrust that they give in each stage.
-    cost, disturbance : float
-        The objective, and the mean of D over the horizon ((m/s)^2), both with rounded roots and edges.
-    iterations : int
-    converged : bool
-        The last step promised less than the tolerance (one iteration only: its QP was solved and the cost fell).
-    solver : str
-        What solved the last QP.
-    curvature : ndarray, shape (n, n)
-        Curvature of the cost by the thrusts of the first stage, for small corrections between plans.
-    """
-
-    states: Array
-    commands_N: Array
-    thrusts_N: Array
-    cost: float
-    disturbance: float
+    states: Array  # shape (N + 1, 13): predicted states, the first one being that of the problem
+    commands_N: Array  # shape (N, n): what to tell the thrusters
+    thrusts_N: Array  # shape (N, n): the mean thrust that they give in each stage
+    cost: float  # the objective, with rounded roots and edges
+    disturbance: float  # mean of D over the horizon, (m/s)^2, with rounded roots and edges
     iterations: int
-    converged: bool
-    solver: str
-    curvature: Array
+    converged: bool  # the last step promised less than the tolerance (one iteration: QP solved and the cost fell)
+    solver: str  # what solved the last QP
+    curvature: Array  # shape (n, n): of the cost by the thrusts of the first stage, for corrections between plans
 
 
 def state_of(body: BodyState) -> Array:
@@ -191,18 +148,9 @@ with this time constant, as a change does that may end at any moment."""
 def reference_of(goal: Goal, stages: int, stage_s: float, change_B: Array | None = None) -> Array:
     """Wished states at the ends of the stages: position, quaternion and twist.
 
-    Parameters
-    ----------
-    goal : Goal
-        Of now; its twist is carried on in its own body frame.
-    stages, stage_s : int, float
-    change_B : ndarray, shape (6,), optional
-        How fast the goal's twist changes, in its body frame; it fades with `RAMP_S`. None: not at all.
-
-    Returns
-    -------
-    ndarray, shape (stages + 1, 13)
-        The first row is the goal itself.
+    The goal's twist is carried on in its own body frame over `stages` of `stage_s`. `change_B`, shape (6,), is how fast
+    it changes, in the body frame; it fades with `RAMP_S` (None: no change). Gives shape (stages + 1, 13), the first row
+    the goal itself.
     """
     reference = np.empty((stages + 1, 13))
     change = np.zeros(6) if change_B is None else np.asarray(change_B, dtype=np.float64)
@@ -211,7 +159,7 @@ def reference_of(goal: Goal, stages: int, stage_s: float, change_B: Array | None
 
 
 @njit
-def _carry_on(p, q, nu, change, stage_s, out):  # type: ignore[no-untyped-def]
+def _carry_on(p: Array, q: Array, nu: Array, change: Array, stage_s: float, out: Array) -> None:
     assign(out[0, :3], p)
     assign(out[0, 3:7], q)
     assign(out[0, 7:], nu)
@@ -247,7 +195,7 @@ def _carry_on(p, q, nu, change, stage_s, out):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _times(a, b, out):  # type: ignore[no-untyped-def]
+def _times(a: Array, b: Array, out: Array) -> None:
     """Quaternion product."""
     out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
     out[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]

@@ -28,9 +28,9 @@ import daqp
 import numpy as np
 import piqp
 
-from wakewise.core.arrays import Array
+from wakewise.core.arrays import Array, IntArray
 from wakewise.core.jit.njit import assign, njit
-from wakewise.planning.kernels import RATE_N, RHO, W_CHANGE, W_EFFORT, W_TWIST
+from wakewise.planning.kernels import RATE_N, RHO, W_CHANGE, W_EFFORT, W_TWIST, PlanTable, PlanWork
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 MANY_ACTIVE = 60
@@ -41,7 +41,7 @@ HINGE_ROUNDS = 8
 
 
 @njit(fastmath=FAST)
-def factor(H, L):  # type: ignore[no-untyped-def]
+def factor(H: Array, L: Array) -> bool:
     """L, lower triangular, with H = L'L, from the lower triangle of H; False if H is not positive definite.
 
     Variables are eliminated from the last to the first, so that all work runs along rows of the lower triangle.
@@ -88,7 +88,7 @@ def factor(H, L):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=FAST)
-def newton(L, g, z):  # type: ignore[no-untyped-def]
+def newton(L: Array, g: Array, z: Array) -> None:
     """Z = -H^-1 g from H = L'L."""
     size = g.shape[0]
     for i in range(size):
@@ -106,7 +106,7 @@ def newton(L, g, z):  # type: ignore[no-untyped-def]
 
 
 @njit
-def mirror(H, full):  # type: ignore[no-untyped-def]
+def mirror(H: Array, full: Array) -> None:
     """Copy the lower triangle of H to both triangles of `full`."""
     for i in range(H.shape[0]):
         for j in range(i + 1):
@@ -115,7 +115,7 @@ def mirror(H, full):  # type: ignore[no-untyped-def]
 
 
 @njit
-def inside(z, low, high):  # type: ignore[no-untyped-def]
+def inside(z: Array, low: Array, high: Array) -> bool:
     """Whether z keeps its bounds."""
     kept = True
     for i in range(z.shape[0]):
@@ -124,7 +124,7 @@ def inside(z, low, high):  # type: ignore[no-untyped-def]
 
 
 @njit
-def open_hinges(z, steps, n, limit, state):  # type: ignore[no-untyped-def]
+def open_hinges(z: Array, steps: Array, n: int, limit: float, state: IntArray) -> bool:
     """Set `state` to the sign of each hinge that is open at z, else 0; True if any changed."""
     changed = False
     for i in range(z.shape[0]):
@@ -136,7 +136,9 @@ def open_hinges(z, steps, n, limit, state):  # type: ignore[no-untyped-def]
 
 
 @njit
-def with_hinges(H, g, steps, n, limit, rho, state, H_out, g_out):  # type: ignore[no-untyped-def]
+def with_hinges(
+    H: Array, g: Array, steps: Array, n: int, limit: float, rho: float, state: IntArray, H_out: Array, g_out: Array
+) -> float:
     """Lower triangle and gradient of the problem with these hinges open; returns its constant."""
     constant = 0.0
     for i in range(H.shape[0]):
@@ -158,7 +160,7 @@ def with_hinges(H, g, steps, n, limit, rho, state, H_out, g_out):  # type: ignor
 
 
 @njit(fastmath=FAST)
-def model_value(H, g, z):  # type: ignore[no-untyped-def]
+def model_value(H: Array, g: Array, z: Array) -> float:
     """G'z + 1/2 z'Hz from the lower triangle of H."""
     total = 0.0
     for i in range(z.shape[0]):
@@ -291,7 +293,9 @@ def condensed_room(stages: int, thrusters: int) -> Condensed:
 
 
 @njit(apart=True, fastmath=FAST)
-def _mix6(out, c0, c1, c2, c3, c4, c5, X, first, count):  # type: ignore[no-untyped-def]
+def _mix6(
+    out: Array, c0: float, c1: float, c2: float, c3: float, c4: float, c5: float, X: Array, first: int, count: int
+) -> None:
     """Add six multiples of rows of X, from row `first` on, to `out`."""
     a, b, c = X[first], X[first + 1], X[first + 2]
     d, e, f = X[first + 3], X[first + 4], X[first + 5]
@@ -300,14 +304,14 @@ def _mix6(out, c0, c1, c2, c3, c4, c5, X, first, count):  # type: ignore[no-unty
 
 
 @njit(apart=True, fastmath=FAST)
-def _mix3(out, c0, c1, c2, X, first, count):  # type: ignore[no-untyped-def]
+def _mix3(out: Array, c0: float, c1: float, c2: float, X: Array, first: int, count: int) -> None:
     a, b, c = X[first], X[first + 1], X[first + 2]
     for j in range(count):
         out[j] += c0 * a[j] + c1 * b[j] + c2 * c[j]
 
 
 @njit(fastmath=FAST)
-def condense(table, work, room):  # type: ignore[no-untyped-def]
+def condense(table: PlanTable, work: PlanWork, room: Condensed) -> None:
     """Fill room.H (lower) and room.g from the stage blocks of `work`; commands' own cost is added by `add_commands`."""
     N, n = work.T.shape
     G, W, fresh, V, lag = room.G, room.W, room.next_W, room.V, room.lag
@@ -385,7 +389,7 @@ def condense(table, work, room):  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True)
-def motion_gradient(table, work, g):  # type: ignore[no-untyped-def]
+def motion_gradient(table: PlanTable, work: PlanWork, g: Array) -> None:
     """Exact gradient by the commands, backwards through motion and lag."""
     N, n = work.T.shape
     costate, fresh, memory = work.gx[N].copy(), np.empty(12), np.zeros(n)
@@ -404,7 +408,7 @@ def motion_gradient(table, work, g):  # type: ignore[no-untyped-def]
 
 
 @njit
-def add_commands(table, before, U, room, steps):  # type: ignore[no-untyped-def]
+def add_commands(table: PlanTable, before: Array, U: Array, room: Condensed, steps: Array) -> None:
     """Add effort and change to the condensed problem; `steps`, (N n,), takes u_k - u_k-1.
 
     The excess of rate is left to the quadratic problem (`qp`): a hinge that is slack at U may not be slack after the
@@ -428,7 +432,7 @@ def add_commands(table, before, U, room, steps):  # type: ignore[no-untyped-def]
 
 
 @njit
-def add_rate_gradient(table, steps, n, g):  # type: ignore[no-untyped-def]
+def add_rate_gradient(table: PlanTable, steps: Array, n: int, g: Array) -> None:
     """Add the gradient of the excess of rate."""
     for here in range(steps.shape[0]):
         over = abs(steps[here]) - table.weights[RATE_N]
