@@ -32,18 +32,8 @@ _ONE_THREAD = 8192
 def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
     """Copy `value` into a read-only, C-contiguous float64 array of the given shape.
 
-    Parameters
-    ----------
-    value : array_like
-    shape : tuple
-        Expected shape; `None` lets that axis have any length.
-    name : str
-        What the value is called in the error message.
-
-    Raises
-    ------
-    InputError
-        If it holds anything but real numbers, the shape differs, or an element is not finite.
+    `shape`: expected shape; `None` lets that axis have any length. `name`: what the value is called in the error
+    message. Raises InputError if it holds anything but real numbers, the shape differs, or an element is not finite.
     """
     known = type(value) is np.ndarray and value.dtype is _FLOAT
     array = np.array(value if known else _real(value, name), dtype=np.float64, order="C")
@@ -83,10 +73,7 @@ def _real(value: ArrayLike, name: str) -> NDArray[Any]:
 def frozen_indices(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> IntArray:
     """Copy `value` into a read-only, C-contiguous int64 array of the given shape (see `frozen`).
 
-    Raises
-    ------
-    InputError
-        If it holds anything but whole numbers, or the shape differs.
+    Raises InputError if it holds anything but whole numbers, or the shape differs.
     """
     array = np.array(frozen(value, shape, name), dtype=np.int64, order="C")
     if not np.array_equal(array, np.asarray(value)):

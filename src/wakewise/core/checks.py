@@ -32,10 +32,7 @@ def quoted(value: object) -> str:
 def one_of(value: T, allowed: Sequence[T], name: str) -> T:
     """The value itself, if it is one of those that are allowed.
 
-    Raises
-    ------
-    InputError
-        Naming the value, what is allowed, and the nearest of it.
+    Raises InputError naming the value, what is allowed, and the nearest of it.
     """
     if isinstance(value, str) and value in allowed:
         return value
@@ -47,10 +44,7 @@ def one_of(value: T, allowed: Sequence[T], name: str) -> T:
 def whole_number(value: object, name: str, lowest: int | None = None, highest: int | None = None) -> int:
     """The value as an int; True and False are no numbers, nor is 1.0.
 
-    Raises
-    ------
-    InputError
-        If it is no whole number, or out of range.
+    Raises InputError if it is no whole number, or out of range.
     """
     try:
         if type(value).__name__ in ("bool", "bool_"):
@@ -67,17 +61,8 @@ def whole_number(value: object, name: str, lowest: int | None = None, highest: i
 def finite_number(value: object, name: str, above: float | None = None, least: float | None = None) -> float:
     """The value as a float.
 
-    Parameters
-    ----------
-    value : object
-    name : str
-    above, least : float, optional
-        What it must be more than; what it must be at least.
-
-    Raises
-    ------
-    InputError
-        If it is no number, not finite, or out of range.
+    `above`, `least`: what it must be more than; what it must be at least. Raises InputError if it is no number, not
+    finite, or out of range.
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise InputError(f"{name}: {quoted(value)}, must be a number")
@@ -100,10 +85,7 @@ def finite_number(value: object, name: str, above: float | None = None, least: f
 def path_of(value: object, name: str) -> Path:
     """The value as a path, which the operating system takes as one, whether anything is there or not.
 
-    Raises
-    ------
-    InputError
-        If it is no text or path, or no file or folder can have that name.
+    Raises InputError if it is no text or path, or no file or folder can have that name.
     """
     if not isinstance(value, (str, os.PathLike)) or not isinstance(text := os.fspath(value), str):
         raise InputError(f"{name}: {quoted(value)}, must be a path")
@@ -128,10 +110,7 @@ def _no_path(text: str, name: str, reason: str) -> NoReturn:
 def boolean(value: object, name: str) -> bool:
     """The value as a bool; neither words nor numbers nor arrays are one.
 
-    Raises
-    ------
-    InputError
-        If it is neither True nor False.
+    Raises InputError if it is neither True nor False.
     """
     if type(value).__name__ not in ("bool", "bool_"):
         raise InputError(f"{name}: {quoted(value)}, must be True or False")
@@ -141,10 +120,7 @@ def boolean(value: object, name: str) -> bool:
 def callable_of(value: T, name: str) -> T:
     """The value itself, if it can be called.
 
-    Raises
-    ------
-    InputError
-        If it cannot.
+    Raises InputError if it cannot.
     """
     if not callable(value):
         raise InputError(f"{name}: {quoted(value)}, must be a function")
@@ -154,10 +130,7 @@ def callable_of(value: T, name: str) -> T:
 def instance_of(value: Any, kind: type[T], name: str) -> T:
     """The value itself, if it is of that kind.
 
-    Raises
-    ------
-    InputError
-        Naming what it is instead.
+    Raises InputError naming what it is instead.
     """
     if not isinstance(value, kind):
         raise InputError(f"{name}: {quoted(value)} is a {type(value).__name__}, must be a {kind.__name__}")
@@ -167,10 +140,7 @@ def instance_of(value: Any, kind: type[T], name: str) -> T:
 def has_methods(value: T, methods: Sequence[str], name: str, kind: str) -> T:
     """The value itself, if it has the methods of a kind of part (a Protocol of `wakewise.core.interfaces`).
 
-    Raises
-    ------
-    InputError
-        Naming the methods that are missing.
+    Raises InputError naming the methods that are missing.
     """
     missing = [method for method in methods if not callable(getattr(value, method, None))]
     if missing or isinstance(value, type):

@@ -82,11 +82,7 @@ def environment_failure(fault: BaseException, place: Path | None = None) -> Envi
     it was raised from, by number (`OSError`, Rust's "os error 28") or by words. That a file is missing or not allowed
     may be the fault of the input: that counts only where no error of Wakewise says so.
 
-    Parameters
-    ----------
-    fault : BaseException
-    place : Path, optional
-        What was being written, for the message where the exception names no file.
+    `place`: what was being written, for the message where the exception names no file.
     """
     seen: set[int] = set()
     cause: BaseException | None = fault

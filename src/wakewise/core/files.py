@@ -27,10 +27,7 @@ def whole_file(path: Path, lasting: bool = False) -> Iterator[Path]:
     What is `lasting` is there, whole, after a power cut too: file and folder are on the disk when the block is left.
     Every file of a result is written so, or in a `whole_folder`; tests/core/test_files.py knows the exceptions.
 
-    Raises
-    ------
-    FileFailure
-        If the operating system does not let it be written, whichever library met that; an OSError too.
+    Raises FileFailure if the operating system does not let it be written, whichever library met that; an OSError too.
     """
     began = temporary_prefix(path.stem)
     with _failures_told(path, began):
@@ -97,10 +94,7 @@ def fsync_path(path: Path) -> None:
 def whole_folder(path: Path) -> Iterator[Path]:
     """Give a temporary folder beside `path`; rename it into place if the block ends well, else remove it.
 
-    Raises
-    ------
-    FileFailure
-        As `whole_file`.
+    Raises FileFailure as `whole_file`.
     """
     began = temporary_prefix(path.name)
     with _failures_told(path, began):
@@ -144,10 +138,7 @@ def name_fault(name: str) -> str | None:
 def child_path(folder: Path, name: str, what: str) -> Path:
     """The place in a folder that a name stands for, and no place elsewhere.
 
-    Raises
-    ------
-    InputError
-        If it cannot be a name; `what` has it, for the message.
+    Raises InputError if it cannot be a name; `what` has it, for the message.
     """
     fault = name_fault(name)
     if fault is not None:

@@ -153,13 +153,9 @@ class FlakeCloud:
     from `low_W_m` to `high_W_m`; of them those at a depth below `depth_m` and with slopes x / z and y / z up to
     `slopes` in the camera's frame are given.
 
-    Parameters
-    ----------
-    p_W_m, v_W_m_s : ndarray, shape (n, 3)
-        Where they are and how the water moves them.
-    looks : ndarray, shape (n, 3)
-        Of each flake, for good: its rank among them (0 to 1: where fewer are in the water than `per_m3`, those of the
-        lowest ranks), its size (standard normal) and its shade (0 to 1).
+    `p_W_m`, `v_W_m_s`, shape (n, 3): where they are and how the water moves them. `looks`, shape (n, 3): of each flake,
+    for good: its rank among them (0 to 1: where fewer are in the water than `per_m3`, those of the lowest ranks), its
+    size (standard normal) and its shade (0 to 1).
     """
 
     p_W_m: Array
@@ -200,18 +196,10 @@ class WakeModel(Protocol):
     def unit_velocity(self, points_W_m: Array, origins_W_m: Array, directions_W: Array, area_m2: Array) -> Array:
         """Velocity per square root of newton.
 
-        Parameters
-        ----------
-        points_W_m : ndarray, shape (n, 3)
-        origins_W_m, directions_W : ndarray, shape (m, 3)
-            Where each jet starts and the unit direction *of the jet* (opposite to the force on the vehicle).
-        area_m2 : ndarray, shape (m,)
-            Disk area of each jet's thruster.
-
-        Returns
-        -------
-        ndarray, shape (m, n, 3), in m/s/sqrt(N)
-            Multiply row i by sqrt(|T_i|) for the velocity that jet i adds at each point.
+        `points_W_m` has shape (n, 3). `origins_W_m`, `directions_W`, shape (m, 3): where each jet starts and the unit
+        direction *of the jet* (opposite to the force on the vehicle). `area_m2`, shape (m,): disk area of each jet's
+        thruster. Returns ndarray, shape (m, n, 3), in m/s/sqrt(N): multiply row i by sqrt(|T_i|) for the velocity that
+        jet i adds at each point.
         """
         ...
 

@@ -55,10 +55,7 @@ class OptionalDependencies:
         The message begins with `what`, such as "wakewise scan". Of the extras' modules `only` those given are needed,
         all if none is.
 
-        Raises
-        ------
-        MissingExtra
-            Names what is missing and how it is installed.
+        Raises MissingExtra that names what is missing and how it is installed.
         """
         missing: list[str] = []
         lacking: list[str] = []

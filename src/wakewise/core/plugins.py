@@ -42,19 +42,9 @@ class ResolvedPlugin(NamedTuple, Generic[T]):
 def find(kind: str, name: str, own: Mapping[str, T]) -> ResolvedPlugin[T]:
     """What `name` stands for.
 
-    Parameters
-    ----------
-    kind : str
-        A key of `GROUPS`.
-    name : str
-        One of `own`, of an entry point of this kind, or ``package.module:name``.
-    own : mapping
-        Our own parts of this kind.
-
-    Raises
-    ------
-    InputError
-        If there is nothing of that name, or it cannot be imported; the reason is named.
+    `kind`: a key of `GROUPS`. `name`: one of `own`, of an entry point of this kind, or ``package.module:name``. `own`:
+    our own parts of this kind. Raises InputError if there is nothing of that name, or it cannot be imported; the reason
+    is named.
     """
     if name in own:
         return ResolvedPlugin(own[name], "")
@@ -89,10 +79,7 @@ def _offered(group: str) -> dict[str, EntryPoint]:
 def load(kind: str, name: str, target: str) -> Any:
     """What `target`, as ``package.module:name``, is; the working folder is looked through, too.
 
-    Raises
-    ------
-    InputError
-        If it cannot be imported; `kind` and `name` say what it was to be.
+    Raises InputError if it cannot be imported; `kind` and `name` say what it was to be.
     """
     module, _, attribute = target.partition(":")
     if not module or not attribute:

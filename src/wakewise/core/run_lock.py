@@ -55,10 +55,7 @@ def exclusive_run(folder: Path) -> Iterator[None]:
     The lock ends with its process, however that ends; the file that stays behind is taken over by the next run. A
     block inside another of the same thread and folder is let be.
 
-    Raises
-    ------
-    InputError
-        If another process or thread is at it.
+    Raises InputError if another process or thread is at it.
     """
     folder.mkdir(parents=True, exist_ok=True)
     mine = (folder.resolve(), threading.get_ident())

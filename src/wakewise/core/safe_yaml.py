@@ -34,11 +34,8 @@ class YamlError(ValueError):
 def read_yaml(text: str) -> Any:
     """Plain values of YAML text.
 
-    Raises
-    ------
-    YamlError
-        If it is not YAML, is longer than `MOST_BYTES`, nests too deep to be read or refers to itself, or gives a key
-        twice, which YAML forbids.
+    Raises YamlError if it is not YAML, is longer than `MOST_BYTES`, nests too deep to be read or refers to itself, or
+    gives a key twice, which YAML forbids.
     """
     if len(text) > MOST_BYTES:
         raise YamlError(f"{1e-6 * len(text):.1f} million characters, at most {1e-6 * MOST_BYTES:g}", None)
@@ -87,14 +84,8 @@ def _refers_to_itself(tree: Any) -> bool:
 def text_of(path: Path, most_bytes: int = MOST_BYTES, encoding: str = "utf-8") -> str:
     """Text of a file that a person or a program wrote; of a larger one than allowed no more is read than shows it.
 
-    Raises
-    ------
-    InputError
-        If no file can have that name.
-    OSError, UnicodeDecodeError
-        If it cannot be read as text.
-    YamlError
-        If it is larger than `most_bytes`.
+    Raises InputError if no file can have that name; OSError, UnicodeDecodeError if it cannot be read as text; YamlError
+    if it is larger than `most_bytes`.
     """
     with path_of(path, "file").open("rb") as file:
         data = file.read(most_bytes + 1)
@@ -106,10 +97,7 @@ def text_of(path: Path, most_bytes: int = MOST_BYTES, encoding: str = "utf-8") -
 def yaml_file(path: Path) -> Any:
     """Plain values of a file that a person wrote.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or see `read_yaml`.
+    Raises InputError if it cannot be read, or see `read_yaml`.
     """
     try:
         return read_yaml(text_of(path))

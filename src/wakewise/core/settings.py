@@ -42,10 +42,7 @@ class Settings(BaseModel):
 def seed_number(value: object, name: str = "seed") -> int:
     """The value as a seed of random draws: a whole number from 0 to 2^63 - 1.
 
-    Raises
-    ------
-    InputError
-        If it is another.
+    Raises InputError if it is another.
     """
     return whole_number(value, name, 0, MAX_SEED)
 
@@ -61,15 +58,8 @@ def describe_faults(
 ) -> str:
     """All faults of a file in one line: which field of `model` is wrong, what was found and what is allowed.
 
-    Parameters
-    ----------
-    error : ValidationError
-    model : type of BaseModel
-        What the file was read as.
-    whole : str
-        What the file is called where a fault is of no single field.
-    known : callable, optional
-        Called with dotted name and value of each; words that it returns are told in place of ours.
+    `model`: what the file was read as. `whole`: what the file is called where a fault is of no single field. `known`:
+    called with dotted name and value of each; words that it returns are told in place of ours.
     """
     told: dict[str, str] = {}
     alike: dict[str, list[str]] = {}
@@ -141,10 +131,7 @@ class Faults:
     def tell(self) -> None:
         """Raise what was gathered, if anything was.
 
-        Raises
-        ------
-        InputError
-            The one that was gathered, or one whose message joins those of all.
+        Raises the InputError that was gathered, or one whose message joins those of all.
         """
         if len(self.found) == 1:
             raise self.found[0]

@@ -70,10 +70,7 @@ def picture_depth(data: bytes) -> tuple[int, bool]:
 def check_picture(data: bytes, name: str) -> bool:
     """Whether bytes begin like a picture that may be decoded.
 
-    Raises
-    ------
-    InputError
-        If its header says that it has more pixels than `MOST_PIXELS`.
+    Raises InputError if its header says that it has more pixels than `MOST_PIXELS`.
     """
     size = picture_size(data)
     if size is not None and size[0] * size[1] > MOST_PIXELS:
@@ -86,10 +83,7 @@ def check_picture(data: bytes, name: str) -> bool:
 def check_arrays(path: Path, most_bytes: int = MOST_BYTES) -> dict[str, tuple[int, ...]]:
     """Shapes of the arrays of an .npy or .npz file, by name, "" for that of an .npy; nothing is unpacked.
 
-    Raises
-    ------
-    InputError
-        If the file holds no such arrays, or they have more than `most_bytes` when they are unpacked.
+    Raises InputError if the file holds no such arrays, or they have more than `most_bytes` when they are unpacked.
     """
     shapes: dict[str, tuple[int, ...]] = {}
     total = 0

@@ -93,6 +93,31 @@ class Parts:
     the controller, and the one that the tank perturbs. `requested` is the scenario as given; `scenario` has the values
     that its seed draws for randomized fields. `given` holds the replaced parts by name.
 
+    Attributes
+    ----------
+    vehicle : Vehicle
+        Nominal vehicle of the controller, with its ballast.
+    target : Target
+        The target at its true place.
+    region : Region
+        Weighted sample points in which D is computed.
+    route : Route
+        Camera poses over time, and the times of the exposures.
+    pilot : Pilot
+        Source of the goals; by default the route.
+    wake : WakeModel
+        The controller's model of its jets.
+    surroundings : Surroundings
+        Obstacles of the planner.
+    controller : Controller
+        From an estimate and a goal to thrusts.
+    estimator : Estimator
+        From measurements to an estimate.
+    world : World
+        Plant and truth.
+    start : BodyState
+        Start of the mission.
+
     Examples
     --------
     >>> import wakewise as ww

@@ -1,7 +1,8 @@
-"""Telemetry on the clock of the trial as MCAP, which Foxglove opens."""
+"""Telemetry of a flight as an MCAP file for Foxglove, with the time of the trial."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import foxglove
@@ -17,13 +18,7 @@ _NS = 1_000_000_000
 def write_mcap(steps: pl.DataFrame | pl.LazyFrame, path: Path, every: int = 5) -> None:
     """Write poses (`/true/pose`, `/estimated/pose`, `/goal/pose`) and figures (`/thrusts`, `/water`) of a flight.
 
-    Parameters
-    ----------
-    steps : polars.DataFrame or LazyFrame
-        The table of steps.parquet.
-    path : Path
-    every : int
-        Keep each n-th step: 10 Hz of a 50 Hz loop is what viewers need.
+    `steps` is the table of steps.parquet; one row of `every` is kept: 10 Hz of a 50 Hz loop is what viewers need.
     """
     kept = steps.lazy().gather_every(every).collect()
     thrusts = [name for name in kept.columns if name.startswith("thrust_")]
@@ -60,4 +55,4 @@ def _numbers(names: list[str]) -> dict[str, object]:
 
 
 def _finite(value: float | None) -> float | None:
-    return value if value is not None and value == value else None  # noqa: PLR0124  (NaN differs from itself)
+    return None if value is None or math.isnan(value) else value

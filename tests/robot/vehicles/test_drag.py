@@ -67,7 +67,7 @@ def test_without_cases_a_draw_is_the_believed_drag() -> None:
 
 
 def test_what_may_be_drawn_is_told() -> None:
-    """All sets for `drawn`, else the one that is named."""
+    """All sets for `random`, else the one that is named."""
     paper = load_vehicle("paper")
     assert possible_drags(paper, "random") == ("nominal", "box", "von-benzon")
     assert possible_drags(paper, "box") == ("box",)
@@ -75,9 +75,9 @@ def test_what_may_be_drawn_is_told() -> None:
 
 def test_a_case_that_is_not_there_is_refused() -> None:
     """One line tells which there are; reserved names and damping that pushes are refused in the file."""
-    with pytest.raises(InputError, match=r"tank.mismatch.drag: 'bx', paper .* nominal, box, von-benzon, drawn"):
+    with pytest.raises(InputError, match=r"tank.mismatch.drag: 'bx', paper .* nominal, box, von-benzon, random"):
         with_drag(load_vehicle("paper"), "bx")
-    with pytest.raises(InputError, match="drag_cases: drawn is not a name"):
+    with pytest.raises(InputError, match="drag_cases: random is not a name"):
         DragCase(
             name="random",
             source="x",

@@ -6,7 +6,8 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli import main
-from wakewise.ui.cli.console import INTERRUPTED, ProgressBars
+from wakewise.ui.cli.console import ProgressBars
+from wakewise.ui.cli.signals import INTERRUPTED
 
 
 def test_work_that_goes_on_after_ctrl_c_is_stopped_at_its_next_word() -> None:

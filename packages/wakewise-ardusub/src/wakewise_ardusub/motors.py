@@ -1,8 +1,8 @@
-"""A vehicle's thrusters as an ArduSub autopilot's motors: their channels, their directions, and pulses for thrusts.
+"""Thrusters of a vehicle as motors of an ArduSub autopilot: channels, directions, and thrusts of pulses.
 
-The vehicle's thruster i is the autopilot's motor i, both in their order. A pulse above 1500 us turns a motor the way in
-which its table has positive thrust; MOT_n_DIRECTION = -1 is taken for a motor that is built in the other way round, so
-its stronger side lies the other way, too. An autopilot does not know whether its wires were swapped instead.
+Thruster i is motor i, in their order. A pulse above 1500 us turns a motor in the direction in which its table has
+positive thrust. MOT_n_DIRECTION = -1 is taken as a motor that is mounted in reverse, so its stronger direction is
+reversed, too; an autopilot cannot distinguish this from swapped wires.
 """
 
 from __future__ import annotations

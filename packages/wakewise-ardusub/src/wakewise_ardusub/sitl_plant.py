@@ -1,10 +1,10 @@
-"""A scenario's vehicle in its water behind an autopilot's firmware: any vehicle and any world that there is a truth of.
+"""Any scenario's vehicle and world as physics behind an autopilot's firmware.
 
-The firmware is answered with what truly is, not with what sensors say: its own sensor models are in it. Position is the
-tank's own, with its surface at a depth of 0, which the vehicle cannot leave (`WaterSurface`). Neither mission nor
-controller of the scenario has a part in it, but for where the vehicle starts.
+The firmware gets the true motion, because its own sensor models add the errors. Positions are the tank's, with the
+surface at a depth of 0, which the vehicle cannot leave (`WaterSurface`). Mission and controller of the scenario have no
+part in it, except for the start pose.
 
-Whether the autopilot's depth is the truth: its VFR_HUD, overheard, against the physics that moves it.
+`DepthMonitor` compares the autopilot's depth (VFR_HUD) with the true one.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What the judging of pulses needs to know of a vehicle, as plain numbers: its thrusters, their curve, its wake model.
+"""A vehicle as plain numbers for the wash meter: thrusters, thrust curve and wake model (craft file).
 
-A small computer on a vehicle reads it from one JSON file that a larger one wrote (`VehicleSummary.of`,
-`vehicle_summary_json`): vehicle files, thrust tables and wake models have readers there that need more than NumPy.
+A larger computer writes the JSON file (`VehicleSummary.of`, `vehicle_summary_json`) for the computer on the vehicle,
+because vehicle files, thrust tables and wake models have readers that need more than NumPy.
 """
 
 from __future__ import annotations

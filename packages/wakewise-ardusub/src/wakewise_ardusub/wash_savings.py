@@ -1,9 +1,9 @@
-"""What a vehicle's pulses do to the water at some points, and what gentler thrusts for the same wrench would have done.
+"""Wash of a vehicle's pulses on points, and that of gentler thrusts for the same wrench.
 
-The one place where pulses are judged: for each row of a log (`links/logs/hindsight.py`) and ten times a second beside a
-vehicle (`wakewise_ardusub.wash_meter`). Pulses become thrusts by the thrusters' curve at the battery's voltage, turned
-where a motor runs the other way; thrusts become a wrench by the vehicle's geometry. For that wrench stand beside the
-flown thrusts the least ones (pseudo-inverse within limits) and the gentlest ones (`wakewise.allocation`).
+Used for each row of a log (`logs/replay_allocation.py`) and ten times per second beside a vehicle (`wash_meter`).
+Pulses become thrusts by the thrusters' curve at the battery's voltage, reversed where a motor is; thrusts become a
+wrench by the vehicle's geometry. The flown thrusts are compared with the minimum-norm ones (pseudo-inverse within
+limits) and the gentlest ones (`wakewise.allocation`).
 """
 
 from __future__ import annotations

@@ -157,12 +157,8 @@ def quat_integrate(q_WB: ArrayLike, omega_B_rad_s: ArrayLike, dt_s: float) -> Ar
 class Pose:
     """X_AB: position and orientation of frame B in frame A.
 
-    Parameters
-    ----------
-    p_m : ndarray, shape (3,)
-        Origin of B from the origin of A, expressed in A.
-    q : ndarray, shape (4,)
-        Unit quaternion q_AB, (w, x, y, z); normalised here.
+    `p_m`, shape (3,): origin of B from the origin of A, expressed in A. `q`, shape (4,): unit quaternion q_AB, (w, x,
+    y, z); normalised here.
     """
 
     p_m: Array
@@ -204,16 +200,8 @@ class Pose:
 def look_at(eye_W_m: ArrayLike, target_W_m: ArrayLike) -> Array:
     """Orientation of a body whose x axis points from `eye` at `target` and whose y axis is level (no roll).
 
-    Returns
-    -------
-    R_WB : ndarray, shape (3, 3)
-        World is NED, so the body's z axis points as far down as the view allows. Straight up or down, where no level
-        axis is singled out, y points east.
-
-    Raises
-    ------
-    InputError
-        If the two points coincide.
+    Returns `R_WB`, shape (3, 3): world is NED, so the body's z axis points as far down as the view allows. Straight up
+    or down, where no level axis is singled out, y points east. Raises InputError if the two points coincide.
     """
     view = np.asarray(target_W_m, dtype=np.float64) - np.asarray(eye_W_m, dtype=np.float64)
     distance = float(np.linalg.norm(view))

@@ -1,12 +1,9 @@
-"""The pilot `human`: a person who sees the video and whose two sticks ask for velocities, which any method makes.
+"""Simulated operator: the pilot `human`, and the stick inputs of the pilot `assisted`.
 
-Assisted teleoperation: the same person as in `manual` (`wakewise.operation.teleop.input`), but what lies behind the
-sticks is a controller that holds the place they lead to, kept within a leash of the vehicle. What is wished is the
-mission's route; how near the goals come to it is the person's doing. The velocity that the sticks lead to is shaped as
-for hands at the desk (`steering.answered`); the desk's assists and what keeps it off things are the pilot `assisted`'s.
-
-The person of `wakewise.operation.teleop.input` at the desk's sticks: eyes on the video, the same `Controls` as any
-other hands.
+The operator (`wakewise.control.operator_model`, the same as in the method `manual`) sees the video and flies a
+reference route by eye. In `HumanPilot` the sticks command velocities; the goal is the integrated position, limited to a
+lead over the vehicle, and any method tracks it. `SimulatedOperatorInput` gives the same operator's stick deflections,
+to be used with the assists of `wakewise.operation.teleop.assisted`.
 """
 
 from __future__ import annotations
@@ -34,7 +31,9 @@ from wakewise.operation.teleop.input import CENTRED, Controls
 from wakewise.operation.teleop.motion import TURN_RAD_S2
 
 ANSWER_S = 0.5
-"""How much later the vehicle answers a velocity; estimate, from the trackers' bandwidth of two radians a second."""
+"""Delay of the vehicle's velocity after the sticks, as the operator expects it; an estimate from the PID's bandwidth of
+2 rad/s.
+"""
 STICKS = StickDeflection(
     inertia=np.zeros(4),
     drag=np.zeros(4),
@@ -45,20 +44,10 @@ STICKS = StickDeflection(
 
 @dataclass(kw_only=True, eq=False)
 class HumanPilot:
-    """A `Pilot` with a memory, which begins afresh at time zero.
+    """A `Pilot` that flies a reference by eye; its state is reset at time zero.
 
-    Parameters
-    ----------
-    wish : Pilot
-        What the person would like to see: goals by the clock.
-    X_BC : Pose
-        Camera mount.
-    target_W_m : ndarray, shape (3,)
-        What is to be kept in the picture.
-    dt_s : float
-        Time between two goals.
-    seed : int
-        Which person it is.
+    `X_BC` is the camera mount, `target_W_m` (3,) the point to be kept in the picture, `dt_s` the time between two goals
+    and `seed` selects the operator.
     """
 
     reference: Pilot
@@ -66,7 +55,7 @@ class HumanPilot:
     target_W_m: Array
     dt_s: float
     seed: int
-    person: OperatorModel = field(init=False)
+    operator: OperatorModel = field(init=False)
     _state: OperatorModelState = field(init=False)
     _place_W_m: Array = field(init=False)
     _velocity_m_s: Array = field(init=False)
@@ -75,23 +64,23 @@ class HumanPilot:
     _turn_rad_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self.person = sample_operator(self.seed, STICKS)
+        self.operator = sample_operator(self.seed, STICKS)
         self._begin(np.zeros(3), 0.0)
 
     def _begin(self, place_W_m: Array, heading_rad: float) -> None:
-        self._state, self._place_W_m, self._heading_rad = begin(self.person), place_W_m, heading_rad
+        self._state, self._place_W_m, self._heading_rad = begin(self.operator), place_W_m, heading_rad
         self._velocity_m_s, self._change_m_s2, self._turn_rad_s = np.zeros(3), np.zeros(3), 0.0
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
-        """Where the sticks have led to, moving as they ask, at the wished roll and pitch."""
-        wished = self.reference.goal(time_s, estimate)
-        roll_rad, pitch_rad, _ = euler_from_quat(wished.X_WB.q)
+        """Integrated position and velocity of the sticks' commands, with roll and pitch of the reference."""
+        reference = self.reference.goal(time_s, estimate)
+        roll_rad, pitch_rad, _ = euler_from_quat(reference.X_WB.q)
         if time_s <= 0.0:
             self._begin(np.array(estimate.X_WB.p_m), float(euler_from_quat(estimate.X_WB.q)[2]))
         view = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
-        wish = CameraMotion.of(wished.X_WB, wished.nu_B, self.X_BC)
+        wanted = CameraMotion.of(reference.X_WB, reference.nu_B, self.X_BC)
         self._state, asked = steer(
-            self.person, self._state, self.dt_s, view, wish, viewed_point(wished, self.X_BC, self.target_W_m)
+            self.operator, self._state, self.dt_s, view, wanted, viewed_point(reference, self.X_BC, self.target_W_m)
         )
         before_m_s, before_rad_s = self._velocity_m_s, self._turn_rad_s
         self._velocity_m_s, self._change_m_s2 = filtered_velocity(before_m_s, self._change_m_s2, asked[:3], self.dt_s)
@@ -111,31 +100,18 @@ class HumanPilot:
         )
 
 
-def viewed_point(wished: Goal, X_BC: Pose, target_W_m: Array) -> Array:
-    """What the wished picture has in its middle, shape (3,), as far off as the target is."""
-    X_WC = wished.X_WB @ X_BC
+def viewed_point(reference: Goal, X_BC: Pose, target_W_m: Array) -> Array:
+    """Point on the optical axis of a goal's camera at the distance of the target, both shape (3,)."""
+    X_WC = reference.X_WB @ X_BC
     axis_W = X_WC.R[:, 2]
     return np.asarray(X_WC.p_m + axis_W * float((target_W_m - X_WC.p_m) @ axis_W))
 
 
 @dataclass(kw_only=True, eq=False)
 class SimulatedOperatorInput:
-    """A `ControlSource` with eyes: a drawn person who would like to see what a pilot says.
+    """A `ControlSource`: stick deflections of a simulated operator who flies a reference by eye.
 
-    Parameters
-    ----------
-    wish : Pilot
-        What the person would like to see: goals by the clock.
-    X_BC : Pose
-        Camera mount.
-    target_W_m : ndarray, shape (3,)
-        What is to be kept in the picture.
-    dt_s : float
-        Time between two looks.
-    seed : int
-        Which person it is.
-    pressed : tuple of str
-        What the person presses on taking the sticks.
+    Fields as of `HumanPilot`; `pressed` are the actions at time zero.
     """
 
     reference: Pilot
@@ -144,28 +120,29 @@ class SimulatedOperatorInput:
     dt_s: float
     seed: int
     pressed: tuple[str, ...] = ("operator",)
-    person: OperatorModel = field(init=False)
+    operator: OperatorModel = field(init=False)
     _state: OperatorModelState = field(init=False)
     _controls: Controls = CENTRED
 
     def __post_init__(self) -> None:
-        self.person = sample_operator(self.seed, STICKS)
-        self._state = begin(self.person)
+        self.operator = sample_operator(self.seed, STICKS)
+        self._state = begin(self.operator)
 
     def look(self, time_s: float, estimate: BodyState, share: float) -> None:
-        """See where the vehicle is, and move the sticks; `share` is what full stick asks for, of the fastest."""
+        """Compute the deflections from the estimate; full stick means this `share` of the largest speeds."""
         if time_s <= 0.0:
-            self._state = begin(self.person)
-        wished = self.reference.goal(time_s, estimate)
+            self._state = begin(self.operator)
+        reference = self.reference.goal(time_s, estimate)
         view = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
-        wish = CameraMotion.of(wished.X_WB, wished.nu_B, self.X_BC)
-        seen = viewed_point(wished, self.X_BC, self.target_W_m)
-        self._state, asked = steer(self.person, self._state, self.dt_s, view, wish, seen)
+        wanted = CameraMotion.of(reference.X_WB, reference.nu_B, self.X_BC)
+        seen = viewed_point(reference, self.X_BC, self.target_W_m)
+        self._state, asked = steer(self.operator, self._state, self.dt_s, view, wanted, seen)
         full = share * np.array([FULL_M_S, FULL_M_S, FULL_M_S, FULL_RAD_S])
         pushed = np.clip(asked / full, -1.0, 1.0)
         first = time_s <= 0.0
         self._controls = Controls(axes=np.array([*pushed, 0.0]), pressed=self.pressed if first else ())
 
-    def read(self, time_s: float) -> Controls:  # noqa: ARG002  (of the last look)
-        """The sticks as they were moved on the last look."""
+    def read(self, time_s: float) -> Controls:
+        """The stick deflections that the last call of `look` computed."""
+        del time_s
         return self._controls

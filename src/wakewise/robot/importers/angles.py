@@ -19,10 +19,7 @@ _WHOLE = 1e-9
 def require_radians(angles: Array, place: SourceLocation, what: str) -> Array:
     """Return angles of a format that states radians, shape (3,); refuse those that can only be degrees.
 
-    Raises
-    ------
-    InputError
-        If an angle is beyond a turn and is not a multiple of an eighth of a turn.
+    Raises InputError if an angle is beyond a turn and is not a multiple of an eighth of a turn.
     """
     for angle in np.abs(angles):
         eighths = angle / _EIGHTH
@@ -41,17 +38,8 @@ def read_angles(rows: list[tuple[Array, SourceLocation]], what: str, key: str) -
     All rows are of one unit, which the key may say (`..._deg`, `..._rad`). Else angles beyond a turn are degrees if all
     are whole or half degrees; whole numbers of radians are nobody's angles, so they are refused.
 
-    Parameters
-    ----------
-    rows : list of (ndarray, shape (3,), and Place)
-        Roll, pitch and yaw of each thruster.
-    what, key : str
-        For messages, and the key that the angles stand under.
-
-    Raises
-    ------
-    InputError
-        If the unit cannot be told.
+    `rows`, shape (3,): roll, pitch and yaw of each thruster. `what`, `key`: for messages, and the key that the angles
+    stand under. Raises InputError if the unit cannot be told.
     """
     unit = unit_of(key)
     if unit == "degrees":

@@ -78,20 +78,10 @@ _PREFIXES = ("math.", "python.", "xacro.", "python.math.")
 def evaluate(text: str, lookup: Callable[[str], Any], functions: dict[str, Callable[[str], Any]] | None = None) -> Any:
     """Evaluate one expression.
 
-    Parameters
-    ----------
-    text : str
-        Numbers, words in quotes, names, arithmetic, comparisons, `a if b else c`, indexing of tables, and the
-        mathematical functions; nothing else exists in this language.
-    lookup : callable
-        Gives the value of a name; raises KeyError if there is none.
-    functions : dict of callables
-        Further functions of one text argument, such as `load_yaml`.
-
-    Raises
-    ------
-    InputError
-        Without a place, which the caller adds.
+    `text`: numbers, words in quotes, names, arithmetic, comparisons, `a if b else c`, indexing of tables, and the
+    mathematical functions; nothing else exists in this language. `lookup`: gives the value of a name; raises KeyError
+    if there is none. `functions`: further functions of one text argument, such as `load_yaml`. Raises InputError:
+    without a place, which the caller adds.
     """
     if len(text) > MAX_LENGTH:
         raise InputError(f"expression of {len(text)} characters, at most {MAX_LENGTH} are read")

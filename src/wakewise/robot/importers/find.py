@@ -44,10 +44,7 @@ def read_number_matrix(path: Path) -> tuple[Array, bool]:
     motor factors with the header motor, roll, pitch, yaw, throttle, forward, lateral. Lines that begin with # are left
     out.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, or no matrix of six rows in it.
+    Raises InputError if there is no such file, or no matrix of six rows in it.
     """
     if not path.is_file():
         raise InputError(f"matrix file {path}: no such file")
@@ -103,10 +100,8 @@ def find_vehicle(
 
     The options are those of `importers.import_vehicle`; they speak of files of other projects only.
 
-    Raises
-    ------
-    InputError
-        If there is no such vehicle or file, it cannot be read as a vehicle, or an option does not apply to it.
+    Raises InputError if there is no such vehicle or file, it cannot be read as a vehicle, or an option does not apply
+    to it.
     """
     path = path_of(name_or_path, "vehicle")
     name_or_path = name_or_path if isinstance(name_or_path, str) else str(path)
@@ -154,17 +149,9 @@ def _reader_from_outside(path: Path) -> Callable[[Path], VehicleDraft] | None:
 def any_vehicle(name_or_path: str | Path) -> Vehicle:
     """A vehicle that can fly, from the library or any file that can be read as a vehicle.
 
-    Parameters
-    ----------
-    name_or_path : str or Path
-        A name of the library, or the path of a vehicle file: ours (YAML), URDF, xacro, SDF, Stonefish, a matrix, or a
-        format that an installed package offers.
-
-    Raises
-    ------
-    InputError
-        If there is no such vehicle or file, it cannot be read as a vehicle, or lacks something that flying needs (the
-        message lists it).
+    `name_or_path`: a name of the library, or the path of a vehicle file: ours (YAML), URDF, xacro, SDF, Stonefish, a
+    matrix, or a format that an installed package offers. Raises InputError if there is no such vehicle or file, it
+    cannot be read as a vehicle, or lacks something that flying needs (the message lists it).
 
     Examples
     --------
@@ -183,10 +170,7 @@ def compare_with(vehicle: AnyVehicle, matrix: str, rows: str | None = None) -> M
     What the file leaves open, such as whether forces or moments come first, is read as the geometry agrees best;
     `rows` names its rows in their order, such as "roll,pitch,yaw,x,y,z".
 
-    Raises
-    ------
-    InputError
-        If there is no such file, it holds no matrix, or the matrix has another number of thrusters.
+    Raises InputError if there is no such file, it holds no matrix, or the matrix has another number of thrusters.
     """
     if not vehicle.thrusters:
         raise InputError(f"vehicle {vehicle.name}: holds no places of thrusters to compare {matrix} with")

@@ -119,10 +119,7 @@ def _gz(plugin: Element, bodies: RobotDescription) -> ParsedThruster:
 def disk_area_m2(diameter_m: float, place: SourceLocation) -> float:
     """Area in m^2 of a propeller's disk.
 
-    Raises
-    ------
-    InputError
-        If the diameter is none that an underwater vehicle's propeller has.
+    Raises InputError if the diameter is none that an underwater vehicle's propeller has.
     """
     low_m, high_m = DIAMETERS_M
     if not low_m <= diameter_m <= high_m:
@@ -223,10 +220,7 @@ _HAND_M = 0.15
 def read_thrusters(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Fill in the thrusters from plugins; where there are none, from joints that are called thrusters.
 
-    Raises
-    ------
-    InputError
-        If a plugin names a joint or link that is not there, or an axis has no length.
+    Raises InputError if a plugin names a joint or link that is not there, or an axis has no length.
     """
     rules: list[str] = []
     order: list[float] = []
@@ -341,10 +335,7 @@ def _by_name(bodies: RobotDescription, unknown: list[Element], found: ParsedVehi
 def _one_each(joints: list[Joint], bodies: RobotDescription, found: ParsedVehicle) -> list[Joint]:
     """One joint per thruster: a propeller counts, the hull that carries it does not.
 
-    Raises
-    ------
-    InputError
-        If two joints of one number lie within one another and neither is called a propeller.
+    Raises InputError if two joints of one number lie within one another and neither is called a propeller.
     """
     above = {j.child: j.parent for j in bodies.joints.values()}
     carriers: set[str] = set()

@@ -124,10 +124,8 @@ _UP_WORDS = re.compile(r"(^|[^a-z])(enu|flu|nwu)([^a-z]|$)", re.IGNORECASE)
 def read_yaml(root: YamlNode, name: str, found: ParsedVehicle, rows: WrenchOrder | None = None) -> None:
     """Fill in what a YAML file says about a vehicle; `rows` is what the user says the rows of a matrix are.
 
-    Raises
-    ------
-    InputError
-        If it holds no matrix, no thruster geometry and no vehicle parameters, or a matrix of the wrong shape.
+    Raises InputError if it holds no matrix, no thruster geometry and no vehicle parameters, or a matrix of the wrong
+    shape.
     """
     if not root.table():
         raise PlacedError(
@@ -166,10 +164,7 @@ def read_yaml(root: YamlNode, name: str, found: ParsedVehicle, rows: WrenchOrder
 def read_matrix_only(root: YamlNode, found: ParsedVehicle, rows: WrenchOrder | None = None) -> None:
     """Find the allocation matrix of a YAML file, for comparison with a geometry.
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    Raises InputError if there is none.
     """
     entries = list(root.walk())
     if not _matrix(root, entries, found, rows, flown=False):
@@ -238,10 +233,7 @@ def _frame(root: YamlNode, entries: Entries, found: ParsedVehicle, *, geometry: 
 def _named_frame(entries: Entries, found: ParsedVehicle) -> tuple[Frame, str] | None:
     """Frame that a key names: of the body before a bare frame before any other; keys of the world's frame do not count.
 
-    Raises
-    ------
-    InputError
-        If two keys name different frames of the body.
+    Raises InputError if two keys name different frames of the body.
     """
     ranked: list[tuple[int, Frame, str, YamlNode]] = []
     for path, item in entries:

@@ -29,12 +29,8 @@ _PACKAGE_NAME = re.compile(r"<name>\s*([A-Za-z0-9_.-]{1,200})\s*</name>")
 class PackagePaths:
     """Finds packages near a file and keeps every path inside the folders that belong to it.
 
-    Parameters
-    ----------
-    file : Path
-        The file that the user gave; its package's folder is the first one allowed.
-    packages : mapping of str to Path
-        Packages that the user placed; their folders are allowed too.
+    `file`: the file that the user gave; its package's folder is the first one allowed. `packages`: packages that the
+    user placed; their folders are allowed too.
     """
 
     def __init__(self, file: Path, packages: Mapping[str, Path] | None = None) -> None:
@@ -70,10 +66,7 @@ class PackagePaths:
     def inside(self, path: Path, place: SourceLocation) -> Path:
         """The real path, links followed.
 
-        Raises
-        ------
-        InputError
-            If it lies outside every folder that belongs to the file.
+        Raises InputError if it lies outside every folder that belongs to the file.
         """
         try:
             real = path.resolve()
@@ -91,10 +84,7 @@ class PackagePaths:
     def locate(self, name: str, folder: Path, place: SourceLocation) -> Path:
         """Path that a file means by `package://p/x`, `model://p/x`, `file://x`, an absolute or a relative path.
 
-        Raises
-        ------
-        InputError
-            If the package is not found or the path leaves the allowed folders.
+        Raises InputError if the package is not found or the path leaves the allowed folders.
         """
         for scheme in ("package://", "model://"):
             if name.startswith(scheme):

@@ -107,19 +107,8 @@ def wrench_rows_to_frd(matrix: Array) -> Array:
 def make_draft(found: ParsedVehicle, convention: str, thrust: str) -> VehicleDraft:
     """Turn what was found into a draft in FRD.
 
-    Parameters
-    ----------
-    found : ParsedVehicle
-    convention : str
-        "auto", "FLU" or "FRD".
-    thrust : str
-        "auto" or "axis" (the rule of the format), "reversed" (its opposite), or "+x" ... "-z", an axis of each
-        thruster's own frame.
-
-    Raises
-    ------
-    InputError
-        If a value is out of range.
+    `convention`: "auto", "FLU" or "FRD". `thrust`: "auto" or "axis" (the rule of the format), "reversed" (its
+    opposite), or "+x" ... "-z", an axis of each thruster's own frame. Raises InputError if a value is out of range.
     """
     frame = found.frame if convention == "auto" else convention
     said = "told" if convention != "auto" else found.frame_why

@@ -69,36 +69,16 @@ def import_vehicle(
 ) -> VehicleDraft:
     """Read a vehicle description of another project.
 
-    Parameters
-    ----------
-    path : str or Path
-        URDF, xacro, Gazebo SDF, Stonefish scenario, or YAML with an allocation matrix or thruster geometry; the
-        format is told by what is in the file, not by its name.
-    convention : str
-        Body axes of the file: "auto" (by format and evidence), "FLU" or "FRD".
-    thrust : str
-        "auto", "axis", "reversed", or an axis of each thruster's own frame such as "+x"; see `make_draft`.
-    matrix : Path, optional
-        YAML file with the matrix that the project ships; kept beside the geometry for comparison.
-    packages : mapping of str to Path, optional
-        Folders of packages that are not found near the file.
-    arguments : mapping of str to str, optional
-        Values of xacro and Stonefish arguments.
-    skip_missing : bool
-        Leave out xacro includes that are not there, with a note, instead of refusing the file.
-    rows : str, optional
-        What the six rows of a matrix are, in the file's order: names parted by commas, such as
-        "roll,pitch,yaw,x,y,z".
-
-    Returns
-    -------
-    VehicleDraft
-        In FRD. What the file does not hold is None and listed in `missing`; `notes` says what was decided and why.
-
-    Raises
-    ------
-    InputError
-        In one line with file and line, for anything that cannot be read or is not a vehicle.
+    `path`: URDF, xacro, Gazebo SDF, Stonefish scenario, or YAML with an allocation matrix or thruster geometry; the
+    format is told by what is in the file, not by its name. `convention`: body axes of the file: "auto" (by format and
+    evidence), "FLU" or "FRD". `thrust`: "auto", "axis", "reversed", or an axis of each thruster's own frame such as
+    "+x"; see `make_draft`. `matrix`: YAML file with the matrix that the project ships; kept beside the geometry for
+    comparison. `packages`: folders of packages that are not found near the file. `arguments`: values of xacro and
+    Stonefish arguments. `skip_missing`: leave out xacro includes that are not there, with a note, instead of refusing
+    the file. `rows`: what the six rows of a matrix are, in the file's order: names parted by commas, such as
+    "roll,pitch,yaw,x,y,z". Returns in FRD. What the file does not hold is None and listed in `missing`; `notes` says
+    what was decided and why. Raises InputError in one line with file and line, for anything that cannot be read or is
+    not a vehicle.
     """
     path = Path(path)
     for value, choices, option in ((convention, FRAME_CHOICES, "frame"), (thrust, THRUST_CHOICES, "thrust direction")):
@@ -255,10 +235,7 @@ def read_matrix(
     `geometry`, shape (6, n), settles by the way of reading in which most entries agree; without it forces come first
     and the frame is FLU as in ROS.
 
-    Raises
-    ------
-    InputError
-        If the file holds none or it has the wrong shape.
+    Raises InputError if the file holds none or it has the wrong shape.
     """
     found = ParsedVehicle(path.stem, "YAML", path, "FLU", "")
     read_matrix_only(parse_yaml(read_text(path), path), found, parse_order(rows))

@@ -115,10 +115,8 @@ def inertia_matrix(values: dict[str, float]) -> Array:
 def checked_mass(text: str | None, place: SourceLocation, link: str) -> float:
     """A link's mass.
 
-    Raises
-    ------
-    InputError
-        If it is missing, not a number, or negative; a massless link is allowed, a massless vehicle is not.
+    Raises InputError if it is missing, not a number, or negative; a massless link is allowed, a massless vehicle is
+    not.
     """
     if text is None:
         raise PlacedError(f"{place}: link {link}: inertial without a mass")
@@ -183,10 +181,7 @@ def collision_shape(X_LS: Pose, geometry: Element | None) -> CollisionShape:
 def read_mass(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Mass, centre of gravity and inertia of all links together, as a simulator would move them.
 
-    Raises
-    ------
-    InputError
-        If the masses add up to nothing, or the inertia is not positive definite.
+    Raises InputError if the masses add up to nothing, or the inertia is not positive definite.
     """
     computed = [link for link in bodies.links.values() if link.computed]
     if computed:

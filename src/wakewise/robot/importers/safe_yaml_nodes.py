@@ -125,10 +125,7 @@ class YamlNode:
 def parse_yaml(text: str, path: Path) -> YamlNode:
     """Parse YAML (or JSON) text.
 
-    Raises
-    ------
-    InputError
-        If it is not YAML or exceeds the limits above.
+    Raises InputError if it is not YAML or exceeds the limits above.
     """
     if len(text) > MAX_TEXT:
         raise InputError(f"{path}: {len(text)} characters, YAML of at most {MAX_TEXT} is read")

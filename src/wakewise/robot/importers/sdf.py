@@ -28,10 +28,7 @@ _MOMENTS = ("x", "y", "z", "p", "q", "r")
 def read_sdf(root: Element, folders: PackagePaths, notes: list[str]) -> RobotDescription:
     """Read an `<sdf>` element; of several models the one with the most thrusters is taken.
 
-    Raises
-    ------
-    InputError
-        If there is no model, a frame is not defined, or a number is not one.
+    Raises InputError if there is no model, a frame is not defined, or a number is not one.
     """
     models = _models(root)
     tops = [root, *root.all("world")]

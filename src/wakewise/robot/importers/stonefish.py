@@ -51,19 +51,8 @@ def count(robot: Element) -> int:
 def read_thrusters(robot: Element, bodies: RobotDescription, density: float | None, found: ParsedVehicle) -> None:
     """Fill in the thrusters of a robot; other actuators are named as not read.
 
-    Parameters
-    ----------
-    robot : Element
-    bodies : RobotDescription
-        Its links.
-    density : float or None
-        Density of the scenario's water in kg/m^3.
-    found : ParsedVehicle
-
-    Raises
-    ------
-    InputError
-        If a thruster is on no link, or a number is not one.
+    `bodies`: its links. `density`: density of the scenario's water in kg/m^3. Raises InputError if a thruster is on no
+    link, or a number is not one.
     """
     rules: list[str] = []
     turning = moving_parts(bodies)
@@ -310,10 +299,7 @@ def read_stonefish(
 ) -> None:
     """Fill in what a scenario says about its robot; `macros` are those of xacro that the file defines.
 
-    Raises
-    ------
-    InputError
-        If there is no robot, or a number is not one.
+    Raises InputError if there is no robot, or a number is not one.
     """
     scenario = StonefishReader(folders, arguments, found.notes)
     whole = Element("scenario", {}, root.place, [root]) if root.tag == "robot" else root

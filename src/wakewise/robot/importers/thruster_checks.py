@@ -183,10 +183,7 @@ def is_unit(length: Any) -> Any:
 def require_count(n: int, where: str = "") -> None:
     """Refuse more thrusters than any vehicle has.
 
-    Raises
-    ------
-    InputError
-        Naming the cap.
+    Raises InputError naming the cap.
     """
     if n > MAX_THRUSTERS:
         raise PlacedError(f"{where}{n} thrusters, at most {MAX_THRUSTERS} are read")
@@ -195,10 +192,8 @@ def require_count(n: int, where: str = "") -> None:
 def require_force_columns(matrix: Array, what: str) -> None:
     """Refuse a matrix, shape (6, n), that would be flown with and is no wrench per newton of each thruster.
 
-    Raises
-    ------
-    InputError
-        If it has no columns or too many, a force column is not of length 1, or a moment has an arm beyond `MAX_ARM_M`.
+    Raises InputError if it has no columns or too many, a force column is not of length 1, or a moment has an arm beyond
+    `MAX_ARM_M`.
     """
     if matrix.shape[1] == 0:
         raise PlacedError(f"{what} has no columns, must have one per thruster")
@@ -223,10 +218,7 @@ def require_force_columns(matrix: Array, what: str) -> None:
 def require_same_count(entries: Entries, found: ParsedVehicle) -> None:
     """Hold the number of thrusters against the file's own lists and counts of them.
 
-    Raises
-    ------
-    InputError
-        If they disagree.
+    Raises InputError if they disagree.
     """
     columns = None if found.matrix is None else int(found.matrix.shape[1])
     n = len(found.thrusters) or columns
@@ -286,15 +278,8 @@ def claimed(words: str) -> int:
 def question_rank(found: ParsedVehicle, matrix: Array, name: str) -> list[str]:
     """Hold the rank of an allocation matrix, shape (6, n), against what the file's own words claim.
 
-    Returns
-    -------
-    list of str
-        Notes that question it.
-
-    Raises
-    ------
-    InputError
-        If the layout claims more axes than it has thrusters, so that it cannot be right.
+    Returns notes that question it. Raises InputError if the layout claims more axes than it has thrusters, so that it
+    cannot be right.
     """
     notes: list[str] = []
     rank = directions(matrix).rank
@@ -316,23 +301,8 @@ def question_rank(found: ParsedVehicle, matrix: Array, name: str) -> list[str]:
 def question_names(found: ParsedVehicle, draft: VehicleDraft, *, told: bool) -> list[str]:
     """Hold places and axes against the thrusters' own names, and a guess of axes against what any vehicle can do.
 
-    Parameters
-    ----------
-    found : ParsedVehicle
-    draft : VehicleDraft
-        In FRD.
-    told : bool
-        Whether the user said along which axis thrusters push.
-
-    Returns
-    -------
-    list of str
-        Notes that question the places.
-
-    Raises
-    ------
-    InputError
-        If nothing but a guess says which way thrusters push, and the vehicle it makes is none.
+    `draft`: in FRD. `told`: whether the user said along which axis thrusters push. Returns notes that question the
+    places. Raises InputError if nothing but a guess says which way thrusters push, and the vehicle it makes is none.
     """
     if not draft.thrusters:
         return []

@@ -286,10 +286,7 @@ _ANGLES = re.compile(
 def read_geometry(entries: Entries, found: ParsedVehicle) -> bool:
     """Fill in thrusters from positions with directions or angles; False if the file places none.
 
-    Raises
-    ------
-    InputError
-        If what stands there cannot be read in one way only.
+    Raises InputError if what stands there cannot be read in one way only.
     """
     positions = find(entries, _POSITIONS)
     directions, key = _direction_matrix(entries)

@@ -27,10 +27,7 @@ CAMERA_TYPES = frozenset({"camera", "depth", "depth_camera", "rgbd_camera", "rgb
 def read_urdf(root: Element) -> RobotDescription:
     """Read an expanded `<robot>` element.
 
-    Raises
-    ------
-    InputError
-        If a joint names a link that is not there, links form a loop, or a number is not one.
+    Raises InputError if a joint names a link that is not there, links form a loop, or a number is not one.
     """
     links: dict[str, Link] = {}
     for element in root.all("link"):

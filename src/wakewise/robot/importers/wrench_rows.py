@@ -72,10 +72,7 @@ def order_of_one(label: str) -> bool:
 def parse_order(rows: str | None) -> WrenchOrder | None:
     """Order of the option `--rows`.
 
-    Raises
-    ------
-    InputError
-        If it does not name each of the six once.
+    Raises InputError if it does not name each of the six once.
     """
     if rows is None:
         return None
@@ -123,22 +120,10 @@ def resolve_order(
     Of the ways of reading, those count in which every force has length 1 and no moment lies along its own force, as no
     thruster makes it. Where none or several are left, the file is refused or questioned, with the option that tells.
 
-    Parameters
-    ----------
-    raw : ndarray
-        Numbers as they stand: flat, or of two dimensions of which one is 6.
-    order : Order or None
-        What the file or the user says.
-    what : str
-        Name of the matrix, for notes and messages.
-    place : Place or None
-        Where it is, if the vehicle has nothing else to fly with; None if a geometry is at hand to settle doubts.
-    notes : list of str
-
-    Raises
-    ------
-    InputError
-        If no way of reading makes a thruster's wrench of every column, and no geometry is at hand.
+    `raw`: numbers as they stand: flat, or of two dimensions of which one is 6. `order`: what the file or the user says.
+    `what`: name of the matrix, for notes and messages. `place`: where it is, if the vehicle has nothing else to fly
+    with; None if a geometry is at hand to settle doubts. Raises InputError if no way of reading makes a thruster's
+    wrench of every column, and no geometry is at hand.
     """
     orders = [FORCES_FIRST, MOMENTS_FIRST] if order is None else [order]
     read = [(one.wrench(m), f"{way}, {one.words}", one) for one in orders for m, way in candidate_layouts(raw)]

@@ -16,15 +16,9 @@ _TRUE, _FALSE = frozenset({"true", "1", "yes"}), frozenset({"false", "0", "no", 
 class XacroExpander:
     """Expands one xacro document.
 
-    Parameters
-    ----------
-    folders : PackagePaths
-        Finds packages and keeps includes inside.
-    arguments : mapping of str to str
-        Values of `$(arg NAME)` that the user gave.
-    skip_missing : bool
-        Leave out includes that are not there, and calls of macros that then do not exist, each with a note; otherwise
-        both are refused.
+    `folders`: finds packages and keeps includes inside. `arguments`: values of `$(arg NAME)` that the user gave.
+    `skip_missing`: leave out includes that are not there, and calls of macros that then do not exist, each with a note;
+    otherwise both are refused.
     """
 
     def __init__(self, folders: PackagePaths, arguments: Mapping[str, str], *, skip_missing: bool) -> None:
@@ -44,10 +38,7 @@ class XacroExpander:
     def expand(self, root: Element) -> Element:
         """Expand the document whose root element this is.
 
-        Raises
-        ------
-        InputError
-            With file and line, for anything that cannot be expanded.
+        Raises InputError with file and line, for anything that cannot be expanded.
         """
         scope = Scope(None)
         self._including.append(root.place.file.resolve())

@@ -138,12 +138,8 @@ _PIECES = re.compile(r"\$\$+(?=[{(])|\$\{(?:[^{}]|\{[^{}]*\})*\}|\$\([^)]*\)|\$|
 class TextSubstitution:
     """Puts values into the text of one document, and counts how deep and how long that gets.
 
-    Parameters
-    ----------
-    folders : PackagePaths
-        Finds packages, and keeps `load_yaml` inside.
-    arguments : mapping of str to str
-        Values of `$(arg NAME)`; the document adds its defaults.
+    `folders`: finds packages, and keeps `load_yaml` inside. `arguments`: values of `$(arg NAME)`; the document adds its
+    defaults.
     """
 
     def __init__(self, folders: PackagePaths, arguments: Mapping[str, str]) -> None:
@@ -156,10 +152,7 @@ class TextSubstitution:
     def deeper(self, place: SourceLocation) -> Iterator[None]:
         """Count one more level while the block runs.
 
-        Raises
-        ------
-        InputError
-            Beyond `MAX_CALLS` levels.
+        Raises InputError beyond `MAX_CALLS` levels.
         """
         if self._depth >= MAX_CALLS:
             raise PlacedError(f"{place}: macros, includes and properties within one another more than {MAX_CALLS} deep")

@@ -80,10 +80,7 @@ class Element:
 def read_bytes(path: Path) -> bytes:
     """Read a whole file of ordinary size.
 
-    Raises
-    ------
-    InputError
-        If it is not a readable regular file or is larger than `MAX_BYTES`.
+    Raises InputError if it is not a readable regular file or is larger than `MAX_BYTES`.
     """
     try:
         if not path.is_file():
@@ -100,10 +97,7 @@ def read_bytes(path: Path) -> bytes:
 def read_text(path: Path) -> str:
     """Read a text file in UTF-8, or in the encoding that its XML declaration names.
 
-    Raises
-    ------
-    InputError
-        If the bytes are not text in that encoding.
+    Raises InputError if the bytes are not text in that encoding.
     """
     data = read_bytes(path)
     encoding = "utf-8"
@@ -129,10 +123,8 @@ def parse_xml(text: str, path: Path) -> Element:
 
     A prefix that the file binds to the xacro namespace becomes `xacro:`, whatever the file calls it.
 
-    Raises
-    ------
-    InputError
-        If the text is not well formed, declares a document type or an entity, or exceeds the limits above.
+    Raises InputError if the text is not well formed, declares a document type or an entity, or exceeds the limits
+    above.
     """
     builder = _Builder(path)
     try:
@@ -197,10 +189,7 @@ class _Builder:
 def number(text: str, place: SourceLocation, what: str) -> float:
     """Turn text into a finite number.
 
-    Raises
-    ------
-    InputError
-        Naming the place and what the number means.
+    Raises InputError naming the place and what the number means.
     """
     try:
         value = float(text)

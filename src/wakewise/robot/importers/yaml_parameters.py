@@ -28,10 +28,7 @@ _QUADRATIC = re.compile(r"([xyzkmn])([UVWPQR])(?:abs)?([UVWPQR])$")
 def read_water(bodies: RobotDescription, found: ParsedVehicle) -> None:
     """Fill in added mass, damping and buoyancy from the plugins.
 
-    Raises
-    ------
-    InputError
-        If a block does not hold the right number of numbers.
+    Raises InputError if a block does not hold the right number of numbers.
     """
     for plugin in bodies.plugins:
         said = words(plugin)
@@ -245,10 +242,7 @@ def vector3(item: YamlNode, what: str) -> Array:
 def read_parameters(entries: Entries, found: ParsedVehicle) -> bool:
     """Fill in mass, inertia, buoyancy and coefficients under the names that controllers use; False if there are none.
 
-    Raises
-    ------
-    InputError
-        If a number is not one, a mass is not positive, or an inertia is not positive definite.
+    Raises InputError if a number is not one, a mass is not positive, or an inertia is not positive definite.
     """
     known = len(found.derived)
     entries = _of_the_vehicle(entries, found)
@@ -292,10 +286,7 @@ def read_parameters(entries: Entries, found: ParsedVehicle) -> bool:
 def _of_the_vehicle(entries: Entries, found: ParsedVehicle) -> Entries:
     """Entries that speak of the vehicle, outermost first, not of an arm or another part of it.
 
-    Raises
-    ------
-    InputError
-        If two masses stand at one depth that may both be the vehicle's.
+    Raises InputError if two masses stand at one depth that may both be the vehicle's.
     """
     whole = [(path, item) for path, item in entries if not any(PART_NAME.search(key) for key in path[:-1])]
     masses = [(path, item) for path, item in whole if path[-1] in _MASS and isinstance(item.value, str)]

@@ -190,33 +190,17 @@ def identify_lag(
 ) -> LagFit:
     """Fit each lag model with dead time to a measured step by least squares and keep the one the data ask for.
 
-    Parameters
-    ----------
-    time_s : array_like, shape (m,)
-        Increasing; resampled evenly if it is not even.
-    command : array_like, shape (m,)
-        What was asked for, in any unit to which steady thrust is proportional: a commanded thrust, or the square of a
-        commanded speed or voltage. A value holds until the
-        next sample. It must change in the record, and should rest before; the sign of the ratio is free.
-    thrust_N : array_like, shape (m,)
-        Measured force; a constant bias is fitted.
-    average_s : float, optional
-        Model and measurement are compared as averages over this time. Left out, it is one period of the strongest line
-        in what a lag leaves unexplained, if that line is faster than the lag and holds 30 % of it (the propeller's
-        blades passing), and otherwise no averaging.
-
-    Returns
-    -------
-    LagFit
-        The model of the lowest Bayesian information criterion (G. Schwarz, Ann. Statist. 6, 1978, 461), with the count
-        of independent readings, not of samples, in it. Standard errors are Newey and West's (Econometrica 55, 1987,
-        703), whose window is the root of the number of averages.
-
-    Raises
-    ------
-    InputError
-        If shapes differ, a value is not finite, time does not increase, there are fewer than 20 samples or averages,
-        or command or thrust never changes.
+    `time_s`, shape (m,): increasing; resampled evenly if it is not even. `command`, shape (m,): what was asked for, in
+    any unit to which steady thrust is proportional: a commanded thrust, or the square of a commanded speed or voltage.
+    A value holds until the next sample. It must change in the record, and should rest before; the sign of the ratio is
+    free. `thrust_N`, shape (m,): measured force; a constant bias is fitted. `average_s`: model and measurement are
+    compared as averages over this time. Left out, it is one period of the strongest line in what a lag leaves
+    unexplained, if that line is faster than the lag and holds 30 % of it (the propeller's blades passing), and
+    otherwise no averaging. Returns the model of the lowest Bayesian information criterion (G. Schwarz, Ann. Statist. 6,
+    1978, 461), with the count of independent readings, not of samples, in it. Standard errors are Newey and West's
+    (Econometrica 55, 1987, 703), whose window is the root of the number of averages. Raises InputError if shapes
+    differ, a value is not finite, time does not increase, there are fewer than 20 samples or averages, or command or
+    thrust never changes.
     """
     record = _record(time_s, command, thrust_N, average_s)
     fits = [_fit(family, record) for family in FAMILIES]
@@ -437,10 +421,8 @@ LARGEST_FILE_BYTES = 200_000_000
 def read_step(path: Path | str) -> tuple[Array, Array, Array]:
     """Read a measured step from a CSV with the columns `time_s`, `command` and `thrust_N`; others are not read.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a column is missing or a cell is no finite number; the message names the line.
+    Raises InputError if the file cannot be read, a column is missing or a cell is no finite number; the message names
+    the line.
     """
     path = Path(path)
     if not path.is_file():

@@ -218,15 +218,8 @@ class SplitLag:
 def delay_step(line: Array, commands: ArrayLike) -> tuple[Array, Array]:
     """Push commands, shape (n,), into a delay of m steps and take out those of m steps ago.
 
-    Parameters
-    ----------
-    line : ndarray, shape (m, n)
-        Commands on their way, oldest first; m = round(delay / step). No rows means no delay.
-
-    Returns
-    -------
-    tuple of ndarray
-        The line after the step, shape (m, n), and the delayed commands, shape (n,).
+    `line`, shape (m, n): commands on their way, oldest first; m = round(delay / step). No rows means no delay. Returns
+    the line after the step, shape (m, n), and the delayed commands, shape (n,).
     """
     queue = np.concatenate([line, np.asarray(commands, dtype=np.float64)[None, :]])
     return queue[1:], queue[0]

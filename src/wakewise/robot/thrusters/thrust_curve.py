@@ -30,16 +30,9 @@ class CurveSide:
     Share 0 is the slowest running pulse, share 1 the outermost pulse of the table. Sharing them lets two voltages be
     mixed although they start to run at different pulses: mixing at equal pulses would smear the start.
 
-    Parameters
-    ----------
-    share : ndarray, shape (k,)
-        From 0 to 1, increasing.
-    silent_us, first_us, last_us : ndarray, shape (v,)
-        Outermost pulse without thrust, the slowest running pulse and the outermost pulse of the table.
-    thrust_N : ndarray, shape (v, k)
-        Magnitudes, never falling along k.
-    rpm, power_W : ndarray, shape (v, k), or None
-        Magnitudes; None if the table has none.
+    `share`, shape (k,): from 0 to 1, increasing. `silent_us`, `first_us`, `last_us`, shape (v,): outermost pulse
+    without thrust, the slowest running pulse and the outermost pulse of the table. `thrust_N`, shape (v, k):
+    magnitudes, never falling along k. `rpm`, `power_W`, shape (v, k): magnitudes; None if the table has none.
     """
 
     share: Array
@@ -74,21 +67,9 @@ class ThrustCurve:
     Between `silent_us` and `first_us` (4 us apart in a fine table) the thruster is taken to run at its slowest. A
     wished thrust below the first one that can be held is rounded to none or to that first step, whichever is nearer.
 
-    Parameters
-    ----------
-    name, source : str
-    supply_V : ndarray, shape (v,)
-        Increasing.
-    neutral_us : float
-        The pulse that is sent for no thrust.
-    forward, reverse : CurveSide
-    notes : tuple of str
-        What was found and done when the table was read, one sentence each.
-
-    Raises
-    ------
-    InputError
-        From every method: if a pulse or thrust is not finite, or the voltage lies outside the table.
+    `supply_V`, shape (v,): increasing. `neutral_us`: the pulse that is sent for no thrust. `notes`: what was found and
+    done when the table was read, one sentence each. Raises InputError from every method: if a pulse or thrust is not
+    finite, or the voltage lies outside the table.
     """
 
     name: str
@@ -256,17 +237,9 @@ _NO_LEVELS = frozen([], (0,), "levels_N")
 class ThrustSteps:
     """The thrusts that one thruster can hold.
 
-    Parameters
-    ----------
-    least_forward_N, least_reverse_N : float
-        Smallest running thrusts, both as magnitudes; 0 where there is no gap.
-    levels_N : ndarray, shape (m,), or None
-        All running thrusts, increasing, reverse ones negative; None: any beyond the least ones.
-
-    Raises
-    ------
-    InputError
-        If a least thrust is negative or not finite, or a level lies in the gap.
+    `least_forward_N`, `least_reverse_N`: smallest running thrusts, both as magnitudes; 0 where there is no gap.
+    `levels_N`, shape (m,): all running thrusts, increasing, reverse ones negative; None: any beyond the least ones.
+    Raises InputError if a least thrust is negative or not finite, or a level lies in the gap.
     """
 
     least_forward_N: float
@@ -288,10 +261,7 @@ class ThrustSteps:
     def of_curve(cls, curve: ThrustCurve, supply_V: float) -> ThrustSteps:
         """Steps of a thruster that follows a curve at a voltage and is commanded in whole microseconds.
 
-        Raises
-        ------
-        InputError
-            If the voltage lies outside the table.
+        Raises InputError if the voltage lies outside the table.
         """
         low, high = curve.pulse_limits_us(supply_V)
         thrusts = curve.thrust_N(np.arange(math.ceil(low), math.floor(high) + 1, PULSE_STEP_US), supply_V)

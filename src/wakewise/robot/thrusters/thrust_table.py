@@ -104,12 +104,9 @@ def read_thrust_table(path: Path | str) -> ThrustCurve:
     al., Order Restricted Statistical Inference, 1988). A row whose power is
     not voltage times current keeps its thrust and loses its electrical readings; `notes` says so.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a column is unknown or missing, a cell is no finite number, a pulse repeats or is
-        outside 500 to 2500 us, thrust falls by more than noise, no row is silent, a voltage has fewer than three
-        rows, or thrust over power says that newton and kilogram-force are mixed up. The message names the line.
+    Raises InputError if the file cannot be read, a column is unknown or missing, a cell is no finite number, a pulse
+    repeats or is outside 500 to 2500 us, thrust falls by more than noise, no row is silent, a voltage has fewer than
+    three rows, or thrust over power says that newton and kilogram-force are mixed up. The message names the line.
     """
     path = Path(path)
     if not path.is_file():
@@ -378,10 +375,7 @@ def _onto(share: Array, part: Array, values: Array) -> Array:
 def library_curve(name: str) -> ThrustCurve:
     """Read a thrust curve that comes with the package, such as `t200`.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name; the message lists those there are.
+    Raises InputError if there is none of that name; the message lists those there are.
     """
     if name not in curve_names():
         raise InputError(f"thrust curve {name!r}: not in the library, allowed {', '.join(curve_names())}")
@@ -397,10 +391,7 @@ def curve_names() -> list[str]:
 def load_curve(name_or_path: str) -> ThrustCurve:
     """Read a thrust curve of the library by name, or any table by path (anything with a slash or .csv).
 
-    Raises
-    ------
-    InputError
-        If there is no such curve or file, or the table cannot be used.
+    Raises InputError if there is no such curve or file, or the table cannot be used.
     """
     if name_or_path in curve_names():
         return library_curve(name_or_path)

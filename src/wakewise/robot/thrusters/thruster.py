@@ -42,10 +42,7 @@ class ThrusterPlacement(Protocol):
 def mount(record: ThrusterPlacement) -> None:
     """Check and freeze place and axis of a frozen record, and give the axis unit length (call in `__post_init__`).
 
-    Raises
-    ------
-    InputError
-        If a number is not finite, the axis has no length, or the place is more than 10 m away.
+    Raises InputError if a number is not finite, the axis has no length, or the place is more than 10 m away.
     """
     where = f"thruster {instance_of(record.name, str, 'thruster: name')}"
     place = frozen(record.p_BT_m, (3,), f"{where}: p_BT_m")
@@ -77,26 +74,12 @@ class Thruster:
 
     A thrust T > 0 pushes the vehicle along `axis_B` and sends the jet along `-axis_B`; T < 0 does the opposite.
 
-    Parameters
-    ----------
-    name : str
-    p_BT_m : ndarray, shape (3,)
-        Centre of the disk from the origin of B, expressed in B.
-    axis_B : ndarray, shape (3,)
-        Direction of the force for positive thrust, normalised here.
-    max_forward_N, max_reverse_N : float
-        Largest thrust along `axis_B` and against it, both as magnitudes.
-    disk_area_m2 : float
-        Area that the propeller sweeps.
-    time_constant_s : float
-        First-order lag from commanded to delivered thrust; 0 means at once.
-    gain : float
-        Newton delivered per newton commanded. 1 unless the parameters are a plant's (see `perturbed`).
-
-    Raises
-    ------
-    InputError
-        If the axis has no length, a number is not finite or out of range, or the thruster is more than 10 m away.
+    `p_BT_m`, shape (3,): centre of the disk from the origin of B, expressed in B. `axis_B`, shape (3,): direction of
+    the force for positive thrust, normalised here. `max_forward_N`, `max_reverse_N`: largest thrust along `axis_B` and
+    against it, both as magnitudes. `disk_area_m2`: area that the propeller sweeps. `time_constant_s`: first-order lag
+    from commanded to delivered thrust; 0 means at once. `gain`: newton delivered per newton commanded. 1 unless the
+    parameters are a plant's (see `perturbed`). Raises InputError if the axis has no length, a number is not finite or
+    out of range, or the thruster is more than 10 m away.
     """
 
     name: str

@@ -30,10 +30,8 @@ def curve_facts(
 ) -> dict[str, Any]:
     """Limits, deadband and a short table at a voltage, and what wished thrusts and pulses give.
 
-    Raises
-    ------
-    InputError
-        If the voltage lies outside the table, or a wished value is not finite or beyond what the table holds.
+    Raises InputError if the voltage lies outside the table, or a wished value is not finite or beyond what the table
+    holds.
     """
     at = curve.voltage(supply_V)
     low, high = curve.limits_N(at)

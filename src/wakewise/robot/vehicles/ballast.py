@@ -37,20 +37,7 @@ class BallastBlock(Settings):
 def with_blocks(vehicle: Vehicle, blocks: Sequence[BallastBlock]) -> Vehicle:
     """The vehicle with blocks of ballast fixed to it.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    blocks : sequence of BallastBlock
-        Places of null mean the centre of buoyancy of the vehicle without them.
-
-    Examples
-    --------
-    >>> import wakewise as ww
-    >>> from wakewise.robot.vehicles.ballast import Block, net_buoyancy_N, with_blocks
-    >>> rov = ww.load_vehicle("paper")
-    >>> lighter = with_blocks(rov, [Block(float_N=3.0, at_B_m=(-0.1, 0.0, 0.0))])
-    >>> round(net_buoyancy_N(lighter) - net_buoyancy_N(rov), 6)
-    3.0
+    `blocks`: places of null mean the centre of buoyancy of the vehicle without them.
     """
     held = [block for block in blocks if block.float_N != 0.0]
     if not held:
@@ -83,10 +70,7 @@ def net_buoyancy_N(vehicle: Vehicle) -> float:
 def ballasted(vehicle: Vehicle, float_N: float, shift_mm: float = 0.0) -> Vehicle:
     """The vehicle with a block of this net buoyancy at its centre of buoyancy and its own mass this far forward.
 
-    Raises
-    ------
-    InputError
-        If `float_N` is not within what a block may have.
+    Raises InputError if `float_N` is not within what a block may have.
     """
     if not abs(float_N) <= 5000.0:
         raise InputError(f"ballast: {float_N:g} N, a block has -5000 to 5000 N")

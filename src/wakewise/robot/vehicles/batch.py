@@ -25,10 +25,7 @@ BLOCK = 64
 def pack_bodies(bodies: Sequence[RigidBody]) -> Array:
     """Parameters of several vehicles for `step_batch`, shape (n, 20, 6); pack once, step often.
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    Raises InputError if there is none.
     """
     if not bodies:
         raise InputError("bodies: none, allowed one or more")
@@ -49,32 +46,14 @@ def step_batch(
 
     With arrays of float64 in C order, and `out`, nothing of size N is made or copied but the states.
 
-    Parameters
-    ----------
-    bodies : RigidBody or ndarray, shape (1, 20, 6) or (N, 20, 6)
-        One for all, or a row for each vehicle from `pack_bodies`.
-    states : array_like, shape (N, 13)
-        Position in W (m), unit quaternion q_WB, twist in B relative to the world (m/s, rad/s).
-    wrenches_B : array_like, shape (N, 6)
-        In N and N m. Of thrusts, shape (N, n), it is `thrusts_N @ vehicle.allocation_matrix.T`: thrusters follow at
-        once here, without lag or dead zone.
-    dt_s : float
-        Unstable beyond 2.78 over the fastest rate of decay, as `step_rk4` is: mind it where bodies are drawn at random.
-    currents_W_m_s : array_like, shape (N, 3) or (3,), optional
-        Velocity of the water round each vehicle or all of them, constant in the world; still water if not given.
-    steps : int, optional
-    out : ndarray of float64, shape (N, 13), C order, optional
-        Where the new states go; may be `states`.
-
-    Returns
-    -------
-    ndarray, shape (N, 13)
-        `out` if it was given.
-
-    Raises
-    ------
-    InputError
-        If a shape disagrees, `dt_s` is not positive, or `out` cannot be written.
+    `bodies`, shape (1, 20, 6): one for all, or a row for each vehicle from `pack_bodies`. `states`, shape (N, 13):
+    position in W (m), unit quaternion q_WB, twist in B relative to the world (m/s, rad/s). `wrenches_B`, shape (N, 6):
+    in N and N m. Of thrusts, shape (N, n), it is `thrusts_N @ vehicle.allocation_matrix.T`: thrusters follow at once
+    here, without lag or dead zone. `dt_s`: unstable beyond 2.78 over the fastest rate of decay, as `step_rk4` is: mind
+    it where bodies are drawn at random. `currents_W_m_s`, shape (N, 3): velocity of the water round each vehicle or all
+    of them, constant in the world; still water if not given. `out`, shape (N, 13): where the new states go; may be
+    `states`. Returns ndarray, shape (N, 13): `out` if it was given. Raises InputError if a shape disagrees, `dt_s` is
+    not positive, or `out` cannot be written.
     """
     packed = bodies.packed[np.newaxis] if isinstance(bodies, RigidBody) else np.asarray(bodies, dtype=np.float64)
     start = np.asarray(states, dtype=np.float64)

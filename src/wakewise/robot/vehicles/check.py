@@ -27,17 +27,9 @@ AnyVehicle = Vehicle | VehicleDraft
 class RemainingAuthority:
     """What is left when one thruster gives nothing.
 
-    Parameters
-    ----------
-    thruster : int
-        Number of the thruster that failed, from 1.
-    rank : int
-        Independent wrench components left.
-    lost : tuple of str
-        Axes that could be made alone before and cannot now.
-    left_pct : ndarray, shape (6, 2), or None
-        What is left of the achievable wrench along each axis, negative and positive; NaN where there was none. None if
-        the thrust limits are not known.
+    `thruster`: number of the thruster that failed, from 1. `rank`: independent wrench components left. `lost`: axes
+    that could be made alone before and cannot now. `left_pct`, shape (6, 2): what is left of the achievable wrench
+    along each axis, negative and positive; NaN where there was none. None if the thrust limits are not known.
     """
 
     thruster: int
@@ -103,15 +95,8 @@ def thrust_limits_N(vehicle: AnyVehicle) -> tuple[Array, Array] | None:
 def achievable_wrench(vehicle: AnyVehicle) -> Array:
     """Largest pure wrench along each axis with every other component zero, within the thrust limits.
 
-    Returns
-    -------
-    ndarray, shape (6, 2)
-        Column 0 is the most negative and column 1 the most positive value, in N and N m.
-
-    Raises
-    ------
-    StageError
-        If the limits are not known, or the linear program fails.
+    Returns ndarray, shape (6, 2): column 0 is the most negative and column 1 the most positive value, in N and N m.
+    Raises StageError if the limits are not known, or the linear program fails.
     """
     limits = thrust_limits_N(vehicle)
     if limits is None:

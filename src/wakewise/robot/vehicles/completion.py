@@ -71,12 +71,8 @@ def unit_of(field: str) -> str:
 def plausible(dotted: str, draft: VehicleDraft | None = None) -> str:
     """Range of a field of a vehicle file among the library's vehicles, in words; empty where a range says nothing.
 
-    Parameters
-    ----------
-    dotted : str
-        Group and field, such as "body.size_m".
-    draft : VehicleDraft, optional
-        The vehicle it is for: where its mass is known the others are scaled to it.
+    `dotted`: group and field, such as "body.size_m". `draft`: the vehicle it is for: where its mass is known the others
+    are scaled to it.
     """
     if dotted not in _POWERS:
         return ""
@@ -159,16 +155,8 @@ def completed(draft: VehicleDraft, like: VehicleDraft) -> VehicleDraft:
     What the draft holds is kept. Its centre of buoyancy comes to lie above its own centre of gravity. Where its file
     has an allocation matrix but no places of thrusters, those stay missing: another vehicle's would contradict it.
 
-    Parameters
-    ----------
-    draft : VehicleDraft
-    like : VehicleDraft
-        A vehicle that can fly.
-
-    Raises
-    ------
-    InputError
-        If the other vehicle cannot fly, or the draft lacks nothing that it could give.
+    `like`: a vehicle that can fly. Raises InputError if the other vehicle cannot fly, or the draft lacks nothing that
+    it could give.
     """
     like.require_whole()
     asked = [name for name in draft.missing_fields if draft.shipped_matrix is None or "thruster" not in name]

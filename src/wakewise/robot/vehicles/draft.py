@@ -109,20 +109,10 @@ _CHECKS: dict[str, Callable[[Array], None]] = {
 class ThrusterDraft:
     """What a file says about one thruster.
 
-    Parameters
-    ----------
-    name : str
-    p_BT_m : ndarray, shape (3,)
-        Centre of the disk from the body origin, FRD.
-    axis_B : ndarray, shape (3,)
-        Direction of the force on the vehicle for positive thrust, FRD; normalised here.
-    max_forward_N, max_reverse_N, disk_area_m2, time_constant_s : float or None
-        As in `Thruster`; None where the file says nothing.
-
-    Raises
-    ------
-    InputError
-        Where `Thruster` would refuse the value.
+    `p_BT_m`, shape (3,): centre of the disk from the body origin, FRD. `axis_B`, shape (3,): direction of the force on
+    the vehicle for positive thrust, FRD; normalised here. `max_forward_N`, `max_reverse_N`, `disk_area_m2`,
+    `time_constant_s`: as in `Thruster`; None where the file says nothing. Raises InputError where `Thruster` would
+    refuse the value.
     """
 
     name: str
@@ -150,40 +140,14 @@ class ThrusterDraft:
 class VehicleDraft:
     """What a file says about a vehicle, in the units and the body frame (FRD) of `Vehicle`.
 
-    Parameters
-    ----------
-    name, title, source, does_not_claim : str
-    size_m : ndarray, shape (3,), or None
-    mass_kg, displaced_volume_m3, camera_fov_rad : float or None
-    inertia_kg_m2 : ndarray, shape (3, 3), or None
-        About the centre of gravity.
-    p_BG_m, p_BB_m : ndarray, shape (3,), or None
-        Centre of gravity and centre of buoyancy.
-    added_mass, linear_damping, quadratic_damping : ndarray, shape (6, 6), or None
-        Positive magnitudes in Fossen's order, as in `Hydrodynamics`.
-    thrusters : tuple of ThrusterDraft
-        May be empty where the file holds only a matrix.
-    shipped_matrix : ndarray, shape (6, n), or None
-        Allocation matrix as the file states it, turned to FRD.
-    curve : CurveChoice or None
-        Table of thrust against pulse width, if the file names one.
-    least_thrust : LeastThrust or None
-        Least thrusts, if the file states them.
-    X_BC : Pose or None
-    tilt : TiltJoint or None
-        The camera's joint, if the file states one.
-    drag_cases : tuple of DragCase
-    provenance : tuple of Provenance
-    notes : tuple of str
-        What was detected, inferred or found odd while reading.
+    `size_m` has shape (3,). `inertia_kg_m2`, shape (3, 3): about the centre of gravity. `p_BG_m`, `p_BB_m`, shape (3,):
+    centre of gravity and centre of buoyancy. `added_mass`, `linear_damping`, `quadratic_damping`, shape (6, 6):
+    positive magnitudes in Fossen's order, as in `Hydrodynamics`. `thrusters`: may be empty where the file holds only a
+    matrix. `shipped_matrix`, shape (6, n): allocation matrix as the file states it, turned to FRD. `curve`: table of
+    thrust against pulse width, if the file names one. `least_thrust`: least thrusts, if the file states them. `tilt`:
+    the camera's joint, if the file states one. `notes`: what was detected, inferred or found odd while reading. Raises
+    InputError: where `Vehicle`, `Thruster` or `Hydrodynamics` would refuse a value that is there.
 
-    Raises
-    ------
-    InputError
-        Where `Vehicle`, `Thruster` or `Hydrodynamics` would refuse a value that is there.
-
-    Notes
-    -----
     An added mass whose halves differ by no more than rounding (a thousandth of its largest element) is replaced by the
     mean of the two, and a note says so.
     """
@@ -339,15 +303,8 @@ class VehicleDraft:
     def require_whole(self, called: str | None = None) -> None:
         """Refuse to fly what is incomplete.
 
-        Parameters
-        ----------
-        called : str, optional
-            What the user calls the vehicle: a path; its name if not given.
-
-        Raises
-        ------
-        InputError
-            Naming all that is missing, and how it is filled in.
+        `called`: what the user calls the vehicle: a path; its name if not given. Raises InputError naming all that is
+        missing, and how it is filled in.
         """
         if self.missing:
             raise InputError(
@@ -360,10 +317,7 @@ class VehicleDraft:
     def allocation_matrix(self) -> Array:
         """Wrench about the body origin per newton, shape (6, n): from the geometry, else the one the file ships.
 
-        Raises
-        ------
-        InputError
-            If the file holds neither.
+        Raises InputError if the file holds neither.
         """
         if self.thrusters:
             return frozen(np.stack([t.wrench_per_newton_B for t in self.thrusters], axis=1), (6, None), "matrix")
@@ -401,10 +355,7 @@ class VehicleDraft:
     def vehicle(self) -> Vehicle:
         """Turn a complete draft into a vehicle that can fly.
 
-        Raises
-        ------
-        InputError
-            If something is missing; the message lists it.
+        Raises InputError if something is missing; the message lists it.
         """
         self.require_whole()
         return Vehicle(

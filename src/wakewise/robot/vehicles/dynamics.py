@@ -79,10 +79,7 @@ def compile_body(
 ) -> RigidBody:
     """Collect what the equations need of a vehicle in water of one density.
 
-    Raises
-    ------
-    InputError
-        If density or gravity is not positive.
+    Raises InputError if density or gravity is not positive.
     """
     for name, value in (("water_density_kg_m3", water_density_kg_m3), ("gravity_m_s2", gravity_m_s2)):
         if not (np.isfinite(value) and value > 0.0):
@@ -117,20 +114,9 @@ def compile_body(
 def acceleration(body: RigidBody, q_WB: Array, nu_B: Array, wrench_B: Array, current_W_m_s: Array) -> Array:
     """Rate of the twist, dnu_B/dt.
 
-    Parameters
-    ----------
-    q_WB : ndarray, shape (4,)
-        Unit quaternion.
-    nu_B : ndarray, shape (6,)
-        Twist relative to the world.
-    wrench_B : ndarray, shape (6,)
-        Wrench of thrusters, tether and so on; weight, buoyancy and water are added here.
-    current_W_m_s : ndarray, shape (3,)
-        Velocity of the water, constant in the world.
-
-    Returns
-    -------
-    ndarray, shape (6,), in m/s2 and rad/s2
+    `q_WB`, shape (4,): unit quaternion. `nu_B`, shape (6,): twist relative to the world. `wrench_B`, shape (6,): wrench
+    of thrusters, tether and so on; weight, buoyancy and water are added here. `current_W_m_s`, shape (3,): velocity of
+    the water, constant in the world. Returns ndarray, shape (6,), in m/s2 and rad/s2.
     """
     state, inputs = pack(np.zeros(3), q_WB, nu_B, wrench_B, current_W_m_s)
     rate = np.empty(13)

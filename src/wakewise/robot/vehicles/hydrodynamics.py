@@ -21,23 +21,12 @@ class Hydrodynamics:
     Order of rows and columns: surge, sway, heave, roll, pitch, yaw. The damping wrench on the vehicle is
     `-(linear_damping @ nu + quadratic_damping @ (abs(nu) * nu))` with the velocity relative to the water.
 
-    Parameters
-    ----------
-    added_mass : ndarray, shape (6, 6)
-        M_A in kg, kg m and kg m2; symmetric, positive semidefinite.
-    linear_damping : ndarray, shape (6, 6)
-        D_l in N s/m, N s and N m s; its symmetric part is positive semidefinite.
-    quadratic_damping : ndarray, shape (6, 6)
-        D_q in N s2/m2 and N m s2; diagonal, since coupled quadratic terms may feed energy to the vehicle.
+    `added_mass`, shape (6, 6): M_A in kg, kg m and kg m2; symmetric, positive semidefinite. `linear_damping`, shape (6,
+    6): d_l in N s/m, N s and N m s; its symmetric part is positive semidefinite. `quadratic_damping`, shape (6, 6): d_q
+    in N s2/m2 and N m s2; diagonal, since coupled quadratic terms may feed energy to the vehicle. Raises InputError if
+    a matrix is not of the kind above, so that the water could do work on the vehicle.
 
-    Raises
-    ------
-    InputError
-        If a matrix is not of the kind above, so that the water could do work on the vehicle.
-
-    Notes
-    -----
-    T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., Wiley 2021, chapters 6 and 8.
+    Source: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., Wiley 2021, chapters 6, 8.
     """
 
     added_mass: Array
@@ -64,17 +53,8 @@ class Hydrodynamics:
 class DragCase:
     """Another set of damping for a vehicle.
 
-    Parameters
-    ----------
-    name, source : str
-    estimate : bool
-    linear_damping, quadratic_damping : ndarray, shape (6, 6)
-        As in `Hydrodynamics`.
-
-    Raises
-    ------
-    InputError
-        If the name is one that means something else, or a matrix could feed energy to the vehicle.
+    `linear_damping`, `quadratic_damping`, shape (6, 6): as in `Hydrodynamics`. Raises InputError if the name is one
+    that means something else, or a matrix could feed energy to the vehicle.
     """
 
     name: str

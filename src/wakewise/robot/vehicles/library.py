@@ -47,11 +47,8 @@ def vehicle_names(*, flyable_only: bool = True) -> list[str]:
 def load_vehicle(name_or_path: str) -> Vehicle:
     """Read a vehicle of the library by name, or any vehicle file by path (anything with a slash or .yaml/.yml).
 
-    Raises
-    ------
-    InputError
-        If there is no such vehicle or file, the file does not hold a usable vehicle (the message names the field), or
-        it lacks something that flying needs (the message lists it).
+    Raises InputError if there is no such vehicle or file, the file does not hold a usable vehicle (the message names
+    the field), or it lacks something that flying needs (the message lists it).
     """
     draft = load_draft(name_or_path)
     draft.require_whole(name_or_path)
@@ -61,10 +58,7 @@ def load_vehicle(name_or_path: str) -> Vehicle:
 def load_draft(name_or_path: str) -> VehicleDraft:
     """Read what a vehicle file says, whole or not; names and paths as for `load_vehicle`.
 
-    Raises
-    ------
-    InputError
-        If there is no such vehicle or file, or a value in it cannot be used; the message names the field.
+    Raises InputError if there is no such vehicle or file, or a value in it cannot be used; the message names the field.
     """
     if name_or_path in draft_names():
         text = (resources.files("wakewise.robot.vehicles") / "library_data" / f"{name_or_path}.yaml").read_text("utf-8")
@@ -90,10 +84,7 @@ def is_path(name: str) -> bool:
 def parse_vehicle(text: str, where: str, name: str) -> VehicleDraft:
     """Read the text of a vehicle file; `where` is what messages call it.
 
-    Raises
-    ------
-    InputError
-        If the text is not a vehicle file or a value in it cannot be used.
+    Raises InputError if the text is not a vehicle file or a value in it cannot be used.
     """
     if text.lstrip().startswith("<"):
         raise InputError(f"vehicle file {where}: is XML, not a vehicle file; see wakewise vehicle import")
@@ -153,12 +144,8 @@ def draft_yaml(draft: VehicleDraft, blanks: Mapping[str, Sequence[str]] | None =
 
     What the draft does not know is left out. A group's source is the draft's own where no provenance names the group.
 
-    Parameters
-    ----------
-    draft : VehicleDraft
-    blanks : mapping of str to lines, optional
-        Comments to write in each group, or in place of one that is not there (see
-        `wakewise.robot.vehicles.completion`).
+    `blanks`: comments to write in each group, or in place of one that is not there (see
+    `wakewise.robot.vehicles.completion`).
     """
     value: dict[str, Any] = {"title": draft.title, "source": draft.source, "does_not_claim": draft.does_not_claim}
     if draft.notes:

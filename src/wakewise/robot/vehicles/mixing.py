@@ -111,10 +111,7 @@ def mixing_disagreements(vehicle: AnyVehicle, factors: Array, height_m: float = 
 
     `height_m` is the z coordinate of the point about which moments are taken.
 
-    Raises
-    ------
-    InputError
-        If the mixer does not have one row per thruster.
+    Raises InputError if the mixer does not have one row per thruster.
     """
     n = vehicle.allocation_matrix.shape[1]
     if np.shape(factors) != (n, 6):
@@ -125,10 +122,7 @@ def mixing_disagreements(vehicle: AnyVehicle, factors: Array, height_m: float = 
 def compare_with_ardusub(vehicle: AnyVehicle) -> MatrixComparison:
     """Compare with the signs of ArduSub's vectored frame that has as many motors; see `compare_signs`.
 
-    Raises
-    ------
-    InputError
-        If ArduSub has no vectored frame with as many motors.
+    Raises InputError if ArduSub has no vectored frame with as many motors.
     """
     n = vehicle.allocation_matrix.shape[1]
     if n not in ARDUSUB_FRAMES:
@@ -145,10 +139,7 @@ def compare_signs(vehicle: AnyVehicle, stated: Array, stated_by: str) -> MatrixC
     the point that the vehicle turns about. Where they sit above or below the origin, the notes say which zeros are
     zeros only about that height.
 
-    Raises
-    ------
-    InputError
-        If the shape differs from that of the matrix built from the geometry.
+    Raises InputError if the shape differs from that of the matrix built from the geometry.
     """
     _require_shape(vehicle, stated, stated_by)
     stated, height_m = np.sign(stated), _horizontal_height(vehicle)
@@ -175,10 +166,7 @@ def compare_signs(vehicle: AnyVehicle, stated: Array, stated_by: str) -> MatrixC
 def compare_matrix(vehicle: AnyVehicle, stated: Array, stated_by: str) -> MatrixComparison:
     """Compare a stated allocation matrix, shape (6, n), FRD, moments about the origin, entry by entry.
 
-    Raises
-    ------
-    InputError
-        If the shape differs from that of the matrix built from the geometry.
+    Raises InputError if the shape differs from that of the matrix built from the geometry.
     """
     _require_shape(vehicle, stated, stated_by)
     matrix = vehicle.allocation_matrix
@@ -195,17 +183,9 @@ def compare_matrix(vehicle: AnyVehicle, stated: Array, stated_by: str) -> Matrix
 def command_effects(vehicle: AnyVehicle, thrusts: Array) -> tuple[str, ...]:
     """What each single command of a mixer makes beside its own axis with this geometry, in % of what it is to make.
 
-    Parameters
-    ----------
-    vehicle : Vehicle or VehicleDraft
-    thrusts : ndarray, shape (n, 6)
-        Thrusts of each command, a column for each of surge, sway, heave, roll, pitch, yaw.
-
-    Returns
-    -------
-    tuple of str
-        A line for each command with side effects of at least 0.1 %: forces in N and moments in N m about the centre
-        of gravity (the origin where it is not known), per N or N m of the commanded axis.
+    `thrusts`, shape (n, 6): thrusts of each command, a column for each of surge, sway, heave, roll, pitch, yaw. Returns
+    a line for each command with side effects of at least 0.1 %: forces in N and moments in N m about the centre of
+    gravity (the origin where it is not known), per N or N m of the commanded axis.
     """
     centre, where = vehicle.p_BG_m, "the centre of gravity"
     if centre is None:

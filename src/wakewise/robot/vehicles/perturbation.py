@@ -38,10 +38,7 @@ def perturbed(
 
     The number of draws does not depend on the arguments, so one seed gives one vehicle however much is perturbed.
 
-    Raises
-    ------
-    InputError
-        If a percentage is outside [0, 90] or the trim leaves no displaced volume.
+    Raises InputError if a percentage is outside [0, 90] or the trim leaves no displaced volume.
     """
     percentages = {
         "mass_pct": mass_pct,
@@ -84,10 +81,7 @@ def perturbed(
 def possible_drags(vehicle: Vehicle, case: str) -> tuple[str, ...]:
     """Names of the sets of drag that a choice may come to: all there are for `drawn`, else the one that it names.
 
-    Raises
-    ------
-    InputError
-        If the vehicle has no such case.
+    Raises InputError if the vehicle has no such case.
     """
     names = (NOMINAL, *(c.name for c in vehicle.drag_cases))
     if case not in (*names, RANDOM):
@@ -100,10 +94,7 @@ def possible_drags(vehicle: Vehicle, case: str) -> tuple[str, ...]:
 def with_drag(vehicle: Vehicle, case: str, rng: np.random.Generator | None = None) -> Vehicle:
     """The vehicle with the drag of a case: its name, `nominal`, or `random`, which takes one of all, each alike.
 
-    Raises
-    ------
-    InputError
-        If the vehicle has no such case.
+    Raises InputError if the vehicle has no such case.
     """
     names = possible_drags(vehicle, case)
     case = names[int((rng or np.random.default_rng(0)).integers(len(names)))]

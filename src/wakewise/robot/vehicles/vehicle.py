@@ -28,19 +28,9 @@ class TiltJoint:
 
     A positive angle looks up, as a positive pitch of the body does; at zero the camera is as its mount states it.
 
-    Parameters
-    ----------
-    low_rad, high_rad : float
-        The stops.
-    rate_rad_s : float
-        How fast it turns.
-    p_BJ_m : ndarray, shape (3,), or None
-        A point of the hinge from the body origin; None: it goes through the camera's centre of projection.
-
-    Raises
-    ------
-    InputError
-        If the range does not hold zero, the rate is not positive, or a number is not finite.
+    `low_rad`, `high_rad`: the stops. `rate_rad_s`: how fast it turns. `p_BJ_m`, shape (3,): a point of the hinge from
+    the body origin; None: it goes through the camera's centre of projection. Raises InputError if the range does not
+    hold zero, the rate is not positive, or a number is not finite.
     """
 
     low_rad: float
@@ -126,42 +116,17 @@ class LeastThrust:
 class Vehicle:
     """Parameters of one vehicle; body frame B is FRD.
 
-    Parameters
-    ----------
-    name, title : str
-        Short name for files, and a name for people.
-    source, does_not_claim : str
-        Where the numbers come from, and what must not be concluded from them.
-    size_m : ndarray, shape (3,)
-        Length, width and height of the box around the vehicle, centred on the body origin.
-    mass_kg : float
-    inertia_kg_m2 : ndarray, shape (3, 3)
-        About the centre of gravity, in the axes of B.
-    displaced_volume_m3 : float
-    p_BG_m, p_BB_m : ndarray, shape (3,)
-        Centre of gravity and centre of buoyancy from the body origin.
-    hydrodynamics : Hydrodynamics
-    thrusters : tuple of Thruster
-    X_BC : Pose
-        Camera mount; the camera frame has OpenCV axes (x right, y down, z forward).
-    tilt : TiltJoint or None
-        What tilts the camera; None where it is fixed.
-    camera_fov_rad : float
-        Horizontal field of view in water.
-    curve : CurveChoice or None
-        Table of thrust against pulse width; its least thrust and its steps of a microsecond are the thrusters'.
-    least_thrust : LeastThrust or None
-        Least thrusts, where no table says so; neither: thrust is continuous through zero.
-    drag_cases : tuple of DragCase
-        Damping as other sources have it, which the true vehicle may have.
-    provenance : tuple of Provenance
-        Source of each group of numbers.
-
-    Raises
-    ------
-    InputError
-        If a number is not finite, mass or volume is not positive, the inertia is not symmetric positive definite, or
-        there are no thrusters or two of one name, or there is no such table or voltage.
+    `name`, `title`: short name for files, and a name for people. `source`, `does_not_claim`: where the numbers come
+    from, and what must not be concluded from them. `size_m`, shape (3,): length, width and height of the box around the
+    vehicle, centred on the body origin. `inertia_kg_m2`, shape (3, 3): about the centre of gravity, in the axes of B.
+    `p_BG_m`, `p_BB_m`, shape (3,): centre of gravity and centre of buoyancy from the body origin. `X_BC`: camera mount;
+    the camera frame has OpenCV axes (x right, y down, z forward). `tilt`: what tilts the camera; None where it is
+    fixed. `camera_fov_rad`: horizontal field of view in water. `curve`: table of thrust against pulse width; its least
+    thrust and its steps of a microsecond are the thrusters'. `least_thrust`: least thrusts, where no table says so;
+    neither: thrust is continuous through zero. `drag_cases`: damping as other sources have it, which the true vehicle
+    may have. `provenance`: source of each group of numbers. Raises InputError if a number is not finite, mass or volume
+    is not positive, the inertia is not symmetric positive definite, or there are no thrusters or two of one name, or
+    there is no such table or voltage.
     """
 
     name: str
@@ -268,10 +233,7 @@ class Vehicle:
 def thrust_steps(curve: CurveChoice | None, least: LeastThrust | None) -> ThrustSteps | None:
     """What thrusters can hold by their table, else by their stated least thrusts; None where neither is known.
 
-    Raises
-    ------
-    InputError
-        If there is no such table, it does not hold the voltage, or a least thrust is negative.
+    Raises InputError if there is no such table, it does not hold the voltage, or a least thrust is negative.
     """
     if curve is not None:
         return ThrustSteps.of_curve(library_curve(curve.table), curve.supply_V)
@@ -283,10 +245,7 @@ def thrust_steps(curve: CurveChoice | None, least: LeastThrust | None) -> Thrust
 def require_kinds(record: Any) -> None:
     """Refuse a vehicle, or a draft of one, whose words, records or lists are something else.
 
-    Raises
-    ------
-    InputError
-        Naming the field.
+    Raises InputError naming the field.
     """
     for field in ("name", "title", "source", "does_not_claim"):
         instance_of(getattr(record, field), str, field)
@@ -347,9 +306,7 @@ def readable_null_space(matrix: Array, tolerance: float = 1e-9) -> Array:
     horizontal thrusters alone; Gram-Schmidt then makes them orthonormal (and leaves vectors that share no thruster as
     they are). In each column the first entry that is not zero is positive.
 
-    Returns
-    -------
-    ndarray, shape (n, k)
+    Returns ndarray, shape (n, k).
     """
     _, singular, Vt = np.linalg.svd(matrix, full_matrices=True)
     rank = int(np.sum(singular > tolerance * max(1.0, float(singular[0]))))

@@ -16,6 +16,8 @@ from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from wakewise.ui.cli.signals import INTERRUPTED
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -24,8 +26,6 @@ if TYPE_CHECKING:
 
 HEARTBEAT_S = 30.0
 """Longest silence of a stage whose progress goes into a pipe or a file."""
-INTERRUPTED = threading.Event()
-"""Set by Ctrl-C; whoever tells of progress afterwards is stopped, should the interrupt itself have been swallowed."""
 
 
 @cache

@@ -1,15 +1,12 @@
-"""The `wakewise` command: joins the commands, and turns errors into one line and an exit code."""
+"""The `wakewise` program: its commands, and errors as one line and an exit code."""
 
 from __future__ import annotations
 
 import io
-import os
-import signal
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
-from types import TracebackType
 from typing import Any
 
 import typer
@@ -38,7 +35,7 @@ from wakewise.ui.cli import (
     world,
 )
 from wakewise.ui.cli.commands import FLIGHT, PANELS, PHOTOGRAPHS, STUDIES, VEHICLES, Command, installed_commands
-from wakewise.ui.cli.console import INTERRUPTED
+from wakewise.ui.cli.signals import EXIT_INTERRUPTED, INTERRUPTED, close_output, exit_code, program_signals
 
 _COMMANDS = (
     Command(FLIGHT, "scan", scan.scan),
@@ -65,8 +62,9 @@ _COMMANDS = (
 class _Panels(TyperGroup):
     """A group whose help lists its commands by panel, panels in the order of `PANELS`."""
 
-    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002  (its base passes it)
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a section for each panel."""
+        del ctx
         width = max(len(command.name) for command in _COMMANDS if command.parent in PANELS)
         for panel in PANELS:
             names = [command.name for command in _COMMANDS if command.parent == panel]
@@ -97,9 +95,6 @@ for _command in _COMMANDS:
     else:
         _parent.command(_command.name, rich_help_panel=_panel)(_command.run)
 
-_INTERRUPTED = 130
-_TERMINATED = 143
-_terminated = False
 _STOPPED = "stopped; what was finished is kept, run the same command again to go on"
 
 
@@ -135,7 +130,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         code = _commands()(args=arguments, standalone_mode=False)
         sys.stdout.flush()
-        if code == _INTERRUPTED:  # Ctrl-C inside a command
+        if code == EXIT_INTERRUPTED:  # Ctrl-C inside a command
             return _stopped()
         return code if isinstance(code, int) else 0
     except (KeyboardInterrupt, typer.Abort):
@@ -177,14 +172,14 @@ def _refused(fault: Exception) -> int | None:
         case WakewiseError():
             _say(str(fault))
         case BrokenPipeError():  # nobody reads on, as after `| head`
-            _close_output()
+            close_output()
         case _:
             failure = environment_failure(fault)
             if failure is None:
                 return None
             _say(f"cannot write: {failure}" if isinstance(fault, OSError) and fault.filename is None else str(failure))
             if isinstance(fault, OSError):
-                _close_output()
+                close_output()
     return 1
 
 
@@ -205,54 +200,17 @@ def _say(message: str) -> None:
 
 def _stopped() -> int:
     _say(_STOPPED)
-    return _TERMINATED if _terminated else _INTERRUPTED
-
-
-def _close_output() -> None:
-    """Drop what could not be written, else Python tries again at its end and tells of it in words of its own."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _terminate(*_: Any) -> None:
-    """End as after Ctrl-C, so that whatever is half-done is tidied up; a second SIGTERM does not disturb that."""
-    global _terminated  # noqa: PLW0603
-    _terminated = True
-    INTERRUPTED.set()
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    raise KeyboardInterrupt
-
-
-def _interrupt(*_: Any) -> None:
-    """Ctrl-C: remembered as well as raised, since libraries that try imports or call back from C may swallow it."""
-    INTERRUPTED.set()
-    raise KeyboardInterrupt
-
-
-def _unraisable(fault: sys.UnraisableHookArgs) -> None:
-    """Ctrl-C in a call back from C cannot be raised there; it is remembered, and no stack needs to tell of it."""
-    if not isinstance(fault.exc_value, KeyboardInterrupt):
-        sys.__unraisablehook__(fault)
-
-
-def _uncaught(kind: type[BaseException], fault: BaseException, trace: TracebackType | None) -> None:
-    """The same where C prints what it cannot raise: of Python's own code none but `run` would let Ctrl-C through."""
-    if not issubclass(kind, KeyboardInterrupt):
-        sys.__excepthook__(kind, fault, trace)
+    return exit_code()
 
 
 def main() -> None:
     """Entry point of the installed command."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # a figure with a sign that the terminal lacks is still a figure
         sys.stdout.reconfigure(errors="replace")
-    signal.signal(signal.SIGTERM, _terminate)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a job in the background has it ignored
-        signal.signal(signal.SIGINT, _interrupt)
-    sys.unraisablehook, sys.excepthook = _unraisable, _uncaught
-    if cache_dir.CHOSEN is not None:
-        _say(f"compiled code is kept in {cache_dir.CHOSEN}: the package's folder and the user's cache are read-only")
-    code = run()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said: an impatient Ctrl-C must not end it with a stack
+    with program_signals():
+        if cache_dir.CHOSEN is not None:
+            _say(
+                f"compiled code is kept in {cache_dir.CHOSEN}: the package's folder and the user's cache are read-only"
+            )
+        code = run()
     sys.exit(code)

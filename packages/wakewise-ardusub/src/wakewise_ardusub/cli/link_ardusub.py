@@ -1,4 +1,4 @@
-"""`wakewise link ardusub`: a real ArduSub vehicle, flown beside its pilot."""
+"""`wakewise link ardusub`: fly a real ArduSub vehicle beside its pilot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`wakewise link ardusub --check` and `--motor-test`: whether a vehicle may be driven, before it is."""
+"""`wakewise link ardusub --check` and `--motor-test`: checks before a vehicle is driven."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`wakewise link route`: one autopilot's MAVLink for several programs."""
+"""`wakewise link route`: MAVLink router of one autopilot for several programs."""
 
 from __future__ import annotations
 

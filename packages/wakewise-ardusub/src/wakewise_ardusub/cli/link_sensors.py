@@ -1,4 +1,4 @@
-"""`wakewise link sensors`: what the sensors of a companion computer say."""
+"""`wakewise link sensors`: live values of the sensors of a companion computer."""
 
 from __future__ import annotations
 

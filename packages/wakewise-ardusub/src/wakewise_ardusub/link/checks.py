@@ -1,13 +1,10 @@
-"""Whether an ArduSub vehicle may be driven motor by motor: a row for each thing that must be so, go or no-go.
+"""Checks before an ArduSub vehicle is driven motor by motor: one row for each condition, go or no-go.
 
-A pure function of facts. `survey.py` gathers them over a connection; without one the rows that need it stay unknown.
+`check` is a pure function of `CheckInputs`. `vehicle_survey.py` collects them over a connection; without a connection
+the rows that need one are unknown. `MotorResults` are the results of the motor test, stored as a file.
 
-What was seen of each motor when it was tested alone, as a file that is kept beside the vehicle.
-
-ArduSub's frames: which way each motor pushes by the mixer, held against a vehicle file's own geometry.
-
-A frame's name proves nothing: FRAME_CONFIG may be another vehicle's, and a matrix may be wrong in the firmware itself.
-So motors are compared one by one, by the signs of their wrenches.
+`match_motors` compares ArduSub's mixer (FRAME_CONFIG) with the geometry of the vehicle file, motor by motor, by the
+signs of the wrench. The name of a frame is not enough, because FRAME_CONFIG or the firmware's matrix may be wrong.
 """
 
 from __future__ import annotations

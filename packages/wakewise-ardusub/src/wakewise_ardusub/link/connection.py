@@ -1,6 +1,6 @@
-"""The way to a vehicle: what `--connection` may say, and the one place that opens it, as the vehicle's companion.
+"""Connection to a vehicle: parser of `--connection` strings and the only place that opens a pymavlink connection.
 
-Over it goes MAVLink 2 only, from the vehicle's own system id and component 191.
+MAVLink 2 only, with the vehicle's own system id and component 191 (onboard computer).
 """
 
 from __future__ import annotations

@@ -1,14 +1,12 @@
-"""Whether the companion's thrusts may act: a state machine without a clock, a wire or a memory of its own.
+"""State machine that decides whether the companion's thrusts may act. It has no clock and no connection.
 
-`EngagementState` judges `EngagementInputs`, what is known at one instant, against `EngagementLimits`. Thrusts may go
-out while it is engaged and nothing is amiss, and only then. The way there is the operator's: consent is asked for once
-all is well, and any fault takes it away for good; nothing engages by itself.
+`EngagementState` evaluates `EngagementInputs` of one instant against `EngagementLimits`. Thrusts are permitted only in
+the state `engaged` and without a fault. The operator consents in the state `ready`; a fault withdraws the consent.
 
     off -> listening <-> ready -> engaged -> refused -> listening
 
-`listening` lacks something and says what, `ready` waits for consent, `engaged` drives, `refused` was engaged until a
-fault and lets no one in for `REST_S`. Faults are judged in the order of `FAULTS`, the gravest first; the bounds of each
-are in docs/hazards.md.
+In `listening` a condition is missing, and `why` names it. In `ready` the consent is missing. `refused` follows a fault
+for `REST_S`. Faults are evaluated in the order of `FAULTS`, the most severe first; docs/hazards.md lists the limits.
 """
 
 from __future__ import annotations

@@ -1,14 +1,11 @@
-"""The relay between ground station and vehicle, for set-ups whose router hands the companion no copy of the sticks.
+"""MAVLink relay between ground station and vehicle, and a router for several programs. All endpoints are UDP.
 
-Everything is forwarded both ways as it came, byte by byte, whatever it is. One thing is changed, and only while the
-companion drives: MANUAL_CONTROL goes on with its sticks let go, under the pilot's own ids and sequence, buttons as they
-are, so that what lies beneath does not integrate against them and the autopilot still hears its pilot. The companion's
-own messages go to the vehicle apart from that; it never speaks as a ground station. Silence of one side is silence to
-the other: the autopilot's own fail-safes see what they would see without the relay.
+`MavlinkRelay` is for set-ups whose router sends the companion no copy of the sticks. It forwards all bytes unchanged in
+both directions, with one exception: while the companion drives, MANUAL_CONTROL carries neutral sticks, with the pilot's
+ids, sequence and buttons, so that the autopilot's controllers do not integrate against them. The companion's messages
+go to the vehicle separately. If one side is silent, the other side hears nothing, so that failsafes act as without it.
 
-One autopilot's bytes for several programs, and theirs for it and for each other, as a router on a vehicle does it.
-
-Nothing is looked into, kept or changed. Every place is UDP; a place that is silent is sent to all the same.
+`MavlinkRouter` forwards the bytes of one autopilot to several programs, and theirs to it and to each other, unchanged.
 """
 
 from __future__ import annotations

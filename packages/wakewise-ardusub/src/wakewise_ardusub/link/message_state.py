@@ -1,8 +1,7 @@
-"""What is known of a vehicle from the MAVLink messages that were heard: a record that each message leaves anew.
+"""Vehicle state from received MAVLink messages: `LinkState` and the pure function `update_link_state`.
 
-`LinkState` is frozen and `update_link_state` is pure, so that any sequence of messages can be played to it. Only what
-the vehicle's own autopilot says counts as its state; sticks count from whoever sends them to this vehicle, ground
-stations are told apart by their system id. A message that says nonsense changes nothing and is counted.
+Only messages of the vehicle's autopilot change its state. Sticks count from any sender that addresses this vehicle;
+ground stations are identified by system id. A message with invalid fields changes nothing and is counted.
 """
 
 from __future__ import annotations

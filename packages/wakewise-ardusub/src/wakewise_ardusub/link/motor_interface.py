@@ -1,6 +1,6 @@
-"""What a session needs of the autopilot's parameters to drive its motors; thrusts to slots, servos to thrusts.
+"""Thrusts to actuator values of the script, servo outputs to thrusts, and the parameters that both need.
 
-Thrusts in newtons become what the script is told: a value in [-1, 1] for each motor, all of them or none.
+An actuator value lies in [-1, 1]. Either all motors get one or none does.
 """
 
 from __future__ import annotations

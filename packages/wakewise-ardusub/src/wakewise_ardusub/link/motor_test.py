@@ -1,9 +1,9 @@
-"""Motor by motor, with somebody looking: each turns alone for a moment, and what was seen is kept.
+"""Motor test: each motor turns alone for a moment, and the operator's answer is recorded.
 
-ArduSub's MAV_CMD_DO_MOTOR_TEST (ArduSub, motors.cpp): the vehicle must be armed, param1 is the motor from 0, the pulse
-goes out as it is (past MOT_n_DIRECTION, as the script's overrides do), a motor keeps its pulse until it gets another,
-and half a second without a command ends the test and disarms. So commands are renewed at 10 Hz, each motor is brought
-to rest before anybody is asked, and nothing is sent at the end.
+ArduSub's MAV_CMD_DO_MOTOR_TEST (ArduSub, motors.cpp): the vehicle must be armed; param1 is the motor from 0; the pulse
+bypasses MOT_n_DIRECTION, as the script's overrides do; a motor keeps its pulse until it gets another; half a second
+without a command ends the test and disarms. So commands are renewed at 10 Hz, each motor is brought to rest before the
+operator is asked, and nothing is sent at the end.
 """
 
 from __future__ import annotations

@@ -1,15 +1,12 @@
-"""The one door through which thrusts leave: it judges every message, every tick of its watch and every thrust.
+"""Output gate: the only place that sends thrusts. It evaluates every message, every tick and every thrust.
 
-Thrusts are sent only while engaged, by facts of that very moment, and only those that a controller decided in this
-engagement. When it ends, `RELEASES` messages tell the script to let go, which gives the pilot the sticks at once; were
-all of them lost, the script would let go `HOLD_MS` after the last thrusts. The watch also sends the last thrusts again,
-so that lost messages do no harm, for no longer than `EngagementLimits.thrusts_s`.
+Thrusts are sent only while engaged, by the facts of that moment, and only if a controller computed them in this
+engagement. At its end `RELEASES` messages tell the script to release the motors, and the pilot has the sticks at once.
+If all of them are lost, the script releases `HOLD_MS` after the last thrusts. The gate also repeats the last thrusts
+against message loss, for at most `EngagementLimits.thrusts_s`. It is thread-safe; its lock is held for one message.
 
-Any thread may call it. It waits for nothing but its own lock, which is held for no longer than a message takes.
-
-How near what must be fresh comes to its limit, and how often it was over it: what a pilot looks at who loses it.
-
-What of a session is worth a line in its journal: changes of the vehicle and of who speaks to it.
+`FreshnessMargins` records how close the age of each input comes to its limit. `EventLogger` writes changes of the
+vehicle and of its senders to the journal.
 """
 
 from __future__ import annotations

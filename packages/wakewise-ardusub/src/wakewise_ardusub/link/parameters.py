@@ -1,9 +1,8 @@
-"""What an autopilot is set to: asked for live until nothing is missing, written and read back, or read from a file.
+"""Parameters of an autopilot: read until complete, set and read back, or parsed from a file; functions of the buttons.
 
-What ArduSub itself does at a button of the pilot's sticks: BTNn_FUNCTION, and BTNn_SFUNCTION while shift is held.
-
-A button that means something to the companion must mean nothing to the autopilot: both hear the same MANUAL_CONTROL.
-Numbers and names as ArduSub's parameter documentation has them, the table of a fresh autopilot as its `joystick.cpp`.
+BTNn_FUNCTION, and BTNn_SFUNCTION while shift is held, are what ArduSub does at a button of MANUAL_CONTROL. A button of
+the companion must have no function there, because autopilot and companion receive the same message. Numbers and names
+are those of ArduSub's parameter documentation; defaults are those of its `joystick.cpp`.
 """
 
 from __future__ import annotations

@@ -1,12 +1,11 @@
-"""What the companion and the script on the autopilot agree on: ids, names, times and bounds. No other file states them.
+"""Protocol between the companion and the script on the autopilot: ids, names, times and bounds, stated only here.
 
 The companion sends thrusts as SET_ACTUATOR_CONTROL_TARGET: `controls[i]` is motor i + 1, a value v in [-1, 1] that the
-script turns into a pulse of 1500 + 400 v us on the channel whose SERVOn_FUNCTION is that motor. An override of a
-channel goes past the mixer, so MOT_n_DIRECTION has no effect on it and the companion applies it (`output.py`).
+script converts into a pulse of 1500 + 400 v us on the channel whose SERVOn_FUNCTION is that motor. An override bypasses
+the mixer, so MOT_n_DIRECTION has no effect on it; the companion applies it (`motor_interface.py`).
+`script/wakewise.lua` states the same numbers; a test compares them.
 
-`script/wakewise.lua` states the same numbers; a test reads them out of it.
-
-What the companion asks the autopilot to send, and how often: ground stations set rates of a few a second.
+`interval_requests` are the message rates that the companion requests, since default rates are a few per second.
 """
 
 from __future__ import annotations

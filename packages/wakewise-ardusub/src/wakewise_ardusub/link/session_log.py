@@ -1,8 +1,7 @@
-"""The journal of a session at sea: what happened when and why, one line of JSON each, whole even if the power goes.
+"""Journal of a session: one line of JSON for each event, safe against a killed process and a power failure.
 
-Each line goes to the operating system in one write to the file's end, so a killed process leaves every line that it
-wrote; `sync` has the disk keep them, and is not called by who must be in time. A line that the power cut short is the
-last one, and the reader leaves it out and says so.
+Each line is one write at the end of the file. `sync` flushes to disk; time-critical threads do not call it. The reader
+omits and reports a last line that is incomplete.
 """
 
 from __future__ import annotations

@@ -1,12 +1,11 @@
-"""From MAVLink messages to `Measurement`s for the estimator, each at the time at which it was made.
+"""MAVLink messages to `Measurement`s for the estimator, each at the time at which it was made.
 
-Clocks. A message says when it was made by its sender's clock, and it comes some time later by ours. `SenderClock` takes
-the quickest of the last messages as the one that took no time at all, so it knows the sender's clock but for the least
-time of travel. A clock that jumps is told and its messages are refused until it has gone on evenly for `SETTLED`.
+**Clocks.** A message carries a time of its sender's clock. `SenderClock` estimates the offset to ours from the message
+with the least delay of the last ones, up to the least travel time. After a jump of the sender's clock its messages are
+refused until `SETTLED` of them are consistent.
 
-Frames. The autopilot's local frame is NED and its body FRD, as ours are; ODOMETRY may come in FLU and ENU, and is
-turned.
-A position without an attitude gets that of the autopilot, carried on by its rates to the same instant.
+**Frames.** The autopilot's local frame is NED and its body FRD, as ours are. ODOMETRY may come in FLU and ENU and is
+converted. A position without an attitude gets the autopilot's attitude, extrapolated by its rates to the same instant.
 """
 
 from __future__ import annotations

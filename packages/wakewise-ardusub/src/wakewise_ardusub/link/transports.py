@@ -1,10 +1,7 @@
-"""What carries a session's bytes: UDP, TCP or a serial line, by the words that `connection.py` reads.
+"""Byte transports (UDP, TCP, serial) and the MAVLink 2 codec of the companion.
 
-UDP is what vehicles' routers offer and what is recommended: a stream that stalls keeps everything behind it waiting.
-
-Where MAVLink packets lie in a datagram, whatever else is in it: a packet counts only if its checksum is right.
-
-Bytes to messages and back: the companion's MAVLink 2 over whatever carries bytes.
+`packets` finds MAVLink packets in bytes by their checksums. UDP is recommended: a stream that stalls delays everything
+behind it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The script onto the autopilot's card by MAVLink's file transfer, and read back from there byte by byte.
+"""MAVFTP client that uploads the script to the autopilot's card and reads it back byte by byte.
 
-Written here since pymavlink's own client is GPL-3. Layout and numbers are those of MAVLink's description of the
-protocol (mavlink.io, MAVLink FTP). An upload that breaks off leaves a cut script, which the autopilot refuses to load.
+Our own, because pymavlink's client is GPL-3. Layout and numbers: mavlink.io, "MAVLink FTP". If an upload is
+interrupted, the script is incomplete and the autopilot refuses to load it.
 """
 
 from __future__ import annotations

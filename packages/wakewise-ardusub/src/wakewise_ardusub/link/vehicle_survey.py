@@ -1,4 +1,4 @@
-"""Gathers over a connection what `checks.py` judges: who is there, what it runs, what it hears and how it is set."""
+"""Collects the facts for `checks.py` over a connection: autopilot, firmware, messages received and parameters."""
 
 from __future__ import annotations
 

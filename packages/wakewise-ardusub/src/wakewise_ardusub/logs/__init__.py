@@ -1,7 +1,7 @@
-"""Logs of real vehicles: what any of their formats says on one clock, and what gentler thrusts would have done.
+"""Logs of real vehicles: records of any format on one clock, and the same wrench with other thrusts.
 
-Start reading in `read.py` (a file becomes a `VehicleLog`). `mavlink.py`, `dataflash.py` and `mavlink.py` are the
-formats, `mavlink.py` what MAVLink messages say, `channels.py` where it is collected, `channels.py` one clock of one
-that jumps, `channels.py` what vehicle it is. `table.py` is the log as rows, `replay_allocation.py` holds the flown
-thrusts against others, `table.py` writes both.
+- `read.py`: a file to a `VehicleLog`; read this first.
+- `mavlink.py`: .tlog and BlueOS's .mcap. `dataflash.py`: ArduPilot's .BIN.
+- `channels.py`: samples by channel, the log's clock and the vehicle's identity.
+- `table.py`: the log as a table and as a folder. `replay_allocation.py`: flown thrusts against other allocations.
 """

@@ -1,15 +1,13 @@
-"""What readers find in a log, whatever its format: samples by channel, parameters, and a count of what was no record.
+"""Records of a log, whatever its format: samples by channel, parameters, counts of bad records, clock and identity.
 
-Channels, all in SI, NED and FRD: `sticks` (forward, right, down, turn in [-1, 1]), `servo` (16 pulses in us),
-`attitude` (roll, pitch, yaw in rad), `position` (north, east, down of the autopilot's origin, m), `armed`, `mode` (its
-number), `voltage`; of depth, each source by itself: `depth VFR_HUD`, `depth AHRS2`, `depth CTUN`, `depth BARO` (m),
-`pressure 1` to `pressure 3` (Pa).
+Channels in SI, NED and FRD: `sticks` (forward, right, down, turn in [-1, 1]), `servo` (16 pulses in us), `attitude`
+(roll, pitch, yaw in rad), `position` (north, east, down from the autopilot's origin, m), `armed`, `mode` (its number),
+`voltage`; each source of depth separately: `depth VFR_HUD`, `depth AHRS2`, `depth CTUN`, `depth BARO` (m), `pressure 1`
+to `pressure 3` (Pa).
 
-One clock for a log whose own may jump: computers without a battery set theirs when the network tells them.
-
-What a vehicle is by its own words: the type in its heartbeats, the name of its firmware, parameters of one alone.
-
-Tables of ArduSub (its modes, its channels, its motors) are used for nothing else than an ArduSub.
+`LogClock` makes one clock of a log whose clock may jump, because computers without a battery set theirs by the network.
+`VehicleIdentity` is the vehicle's type by its heartbeats, its firmware's name, or parameters that only one firmware
+has. ArduSub's tables (modes, channels, motors) are used for an ArduSub only.
 """
 
 from __future__ import annotations

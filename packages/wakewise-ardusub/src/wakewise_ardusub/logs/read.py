@@ -1,4 +1,4 @@
-"""Any log of an ArduSub vehicle: told apart by its bytes, not by its name; what is another's is refused by name."""
+"""Reads any log of an ArduSub vehicle. The format is found by the bytes, and other vehicles are refused by name."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What other thrusts would have done at each instant of a log: least ones and gentle ones for the flown wrench.
+"""Replay of a log with other allocations of the flown wrench: minimum-norm thrusts and gentle thrusts.
 
-How pulses are judged is in `wakewise_ardusub.wash_savings`; here each different row of a log is judged once. D is of
-points that are fixed to the vehicle, since a log does not know where the target was.
+`wakewise_ardusub.wash_savings` evaluates the pulses; here each distinct row of a log is evaluated once. D is of points
+that are fixed to the vehicle, because a log does not hold the target's position.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
-"""A log as a table: one row per tick of one clock, whatever rate each channel came at.
+"""A log as a table with one row for each tick of one clock, and as a folder (table, facts, parameters).
 
-What a log and a flight in the tank both know has the same name and meaning as in a trial's `steps.parquet`: where the
-vehicle believed to be (`est_`), and with `hindsight.py` its thrusts and wrench.
-
-A read log as a folder: the table, what was found in the file, and the parameters.
+Columns that a trial's `steps.parquet` has, too, have the same names and meanings: the estimated pose (`est_`), thrusts
+and wrench.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
-"""ArduPilot's JSON physics link: a vehicle of Wakewise in its water behind the real firmware, or behind the stand-in.
+"""Simulated vehicle behind ArduSub's firmware or the simulated autopilot, over ArduPilot's JSON interface.
 
-Start reading in `physics.py` (a frame of pulses is answered by motion). `datagrams.py` is what is on the wire,
-`physics.py` which frames are new, `physics.py` what a pulse gives, `surface.py` a body for quick tests, `surface.py`
-and `surface.py` where the water ends and how a vehicle comes under it, `depth_monitor.py` whether the autopilot
-knows its depth, `physics.py` the socket. A tank is put behind it in `wakewise_ardusub.sitl_plant`.
+- `physics.py`: servo pulses in, motion out; frames, thrust table and socket. Read this first.
+- `datagrams.py`: the wire format.
+- `surface.py`: the water's surface, a body for quick tests, and lowering the vehicle at the start.
+
+`wakewise_ardusub.sitl_plant` puts a tank behind it.
 """
 
 from wakewise_ardusub.physics.datagrams import (

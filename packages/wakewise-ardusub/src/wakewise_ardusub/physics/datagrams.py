@@ -1,9 +1,9 @@
-"""What ArduPilot's JSON physics link says on the wire: pulses in, motion out; both ends of it, without a socket.
+"""Wire format of ArduPilot's JSON interface for external physics: pulses in, motion out; both ends, without a socket.
 
-A request is `<HHI`: a magic number that says how many channels follow, the rate in Hz, a count of frames; then one
-uint16 per channel, the pulse in microseconds. A reply is one line of JSON between two line feeds, without a space: the
-firmware's reader looks for the bare keys and refuses a line with a space after a colon. Layout and names as in
-ArduPilot's libraries/SITL/examples/JSON/readme.md and SIM_JSON (facts; no code of it is here).
+A request is `<HHI`: a magic number that gives the number of channels, the rate in Hz, a frame count; then one uint16
+per channel, the pulse in us. A reply is one line of JSON between two line feeds, without spaces: the firmware's parser
+searches the keys and refuses a space after a colon. Layout and names as in ArduPilot's
+libraries/SITL/examples/JSON/readme.md and SIM_JSON (facts; no code of it is here).
 """
 
 from __future__ import annotations

@@ -1,17 +1,11 @@
-"""Answers the firmware's frames: pulses move a vehicle in its water by one step, its true motion goes back.
+"""Physics server for ArduPilot's JSON interface: each frame of servo pulses advances the vehicle by one step.
 
-No socket and no clock of its own, so that a test, or a stand-in in the same process, calls `answer` directly; the
-sockets are in `udp.py`.
+`PhysicsServer.answer` has no socket and no clock, so that a test or the simulated autopilot calls it directly; `serve`
+adds the UDP socket (loopback by default). `FrameCounter` detects repeated and lost frames: a repeat gets the same
+answer and moves nothing.
 
-Which frames of the firmware are new: a repeat is answered again and moves nothing, a gap is counted.
-
-The socket of the physics link; loopback unless another address is asked for.
-
-Servo pulses to thrusts, as the vehicle's speed controllers and propellers make them; for every new frame, so quick.
-
-What one pulse gives is looked up in a table made once, a row per thruster and a column per microsecond. A motor that
-turns the other way round than the vehicle file says (MOT_n_DIRECTION of -1 makes up for it in the autopilot) does so
-here, too: the autopilot's turned pulse meets the turned motor.
+`PulseTable` holds the thrust of each pulse, one row per thruster and one column per us. A motor with MOT_n_DIRECTION of
+-1 is reversed here as well, because the autopilot reverses its pulse.
 """
 
 from __future__ import annotations

@@ -1,17 +1,13 @@
-"""The water's surface for a vehicle behind a firmware: what rises above it is not carried, and pushes no water.
+"""Water surface for a simulated vehicle: buoyancy and thrust lost above it, and the start at the surface.
 
-The hull is its box. The share of its height that is above z = 0 has lost its buoyancy, which acts at the centre of
-buoyancy; a thruster gives the share of its disk's height that is below. An estimate: no waves, no splash, and drag and
-added mass stay those of the whole hull.
+`WaterSurface`: the hull is a box. The share of its height above z = 0 has no buoyancy, which acts at the centre of
+buoyancy; a thruster gives the share of its disk's height that is below. Limits: no waves, no splash, and drag and added
+mass of the whole hull.
 
-A vehicle in still water without walls, by the readable equations: the body of quick tests, of no kernel and no tank.
+`FreeWater`: a vehicle in still water without walls (Fossen's equations in NumPy), for quick tests.
 
-Motors lag and steps are those of the vehicle file. It stops at the surface, and nothing else is there.
-
-A vehicle that is held at the surface while its autopilot starts, then let down to where it begins.
-
-ArduSub takes the pressure at its start for that of the surface, and any that is less for it later on. Started under
-water it reads a depth of 0 there, and goes on doing so while it rises.
+`LoweringBody`: holds the vehicle at the surface while the autopilot starts, then lowers it to its start. ArduSub takes
+the pressure at its start as that of the surface; started under water it would read a depth of 0 there.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The page of a real vehicle's log: one HTML file beside its table."""
+"""Page of a real vehicle's log: one HTML file beside its table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a real vehicle's log: what the pilot asked, what the vehicle did, what other thrusts would have done."""
+"""Figures of a real vehicle's log: sticks, motion, pulses, thrusts and wash."""
 
 from __future__ import annotations
 

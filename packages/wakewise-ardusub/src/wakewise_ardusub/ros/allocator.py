@@ -1,7 +1,7 @@
-"""A wrench to thrusts as a node does it: bounded ever, gentle where a target and the vehicle's place are known.
+"""Thruster allocation of the ROS 2 node: within limits always, and with least wash if target and pose are known.
 
-What ROS 2's `thruster_allocation_matrix_controller` does with a pseudo-inverse, with what that lacks: limits, thrusters
-that have failed, and a target whose water is to be left alone.
+It replaces the pseudo-inverse of ROS 2's `thruster_allocation_matrix_controller` and adds thrust limits, failed
+thrusters and a protected target.
 """
 
 from __future__ import annotations

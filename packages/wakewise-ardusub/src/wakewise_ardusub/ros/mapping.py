@@ -1,14 +1,12 @@
-"""Wrenches, poses and points of ROS 2 in our frames, and back.
+"""Wrenches, poses and point clouds of ROS 2 in our frames, and back.
 
 ROS has ENU worlds and FLU bodies (REP 103, https://www.ros.org/reps/rep-0103.html); marine packages also publish NED
 and forward-starboard-down, our own frames, as `map_ned` and `base_link_fsd` (after REP 105's names,
 https://www.ros.org/reps/rep-0105.html). Quaternions of ROS are (x, y, z, w).
 
-Points from the bytes of a sensor_msgs/PointCloud2.
-
-A cloud says where in each point's bytes its numbers are
-(https://docs.ros2.org/latest/api/sensor_msgs/msg/PointCloud2.html); x, y and z are needed, `weight` or `intensity` is
-taken for how much a point counts.
+`cloud_points` decodes a sensor_msgs/PointCloud2
+(https://docs.ros2.org/latest/api/sensor_msgs/msg/PointCloud2.html): x, y and z are required, `weight` or `intensity` is
+the weight of a point.
 """
 
 from __future__ import annotations

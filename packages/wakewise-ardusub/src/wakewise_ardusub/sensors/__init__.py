@@ -1,9 +1,10 @@
-"""Sensors that a companion computer reads, and poses that others send it: bytes in, `Measurement` out.
+"""Sensors of a companion computer and poses from other programs: bytes in, `Measurement`s out.
 
-Start reading in `line_poses.py` (what comes out). `ms5837.py` is the pressure sensor of Bar30 and Bar02, `jy901.py`
-WitMotion's inertial unit, `line_poses.py` the plain protocol by which any program sends poses; MAVLink's own are read
-by `wakewise_ardusub.link.telemetry_adapter`. `devices.py` is the serial port, the I2C bus and the socket themselves,
-`sensor_polling.py` reads them all and says what each says, `line_poses.py` hands poses on as MAVLink.
+- `ms5837.py`: pressure sensor of Bar30 and Bar02. `jy901.py`: WitMotion's inertial unit.
+- `line_poses.py`: poses as lines of text, and forwarding of poses as MAVLink.
+- `devices.py`: I2C bus, serial port and UDP socket. `sensor_polling.py`: polling of all, rates and errors.
+
+Poses that come as MAVLink are read by `wakewise_ardusub.link.telemetry_adapter`.
 """
 
 from typing import TYPE_CHECKING

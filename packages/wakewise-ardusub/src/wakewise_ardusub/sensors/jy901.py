@@ -1,10 +1,10 @@
 """WitMotion's JY901 and WT901 inertial units: frames of 11 bytes on a serial line.
 
 A frame is 0x55, its kind, four signed 16-bit numbers (low byte first) and the sum of the ten bytes before, modulo 256
-(WT901 data sheet v20-0702, section 5.1). As shipped the unit speaks 9600 baud at 10 Hz.
+(WT901 data sheet v20-0702, section 5.1). The factory setting is 9600 baud and 10 Hz.
 
-**Axes.** The sheet of the module has x to the right, y forward and z up (section 3.3); sheets of units in a case have x
-forward and y to the left. `mounting` says where each axis points on the vehicle, whichever it is.
+**Axes.** In the module's data sheet x is right, y forward and z up (section 3.3); in those of units in a case x is
+forward and y left. `mounting` gives the direction of each axis on the vehicle.
 """
 
 from __future__ import annotations

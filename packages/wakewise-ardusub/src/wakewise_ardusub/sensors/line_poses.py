@@ -1,22 +1,19 @@
-"""Poses by the plainest protocol: a datagram of text, a pose a line, as JSON or as numbers parted by commas.
+"""Poses as lines of text over UDP, one pose per line, as JSON or as comma-separated numbers; forwarding as MAVLink.
 
 For optical tracking, a SLAM program, a DVL's dead reckoning, or a person with netcat:
 
     {"t": 12.5, "p": [1.0, 2.0, 3.0], "q": [1, 0, 0, 0], "std_m": 0.005, "std_rad": 0.01}
     12.5,1.0,2.0,3.0,1,0,0,0,0.005,0.01
 
-`t` is in seconds of the sender's own clock and may be null (in CSV: empty): the time of arrival counts then. `p` is in
-metres, north-east-down unless `"frame": "enu"` says otherwise, which makes the body forward-left-up. `q` is (w, x, y,
-z) from body to world; `"rpy"` in radians may stand in its place; without either it is a position alone, as optical
-tracking has it. `std_m` and `std_rad`, one sigma per axis, may be left out. Lines that begin with # are none.
+`t` is in seconds of the sender's own clock and may be null (in CSV: empty); then the time of arrival counts. `p` is in
+metres, north-east-down; with `"frame": "enu"` east-north-up, and the body is forward-left-up. `q` is (w, x, y, z) from
+body to world, or `"rpy"` in radians; without either it is a position alone. `std_m` and `std_rad`, one sigma per axis,
+may be left out. Lines that begin with # are comments.
 
-What a source of poses says, with how sure it is.
-
-Poses handed on as MAVLink's VISION_POSITION_ESTIMATE, to an autopilot, a ground station or `wakewise link ardusub`.
-
-Fields and the layout of the covariance are those of MAVLink's common set
+`PoseForwarder` sends poses as VISION_POSITION_ESTIMATE to an autopilot, a ground station or `wakewise link ardusub`.
+Fields and covariance are those of MAVLink's common set
 (https://mavlink.io/en/messages/common.html#VISION_POSITION_ESTIMATE): NED and FRD, the upper triangle of a 6 x 6 matrix
-by rows, its first number NaN where it is not known. Who reads the message is `wakewise_ardusub.link.telemetry_adapter`.
+by rows, its first number NaN if it is not known. `wakewise_ardusub.link.telemetry_adapter` reads the message.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Pressure and temperature of TE's MS5837-30BA (Bar30) and MS5837-02BA (Bar02), over I2C.
 
-Commands, times, compensation of first and second order and the check sum are those of TE's data sheets: MS5837-30BA
+Commands, times, compensation of first and second order and the checksum are those of TE's data sheets: MS5837-30BA
 Rev C2 12/2019 and MS5837-02BA 09/2017, sections "Pressure and temperature calculation", "Second-order temperature
-compensation" and "Cyclic redundancy check". All of it is reckoned in whole numbers, as there.
+compensation" and "Cyclic redundancy check". The arithmetic is in integers, as there.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""All sensors at once: each source is polled, and says what it read last, how often, and what went wrong."""
+"""Polling of all sensors: latest values, sample rates and errors of each source."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
-"""Who takes the photographs at sea: a camera that MAVLink reaches, or a program of the operator's.
+"""Cameras of a session: MAVLink commands, or a program that is run for each photograph.
 
-The session says when (its buttons, or the mission) and keeps from where; the camera takes them. Three ways:
+The session triggers the photographs (buttons or mission) and records their poses. Three kinds:
 
 - `mavlink`: MAV_CMD_IMAGE_START_CAPTURE, one image, to every component of the vehicle (MAVLink's camera protocol; an
-  autopilot of 4.4 or later with a camera set up takes it as well);
-- `digicam`: MAV_CMD_DO_DIGICAM_CONTROL, its older kin, which every ArduPilot with a camera set up takes;
-- `run:PROGRAM ...`: a program for each photograph, for cameras that speak no MAVLink, as the stock one of a BlueROV2.
+  autopilot of 4.4 or later with a camera set up accepts it as well);
+- `digicam`: MAV_CMD_DO_DIGICAM_CONTROL, the older command, which every ArduPilot with a camera set up accepts;
+- `run:PROGRAM ...`: a program for each photograph, for cameras without MAVLink, as the stock one of a BlueROV2.
 
-Nobody waits for any of them in the flying thread.
+None of them blocks the control thread.
 """
 
 from __future__ import annotations

@@ -1,18 +1,13 @@
-"""The parts of a flight, joined to the vehicle of a warden.
+"""Parts of a flight joined to a real vehicle: plant, pilot, controller, estimator, wash figures and warm-up.
 
-What ground stations are told of a flight: D, what is saved of it, how much of the target photographs have seen.
+`ArduSubPlant` passes thrusts to the output gate and returns the measurements since. A step waits until shortly before
+the flight's clock has reached its end: the estimator processes the measurements meanwhile, so that the next thrusts are
+computed on time from data that are nearly as fresh as possible. The gate decides whether thrusts are sent.
 
-A rehearsal: the whole chain decides a few times for nobody, so that nothing is slow when thrusts count.
-
-The vehicle in the sea as a `Plant`: thrusts go to the warden, what was measured meanwhile comes back.
-
-A step holds its thrusts by waiting until shortly before the flight's clock has come to the step's end: the estimator
-takes in what it returns meanwhile, so that the next thrusts are decided on time, by what is nearly as fresh as can be.
-Whether thrusts go out is the warden's to say.
-
-The thread between a connection and its warden: takes what comes, and ticks whether anything comes or not.
-
-Who flies now: the pilot or the controller, settled once a step, and what each part of the loop makes of it.
+`LinkThread` receives messages and ticks the gate. `FlightOwnership` records who flies, the pilot or the controller,
+once for each step; `EngagedPilot`, `EngagedController` and `ServoEstimator` act on it. `WashFigures` are the values for
+ground stations: D, savings and coverage. `run_warm_up` runs the whole chain a few times without output, so that the
+first real step is not slow.
 """
 
 from __future__ import annotations

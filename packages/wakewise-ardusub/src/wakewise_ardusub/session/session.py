@@ -1,10 +1,10 @@
-"""A session beside the pilot: from a connection to a flight, in threads that none of waits for another.
+"""Session of a real vehicle beside its pilot: from a connection to a flight, in threads that do not block each other.
 
-The link's thread listens and watches from the first moment; another waits until the vehicle is heard, makes the parts,
-rehearses them and then flies (`LiveFlight`). Whoever owns the session looks on, hands the operator's
-key presses over and ends it.
+The link's thread receives and evaluates from the start. A second thread waits for the vehicle, makes the parts of the
+flight, runs them once (`run_warm_up`) and flies (`LiveFlight`). The owner passes the operator's key presses on and ends
+the session.
 
-What is to be spared at sea: points, or a ball that stands for a target of which only the place is known.
+`ProtectedRegion`: the points to protect, or a ball for a target of which only the position is known.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The companion's own watch beside the stand-in, in one process and in the rehearsal's time.
+"""The companion's output gate beside the simulated autopilot, in one process and in simulated time.
 
-What is flown is the shipped warden with its post, drive and limits; the controller is the plainest there can be,
-constant thrusts ten times a second. `FAULTS_ABOARD` is what may go wrong around it, and `run_companion_fault` says how
-long a script still drove an output then.
+The gate, codec, motor interface and limits are the shipped ones. The controller is the simplest: constant thrusts ten
+times per second. `COMPANION_FAULTS` are the faults that can be injected; `run_companion_fault` measures how long the
+script drives an output after one.
 """
 
 from __future__ import annotations

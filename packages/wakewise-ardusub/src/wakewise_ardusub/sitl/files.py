@@ -1,7 +1,6 @@
-"""The autopilot's files over MAVFTP: enough for uploading, listing, reading back and removing a script.
+"""MAVFTP server of the simulated autopilot: upload, list, read and remove a script. Files are kept in memory.
 
-Layout of a packet and the numbers as in MAVLink's description of the protocol (mavlink.io, MAVLink FTP). Files are kept
-in memory. One answer for each request; a request that is repeated (same number) gets the same answer again.
+Packet layout and numbers: mavlink.io, "MAVLink FTP". A repeated request (same number) gets the same answer again.
 """
 
 from __future__ import annotations

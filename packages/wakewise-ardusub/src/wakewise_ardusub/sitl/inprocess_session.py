@@ -1,11 +1,10 @@
-"""A flight of the stand-in in one process and in its own time: pilot, companion, faults at will, what the outputs did.
+"""Flight of the simulated autopilot in one process and in simulated time: pilot, companion, faults and outputs.
 
-The companion is the plainest there can be, a stream of thrusts; it makes no attempt at being safe, so what is measured
-here is what the script and the autopilot see to by themselves.
+The companion is only a stream of thrusts without safety functions, so the results show what script and autopilot do by
+themselves.
 
-A pilot ashore for whom nobody must be there: arms the stand-in, switches the script on and lets the sticks go.
-
-Once it has seen both it leaves them as somebody else puts them, until the stand-in starts anew.
+`ScriptedGroundStation` is a pilot without a person: it arms the vehicle, enables the script and sends neutral sticks.
+What another station changes afterwards stays so until the autopilot restarts.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""What a message does to the stand-in; those of no concern to it do nothing, whoever sends them.
+"""MAVLink messages of the simulated autopilot: handlers of received messages, builders and rates of sent ones.
 
-What the stand-in tells, and how often: the messages that ground stations, companions and logs live on.
-
-Each is built from the truth that physics told last: there is no noise, no estimator and no magnetometer here. Only the
-depth is the sensor's, which may have been calibrated under water (`SimulatedAutopilot.depth_m`).
+Messages without a handler are ignored. Sent messages come from the true motion: there is no noise, no estimator and no
+magnetometer. Only the depth is that of the sensor, whose zero may have been set under water
+(`SimulatedAutopilot.depth_m`).
 """
 
 from __future__ import annotations

@@ -1,26 +1,21 @@
-"""Flight modes: what MANUAL, STABILIZE and ALT_HOLD make of the pilot's demands; simple loops of the documented kind.
+"""Flight modes of the simulated autopilot, from the pilot's sticks and buttons to one pulse per motor.
 
-MANUAL hands the demands on. STABILIZE holds roll and pitch at the angles asked for, and the heading while the yaw stick
-is let go: the angle's error times ATC_ANG_*_P is a rate, its error in a PID (ATC_RAT_*) a demand. ALT_HOLD holds the
-depth as well while the throttle is let go: the depth's error times PSC_POSZ_P is a velocity, its error times PSC_VELZ_P
-an acceleration, and a PI of what is missing of that the throttle. Those loops go on while a script overrides the
-outputs, so what they have summed up jumps out when the override ends, unless the mode was entered anew: then depth and
-heading are those of that moment, and the sum is what gives the throttle of the mode before, as in ArduSub.
+**Sticks.** A demand is the stick times the gain (JS_GAIN_DEFAULT); the pulse is 1500 us plus up to 400 us times it. The
+last sticks stay valid until the failsafe of the pilot's input.
 
-The pilot's sticks, as MANUAL_CONTROL says them, to demands.
+**Modes.** MANUAL passes the demands on. STABILIZE holds roll and pitch at the commanded angles, and the heading while
+the yaw stick is neutral: the angle's error times ATC_ANG_*_P is a rate, its error in a PID (ATC_RAT_*) a demand.
+ALT_HOLD also holds the depth while the throttle is neutral: the depth's error times PSC_POSZ_P is a velocity, its error
+times PSC_VELZ_P an acceleration, and a PI of the remaining error the throttle. The controllers run on while a script
+overrides the outputs, so their integrals act when the override ends, unless the mode was entered anew: then depth and
+heading are those of that moment, and the integral gives the throttle of the mode before, as in ArduSub.
 
-A stick's way becomes a pulse of 1500 us plus up to 400 times the gain (JS_GAIN_DEFAULT), so a demand is the stick times
-the gain. The last sticks go on until the failsafe of the pilot's input says otherwise.
+**Buttons.** BTNn_FUNCTION and, while a shift button is held, BTNn_SFUNCTION: arming, disarming, modes and shift. Mount,
+lights, gain, trim, input hold, relays and servos are not simulated.
 
-What the pilot's buttons do, by BTNn_FUNCTION and, while a shift button is held, by BTNn_SFUNCTION.
-
-Arming, disarming, modes and shift are here; mount, lights, gain, trim, input hold, relays and servos are not.
-
-The mixer: demands to one pulse per motor, by the factors of ArduSub's vectored frames.
-
-Roll, pitch and throttle are summed and divided by the largest sum where that is above 1; yaw, forward and lateral
-likewise; both are added and cut at 1 (see `wakewise.control.motor_mix`, which tells the sources). MOT_n_DIRECTION turns
-a motor's pulse about the middle.
+**Mixer.** ArduSub's vectored frames: roll, pitch and throttle are summed and divided by the largest sum where that is
+above 1; yaw, forward and lateral likewise; both are added and limited to 1 (sources: `wakewise.control.motor_mix`).
+MOT_n_DIRECTION mirrors a motor's pulse about 1500 us.
 """
 
 from __future__ import annotations

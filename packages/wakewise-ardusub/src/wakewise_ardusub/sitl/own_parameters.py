@@ -1,9 +1,7 @@
-"""The stand-in's own parameters: those of a vehicle as it leaves the box, as far as anything here reads them.
+"""Parameters of the simulated autopilot: default values, .params files, and tables that a script adds.
 
-Names and values as ArduSub's parameter documentation has them, gains of the attitude as in its frame parameters of the
-BlueROV2 Heavy. Other sets are read from `.params` files, which replace these value by value.
-
-The stand-in's table of parameters, which a script may add to.
+Names and values are those of ArduSub's parameter documentation; gains of the attitude are those of its frame parameters
+of the BlueROV2 Heavy. A .params file replaces single values.
 """
 
 from __future__ import annotations

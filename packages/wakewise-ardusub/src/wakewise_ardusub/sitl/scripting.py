@@ -1,8 +1,8 @@
-"""Runs a Lua script as the autopilot's scripting engine does: in turns, within a budget of instructions and of memory.
+"""Lua scripting of the simulated autopilot: scheduled calls with limits of instructions and memory.
 
-Lua is the firmware's own version, 5.3, by `lupa`, with the bindings of `bindings.lua`. Two things differ: numbers have
-64 bits here and 32 there, and no other scripts run beside it. A script that fails is stopped, said to the ground
-station, and not started again before the next start.
+Lua is the firmware's version, 5.3, by `lupa`, with the bindings of `bindings.lua`. Two differences: numbers have 64
+bits here and 32 there, and no other scripts run. A script that fails is stopped, reported to the ground station, and
+not started again before the next boot.
 """
 
 from __future__ import annotations

@@ -1,12 +1,11 @@
-"""The servo outputs: what the motors ask for, unless a script has put something over it for a while.
+"""Servo outputs of the simulated autopilot: motor pulses, overrides by a script, and the motor test.
 
-An override counts loops, not time, and goes on when the vehicle is disarmed, as the firmware's does: a script that
-drives motors must itself see to that.
+An override is counted in loops and persists when the vehicle is disarmed, as in the firmware: a script that drives
+motors must check arming itself.
 
-MAV_CMD_DO_MOTOR_TEST as ArduSub has it: one motor's pulse, past the mixer, for as long as it is asked for again.
-
-By what its motors.cpp does: armed only; motors are counted from 0 and keep their pulse until they get another; half a
-second without a command ends the test and disarms; none begins within ten seconds of that, nor within two of a refusal.
+MAV_CMD_DO_MOTOR_TEST as in ArduSub's motors.cpp: armed only; motors are counted from 0 and keep their pulse, past the
+mixer, until they get another; half a second without a command ends the test and disarms; none begins within ten seconds
+of that, nor within two of a refusal.
 """
 
 from __future__ import annotations

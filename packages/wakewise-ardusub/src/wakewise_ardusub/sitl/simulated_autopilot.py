@@ -1,8 +1,7 @@
-"""The stand-in itself: bytes and motion in, pulses and bytes out, a loop at a time; time is what physics says.
+"""Simulated ArduSub autopilot: MAVLink bytes and motion in, servo pulses and bytes out, one loop at a time.
 
-Nothing here waits, sleeps or reads a clock, so a minute of flight takes as long as its arithmetic.
-
-What happens when the ground station or the pilot falls silent while the vehicle is armed.
+Nothing waits, sleeps or reads a clock: time is that of the physics. Failsafes act when the ground station or the pilot
+falls silent while the vehicle is armed.
 """
 
 from __future__ import annotations

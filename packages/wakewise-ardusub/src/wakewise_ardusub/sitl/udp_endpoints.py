@@ -1,7 +1,6 @@
-"""The stand-in's sockets: ground stations and companions on one side, physics on the other, and the clock on the wall.
+"""UDP sockets of the simulated autopilot in real time: ground stations and companions, and physics.
 
-Like the router on a vehicle's computer it hands what comes from one link to all others, so that a companion hears the
-pilot's sticks and the ground station the companion's figures.
+Like the router on a vehicle's computer, it forwards what comes from one endpoint to all others.
 """
 
 from __future__ import annotations

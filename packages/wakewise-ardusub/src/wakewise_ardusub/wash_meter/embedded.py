@@ -1,9 +1,8 @@
-"""The meter on a computer that has NumPy and pymavlink and little else: `python -m
-wakewise_ardusub.wash_meter.embedded`.
+"""Wash meter for computers with NumPy and pymavlink only: `python -m wakewise_ardusub.wash_meter.embedded`.
 
-BlueROV2's own computer is a 32-bit one, for which Numba, SciPy's wheels and the readers of vehicle files are not to be
-had. Here the vehicle comes from a craft file (`wakewise link wash-meter --vehicle NAME --write FILE` makes one on a
-larger computer), options are read by the standard library, and the kernels run as the Python that they are written in.
+A BlueROV2's computer has 32 bits: Numba, SciPy's wheels and the readers of vehicle files are not available. The vehicle
+comes from a craft file (`wakewise link wash-meter --vehicle NAME --write FILE` writes one on a larger computer), the
+standard library parses the options, and the kernels run as plain Python.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""The meter itself: pulses and pose in, a reading out, and sums over the last minute and the whole dive.
+"""Wash meter: servo pulses and pose to a reading of the wash, with totals over the last minute and the dive.
 
-The last minutes as the page draws them: one mean a second, so that a page opened late sees them, too.
-
-The dive on disk: a row of CSV for every reading while thrusters run, and how it ended as JSON.
-
-A reading as JSON: what the page, and anybody else on this computer, is told.
+`WashHistory` keeps one mean per second of the last minutes, for pages that are opened late. `DiveRecord` writes one CSV
+row for each reading while thrusters run, and a JSON summary at the end. `reading_as_json` is the reading as the page
+gets it.
 """
 
 from __future__ import annotations

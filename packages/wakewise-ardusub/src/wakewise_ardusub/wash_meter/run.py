@@ -1,7 +1,4 @@
-"""A meter at work: the wire, the meter, the page and the record, in one loop of ten readings a second.
-
-What is asked of a meter, checked.
-"""
+"""Loop of the wash meter: connection, meter, page and record, ten readings per second; its settings."""
 
 from __future__ import annotations
 

@@ -1,10 +1,8 @@
-"""What a vehicle said last, channel by channel, and how old it is: by the same reading of messages as for logs.
+"""Latest values of a vehicle by channel with their ages, and the MAVLink socket of the meter (UDP).
 
-The connection that a vehicle is heard by: MAVLink over UDP, and the few words that a meter may say.
-
-It is silent unless asked otherwise. What it can say is listed here and nowhere else: a heartbeat of an onboard computer
-(a server that one must speak to first sends nothing otherwise), requests to read a parameter, and named values. None
-of them commands the vehicle or changes anything on it.
+Messages are decoded as in the readers of logs. The socket is silent by default. It can send only what is listed here:
+the heartbeat of an onboard computer (to a server that must be addressed first), requests to read a parameter, and named
+values. None of them commands the vehicle or changes anything on it.
 """
 
 from __future__ import annotations

@@ -104,8 +104,9 @@ class Gamepad:
             self._notes.clear()
         return found
 
-    def read(self, time_s: float) -> Controls | None:  # noqa: ARG002  (hands have their own clock)
-        """Sticks as they are, and what was pressed since; None while nobody is there."""
+    def read(self, time_s: float) -> Controls | None:
+        """Axes now, and the buttons pressed since the last call; None without an armed gamepad."""
+        del time_s  # the device has its own clock
         with self._lock:
             if self._pad is None or not self._armed or time.monotonic() > self._heard_s + STALE_S:
                 self._pressed.clear()

@@ -17,7 +17,7 @@ As YAML, where only what differs from the defaults need be given and `-` turns a
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -198,12 +198,12 @@ def _dead_zone(value: Any, what: str) -> float:
     return float(value)
 
 
-def _mapping(value: Any, what: str, allowed: Iterable[str] | None) -> Mapping[str, Any]:
+def _mapping(value: Any, what: str, allowed: Collection[str] | None) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
         raise InputError(f"{what}: {value!r}, must be a mapping of names")
-    for key in value if allowed is not None else ():
-        if key not in allowed:  # type: ignore[operator]
-            raise InputError(f"{what}: {key!r} is unknown, allowed are {', '.join(allowed or ())}")
+    for key in value:
+        if allowed is not None and key not in allowed:
+            raise InputError(f"{what}: {key!r} is unknown, allowed are {', '.join(allowed)}")
     return value
 
 
