@@ -24,7 +24,7 @@ import gc, json
 import wakewise as ww
 from numba.core.dispatcher import Dispatcher
 from wakewise.core.jit.precompile import compile_kernels
-warm(("plan", "fly"))
+compile_kernels(("plan", "fly"))
 ww.fly(ww.Scenario.preset("quick"), duration_s=0.2)
 kernels = [kernel for kernel in gc.get_objects() if isinstance(kernel, Dispatcher)]
 used = [kernel for kernel in kernels if kernel.py_func.__module__.startswith("wakewise") and kernel.signatures]

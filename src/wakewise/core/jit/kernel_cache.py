@@ -158,6 +158,14 @@ class KernelCache(caching.FunctionCache):
 
     _impl_class = _Impl
 
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The kept code, or None; also where the record of what is kept names a class that has moved since."""
+        try:
+            return super().load_overload(sig, target_context)
+        except (ImportError, AttributeError):
+            self.flush()
+            return None
+
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled for a signature, while no other process does the same in that folder."""
         with _alone(Path(self.cache_path)):

@@ -268,10 +268,8 @@ def _made_from(job: str) -> str:
 
 def _compile_what_is_asked(asked: Iterable[str], answers: IO[str]) -> None:
     """Compile the kernels that lines of JSON name, and answer each line with one."""
-    from wakewise.core.jit.haste import hasten
     from wakewise.core.jit.kernel_cache import type_from
 
-    hasten()
     # Looking for garbage is a fifth of Numba's time in Python; done seldom, it costs memory that goes with the process.
     gc.freeze()
     gc.set_threshold(_SELDOM)
