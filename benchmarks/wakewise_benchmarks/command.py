@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.commands import STUDIES, Command
+from wakewise.ui.cli.commands import STUDIES, CliCommand
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, write_page
 from wakewise.ui.cli.options import Json
 from wakewise_paper.cli.bench_operator import show_operator
@@ -246,5 +246,5 @@ def _show(result: dict[str, Any], indent: str) -> None:
             typer.echo(f"{indent}{key:<34}{format_value(value):>10}")
 
 
-COMMANDS = (Command(STUDIES, "bench", bench),)
+COMMANDS = (CliCommand(STUDIES, "bench", bench),)
 """What this package adds to `wakewise`."""

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.commands import PHOTOGRAPHS, Command
+from wakewise.ui.cli.commands import PHOTOGRAPHS, CliCommand
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table
 from wakewise.ui.cli.options import Json, seed_option
 
@@ -122,5 +122,5 @@ def _ball(text: str) -> tuple[list[float], float]:
     return numbers[:3], numbers[3]
 
 
-COMMANDS = (Command(PHOTOGRAPHS, "nerf", nerf),)
+COMMANDS = (CliCommand(PHOTOGRAPHS, "nerf", nerf),)
 """What this package adds to `wakewise`."""

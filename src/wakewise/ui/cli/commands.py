@@ -1,6 +1,6 @@
 """Commands as entries of the `wakewise` program; installed packages add their own through entry points.
 
-A package offers a tuple of `Command` under the entry point group `wakewise.commands`.
+A package offers a tuple of `CliCommand` under the entry point group `wakewise.commands`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ PANELS = (FLIGHT, PHOTOGRAPHS, VEHICLES, REAL_VEHICLE, STUDIES)
 """Sections of `wakewise --help`, in their order."""
 
 
-class Command(NamedTuple):
+class CliCommand(NamedTuple):
     """One command.
 
     `parent` is one of `PANELS` for a command of `wakewise`, or the name of a command group, such as "wake". `run` is a
@@ -31,7 +31,7 @@ class Command(NamedTuple):
     run: Any
 
 
-def installed_commands() -> tuple[Command, ...]:
+def installed_commands() -> tuple[CliCommand, ...]:
     """Commands of the installed packages, packages in alphabetical order."""
     points = sorted(entry_points(group=GROUP), key=lambda point: point.name)
     return tuple(command for point in points for command in point.load())

@@ -34,27 +34,27 @@ from wakewise.ui.cli import (
     wake,
     world,
 )
-from wakewise.ui.cli.commands import FLIGHT, PANELS, PHOTOGRAPHS, STUDIES, VEHICLES, Command, installed_commands
+from wakewise.ui.cli.commands import FLIGHT, PANELS, PHOTOGRAPHS, STUDIES, VEHICLES, CliCommand, installed_commands
 from wakewise.ui.cli.signals import EXIT_INTERRUPTED, INTERRUPTED, close_output, exit_code, program_signals
 
 _COMMANDS = (
-    Command(FLIGHT, "scan", scan.scan),
-    Command(FLIGHT, "compare", compare.compare),
-    Command(FLIGHT, "cockpit", cockpit.cockpit),
-    Command(FLIGHT, "film", film.film),
-    Command(FLIGHT, "export", export.export),
-    Command(FLIGHT, "world", world.app),
-    Command(FLIGHT, "tank", tank.app),
-    Command(FLIGHT, "target", target.app),
-    Command(PHOTOGRAPHS, "reconstruct", reconstruct.reconstruct_photos),
-    Command(PHOTOGRAPHS, "evaluate", evaluate.evaluate),
-    Command(PHOTOGRAPHS, "calibrate", calibrate.calibrate),
-    Command(PHOTOGRAPHS, "colour", color.colour),
-    Command(VEHICLES, "vehicle", vehicle.app),
-    Command(VEHICLES, "allocate", allocate.allocate),
-    Command(VEHICLES, "wake", wake.app),
-    Command(STUDIES, "campaign", campaign.app),
-    Command(STUDIES, "compile", precompile.warm),
+    CliCommand(FLIGHT, "scan", scan.scan),
+    CliCommand(FLIGHT, "compare", compare.compare),
+    CliCommand(FLIGHT, "cockpit", cockpit.cockpit),
+    CliCommand(FLIGHT, "film", film.film),
+    CliCommand(FLIGHT, "export", export.export),
+    CliCommand(FLIGHT, "world", world.app),
+    CliCommand(FLIGHT, "tank", tank.app),
+    CliCommand(FLIGHT, "target", target.app),
+    CliCommand(PHOTOGRAPHS, "reconstruct", reconstruct.reconstruct_photos),
+    CliCommand(PHOTOGRAPHS, "evaluate", evaluate.evaluate),
+    CliCommand(PHOTOGRAPHS, "calibrate", calibrate.calibrate),
+    CliCommand(PHOTOGRAPHS, "colour", color.colour),
+    CliCommand(VEHICLES, "vehicle", vehicle.app),
+    CliCommand(VEHICLES, "allocate", allocate.allocate),
+    CliCommand(VEHICLES, "wake", wake.app),
+    CliCommand(STUDIES, "campaign", campaign.app),
+    CliCommand(STUDIES, "compile", precompile.warm),
     *installed_commands(),
 )
 

@@ -1,14 +1,11 @@
-"""Reports: one HTML page per trial or comparison, with plots, photographs and a 3D scene; it opens with no network.
+"""Reports: one HTML file per trial, comparison, campaign, vehicle or model; it opens with no network.
 
-Start reading in `report.py` (a trial's page, part by part; `model.py` is the part of its model, `page.py` keeps
-what is made early) and `compare.py` (trials side by side). `trial.py` reads a trial's folder, `text.py` and
-`references.py` say figures in words, `page.py` is HTML with its style and script, `figures.py`, `views.py`,
-`media.py`, `errors.py`, `media.py` and `scene3d.py` are the pictures, `svg_style.py` their colours, `references.py`
-what the water gets wrong, `report.py` what ballast the flight lacked, `model.py` what its photographs saw. Studies have
-pages of their own: `wake.py` with `wake_plots.py`, `target.py`, `gentle.py`, `operator.py`, `degradation.py`;
-`vehicle/` is a vehicle's, `log.py` with `log_plots.py` a real vehicle's log's, `photo_preview.py` that of a look at
-photographs, `photo_model/` that of the model made from them, `campaign.py` a campaign's and `reproduce/` that of the
-paper's tables (both with `methods_compared.py` and `methods_compared.py`).
+- `report.py`: a trial's page; `model.py`: its part about the model; `compare.py`: trials side by side.
+- `campaign.py`: a campaign; `methods_compared.py`: its methods. `vehicle/`: a vehicle. `target.py`: a target.
+- `photo_preview.py`: photographs before the long stages. `photo_model/`: a model made of photographs.
+- `page.py`: templates (`templates/`) and parts of a page. `text.py`, `references.py`: words, reference values.
+- `figures.py`, `views.py`, `media.py`, `errors.py`, `scene3d.py`: pictures; `svg_style.py`: their colours.
+- `trial.py`: reads a trial's folder.
 """
 
 from typing import TYPE_CHECKING

@@ -88,7 +88,7 @@ def lpips_distance() -> tuple[Distance | None, str | None]:
         package: Any = import_module("lpips")
         network = package.LPIPS(net="alex", verbose=False)
     except ImportError:
-        return None, "the package lpips is not installed (pip install lpips)"
+        return None, "the package lpips is not installed; it is no dependency of Wakewise"
     except (OSError, RuntimeError) as fault:  # its weights are downloaded when it is first used
         return None, f"lpips cannot load its network: {' '.join(str(fault).split())[:120]}"
 

@@ -1,6 +1,6 @@
 """Commands that this package adds to `wakewise`: `wakewise link ...`, one module per command."""
 
-from wakewise.ui.cli.commands import REAL_VEHICLE, Command
+from wakewise.ui.cli.commands import REAL_VEHICLE, CliCommand
 from wakewise_ardusub.cli import link
 
-COMMANDS = (Command(REAL_VEHICLE, "link", link.app),)
+COMMANDS = (CliCommand(REAL_VEHICLE, "link", link.app),)
