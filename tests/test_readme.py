@@ -138,7 +138,7 @@ def test_the_python_of_docs_campaigns_runs(tmp_path, monkeypatch, capsys):
         ("-5.1", "dp"),
         ("-6.0", "mpc"),
     ]
-    assert len([ast.parse(block) for block in blocks("docs/campaigns.md", "python")]) == 4
+    assert len([ast.parse(block) for block in blocks("docs/campaigns.md", "python")]) == 5
 
 
 def bare(text):

@@ -4,7 +4,8 @@ import pytest
 
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import load_scenario
-from wakewise_benchmarks import BENCHES, reconstruction
+from wakewise_benchmarks import reconstruction
+from wakewise_benchmarks.registry import BENCHES
 
 SMALL = {
     "target.kind": "brain",

@@ -5,8 +5,9 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.experiments.trials.timing import BenchOptions
-from wakewise_benchmarks import BENCHES, adversarial_photos, adversarial_scenes
+from wakewise_benchmarks import adversarial_photos, adversarial_scenes
 from wakewise_benchmarks.command import show_traps
+from wakewise_benchmarks.registry import BENCHES
 
 
 @pytest.mark.slow

@@ -137,7 +137,7 @@ def bench(
     from wakewise.core.errors import STRICT, InputError
     from wakewise.core.optional_dependencies import need
     from wakewise.experiments.trials import BenchOptions
-    from wakewise_benchmarks import BENCHES, run_bench
+    from wakewise_benchmarks.registry import BENCHES, run_bench
 
     if plot is not None and name not in ("gentle", "operator"):
         raise InputError("--plot: only `wakewise bench gentle` and `wakewise bench operator` draw")

@@ -16,4 +16,4 @@ def test_constants_of_physics_are_written_in_one_place_only() -> None:
     for path in SOURCE.rglob("*.py"):
         tokens = tokenize.generate_tokens(io.StringIO(path.read_text(encoding="utf-8")).readline)
         found += [f"{path.relative_to(SOURCE)}: {token.string}" for token in tokens if token.string in numbers]
-    assert sorted(found) == ["physics.py: 9.80665", "physics.py: 998.0"]
+    assert sorted(found) == ["core/constants.py: 9.80665", "core/constants.py: 998.0"]

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-import wakewise
-
-ROOT = Path(wakewise.__file__).parent
+ROOT = Path(__file__).parents[2]
+SOURCES = (ROOT / "src", *sorted(ROOT.glob("packages/*/src")), ROOT / "benchmarks")
 # By name, whoever's they are: methods and functions that write to the place that they are given.
 WRITERS = {
     *("write_parquet", "write_csv", "write_ipc", "write_ndjson", "sink_parquet", "sink_csv"),
@@ -19,46 +18,76 @@ WRITERS = {
     *("write_text", "write_bytes", "touch", "to_csv", "to_parquet", "dump"),
     *("copy", "copy2", "copyfile", "copyfileobj", "copytree", "Writer", "FileHandler"),
 }
-_GUARDS = {"whole_file", "whole_folder", "TemporaryDirectory", "workroom"}
+_GUARDS = {"whole_file", "whole_folder", "TemporaryDirectory", "database_folder"}
 # Whole by other means, or no result. A line here needs a reason that is true of every write of that function.
 ALLOWED = dict.fromkeys(
-    ("campaigns.attempts._add", "cli.reconstruct_log.RunLog.say", "operation.at_sea.cameras.note_view"),
+    (
+        "wakewise.experiments.campaigns.attempt_log._add",
+        "wakewise.ui.cli.reconstruct.RunLog.say",
+        "wakewise_ardusub.session.cameras.note_view",
+    ),
     "lines are only ever added, and half a line is passed over",
 )
 ALLOWED |= dict.fromkeys(
-    ("links.ardusub.journal.Journal.__init__", "meter.record.Record.__init__", "campaigns.worker._logged"),
+    (
+        "wakewise_ardusub.link.session_log.SessionLog.__init__",
+        "wakewise_ardusub.wash_meter.meter.DiveRecord.__init__",
+        "wakewise.experiments.campaigns.worker._logged",
+    ),
     "a log that grows while something runs",
 )
 ALLOWED |= dict.fromkeys(
-    ("campaigns.claims._locked", "numba_kernels._alone", "processes._take"),
+    (
+        "wakewise.experiments.campaigns.trial_lock._locked",
+        "wakewise.core.jit.kernel_cache._alone",
+        "wakewise.core.run_lock._take",
+    ),
     "a lock, which holds no result",
 )
 ALLOWED |= dict.fromkeys(
-    ("campaigns.claims.take", "warming._take_note"), "gets its name by a link or by renaming, when it is whole"
+    ("wakewise.experiments.campaigns.trial_lock.acquire_lock", "wakewise.core.jit.precompile._take_note"),
+    "gets its name by a link or by renaming, when it is whole",
 )
-ALLOWED |= {"campaigns.run._driver_file": "says that a process is there; half of one is passed over"}
+ALLOWED |= {
+    "wakewise.experiments.campaigns.run._driver_file": "says that a process is there; half of one is passed over"
+}
 ALLOWED |= dict.fromkeys(
-    ("film.encode._VP9.__init__", "film.encode._H264.__init__", "film.encode._WebP.close"),
+    (
+        "wakewise.ui.film.encode._VP9.__init__",
+        "wakewise.ui.film.encode._H264.__init__",
+        "wakewise.ui.film.encode._WebP.close",
+    ),
     "is given the temporary name of `film_writer`, which is in a block of `whole_file`",
 )
-ALLOWED |= {"lattice.compute.compute_run": "`LatticeRun.save` writes in a block of `whole_file`"}
+ALLOWED |= {
+    "wakewise_paper.lattice_reference.mean_field.compute_run": "`LatticeRun.save` writes in a block of `whole_file`"
+}
 ALLOWED |= dict.fromkeys(
     (
         *(
-            "links.exports.colmap.write_colmap",
-            "links.exports.colmap._write_binary",
-            "links.exports.colmap._write_text",
+            "wakewise.experiments.exports.colmap.write_colmap",
+            "wakewise.experiments.exports.colmap._write_binary",
+            "wakewise.experiments.exports.colmap._write_text",
         ),
-        *("links.exports.nerfstudio.write_nerfstudio", "links.exports.nerfstudio._write_ply"),
-        *("links.exports.rosbag2.write_bag", "links.exports.checksums.copied"),
-        *("trials.dataset.part._Gathered.tables", "trials.dataset.part._make", "reconstruction.film_frames._write"),
+        *("wakewise.experiments.exports.colmap.write_nerfstudio", "wakewise.experiments.exports.colmap._write_ply"),
+        *("wakewise.experiments.exports.rosbag2.write_bag", "wakewise.experiments.trials.dataset.checksums.copied"),
+        *(
+            "wakewise.experiments.trials.dataset.part._Gathered.tables",
+            "wakewise.experiments.trials.dataset.part._make",
+            "wakewise.experiments.exports.training_data.undistorted",
+            "wakewise.experiments.exports.training_data.place_picture",
+            "wakewise.vision.reconstruction.photos.video_frames._write",
+        ),
     ),
     "writes into a folder of `whole_folder`, which its caller makes",
 )
 ALLOWED |= dict.fromkeys(
     (
-        *("reconstruction.depth_store.DepthStore.add", "reconstruction.masks.write_for_colmap"),
-        "reconstruction.own_lenses.own_lenses",
+        *(
+            "wakewise.vision.reconstruction.dense.dense_points.DepthStore.add",
+            "wakewise.vision.reconstruction.photos.masks.write_for_colmap",
+        ),
+        "wakewise.vision.reconstruction.sfm.per_photo_intrinsics.fit_per_photo_intrinsics",
     ),
     "writes into a temporary folder, which its caller makes",
 )
@@ -133,10 +162,11 @@ def _opens_to_write(call: ast.Call) -> bool:
 
 def _everywhere() -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
-    for path in sorted(ROOT.rglob("*.py")):
-        module = path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".").removesuffix(".__init__")
-        for where, line, words in writes(ast.parse(path.read_text(encoding="utf-8"))):
-            found.setdefault(f"{module}.{where}", []).append(f"{path.relative_to(ROOT)}:{line}: {words}")
+    for source in SOURCES:
+        for path in sorted(source.glob("wakewise*/**/*.py")):
+            module = ".".join(part for part in path.relative_to(source).with_suffix("").parts if part != "__init__")
+            for where, line, words in writes(ast.parse(path.read_text(encoding="utf-8"))):
+                found.setdefault(f"{module}.{where}", []).append(f"{path.relative_to(ROOT)}:{line}: {words}")
     return found
 
 

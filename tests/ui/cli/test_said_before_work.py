@@ -50,7 +50,7 @@ def test_a_comparison_is_of_two_methods(methods: str, capsys: Capsys, tmp_path: 
 
 def test_benches_are_listed_with_what_and_how_long(capsys: Capsys, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a name nothing runs; each bench has a line, and the hours are told beforehand."""
-    from wakewise_benchmarks import BENCHES
+    from wakewise_benchmarks.registry import BENCHES
 
     monkeypatch.setattr("wakewise_benchmarks.run_bench", lambda *_: pytest.fail("a bench was run"))
     assert run(["bench"]) == 0
