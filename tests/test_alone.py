@@ -18,7 +18,7 @@ from pathlib import Path
 from wakewise.core.files import whole_file, whole_folder
 from wakewise.core.run_lock import exclusive_run
 folder = Path(sys.argv[1])
-with alone(folder), whole_file(folder / "a.db"), whole_folder(folder / "images" / "b"):
+with exclusive_run(folder), whole_file(folder / "a.db"), whole_folder(folder / "images" / "b"):
     print("held", flush=True)
     time.sleep(60)
 """
@@ -100,7 +100,7 @@ def test_many_that_begin_at_once_take_turns_or_are_refused(tmp_path: Path) -> No
         "folder, end, inside = Path(sys.argv[1]), time.time() + 1.5, 0\n"
         "while time.time() < end:\n"
         "    try:\n"
-        "        with alone(folder):\n"
+        "        with exclusive_run(folder):\n"
         "            (folder / 'inside').touch(exist_ok=False)\n"
         "            (folder / 'inside').unlink()\n"
         "            inside += 1\n"

@@ -160,7 +160,7 @@ print(json.dumps(answers))
         ("evaluate cloud.ply --reference cloud.ply", "photos"),
         ("film runs/x", "photos,reports"),
         ("export runs/x --to rosbag2", "ros"),
-        ("degrade --out runs/x", "photos,reports"),
+        ("photo-robustness --out runs/x", "photos,reports"),
         ("calibrate .", "photos"),
         ("colour . --out runs/x", "photos"),
         ("nerf . --out runs/x", "nerf,photos"),
@@ -192,8 +192,8 @@ from wakewise.core.errors import MissingExtra, WakewiseError
 assert issubclass(MissingExtra, WakewiseError) and issubclass(MissingExtra, ImportError)
 lines = []
 for room, name in (
-    ("imaging", "Scene"), ("reconstruction", "reconstruct"), ("reports", "write_report"), ("trials", "run_trial"),
-    ("operation", "photograph_flight"), ("film", "write_film"),
+    ("vision.imaging", "Scene"), ("vision.reconstruction", "reconstruct"), ("ui.reports", "write_report"),
+    ("experiments.trials", "run_trial"), ("operation", "photograph_flight"), ("ui.film", "write_film"),
 ):
     try:
         exec(f"from wakewise.{room} import {name}")
@@ -221,10 +221,11 @@ def test_a_function_names_all_that_is_missing_before_it_begins(call, extras, tmp
     found = without_extras(
         f"""
 import wakewise as ww
+from wakewise.core.errors import MissingExtra
 scenario = ww.Scenario.preset("quick")
 try:
     {call}
-except ww.errors.MissingExtra as refusal:
+except MissingExtra as refusal:
     print(refusal)
 """,
         tmp_path,

@@ -330,7 +330,7 @@ def layout_of(vehicle: Vehicle, failed: Sequence[int | str] = ()) -> Layout:
         If there is no such thruster.
     """
     lower, upper = _vehicle(vehicle).thrust_lower_N.copy(), vehicle.thrust_upper_N.copy()
-    if isinstance(failed, (str, bytes)) or not hasattr(failed, "__iter__"):
+    if isinstance(failed, (str, bytes)) or not hasattr(failed, "__iter__") or getattr(failed, "ndim", 1) == 0:
         raise InputError(f"failed: {quoted(failed)}, must be a list of thrusters' names or places")
     known = [thruster.name for thruster in vehicle.thrusters]
     for which in failed:

@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 GENERATED = {"commands.md", "scenario.md"}
 """Pages that the program writes from its own help and settings; tests/ui/cli/test_commands.py compares them."""
-PROGRAMS = {"python", "toml", "yaml", "json", "text"}
+PROGRAMS = {"python", "toml", "yaml", "json", "text", "mermaid"}
 """Languages of blocks that are no command lines; Python blocks have tests of their own (tests/test_readme.py)."""
 
 

@@ -70,7 +70,6 @@ class FilterState:
         )
 
     @property
-    @property
     def gyro_bias_rad_s(self) -> Array:
         """Estimated bias of the gyro, shape (3,)."""
         return self.mean[19:22]

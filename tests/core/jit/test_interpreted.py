@@ -58,10 +58,10 @@ from wakewise.core.jit.precompile import PrecompileResult, is_warm, compile_kern
 import numpy as np
 from wakewise.simulation.lattice.streaming_stores import copy_line, load_element, store_element
 from wakewise.simulation.lattice.streaming_stores import settle_stores, stream_line
-assert not COMPILED and is_warm() and warm().kernels == 0
+assert not COMPILED and is_warm() and compile_kernels().kernels == 0
 a, b = np.zeros(32, np.float32), np.arange(32, dtype=np.float32)
-poke(a, 0, np.float32(7.0)), copy_line(a, 16, b, 8), stream_line(a, 0, b, 16), settle_stores()
-assert peek(a, 16) == 8.0 and a[0] == 16.0
+store_element(a, 0, np.float32(7.0)), copy_line(a, 16, b, 8), stream_line(a, 0, b, 16), settle_stores()
+assert load_element(a, 16) == 8.0 and a[0] == 16.0
 sys.settrace(trace)
 found = answers()
 sys.settrace(None)

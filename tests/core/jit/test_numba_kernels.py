@@ -66,9 +66,12 @@ def small_package(tmp_path: Path) -> Path:
     """A package of the same name in which one file's kernel uses another's, and that one a third's constant."""
     folder = tmp_path / "wakewise"
     folder.mkdir()
-    (folder / "__init__.py").touch()
-    for door in ("compiled.py", "numba_kernels.py"):
-        shutil.copy(PACKAGE / door, folder)
+    jit = folder / "core" / "jit"
+    jit.mkdir(parents=True)
+    for place in (folder, jit.parent, jit):
+        (place / "__init__.py").touch()
+    for name in ("njit.py", "kernel_cache.py"):
+        shutil.copy(PACKAGE / "core" / "jit" / name, jit)
     (folder / "constants.py").write_text("STEP = 1.0\n")
     (folder / "callee.py").write_text(
         "from wakewise.core.jit.njit import njit\n"

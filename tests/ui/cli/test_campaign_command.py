@@ -207,8 +207,8 @@ def test_a_group_or_figure_that_is_not_there_is_refused(cheap_work: Path, capsys
 def test_ctrl_c_ends_with_130_and_the_same_command_goes_on(cheap_work: Path) -> None:
     """Nothing that was finished is lost, and no worker stays behind."""
     script = (
-        "import sys; from wakewise.experiments.campaigns import definition; from wakewise import warming\n"
-        "definition._WORK['fly'] = 'pretend:fly'; warming.warm = lambda *_, **__: None\n"
+        "import sys; from wakewise.experiments.campaigns import definition; from wakewise.core.jit import precompile\n"
+        "definition._WORK['fly'] = 'pretend:fly'; precompile.compile_kernels = lambda *_, **__: None\n"
         "from wakewise.ui.cli.main import main; main()"
     )
     (cheap_work / "small.yaml").write_text(FILE.replace("seeds: 2", "seeds: 6"))

@@ -101,7 +101,7 @@ def stratified_bootstrap(
         del axis  # the last: SciPy hands over row numbers of shape (draws, rows of a stratum)
         return statistic(values[np.atleast_2d(np.concatenate(picked, axis=-1))])
 
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.simplefilter("ignore", stats.DegenerateDataWarning)  # draws that are not finite are left out below
         drawn = stats.bootstrap(
             groups, drawn_statistic, n_resamples=resamples, vectorized=True, method="percentile", rng=seed
