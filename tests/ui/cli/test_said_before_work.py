@@ -52,7 +52,7 @@ def test_benches_are_listed_with_what_and_how_long(capsys: Capsys, monkeypatch: 
     """Without a name nothing runs; each bench has a line, and the hours are told beforehand."""
     from wakewise_benchmarks.registry import BENCHES
 
-    monkeypatch.setattr("wakewise_benchmarks.run_bench", lambda *_: pytest.fail("a bench was run"))
+    monkeypatch.setattr("wakewise_benchmarks.registry.run_bench", lambda *_: pytest.fail("a bench was run"))
     assert run(["bench"]) == 0
     lines = capsys.readouterr().out.splitlines()
     told = {line.split()[0]: line for line in lines if line.split() and line.split()[0] in BENCHES}
