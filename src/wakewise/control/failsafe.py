@@ -149,7 +149,7 @@ class PlanFailsafe:
             trouble = self._judge(plan)
         except WakewiseError as error:
             plan, trouble = None, ("refused", f"plan refused: {error}")
-        except Exception as error:
+        except Exception as error:  # a fault of the program must not leave the vehicle without thrusts
             if self.strict:
                 raise
             plan, trouble = None, ("failed", f"planner failed: {type(error).__name__}: {error}")

@@ -21,6 +21,7 @@ trouble. ArduSub has no wrench: its mixer is part of what is compared.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -138,16 +139,16 @@ class Demand:
     goal: Goal | None = None
 
 
-class MotionStage:
+class MotionStage(ABC):
     """Stage 3: from an estimate and a goal to a `Demand`."""
 
     def begin(self, state: PipelineState) -> PipelineState:
         """Fill in what the stage remembers before its first step."""
         return state
 
+    @abstractmethod
     def step(self, state: PipelineState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PipelineState, Demand]:
         """Decide the wrench for the next `dt_s` seconds."""
-        raise NotImplementedError
 
     def allocated(self, state: PipelineState, found: Allocation, dt_s: float) -> PipelineState:
         """Take in how the stage's wrench was allocated."""

@@ -67,7 +67,7 @@ class ControlSettings(Settings):
 
     Gains. The paper's PID has 150 N/m, 80 N s/m and 20 N/(m s). They are wishes for its vehicle: others get the same
     bandwidth by their mass, moments by their inertia, and each axis is slowed until its loop keeps its margins
-    (`stability.stable_gain_scale`). How late the estimate is, is told in `tracker`.
+    (`gain_margins.stable_gain_scale`). How late the estimate is, is said in `pid`.
 
     Weights. The first term of the cost is the weighted mean square of the water's speed at the target's points, in
     (m/s)^2, with weight `w_disturbance`; effort is set beside it. Planner and allocators of one instant share the two.

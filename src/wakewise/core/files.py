@@ -56,7 +56,7 @@ def _failures_told(path: Path, began: str) -> Iterator[None]:
     """
     try:
         yield
-    except Exception as fault:
+    except Exception as fault:  # what is not of the computer is raised again below
         failure = environment_failure(fault, path)
         told = isinstance(fault, WakewiseError) or getattr(failure, "errno", None)
         if not told and not _has_room(path.parent):

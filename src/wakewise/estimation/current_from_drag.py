@@ -133,7 +133,7 @@ def current_if_known(
 
     - `sets`, shape (k, 20, 6): numbers of the vehicle with each drag that it may have, each alike; the nominal one
       first.
-    - `rest_q`, shape (4,): attitude that the force is samples for.
+    - `rest_q`, shape (4,): attitude at which the force is given.
     - `force_W_N`, `force_covariance`, shape (3,) and (3, 3): force at rest that the model does not explain, and how
       sure that is.
     - `drag_std`: relative error of each drag.

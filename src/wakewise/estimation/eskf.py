@@ -42,9 +42,9 @@ from wakewise.robot.vehicles import Vehicle, compile_body, with_each_drag
 class FilterState:
     """State of the filter.
 
-    `mean`, shape (E + 1,), and `covariance`, shape (E, E), as laid out in `kernels`, hold at `settled_s`; so do
+    `mean`, shape (E + 1,), and `covariance`, shape (E, E), as laid out in `eskf_kernels`, hold at `settled_s`; so do
     `thrusts_N`, shape (n,), what the thrusters are believed to give, behind their commands. `rest_q`, shape (4,), is
-    the attitude that the unmodelled load is values for, the first one. `time_s` is now, on the clock of the
+    the first attitude, at which the unmodelled load is given. `time_s` is now, on the clock of the
     measurements. `commands` (start time, thrusts) and `pending` measurements lie between the two times.
     """
 

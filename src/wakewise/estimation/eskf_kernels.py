@@ -269,9 +269,9 @@ def _add_current(F: Array, A: Array, mean: Array, dt_s: float) -> None:
         change[0] -= dt_s * (w[1] * seen[2] - w[2] * seen[1])
         change[1] -= dt_s * (w[2] * seen[0] - w[0] * seen[2])
         change[2] -= dt_s * (w[0] * seen[1] - w[1] * seen[0])
-        propagate_mean = rotate(q[0], q[1], q[2], q[3], change[0], change[1], change[2])
+        moved = rotate(q[0], q[1], q[2], q[3], change[0], change[1], change[2])
         for i in range(3):
-            F[i, CURRENT + j] += 0.5 * dt_s * propagate_mean[i]
+            F[i, CURRENT + j] += 0.5 * dt_s * moved[i]
             F[3 + i, CURRENT + j] += 0.5 * dt_s * change[3 + i]
             F[6 + i, CURRENT + j] += change[i]
             F[9 + i, CURRENT + j] += change[3 + i]

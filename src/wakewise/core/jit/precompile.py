@@ -279,7 +279,7 @@ def _compile_what_is_asked(asked: Iterable[str], answers: IO[str]) -> None:
         try:
             getattr(import_module(module), name).compile(tuple(type_from(words) for words in task["types"]))
             answer = _DONE
-        except Exception as fault:
+        except Exception as fault:  # one kernel that fails must not end the others; it is reported
             answer = f"{_FAILED} {type(fault).__name__}: {' '.join(str(fault).split())[:300]}"
         answers.write(answer + "\n")
         answers.flush()

@@ -121,7 +121,7 @@ def report_full_disk(folder: Path) -> Iterator[None]:
     """
     try:
         yield
-    except Exception as fault:
+    except Exception as fault:  # all but a full disk is raised again
         if not is_full(fault):
             raise
         raise EnvironmentFailure(f"{folder}: {FULL}; {RESUME_HINT}") from None

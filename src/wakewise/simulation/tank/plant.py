@@ -144,7 +144,7 @@ class VehiclePlant:
         self._steps = vehicle.thrust_steps
         self._asked, self._turned_N = b"", np.zeros(n)
         self._follows = _following(vehicle, self._body.added_mass, density_kg_m3)
-        self._calm = self._still and tether is None and not failures  # so that nothing is key of between two events
+        self._calm = self._still and tether is None and not failures  # so that nothing acts between two events
         # Velocity in the world before the last step, that step, and 1 if the hull was surely clear of everything then.
         self._last = np.zeros(5)
         self._water_W = ambient.velocity(start.X_WB.p_m[None], 0.0)[0]
@@ -172,7 +172,7 @@ class VehiclePlant:
         return self._motors_N * self._gains * self._factors
 
     def take_impulse_N_s(self) -> Array:
-        """Integral of forward and of reverse thrust since this was last key for, both positive, shape (n, 2)."""
+        """Integral of forward and of reverse thrust since the last call, both positive, shape (n, 2)."""
         taken, self._impulse_N_s = self._impulse_N_s, np.zeros_like(self._impulse_N_s)
         return taken
 

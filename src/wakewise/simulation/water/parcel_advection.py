@@ -74,15 +74,15 @@ def advect_parcels(
         sine2 = min(max(1.0 - ro * ro / max(rr * oo, 1e-30), 0.0), 1.0) if rr * oo > 1e-20 else 0.0
         spread = laws[1]
         if shorter > 0.0 and not wake[i] and start[i] > 0.0:
-            # `closure.lasting_spread`
+            # `lasting_spread` of the reference (tests)
             spread *= 1.0 - shorter * max(1.0 - speed[i] / (start[i] * min(1.0, end / s)), 0.0)
         wide = spread * math.sqrt(1.0 - sine2) + puff * math.sqrt(sine2)
         path, after = travelled(s, D[i], speed[i], dt_s, core_spread, wide)
         if wake[i]:
-            # `closure.wake_sigma_m`
+            # `wake_sigma_m` of the reference (tests)
             rate = 3.0 * (WAKE_ENTRAINMENT - 0.5 * laws[1]) * start[i] * end * end
             after = (after**3 + rate * dt_s) ** (1.0 / 3.0)
-        # `closure.share_left`; the mean of the step's ends counts.
+        # `share_left` of the reference (tests); the mean of the step's ends counts.
         before = min((first / s) ** 2 if s < end else 0.25 * D[i] / s, 1.0)
         grown = min((first / after) ** 2 if after < end else 0.25 * D[i] / after, 1.0)
         across = math.sqrt(max(pp - rp * rp / max(rr, 1e-20), 0.0))
@@ -144,7 +144,7 @@ def slugs(
 def travelled(
     sigma: float, D: float, speed: float, dt_s: float, core_spread: float, wide: float
 ) -> tuple[float, float]:
-    """Path of one parcel and its size after it: `closure.travel`."""
+    """Path of one parcel and its size after it: `travel` of the reference (tests)."""
     first, end = FIRST_D * D, CORE_END_D * D
     start, left_s, path = sigma, dt_s, 0.0
     if sigma < end:

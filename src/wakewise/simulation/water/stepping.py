@@ -48,7 +48,7 @@ _STEEPEST_GRAZE = math.sin(math.radians(10))  # parcels that come in flatter tha
 class WaterConstants(NamedTuple):
     """What stays the same from step to step."""
 
-    drift: Array  # shape (5,): as in `advect_parcels.drift`; the fourth is the time step in s
+    drift: Array  # shape (5,): as in `parcel_advection.advect_parcels`; the fourth is the time step in s
     wake_stream: int  # of the hull's wake: one more than the jets' own
     rest_speed: float  # in m/s
     gusty: bool
@@ -147,7 +147,7 @@ def advance(
     - `places`, `ambient`, shape (n + r + t, 3): what `places_of` said, and the ambient water's velocity there, to which
       the body's answer is added.
     - `body_to_ambient`, shape (s,): the body's answer to the ambient water.
-    - `disks`, shape (3, t, 3): as in `advect_parcels.send`.
+    - `disks`, shape (3, t, 3): as in `parcel_advection.emit_parcels`.
     - `impulses_m4_s`, shape (t, 2): forward and reverse, over the water's density.
     - `noise`, shape (n + k, 3): standard normal: of the parcels that there are and then of those sent.
     """

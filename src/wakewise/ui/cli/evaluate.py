@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -158,16 +159,10 @@ def evaluate(
             figures | {"why": why, "units": units, "definitions": {k: text for k, (_, text) in definitions.items()}}
         )
         return
-    from rich.table import Table
-
-    table = Table(title=f"{cloud} against {reference or depth_maps}")
-    table.add_column("figure")
-    table.add_column("value", justify="right")
-    table.add_column("what it is")
-    for key, value in figures.items():
-        if not isinstance(value, (list, dict)) and key != "model_faults":
-            table.add_row(key, format_value(value), definitions[key][1])
-    print_table(table)
+    shown = {
+        key: value for key, value in figures.items() if not isinstance(value, (list, dict)) and key != "model_faults"
+    }
+    _print_figures(f"{cloud} against {reference or depth_maps}", shown, {key: definitions[key][1] for key in shown})
     for share in figures.get("shares", ()):
         typer.echo(
             f"within {share['threshold_mm']:.3g} mm: {share['accuracy_pct']:.1f} % of the model, "
@@ -226,16 +221,9 @@ def _print_views(views: Path, photos: Path, split: Path | None, json: bool) -> N
         definitions = {key: text for key, (_, text) in VIEW_DEFINITIONS.items()}
         print_json(figures | {"why": scores.why, "units": units, "definitions": definitions})
         return
-    from rich.table import Table
-
-    table = Table(title=f"{views} against {photos}")
-    table.add_column("figure")
-    table.add_column("value", justify="right")
-    table.add_column("what it is")
-    for key, value in figures.items():
-        if key != "per_view":
-            table.add_row(key, format_value(value), scores.why.get(key, VIEW_DEFINITIONS[key][1]))
-    print_table(table)
+    shown = {key: value for key, value in figures.items() if key != "per_view"}
+    meanings = {key: scores.why.get(key, VIEW_DEFINITIONS[key][1]) for key in shown}
+    _print_figures(f"{views} against {photos}", shown, meanings)
 
 
 def _remark(figures: dict[str, Any]) -> None:
@@ -369,3 +357,16 @@ def _against_depths(points: Array, depth_maps: Path | None, cameras: Path | None
     if depth_maps is None or cameras is None:
         raise InputError("--depth-maps: needs --cameras FOLDER with the .camera files that the maps belong to")
     return dataclasses.asdict(compare_depths(points, read_depth_views(depth_maps, cameras))), DEPTH_DEFINITIONS
+
+
+def _print_figures(title: str, figures: Mapping[str, Any], meanings: Mapping[str, str]) -> None:
+    """A table of figures with what each is."""
+    from rich.table import Table
+
+    table = Table(title=title)
+    table.add_column("figure")
+    table.add_column("value", justify="right")
+    table.add_column("what it is")
+    for key, value in figures.items():
+        table.add_row(key, format_value(value), meanings[key])
+    print_table(table)

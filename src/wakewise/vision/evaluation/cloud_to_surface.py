@@ -353,12 +353,12 @@ def suspicious_extent(cloud_m: Array, truth_m: Array) -> str | None:
     # The middle nine tenths: a stray point must not enlarge the cloud.
     low, high = np.percentile(cloud, (5.0, 95.0), axis=0)
     extent = float(np.linalg.norm(high - low)) / 0.9
-    boolean = float(np.linalg.norm(np.ptp(truth_m, axis=0)))
-    if extent <= 0.0 or boolean <= 0.0 or 1.0 / MAX_SCALE_RATIO < extent / boolean < MAX_SCALE_RATIO:
+    length = float(np.linalg.norm(np.ptp(truth_m, axis=0)))
+    if extent <= 0.0 or length <= 0.0 or 1.0 / MAX_SCALE_RATIO < extent / length < MAX_SCALE_RATIO:
         return None
-    ratio = extent / boolean
+    ratio = extent / length
     return (
-        f"reference: {boolean:.3g} m across while the cloud is {extent:.3g} m, a suspicious scale (ratio {ratio:.3g}); "
+        f"reference: {length:.3g} m across while the cloud is {extent:.3g} m, a suspicious scale (ratio {ratio:.3g}); "
         "are both in metres?"
     )
 

@@ -149,14 +149,14 @@ class OutputGate:
     send : callable
     drive : MotorInterface
     limits : EngagementLimits
-    journal : Journal or None
+    journal : SessionLog or None
     system : int
         The vehicle's id.
     session : int
         Number that tells this program's heartbeats, and the times of its thrusts, from a rival's.
     buttons : mapping
         What buttons of the pilot's sticks mean: "engage", which also releases, and actions of
-        `wakewise.operation.teleop.input`. While the autopilot acts at one of them as well (`buttons.py`), nothing
+        `wakewise.operation.teleop.input`. While the autopilot acts at one of them as well (`parameters.py`), nothing
         engages.
     listen_only : bool
         Never engages, and sends no thrust whatever happens.

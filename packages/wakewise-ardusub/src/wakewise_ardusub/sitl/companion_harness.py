@@ -47,7 +47,7 @@ class CompanionHarness:
     ----------
     flight : InProcessSession
     limits : Limits, optional
-    journal : Journal, optional
+    journal : SessionLog, optional
     buttons : mapping, optional
         As of `OutputGate`.
     thrusts_N : ndarray, shape (n,), optional
