@@ -7,6 +7,7 @@ plan. The rest of a method is its settings:
 |---|---|---|---|
 | `dp` | PID | least thrusts | dynamic positioning, the baseline |
 | `no-forward-jets` | PID | least thrusts | level thrusters at the bow never blow ahead |
+| `weighted-pseudo-inverse` | PID | weighted least squares | a price on jets at the target, no wake model |
 | `allocation-only` | PID | null space, gentle | weights and wake terms of `wake-aware` |
 | `mpc` | MPC | the plan's own | no disturbance term |
 | `mpc-smooth` | MPC | the plan's own | the same with a price on change of thrust |
@@ -42,6 +43,7 @@ from wakewise.control.null_space_allocation import (
 from wakewise.control.pid import make_pid
 from wakewise.control.pipeline import Pipeline, TrackingStage
 from wakewise.control.settings import ControlSettings
+from wakewise.control.weighted_allocation import weighted_allocator
 from wakewise.core.interfaces import Controller, WakeModel
 from wakewise.core.plugins import find
 from wakewise.planning import Surroundings
@@ -94,6 +96,23 @@ def tracking(
         motion=stage,
         attitude=attitude_optimizer(context, vehicle, settings, around or around_target(region)),
         allocator=Allocator(layout=own, context=context),
+    )
+
+
+def weighted(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,
+) -> Pipeline:
+    """`weighted-pseudo-inverse`: PID, and a price on thrusters that blow at the target."""
+    del around
+    return Pipeline(
+        name="weighted-pseudo-inverse",
+        layout=vehicle_layout(vehicle),
+        motion=TrackingStage(pid=make_pid(vehicle, settings)),
+        allocator=weighted_allocator(vehicle, region, wake, settings),
     )
 
 
@@ -180,6 +199,7 @@ Maker = Callable[[Vehicle, Region, WakeModel, ControlSettings, Surroundings | No
 MAKERS: dict[str, Maker] = {
     "dp": partial(tracking, name="dp"),
     "no-forward-jets": partial(tracking, name="no-forward-jets", layout=bow_layout),
+    "weighted-pseudo-inverse": weighted,
     "manual": manual,
     "ardusub": ardusub,
     "pseudo-inverse": partial(mpc, name="pseudo-inverse", least=True),

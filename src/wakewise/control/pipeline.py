@@ -4,7 +4,7 @@
       | 1 reference        hull attitude where the camera tilts               attitude_optimizer.py
       | 2 input check      finite, pose known; else the last thrusts fade     failsafe.py
       | 3 motion           MPC and tracking, PID, autopilot or plug-in        mpc_controller.py, pid.py, ...
-      | 4 allocation       one wrench to n thrusts                            null_space_allocation.py
+      | 4 allocation       one wrench to n thrusts                            null_space_allocation.py, ...
       | 5 failsafe         wrong, missing or late answers                     failsafe.py
       | 6 thruster model   PWM in the dead zone                               thruster_pwm.py
       v
@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -135,8 +135,21 @@ class Demand:
     thrusts_N: Array | None = None
     disturbance: float | None = None
     trouble: str | None = None
-    allocator: Allocator | None = None
+    allocator: WrenchAllocator | None = None
     goal: Goal | None = None
+
+
+class WrenchAllocator(Protocol):
+    """Stage 4: from a wrench to thrusts."""
+
+    @property
+    def layout(self) -> Layout:
+        """Thrusters and their limits."""
+
+    def allocate(
+        self, state: PipelineState, wrench_B: Array, estimate: BodyState, dt_s: float
+    ) -> tuple[PipelineState, Allocation | None]:
+        """Thrusts that make a wrench, shape (6,), within limits; None if the wake model gives what is not finite."""
 
 
 class MotionStage(ABC):
@@ -216,8 +229,8 @@ class Pipeline:
     attitude: AttitudeOptimizer | None = None
     checks_input: bool = True
     lost_m: float | None = None
-    allocator: Allocator | None = None
-    sent_by: Allocator | None = None
+    allocator: WrenchAllocator | None = None
+    sent_by: WrenchAllocator | None = None
     failsafe: Failsafe | None = None
     pwm: ThrusterPwm | None = None
     incidents: Incidents = field(default_factory=Incidents)

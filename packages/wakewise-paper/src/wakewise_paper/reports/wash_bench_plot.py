@@ -19,6 +19,7 @@ LOOKS = {
     "dp": ("#c65a3a", "o"),
     "no-forward-jets": ("#b9923a", "s"),
     "mpc": (QUIET, "^"),
+    "weighted-pseudo-inverse": ("#6f7f3a", "^"),
     "allocation-only": ("#5b8fb0", "D"),
     "wake-aware": ("#1f7a78", "o"),
     "wake-aware+trim": ("#7d4f9e", "P"),

@@ -116,6 +116,7 @@ METHODS = (
     "dp",
     "manual",
     "no-forward-jets",
+    "weighted-pseudo-inverse",
     "ardusub",
     "pseudo-inverse",
     "mpc",

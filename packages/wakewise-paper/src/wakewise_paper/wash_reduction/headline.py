@@ -22,8 +22,15 @@ SILT, SWAY, PLACE, ENERGY = "ray_optical_depth", "sway_rms_mm", "camera_rmse_mm"
 SWAY_WASH = "sway_wash_mm"
 """What the vehicle adds to the sway of the same water without it: all that a controller can take away (0038)."""
 BODY = "position_rmse_mm"
-RIVALS = ("dp", "mpc", "no-forward-jets", "no-forward-jets+trim")
-BESIDE = ("allocation-only", "wake-aware+trim", "dp+trim", "no-forward-jets", "no-forward-jets+trim")
+RIVALS = ("dp", "mpc", "no-forward-jets", "no-forward-jets+trim", "weighted-pseudo-inverse")
+BESIDE = (
+    "allocation-only",
+    "wake-aware+trim",
+    "dp+trim",
+    "no-forward-jets",
+    "no-forward-jets+trim",
+    "weighted-pseudo-inverse",
+)
 """What the table is made for as well."""
 WRONG = "wake-aware, wrong current"
 

@@ -36,7 +36,17 @@ from wakewise.operation.worlds.library import load_world, world_names
 from wakewise_paper.world_study.flight import FLIGHT, FLIGHT_FIGURES, MODEL_FIGURES, SCAN, scan, short_flight
 from wakewise_paper.world_study.lattice_comparison import JUDGED, judge_table, judge_trials
 
-METHODS = ("dp", "manual", "ardusub", "mpc", "mpc-smooth", "no-forward-jets", "allocation-only", "wake-aware")
+METHODS = (
+    "dp",
+    "manual",
+    "ardusub",
+    "mpc",
+    "mpc-smooth",
+    "no-forward-jets",
+    "weighted-pseudo-inverse",
+    "allocation-only",
+    "wake-aware",
+)
 """The first is what the others are held against."""
 
 EMERGENT = (
