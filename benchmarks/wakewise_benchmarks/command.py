@@ -31,77 +31,6 @@ def show_traps(result: dict[str, Any]) -> None:
     typer.echo(f"  right {result['right']}, said {result['said']}, silently wrong {result['silent_wrongs']}")
 
 
-Name = Annotated[str, typer.Argument(help="Which bench, or all; without a name they are listed.", show_default=False)]
-Data = Annotated[
-    Path, typer.Option(help="Folder of reference data that some figures are held against.", envvar="WAKEWISE_DATA")
-]
-Seeds = Annotated[
-    int | None,
-    typer.Option(
-        help="gentle, operator, worlds: flights per method, seeds 1 to this; 3, 3 and 10 if not given.",
-        min=1,
-        max=1000,
-        show_default=False,
-    ),
-]
-Methods = Annotated[
-    str, typer.Option(help="gentle, worlds: methods, with commas between; all if not given.", show_default=False)
-]
-Worlds = Annotated[
-    str,
-    typer.Option(
-        help="operator, worlds: which, with commas between; operator flies those with trouble and a calm one, worlds "
-        "all of them, if not given.",
-        show_default=False,
-    ),
-]
-WTracks = Annotated[
-    str,
-    typer.Option(help="operator: weights, with commas between; 1,2,5,10,20 if not given.", show_default=False),
-]
-Models = Annotated[
-    int, typer.Option(help="worlds: seeds for which a whole scan is made and its model judged.", min=0, max=1000)
-]
-Scenarios = Annotated[
-    str,
-    typer.Option(
-        help="gentle: which, with commas between: orbit (both vehicles), orbit/paper, worlds, world/mud, paper (the "
-        "paper's own world); traps: by name; all if not given.",
-        show_default=False,
-    ),
-]
-Mechanisms = Annotated[
-    str,
-    typer.Option(help="gentle: mechanisms to switch, with commas between, or all.", show_default=False),
-]
-Judge = Annotated[
-    int,
-    typer.Option(help="worlds: seeds flown in the lattice as well, minutes of a core each.", min=0, max=1000),
-]
-Bound = Annotated[
-    int,
-    typer.Option(
-        help="gentle: seeds for which the most is worked out that sharing thrusts out could gain, two minutes of a "
-        "core each; the whole is --methods dp,no-forward-jets,wake-aware --bound 3.",
-        min=0,
-        max=1000,
-    ),
-]
-Fresh = Annotated[
-    bool, typer.Option("--fresh", help="gentle, operator, worlds: fly anew what an earlier run has flown.")
-]
-Workers = Annotated[int, typer.Option(help="gentle, operator, worlds: processes that fly side by side.", min=1, max=64)]
-Store = Annotated[
-    Path | None,
-    typer.Option(
-        help="gentle, operator, worlds: folder that keeps flights; the cache if not given.", show_default=False
-    ),
-]
-Plot = Annotated[
-    Path | None,
-    typer.Option(help="gentle, operator: draw the figures into this file (.png, .svg).", show_default=False),
-]
-
 _SEEDS = {"gentle": 3, "operator": 3}
 """Seeds of a bench that flies, if not given; 10 of the others."""
 
@@ -111,21 +40,72 @@ _LASTS = {"gentle": "hours", "operator": "hours", "worlds": "hours"}
 
 
 def bench(
-    name: Name = "",
-    data: Data = Path("../shared/data"),
-    seeds: Seeds = None,
-    methods: Methods = "",
-    scenarios: Scenarios = "",
-    mechanisms: Mechanisms = "",
-    worlds: Worlds = "",
-    w_tracks: WTracks = "",
-    models: Models = 1,
-    judge: Judge = 0,
-    bound: Bound = 0,
-    fresh: Fresh = False,
-    workers: Workers = 2,
-    store: Store = None,
-    plot: Plot = None,
+    name: Annotated[
+        str, typer.Argument(help="Which bench, or all; without a name they are listed.", show_default=False)
+    ] = "",
+    data: Annotated[
+        Path, typer.Option(help="Folder of reference data that some figures are held against.", envvar="WAKEWISE_DATA")
+    ] = Path("../shared/data"),
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            help="gentle, operator, worlds: flights per method, seeds 1 to this; 3, 3 and 10 if not given.",
+            min=1,
+            max=1000,
+        ),
+    ] = None,
+    methods: Annotated[
+        str, typer.Option(help="gentle, worlds: methods, with commas between; all if not given.", show_default=False)
+    ] = "",
+    scenarios: Annotated[
+        str,
+        typer.Option(
+            help="gentle: which, with commas between: orbit (both vehicles), orbit/paper, worlds, world/mud, paper "
+            "(the paper's own world); traps: by name; all if not given.",
+            show_default=False,
+        ),
+    ] = "",
+    mechanisms: Annotated[
+        str, typer.Option(help="gentle: mechanisms to switch, with commas between, or all.", show_default=False)
+    ] = "",
+    worlds: Annotated[
+        str,
+        typer.Option(
+            help="operator, worlds: which, with commas between; operator flies those with trouble and a calm one, "
+            "worlds all of them, if not given.",
+            show_default=False,
+        ),
+    ] = "",
+    w_tracks: Annotated[
+        str, typer.Option(help="operator: weights, with commas between; 1,2,5,10,20 if not given.", show_default=False)
+    ] = "",
+    models: Annotated[
+        int, typer.Option(help="worlds: seeds for which a whole scan is made and its model judged.", min=0, max=1000)
+    ] = 1,
+    judge: Annotated[
+        int, typer.Option(help="worlds: seeds flown in the lattice as well, minutes of a core each.", min=0, max=1000)
+    ] = 0,
+    bound: Annotated[
+        int,
+        typer.Option(
+            help="gentle: seeds for which the most is worked out that sharing thrusts out could gain, two minutes of "
+            "a core each; the whole is --methods dp,no-forward-jets,wake-aware --bound 3.",
+            min=0,
+            max=1000,
+        ),
+    ] = 0,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="gentle, operator, worlds: fly anew what an earlier run has flown.")
+    ] = False,
+    workers: Annotated[
+        int, typer.Option(help="gentle, operator, worlds: processes that fly side by side.", min=1, max=64)
+    ] = 2,
+    store: Annotated[
+        Path | None, typer.Option(help="gentle, operator, worlds: folder that keeps flights; the cache if not given.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="gentle, operator: draw the figures into this file (.png, .svg).")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Measure speed and quality of one part: thread CPU, median and p99 after warm-up.

@@ -12,55 +12,37 @@ from wakewise.ui.cli.commands import PHOTOGRAPHS, CliCommand
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table
 from wakewise.ui.cli.options import Json, seed_option
 
-Model = Annotated[
-    Path,
-    typer.Argument(metavar="MODEL_FOLDER", help="Folder with a model (sparse/): a trial, or what reconstruct left."),
-]
-Photos = Annotated[
-    Path | None,
-    typer.Option("--photos", help="Folder of the photographs; MODEL_FOLDER/images if not given.", show_default=False),
-]
-Out = Annotated[
-    Path | None, typer.Option("--out", help="Folder for the field; MODEL_FOLDER/nerf if not given.", show_default=False)
-]
-Profile = Annotated[
-    str,
-    typer.Option("--profile", help="gpu, as in the paper, or cpu, a demonstration; auto takes what there is."),
-]
-Steps = Annotated[
-    int | None,
-    typer.Option(
-        "--steps", min=1, max=1_000_000, help="Steps of training; the profile's if not given.", show_default=False
-    ),
-]
-Device = Annotated[str, typer.Option("--device", help="auto, cpu or cuda.")]
-Region = Annotated[
-    str | None,
-    typer.Option(
-        "--region",
-        metavar="X,Y,Z,R",
-        help="Ball that is wanted, in the model's units; a trial's target, else where the sparse points are.",
-        show_default=False,
-    ),
-]
-Seed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of every random draw.")]
-Threads = Annotated[
-    int, typer.Option("--threads", min=1, max=64, help="Threads on a CPU; where others work too, 1 may be the fastest.")
-]
-NoMesh = Annotated[bool, typer.Option("--no-mesh", help="Stop at the points.")]
-
 
 def nerf(
-    model: Model,
-    photos: Photos = None,
-    out: Out = None,
-    profile: Profile = "auto",
-    steps: Steps = None,
-    device: Device = "auto",
-    region: Region = None,
-    seed: Seed = 0,
-    threads: Threads = 2,
-    no_mesh: NoMesh = False,
+    model: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MODEL_FOLDER", help="Folder with a model (sparse/): a trial, or what reconstruct left."
+        ),
+    ],
+    photos: Annotated[
+        Path | None, typer.Option(help="Folder of the photographs; MODEL_FOLDER/images if not given.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the field; MODEL_FOLDER/nerf if not given.")] = None,
+    profile: Annotated[
+        str, typer.Option(help="gpu, as in the paper, or cpu, a demonstration; auto takes what there is.")
+    ] = "auto",
+    steps: Annotated[
+        int | None, typer.Option(min=1, max=1_000_000, help="Steps of training; the profile's if not given.")
+    ] = None,
+    device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
+    region: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z,R",
+            help="Ball that is wanted, in the model's units; a trial's target, else where the sparse points are.",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(callback=seed_option, help="Seed of every random draw.")] = 0,
+    threads: Annotated[
+        int, typer.Option(min=1, max=64, help="Threads on a CPU; where others work too, 1 may be the fastest.")
+    ] = 2,
+    no_mesh: Annotated[bool, typer.Option("--no-mesh", help="Stop at the points.")] = False,
     json: Json = False,
 ) -> None:
     """Train a neural radiance field on a model's photographs; judge it on held-out views; take its surface.

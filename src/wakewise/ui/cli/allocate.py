@@ -23,75 +23,52 @@ _STILL_M2_S2 = 1e-12
 
 Six = tuple[float, float, float, float, float, float]
 
-VehicleName = Annotated[str, typer.Option("--vehicle", help="Library name or vehicle file.")]
-PoseNumbers = Annotated[
-    Six,
-    typer.Option(
-        "--pose",
-        metavar="X Y Z ROLL PITCH YAW",
-        help="Where the vehicle is: m and rad; z and yaw as in NED, down and clockwise seen from above.",
-    ),
-]
-WrenchNumbers = Annotated[
-    Six,
-    typer.Option(
-        "--wrench", metavar="X Y Z K M N", help="Force (N) and moment (N m) about the body origin, body axes (FRD)."
-    ),
-]
-Points = Annotated[
-    Path, typer.Option("--points", help="CSV with x_m, y_m, z_m in the world (NED) and weight: what to spare.")
-]
-WakeModelName = Annotated[
-    str,
-    typer.Option(
-        "--wake-model",
-        help="paper, paper-calibrated, fitted, linear, jet, jet-fitted, learned, or package.module:make.",
-    ),
-]
-Sum = Annotated[str, typer.Option("--sum", help="How jets that meet add up: coherent or incoherent.")]
-Failed = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--failed",
-        metavar="NAME|NUMBER",
-        help="A thruster that gives nothing: its name, or its number in the table, from 1; may be repeated.",
-    ),
-]
-Priority = Annotated[
-    str | None,
-    typer.Option(
-        metavar="AXES",
-        help="What to give up last where limits do not allow the wrench, such as ZKMN,XY; else its direction is kept.",
-        show_default=False,
-    ),
-]
-Wash = Annotated[
-    float,
-    typer.Option("--w-disturbance", help="Weight of the mean square speed, D over the sum of weights, per (m/s)^2."),
-]
-Effort = Annotated[float, typer.Option("--w-effort", help="Weight of squared thrusts, per N^2; more than 0.")]
-Change = Annotated[float, typer.Option("--w-previous", help="Weight of squared change from --previous, per N^2.")]
-Previous = Annotated[
-    str | None,
-    typer.Option(metavar="T1,T2,...", help="Thrusts of the step before (N), for --w-previous.", show_default=False),
-]
-Boxes = Annotated[int, typer.Option("--budget", min=1, max=1_000_000, help="Most boxes that branch and bound takes.")]
-
 
 def allocate(
-    pose: PoseNumbers,
-    wrench: WrenchNumbers,
-    points: Points,
-    vehicle: VehicleName = "paper",
-    wake_model: WakeModelName = "jet",
-    sum_: Sum = "coherent",
-    failed: Failed = None,
-    priority: Priority = None,
-    w_disturbance: Wash = DISTURBANCE_WEIGHT,
-    w_effort: Effort = EFFORT_WEIGHT,
-    w_previous: Change = CHANGE_WEIGHT,
-    previous: Previous = None,
-    budget: Boxes = BUDGET,
+    pose: Annotated[
+        Six,
+        typer.Option(
+            metavar="X Y Z ROLL PITCH YAW",
+            help="Where the vehicle is: m and rad; z and yaw as in NED, down and clockwise seen from above.",
+        ),
+    ],
+    wrench: Annotated[
+        Six,
+        typer.Option(metavar="X Y Z K M N", help="Force (N) and moment (N m) about the body origin, body axes (FRD)."),
+    ],
+    points: Annotated[Path, typer.Option(help="CSV with x_m, y_m, z_m in the world (NED) and weight: what to spare.")],
+    vehicle: Annotated[str, typer.Option(help="Library name or vehicle file.")] = "paper",
+    wake_model: Annotated[
+        str,
+        typer.Option(help="paper, paper-calibrated, fitted, linear, jet, jet-fitted, learned, or package.module:make."),
+    ] = "jet",
+    sum_: Annotated[str, typer.Option("--sum", help="How jets that meet add up: coherent or incoherent.")] = "coherent",
+    failed: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME|NUMBER",
+            help="A thruster that gives nothing: its name, or its number in the table, from 1; may be repeated.",
+        ),
+    ] = None,
+    priority: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXES",
+            help="What to give up last where limits do not allow the wrench, such as ZKMN,XY; else its direction is "
+            "kept.",
+        ),
+    ] = None,
+    w_disturbance: Annotated[
+        float, typer.Option(help="Weight of the mean square speed, D over the sum of weights, per (m/s)^2.")
+    ] = DISTURBANCE_WEIGHT,
+    w_effort: Annotated[float, typer.Option(help="Weight of squared thrusts, per N^2; more than 0.")] = EFFORT_WEIGHT,
+    w_previous: Annotated[
+        float, typer.Option(help="Weight of squared change from --previous, per N^2.")
+    ] = CHANGE_WEIGHT,
+    previous: Annotated[
+        str | None, typer.Option(metavar="T1,T2,...", help="Thrusts of the step before (N), for --w-previous.")
+    ] = None,
+    budget: Annotated[int, typer.Option(min=1, max=1_000_000, help="Most boxes that branch and bound takes.")] = BUDGET,
     json: Json = False,
 ) -> None:
     """Give the thrusts that make a wrench and disturb weighted points least, by the weights of a flight.

@@ -11,13 +11,6 @@ from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table
 from wakewise.ui.cli.options import Json
 
-Photos = Annotated[Path, typer.Argument(help="Folder of photographs of one ChArUco board.")]
-Squares = Annotated[str, typer.Option("--board", metavar="COLUMNSxROWS", help="Squares across and down.")]
-Square = Annotated[float, typer.Option("--square-mm", help="Side of a square.")]
-Marker = Annotated[float, typer.Option("--marker-mm", help="Side of a marker.")]
-Lens = Annotated[
-    str, typer.Option("--model", help="pinhole, opencv (4 coefficients, as COLMAP's), radial (5) or rational (8).")
-]
 Out = Annotated[
     Path | None,
     typer.Option("--out", help="File for the camera, which `wakewise reconstruct --camera` reads: JSON with all "
@@ -26,11 +19,13 @@ Out = Annotated[
 
 
 def calibrate(
-    photos: Photos,
-    board: Squares = "11x8",
-    square_mm: Square = 8.0,
-    marker_mm: Marker = 6.0,
-    model: Lens = "radial",
+    photos: Annotated[Path, typer.Argument(help="Folder of photographs of one ChArUco board.")],
+    board: Annotated[str, typer.Option(metavar="COLUMNSxROWS", help="Squares across and down.")] = "11x8",
+    square_mm: Annotated[float, typer.Option(help="Side of a square.")] = 8.0,
+    marker_mm: Annotated[float, typer.Option(help="Side of a marker.")] = 6.0,
+    model: Annotated[
+        str, typer.Option(help="pinhole, opencv (4 coefficients, as COLMAP's), radial (5) or rational (8).")
+    ] = "radial",
     out: Out = None,
     json: Json = False,
 ) -> None:

@@ -20,82 +20,35 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-File = Annotated[Path, typer.Argument(help="Campaign YAML file; `wakewise campaign example` prints one.")]
 Folder = Annotated[Path, typer.Argument(help="Folder of a campaign, or its file where --out was not given.")]
-Engines = Annotated[str, typer.Option("--engine", help="processes, or dask for more than one computer.")]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler",
-        metavar="ADDR",
-        help="dask: address of a running scheduler, such as tcp://10.0.0.1:8786, or its scheduler file; a cluster on "
-        "this computer if not given.",
-        show_default=False,
-    ),
-]
-Workers = Annotated[
-    int | None,
-    typer.Option(
-        help="Trials at once; one per core if not given. Each has its share of the cores.", show_default=False
-    ),
-]
-Timeout = Annotated[
-    float | None,
-    typer.Option("--timeout", metavar="S", help="End a trial that takes longer; else the file's.", show_default=False),
-]
-Memory = Annotated[
-    float | None,
-    typer.Option("--memory", metavar="MB", help="End a trial that takes more; else the file's.", show_default=False),
-]
-Retries = Annotated[
-    int | None,
-    typer.Option(help="Tries after a process that died or was ended; else the file's.", show_default=False),
-]
-Out = Annotated[
-    Path | None, typer.Option("--out", help="Folder of the campaign; runs/NAME if not given.", show_default=False)
-]
-Again = Annotated[bool, typer.Option("--again", help="Try trials anew that have failed.")]
-By = Annotated[
-    str,
-    typer.Option(
-        help="Group by these, with commas between: method, target, world, vehicle, variation, seed; all that differ "
-        "but the seed if not given.",
-        show_default=False,
-    ),
-]
-Figures = Annotated[
-    str, typer.Option(help="Figures to show, with commas between; the main ones if not given.", show_default=False)
-]
-Compare = Annotated[
-    str,
-    typer.Option(
-        help="What is compared: method, target, world, vehicle or variation; the first that differs if not given.",
-        show_default=False,
-    ),
-]
-PageOut = Annotated[
-    Path | None,
-    typer.Option(
-        "--out", help="File or folder to write; campaign.html in its folder if not given.", show_default=False
-    ),
-]
-Write = Annotated[
-    Path | None,
-    typer.Option("--write", help="Write all trials, a row each, as .parquet or .csv.", show_default=False),
-]
 
 
 @app.command("run")
 def run_campaign(
-    file: File,
-    engine: Engines = "processes",
-    scheduler: Scheduler = None,
-    workers: Workers = None,
-    timeout: Timeout = None,
-    memory: Memory = None,
-    retries: Retries = None,
-    out: Out = None,
-    again: Again = False,
+    file: Annotated[Path, typer.Argument(help="Campaign YAML file; `wakewise campaign example` prints one.")],
+    engine: Annotated[str, typer.Option(help="processes, or dask for more than one computer.")] = "processes",
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDR",
+            help="dask: address of a running scheduler, such as tcp://10.0.0.1:8786, or its scheduler file; a cluster "
+            "on this computer if not given.",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Trials at once; one per core if not given. Each has its share of the cores.")
+    ] = None,
+    timeout: Annotated[
+        float | None, typer.Option(metavar="S", help="End a trial that takes longer; else the file's.")
+    ] = None,
+    memory: Annotated[
+        float | None, typer.Option(metavar="MB", help="End a trial that takes more; else the file's.")
+    ] = None,
+    retries: Annotated[
+        int | None, typer.Option(help="Tries after a process that died or was ended; else the file's.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the campaign; runs/NAME if not given.")] = None,
+    again: Annotated[bool, typer.Option("--again", help="Try trials anew that have failed.")] = False,
     json: Json = False,
 ) -> None:
     """Make the trials of a campaign that are not made yet.
@@ -184,7 +137,22 @@ def show_status(folder: Folder, json: Json = False) -> None:
 
 
 @app.command("table")
-def show_table(folder: Folder, by: By = "", figures: Figures = "", write: Write = None, json: Json = False) -> None:
+def show_table(
+    folder: Folder,
+    by: Annotated[
+        str,
+        typer.Option(
+            help="Group by these, with commas between: method, target, world, vehicle, variation, seed; all that "
+            "differ but the seed if not given.",
+            show_default=False,
+        ),
+    ] = "",
+    figures: Annotated[
+        str, typer.Option(help="Figures to show, with commas between; the main ones if not given.", show_default=False)
+    ] = "",
+    write: Annotated[Path | None, typer.Option(help="Write all trials, a row each, as .parquet or .csv.")] = None,
+    json: Json = False,
+) -> None:
     """Each group's figures: mean and 95 % interval over its trials; failures with their reasons."""
     from wakewise.experiments.campaigns.table import failures, group_table, results, write_table
 
@@ -199,7 +167,20 @@ def show_table(folder: Folder, by: By = "", figures: Figures = "", write: Write 
 
 
 @app.command("page")
-def make_page(folder: Folder, compare: Compare = "", out: PageOut = None, json: Json = False) -> None:
+def make_page(
+    folder: Folder,
+    compare: Annotated[
+        str,
+        typer.Option(
+            help="What is compared: method, target, world, vehicle or variation; the first that differs if not given.",
+            show_default=False,
+        ),
+    ] = "",
+    out: Annotated[
+        Path | None, typer.Option(help="File or folder to write; campaign.html in its folder if not given.")
+    ] = None,
+    json: Json = False,
+) -> None:
     """Write a page that says who won, by how much, how sure, at what price, and shows where it failed."""
     from dataclasses import asdict
 

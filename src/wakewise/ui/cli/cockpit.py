@@ -31,31 +31,7 @@ if TYPE_CHECKING:
     from wakewise.operation.teleop.input import ControlSource
     from wakewise.ui.cockpit.session import CockpitSession
 
-Port = Annotated[int, typer.Option("--port", help="Port of the page; 0 takes any that is free.", min=0, max=65535)]
-Host = Annotated[
-    str,
-    typer.Option(
-        "--host", help="Address to listen at. Any but this computer's own asks for the token that is printed then."
-    ),
-]
-Origins = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--origin",
-        metavar="URL",
-        help="Where browsers ask for the page if a proxy stands before it, as BlueOS does: http://192.168.2.2; may be "
-        "given more than once. The token is asked of everybody then.",
-        show_default=False,
-    ),
-]
 Gamepad = Annotated[bool, typer.Option("--gamepad", help="Fly with a gamepad at this computer, too.")]
-Mapping = Annotated[
-    Path | None,
-    typer.Option(
-        "--mapping", metavar="FILE", help="YAML file that says what the gamepad's parts do.", show_default=False
-    ),
-]
-NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Do not open the page in a browser.")]
 
 _LOOK_S = 0.1
 
@@ -70,12 +46,24 @@ def cockpit(
     world: World = None,
     seed: Seed = None,
     sets: Sets = None,
-    port: Port = 8765,
-    host: Host = "127.0.0.1",
-    origin: Origins = None,
+    port: Annotated[int, typer.Option(help="Port of the page; 0 takes any that is free.", min=0, max=65535)] = 8765,
+    host: Annotated[
+        str,
+        typer.Option(help="Address to listen at. Any but this computer's own asks for the token that is printed then."),
+    ] = "127.0.0.1",
+    origin: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="URL",
+            help="Where browsers ask for the page if a proxy stands before it, as BlueOS does: http://192.168.2.2; "
+            "may be given more than once. The token is asked of everybody then.",
+        ),
+    ] = None,
     gamepad: Gamepad = False,
-    mapping: Mapping = None,
-    no_browser: NoBrowser = False,
+    mapping: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="YAML file that says what the gamepad's parts do.")
+    ] = None,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the page in a browser.")] = False,
     json: Json = False,
 ) -> None:
     """Fly by hand: a page in the browser with the camera's picture, the helm, and what the thrusters do to the target.

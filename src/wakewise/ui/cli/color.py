@@ -10,23 +10,21 @@ import typer
 from wakewise.ui.cli.console import ProgressBars, print_json
 from wakewise.ui.cli.options import Json
 
-Photos = Annotated[Path, typer.Argument(help="Folder of photographs, or of a finished trial.")]
-Out = Annotated[
-    Path | None,
-    typer.Option("--out", help="Folder for the corrected photographs; PHOTOS-colour if not given.", show_default=False),
-]
-Model = Annotated[
-    Path | None,
-    typer.Option(
-        "--model",
-        help="Folder that wakewise reconstruct or scan made from the same photographs: with its depths the water is "
-        "undone by physics. A trial brings its own.",
-        show_default=False,
-    ),
-]
 
-
-def colour(photos: Photos, out: Out = None, model: Model = None, json: Json = False) -> None:
+def colour(
+    photos: Annotated[Path, typer.Argument(help="Folder of photographs, or of a finished trial.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the corrected photographs; PHOTOS-colour if not given.")
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder that wakewise reconstruct or scan made from the same photographs: with its depths the water "
+            "is undone by physics. A trial brings its own."
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
     """Correct the colours of underwater photographs for people; matching and measuring use the photographs as taken.
 
     With a model, the water's veil and attenuation are fitted to colour and depth and undone. Without one, or for a

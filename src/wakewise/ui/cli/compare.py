@@ -23,8 +23,6 @@ from wakewise.ui.cli.options import (
     overrides,
 )
 
-Methods = Annotated[str, typer.Option("--methods", help="Comma-separated; ratios are to the first.")]
-
 _ROWS = (
     "success",
     "rmse_mm",
@@ -45,7 +43,7 @@ _ROWS = (
 
 def compare(
     scenario: ScenarioFile = None,
-    methods: Methods = "dp,wake-aware",
+    methods: Annotated[str, typer.Option(help="Comma-separated; ratios are to the first.")] = "dp,wake-aware",
     preset: Preset = "quick",
     out: Out = None,
     target: TargetName = None,

@@ -109,110 +109,61 @@ def _check(folder: Path, words: DatasetOptions, out: Path | None, json: bool) ->
         typer.echo(f"{folder}: {checked.files} files, {checked.bytes / 1e6:.1f} MB, all as they were made")
 
 
-Trial = Annotated[
-    Path | None,
-    typer.Argument(
-        metavar="trial", help="Folder of a trial that was flown; dataset: of a campaign, too.", show_default=False
-    ),
-]
-To = Annotated[str, typer.Option("--to", help="nerfstudio, colmap, tum, rosbag2, qgc-plan; dataset; auv_controllers.")]
-VehicleName = Annotated[
-    str | None,
-    typer.Option("--vehicle", help="auv_controllers: library name or vehicle YAML file.", show_default=False),
-]
-Out = Annotated[
-    Path | None,
-    typer.Option(
-        "--out",
-        help="New folder to write (qgc-plan, auv_controllers: file). In the trial's folder, export/, or "
-        "NAME-auv_controllers.yaml, if not given.",
-        show_default=False,
-    ),
-]
-Poses = Annotated[
-    str,
-    typer.Option(
-        "--poses",
-        help="nerfstudio, colmap: true poses and camera, or estimated ones as the crew has them. The others hold both "
-        "poses; a bag's camera_info is the crew's calibration, as at sea, beside nerfstudio's true one.",
-    ),
-]
-Frame = Annotated[
-    str,
-    typer.Option(
-        "--frame", help="auv_controllers: fsd, for its own controllers, or flu, for wrenches as ROS has them."
-    ),
-]
-At = Annotated[
-    str | None,
-    typer.Option("--origin", metavar="LAT,LON", help="qgc-plan: the world's origin in degrees.", show_default=False),
-]
-Licence = Annotated[
-    str | None,
-    typer.Option(
-        "--license", help="dataset: SPDX name, such as CC-BY-4.0, or the address of another.", show_default=False
-    ),
-]
-Creator = Annotated[
-    list[str] | None,
-    typer.Option("--creator", help="dataset: who made it; may be repeated.", show_default=False),
-]
-Name = Annotated[str | None, typer.Option("--name", help="dataset: its name; the folder's.", show_default=False)]
-Url = Annotated[str | None, typer.Option("--url", help="dataset: where it will be found.", show_default=False)]
-Date = Annotated[
-    str | None, typer.Option("--date", metavar="YYYY-MM-DD", help="dataset: of publication; today.", show_default=False)
-]
-Version = Annotated[
-    str | None, typer.Option("--version", metavar="X.Y.Z", help="dataset: its version; 1.0.0.", show_default=False)
-]
-Answers = Annotated[
-    Path | None,
-    typer.Option(
-        "--answers",
-        metavar="YAML",
-        help="dataset: answers that its data sheet asks for: purpose, funding, period, ethics, maintenance.",
-        show_default=False,
-    ),
-]
-HeldOut = Annotated[
-    int | None,
-    typer.Option(
-        "--held-out",
-        metavar="N",
-        help="nerfstudio, colmap: hold one photograph in N out from training, spread over the path; 0 for none; 8.",
-        show_default=False,
-    ),
-]
-SplitSeed = Annotated[
-    int | None,
-    typer.Option(
-        "--seed",
-        callback=seed_option,
-        help="nerfstudio, colmap: draws held-out photographs; 0.",
-        show_default=False,
-    ),
-]
-Check = Annotated[bool, typer.Option("--check", help="dataset: hold a data set against its check sums instead.")]
-
-
 def export(
-    trial: Trial = None,
-    to: To = "",
-    vehicle: VehicleName = None,
-    out: Out = None,
-    poses: Poses = "true",
-    origin: At = None,
-    frame: Frame = "fsd",
-    held_out: HeldOut = None,
-    seed: SplitSeed = None,
-    licence: Licence = None,
-    creator: Creator = None,
-    name: Name = None,
-    url: Url = None,
-    date: Date = None,
-    version: Version = None,
-    answers: Answers = None,
-    check: Check = False,
+    trial: Annotated[
+        Path | None,
+        typer.Argument(metavar="trial", help="Folder of a trial that was flown; dataset: of a campaign, too."),
+    ] = None,
+    to: Annotated[str, typer.Option(help="nerfstudio, colmap, tum, rosbag2, qgc-plan; dataset; auv_controllers.")] = "",
+    vehicle: Annotated[str | None, typer.Option(help="auv_controllers: library name or vehicle YAML file.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="New folder to write (qgc-plan, auv_controllers: file). In the trial's folder, export/, or "
+            "NAME-auv_controllers.yaml, if not given."
+        ),
+    ] = None,
+    poses: Annotated[
+        str,
+        typer.Option(
+            help="nerfstudio, colmap: true poses and camera, or estimated ones as the crew has them. The others hold "
+            "both poses; a bag's camera_info is the crew's calibration, as at sea, beside nerfstudio's true one."
+        ),
+    ] = "true",
+    origin: Annotated[
+        str | None, typer.Option(metavar="LAT,LON", help="qgc-plan: the world's origin in degrees.")
+    ] = None,
+    frame: Annotated[
+        str, typer.Option(help="auv_controllers: fsd, for its own controllers, or flu, for wrenches as ROS has them.")
+    ] = "fsd",
+    held_out: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            help="nerfstudio, colmap: hold one photograph in N out from training, spread over the path; 0 for none; 8.",
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(callback=seed_option, help="nerfstudio, colmap: draws held-out photographs; 0.")
+    ] = None,
+    licence: Annotated[
+        str | None, typer.Option("--license", help="dataset: SPDX name, such as CC-BY-4.0, or the address of another.")
+    ] = None,
+    creator: Annotated[list[str] | None, typer.Option(help="dataset: who made it; may be repeated.")] = None,
+    name: Annotated[str | None, typer.Option(help="dataset: its name; the folder's.")] = None,
+    url: Annotated[str | None, typer.Option(help="dataset: where it will be found.")] = None,
+    date: Annotated[str | None, typer.Option(metavar="YYYY-MM-DD", help="dataset: of publication; today.")] = None,
+    version: Annotated[str | None, typer.Option(metavar="X.Y.Z", help="dataset: its version; 1.0.0.")] = None,
+    answers: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="YAML",
+            help="dataset: answers that its data sheet asks for: purpose, funding, period, ethics, maintenance.",
+        ),
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="dataset: hold a data set against its check sums instead.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Export a trial to other tools: trainers of splats and NeRFs, COLMAP, evo, ROS 2, QGroundControl.

@@ -11,43 +11,31 @@ from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import ProgressBars, print_json, write_page
 from wakewise.ui.cli.options import Json
 
-Trial = Annotated[
-    Path | None, typer.Argument(metavar="trial", help="Folder of a finished trial (wakewise scan).", show_default=False)
-]
-Rows = Annotated[
-    Path | None,
-    typer.Option(
-        "--rows",
-        metavar="FOLDER",
-        help="Instead of a film: one picture of a folder that compare left, methods in rows, times in columns.",
-        show_default=False,
-    ),
-]
-Out = Annotated[
-    Path | None,
-    typer.Option(
-        "--out",
-        help="File to write: .mp4, .webm or .webp (rows: .png or .jpg). In the trial's folder, film.mp4 or rows.png, "
-        "if not given.",
-        show_default=False,
-    ),
-]
-Seconds = Annotated[float, typer.Option("--seconds", help="Length of the film; it shows the whole flight.")]
-Fps = Annotated[float, typer.Option("--fps", help="Frames per second.")]
-Seen = Annotated[str, typer.Option("--view", help="camera, outside or both.")]
-At = Annotated[
-    str, typer.Option("--at", metavar="S,S,...", help="Rows: times in s, counted from the first photograph.")
-]
-
 
 def film(
-    trial: Trial = None,
-    rows: Rows = None,
-    out: Out = None,
-    seconds: Seconds = 20.0,
-    fps: Fps = 12.0,
-    view: Seen = "both",
-    at: At = "0,5,10",
+    trial: Annotated[
+        Path | None, typer.Argument(metavar="trial", help="Folder of a finished trial (wakewise scan).")
+    ] = None,
+    rows: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Instead of a film: one picture of a folder that compare left, methods in rows, times in columns.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="File to write: .mp4, .webm or .webp (rows: .png or .jpg). In the trial's folder, film.mp4 or "
+            "rows.png, if not given."
+        ),
+    ] = None,
+    seconds: Annotated[float, typer.Option(help="Length of the film; it shows the whole flight.")] = 20.0,
+    fps: Annotated[float, typer.Option(help="Frames per second.")] = 12.0,
+    view: Annotated[str, typer.Option(help="camera, outside or both.")] = "both",
+    at: Annotated[
+        str, typer.Option(metavar="S,S,...", help="Rows: times in s, counted from the first photograph.")
+    ] = "0,5,10",
     json: Json = False,
 ) -> None:
     """Make a film of a trial: what the camera saw, and from outside the vehicle, its wash, the silt and the target.

@@ -10,13 +10,13 @@ import typer
 from wakewise.ui.cli.console import ProgressBars, print_json
 from wakewise.ui.cli.options import Json
 
-Processes = Annotated[
-    int | None,
-    typer.Option(help="How many compile side by side; one a core if not given, up to four.", min=1, show_default=False),
-]
 
-
-def warm(processes: Processes = None, json: Json = False) -> None:
+def warm(
+    processes: Annotated[
+        int | None, typer.Option(help="How many compile side by side; one a core if not given, up to four.", min=1)
+    ] = None,
+    json: Json = False,
+) -> None:
     """Compile all kernels once and keep them; commands do the same for what they need when it is missing."""
     from wakewise.core.jit.precompile import compile_kernels as compile_all
     from wakewise.core.jit.precompile import is_warm

@@ -35,25 +35,6 @@ from wakewise.ui.cli.options import (
 if TYPE_CHECKING:
     from wakewise.operation import Scenario
 
-Method = Annotated[
-    str | None,
-    typer.Option(
-        "--method",
-        help="dp, no-forward-jets, manual, ardusub, pseudo-inverse, mpc, mpc-smooth, linear, allocation-only, "
-        "wake-aware, a plug-in, or package.module:make.",
-        show_default=False,
-    ),
-]
-
-Resume = Annotated[
-    Path | None,
-    typer.Option(
-        "--resume",
-        metavar="FOLDER",
-        help="Go on with what a folder holds, as its scenario.yaml says: a trial cut short, a flight by hand.",
-        show_default=False,
-    ),
-]
 
 _HEADLINES = (
     "success",
@@ -78,14 +59,27 @@ def scan(
     scenario: ScenarioFile = None,
     preset: Preset = "quick",
     out: Out = None,
-    method: Method = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            help="dp, no-forward-jets, weighted-pseudo-inverse, manual, ardusub, pseudo-inverse, "
+            "mpc, mpc-smooth, linear, allocation-only, "
+            "wake-aware, a plug-in, or package.module:make."
+        ),
+    ] = None,
     target: TargetName = None,
     target_size: TargetSize = None,
     vehicle: Vehicle = None,
     world: World = None,
     seed: Seed = None,
     sets: Sets = None,
-    resume: Resume = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Go on with what a folder holds, as its scenario.yaml says: a trial cut short, a flight by hand.",
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Fly layered orbits round a target, photograph it, reconstruct it, measure the model, write a report.

@@ -21,50 +21,6 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-VehicleName = Annotated[str, typer.Option("--vehicle", help="Library name or vehicle YAML file.")]
-PoseNumbers = Annotated[
-    tuple[float, float, float, float, float, float],
-    typer.Option(
-        "--pose",
-        metavar="X Y Z ROLL PITCH YAW",
-        help="Where the vehicle is held: m and rad; z and yaw as in NED, down and clockwise seen from above.",
-    ),
-]
-Thrusts = Annotated[
-    Path,
-    typer.Option(
-        "--thrusts",
-        help="CSV with time_s and one thrust in N per thruster (thrust_1_N ... or the thrusters' names, any order), "
-        "each row held until the next; the last row ends the history.",
-    ),
-]
-Points = Annotated[Path, typer.Option("--points", help="CSV with x_m, y_m, z_m in the world (NED).")]
-Floor = Annotated[
-    float | None,
-    typer.Option("--floor", metavar="Z", help="Depth of the floor; open water if not given.", show_default=False),
-]
-TargetMesh = Annotated[
-    str | None,
-    typer.Option(
-        "--target",
-        metavar="MESH",
-        help="A mesh file in m, or a coral (branching, gorgonian, ...): stands on the floor at x = y = 0.",
-        show_default=False,
-    ),
-]
-FlowName = Annotated[str, typer.Option("--flow", help="parcels, the water of trials; or lattice, steady mean jets.")]
-Every = Annotated[
-    float | None,
-    typer.Option("--every", metavar="S", help="Times of the answer; else those of the thrusts.", show_default=False),
-]
-ProbeSeed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of the turbulence.")]
-Turbulence = Annotated[bool, typer.Option("--turbulence", help="With the turbulence of trials; else mean jets.")]
-Swirl = Annotated[bool, typer.Option("--swirl", help="Parcels as wide as a propeller's swirling jets.")]
-Density = Annotated[float, typer.Option("--density", min=900.0, max=1100.0, help="Of the water, kg/m3.")]
-ProbeOut = Annotated[
-    Path | None, typer.Option("--out", help="Write the JSON object here, or arrays to a .npz.", show_default=False)
-]
-
 
 @app.callback()
 def _group() -> None:
@@ -73,19 +29,43 @@ def _group() -> None:
 
 @app.command("probe")
 def probe_command(
-    thrusts: Thrusts,
-    points: Points,
-    vehicle: VehicleName = "paper",
-    pose: PoseNumbers = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    floor: Floor = None,
-    target: TargetMesh = None,
-    flow: FlowName = "parcels",
-    every: Every = None,
-    seed: ProbeSeed = 0,
-    turbulence: Turbulence = False,
-    swirl: Swirl = False,
-    density: Density = TRIM_WATER_KG_M3,
-    out: ProbeOut = None,
+    thrusts: Annotated[
+        Path,
+        typer.Option(
+            help="CSV with time_s and one thrust in N per thruster (thrust_1_N ... or the thrusters' names, any "
+            "order), each row held until the next; the last row ends the history."
+        ),
+    ],
+    points: Annotated[Path, typer.Option(help="CSV with x_m, y_m, z_m in the world (NED).")],
+    vehicle: Annotated[str, typer.Option(help="Library name or vehicle YAML file.")] = "paper",
+    pose: Annotated[
+        tuple[float, float, float, float, float, float],
+        typer.Option(
+            metavar="X Y Z ROLL PITCH YAW",
+            help="Where the vehicle is held: m and rad; z and yaw as in NED, down and clockwise seen from above.",
+        ),
+    ] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    floor: Annotated[
+        float | None, typer.Option(metavar="Z", help="Depth of the floor; open water if not given.")
+    ] = None,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MESH",
+            help="A mesh file in m, or a coral (branching, gorgonian, ...): stands on the floor at x = y = 0.",
+        ),
+    ] = None,
+    flow: Annotated[str, typer.Option(help="parcels, the water of trials; or lattice, steady mean jets.")] = "parcels",
+    every: Annotated[
+        float | None, typer.Option(metavar="S", help="Times of the answer; else those of the thrusts.")
+    ] = None,
+    seed: Annotated[int, typer.Option(callback=seed_option, help="Seed of the turbulence.")] = 0,
+    turbulence: Annotated[
+        bool, typer.Option("--turbulence", help="With the turbulence of trials; else mean jets.")
+    ] = False,
+    swirl: Annotated[bool, typer.Option("--swirl", help="Parcels as wide as a propeller's swirling jets.")] = False,
+    density: Annotated[float, typer.Option(min=900.0, max=1100.0, help="Of the water, kg/m3.")] = TRIM_WATER_KG_M3,
+    out: Annotated[Path | None, typer.Option(help="Write the JSON object here, or arrays to a .npz.")] = None,
     json: Json = False,
 ) -> None:
     """Give the flow at points and times for a vehicle held in place and a history of thrusts.

@@ -18,25 +18,6 @@ STREAMS_M_S = (0.004, 0.036, 0.06, 0.18)
 
 app = typer.Typer(help="What Wakewise makes of a target.", no_args_is_help=False, rich_markup_mode=None)
 
-Kind = Annotated[
-    str, typer.Argument(help="anemone, brain, branching, gorgonian, plate, seagrass, soft-coral, or a mesh file.")
-]
-Out = Annotated[
-    Path | None,
-    typer.Option(help="Also write a page (.html), a picture (.svg) or a coloured mesh (.ply).", show_default=False),
-]
-MarksFile = Annotated[
-    Path | None,
-    typer.Option("--marks", help="CSV of delicate places: x_m, y_m, z_m, radius_m, weight.", show_default=False),
-]
-Points = Annotated[int, typer.Option(help="Points of the region, 2 to 10000.")]
-Gain = Annotated[
-    float, typer.Option(help="How many times more the most delicate feature counts; 0 is the paper's weights.")
-]
-TargetSeed = Annotated[
-    int, typer.Option("--seed", callback=seed_option, help="Individual of a procedural coral, and draw of the points.")
-]
-
 
 @app.callback()
 def _target() -> None:
@@ -45,13 +26,21 @@ def _target() -> None:
 
 @app.command("show")
 def show(
-    target: Kind = "branching",
-    out: Out = None,
-    marks: MarksFile = None,
+    target: Annotated[
+        str, typer.Argument(help="anemone, brain, branching, gorgonian, plate, seagrass, soft-coral, or a mesh file.")
+    ] = "branching",
+    out: Annotated[
+        Path | None, typer.Option(help="Also write a page (.html), a picture (.svg) or a coloured mesh (.ply).")
+    ] = None,
+    marks: Annotated[Path | None, typer.Option(help="CSV of delicate places: x_m, y_m, z_m, radius_m, weight.")] = None,
     target_size: TargetSize = None,
-    points: Points = 300,
-    gain: Gain = 0.0,
-    seed: TargetSeed = 0,
+    points: Annotated[int, typer.Option(help="Points of the region, 2 to 10000.")] = 300,
+    gain: Annotated[
+        float, typer.Option(help="How many times more the most delicate feature counts; 0 is the paper's weights.")
+    ] = 0.0,
+    seed: Annotated[
+        int, typer.Option(callback=seed_option, help="Individual of a procedural coral, and draw of the points.")
+    ] = 0,
     json: Json = False,
 ) -> None:
     """Show a target: size, surface, thickness, delicate features and the points that stand for its water.

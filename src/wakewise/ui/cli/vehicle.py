@@ -23,23 +23,6 @@ app.command("lag")(vehicle_thruster.lag)
 app.command("trim")(vehicle_trim.trim)
 
 Name = Annotated[str, typer.Argument(help="Library name, vehicle file, or a file that `vehicle import` can read.")]
-Out = Annotated[
-    Path | None,
-    typer.Option("--out", help="Also write a drawing (.svg) or a page (.html) to this file.", show_default=False),
-]
-Drawing = Annotated[
-    Path | None, typer.Option("--drawing", help="Also write an SVG drawing to this file.", show_default=False)
-]
-Matrix = Annotated[
-    str | None,
-    typer.Option(
-        "--matrix",
-        metavar="FILE",
-        help="Allocation matrix to compare with the geometry: YAML, six lines of numbers, motor factors as CSV, "
-        "or the word ardusub for ArduSub's frame.",
-        show_default=False,
-    ),
-]
 SkipMissing = Annotated[bool, typer.Option("--skip-missing", help="Leave out xacro includes that are not there.")]
 Packages = Annotated[
     list[str] | None,
@@ -75,8 +58,10 @@ def list_vehicles(json: Json = False) -> None:
 @app.command("show")
 def show(
     vehicle: Name = "paper",
-    out: Out = None,
-    drawing: Drawing = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Also write a drawing (.svg) or a page (.html) to this file.")
+    ] = None,
+    drawing: Annotated[Path | None, typer.Option(help="Also write an SVG drawing to this file.")] = None,
     frame: vehicle_import.Frame = "auto",
     thrust_direction: vehicle_import.Thrust = "auto",
     package: Packages = None,
@@ -123,7 +108,14 @@ def show(
 @app.command("check")
 def check(
     vehicle: Name,
-    matrix: Matrix = None,
+    matrix: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="Allocation matrix to compare with the geometry: YAML, six lines of numbers, motor factors as CSV, "
+            "or the word ardusub for ArduSub's frame.",
+        ),
+    ] = None,
     frame: vehicle_import.Frame = "auto",
     thrust_direction: vehicle_import.Thrust = "auto",
     package: Packages = None,

@@ -15,27 +15,6 @@ if TYPE_CHECKING:
     from wakewise.robot.vehicles import VehicleDraft
     from wakewise.robot.vehicles.mixing import MatrixComparison
 
-File = Annotated[
-    Path,
-    typer.Argument(help="URDF, xacro, Gazebo SDF, Stonefish .scn, YAML with a matrix; or a vehicle file to complete."),
-]
-Out = Annotated[
-    Path | None,
-    typer.Option(
-        "--out",
-        help="Write what was found as a vehicle file, what a flight needs beside as comments to fill in.",
-        show_default=False,
-    ),
-]
-Like = Annotated[
-    str | None,
-    typer.Option(
-        "--like",
-        metavar="NAME",
-        help="Estimate what is missing after this vehicle, scaled by mass; each such group is marked estimate: true.",
-        show_default=False,
-    ),
-]
 Frame = Annotated[str, typer.Option("--frame", help="Body axes of the file: auto, FLU or FRD.")]
 Thrust = Annotated[
     str,
@@ -43,13 +22,6 @@ Thrust = Annotated[
         "--thrust-direction",
         help="auto (the format's rule), reversed, or an axis of each thruster's own frame: +x, -x, +y, -y, +z, -z.",
     ),
-]
-Matrix = Annotated[
-    Path | None,
-    typer.Option("--matrix", help="Matrix that the project ships, to hold against the geometry.", show_default=False),
-]
-Packages = Annotated[
-    list[str] | None, typer.Option("--package", metavar="NAME=DIR", help="Where a package is; may be repeated.")
 ]
 Arguments = Annotated[
     list[str] | None, typer.Option("--arg", metavar="NAME:=VALUE", help="A xacro argument; may be repeated.")
@@ -63,20 +35,40 @@ Rows = Annotated[
         show_default=False,
     ),
 ]
-Skip = Annotated[bool, typer.Option("--skip-missing", help="Leave out xacro includes that are not there.")]
 
 
 def import_file(
-    file: File,
-    out: Out = None,
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="URDF, xacro, Gazebo SDF, Stonefish .scn, YAML with a matrix; or a vehicle file to complete."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Write what was found as a vehicle file, what a flight needs beside as comments to fill in."),
+    ] = None,
     frame: Frame = "auto",
     thrust_direction: Thrust = "auto",
-    matrix: Matrix = None,
-    package: Packages = None,
+    matrix: Annotated[
+        Path | None, typer.Option(help="Matrix that the project ships, to hold against the geometry.")
+    ] = None,
+    package: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=DIR", help="Where a package is; may be repeated.")
+    ] = None,
     arg: Arguments = None,
-    skip_missing: Skip = False,
+    skip_missing: Annotated[
+        bool, typer.Option("--skip-missing", help="Leave out xacro includes that are not there.")
+    ] = False,
     rows: Rows = None,
-    like: Like = None,
+    like: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Estimate what is missing after this vehicle, scaled by mass; each such group is marked estimate: "
+            "true.",
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Import a vehicle file of another project; say what it holds, what was decided, and what is missing.

@@ -10,47 +10,24 @@ import typer
 from wakewise.ui.cli.console import format_value, print_json, print_table
 from wakewise.ui.cli.options import Json
 
-Table = Annotated[
-    str,
-    typer.Argument(
-        help="Thrust curve of the library (t200) or path of a CSV with columns supply_V, pwm_us, thrust_N or "
-        "force_kgf, and if known rpm, power_W, current_A, voltage_V."
-    ),
-]
-Supply = Annotated[
-    float | None,
-    typer.Option("--supply-V", help="Supply voltage, within the table; 16, or the nearest there is, if not given."),
-]
-Thrusts = Annotated[
-    list[float] | None, typer.Option("--thrust", metavar="N", help="Wished thrust to look up; may be repeated.")
-]
-Pulses = Annotated[list[float] | None, typer.Option("--pwm", metavar="US", help="Pulse to look up; may be repeated.")]
-Plot = Annotated[
-    Path | None, typer.Option("--plot", help="Also write an SVG drawing to this file.", show_default=False)
-]
-Data = Annotated[
-    Path,
-    typer.Argument(
-        help="CSV of a measured step with columns time_s, command and thrust_N. The command is a commanded thrust, or "
-        "the square of a commanded speed or voltage."
-    ),
-]
-Average = Annotated[
-    float | None,
-    typer.Option(
-        "--average-s",
-        help="Compare averages over this time; 0 for raw samples, one period of the propeller's ripple if not given.",
-        show_default=False,
-    ),
-]
-
 
 def thruster(
-    table: Table = "t200",
-    supply_V: Supply = None,
-    thrust: Thrusts = None,
-    pwm: Pulses = None,
-    plot: Plot = None,
+    table: Annotated[
+        str,
+        typer.Argument(
+            help="Thrust curve of the library (t200) or path of a CSV with columns supply_V, pwm_us, thrust_N or "
+            "force_kgf, and if known rpm, power_W, current_A, voltage_V."
+        ),
+    ] = "t200",
+    supply_V: Annotated[
+        float | None,
+        typer.Option("--supply-V", help="Supply voltage, within the table; 16, or the nearest there is, if not given."),
+    ] = None,
+    thrust: Annotated[
+        list[float] | None, typer.Option(metavar="N", help="Wished thrust to look up; may be repeated.")
+    ] = None,
+    pwm: Annotated[list[float] | None, typer.Option(metavar="US", help="Pulse to look up; may be repeated.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Also write an SVG drawing to this file.")] = None,
     json: Json = False,
 ) -> None:
     """Show a thrust curve: limits, deadband, and pulses, thrusts, speed and power both ways."""
@@ -84,7 +61,23 @@ def thruster(
         typer.echo(f"drawing: {plot}")
 
 
-def lag(data: Data, average_s: Average = None, json: Json = False) -> None:
+def lag(
+    data: Annotated[
+        Path,
+        typer.Argument(
+            help="CSV of a measured step with columns time_s, command and thrust_N. The command is a commanded "
+            "thrust, or the square of a commanded speed or voltage."
+        ),
+    ],
+    average_s: Annotated[
+        float | None,
+        typer.Option(
+            help="Compare averages over this time; 0 for raw samples, one period of the propeller's ripple if not "
+            "given."
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
     """Identify a thruster's lag and dead time from a measured step."""
     from wakewise.robot.thrusters.lag_fit import identify_lag, read_step
     from wakewise.robot.thrusters.thruster_facts import lag_facts

@@ -15,40 +15,23 @@ from wakewise.ui.cli.options import Json
 if TYPE_CHECKING:
     from wakewise.control.ballast_advice import TrimAdvice, TrimRow
 
-Vehicle = Annotated[
-    str | None, typer.Argument(help="Library name or vehicle file; paper if not given.", show_default=False)
-]
-ScenarioFile = Annotated[
-    Path | None, typer.Option("--scenario", help="Scenario file with mission, target and tank.", show_default=False)
-]
-NetWeight = Annotated[
-    float | None,
-    typer.Option("--net-weight", metavar="N", help="Known net weight; negative if it floats.", show_default=False),
-]
-KnownTo = Annotated[
-    float | None,
-    typer.Option(
-        "--known-to", metavar="N", help="How well: the trim lies within this, more or less.", show_default=False
-    ),
-]
-Flight = Annotated[
-    Path | None, typer.Option("--flight", help="Folder of a trial: trim from its hover.", show_default=False)
-]
-Write = Annotated[
-    Path | None,
-    typer.Option("--write", help="With --flight: scenario file with the ballast for the next.", show_default=False),
-]
 KNOWN_TO_N = 0.5
 """A net weight that was measured or weighed is known to that."""
 
 
 def trim(
-    vehicle: Vehicle = None,
-    scenario: ScenarioFile = None,
-    net_weight: NetWeight = None,
-    known_to: KnownTo = None,
-    flight: Flight = None,
-    write: Write = None,
+    vehicle: Annotated[str | None, typer.Argument(help="Library name or vehicle file; paper if not given.")] = None,
+    scenario: Annotated[Path | None, typer.Option(help="Scenario file with mission, target and tank.")] = None,
+    net_weight: Annotated[
+        float | None, typer.Option(metavar="N", help="Known net weight; negative if it floats.")
+    ] = None,
+    known_to: Annotated[
+        float | None, typer.Option(metavar="N", help="How well: the trim lies within this, more or less.")
+    ] = None,
+    flight: Annotated[Path | None, typer.Option(help="Folder of a trial: trim from its hover.")] = None,
+    write: Annotated[
+        Path | None, typer.Option(help="With --flight: scenario file with the ballast for the next.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Advise on ballast: for a mission beforehand, or from the hover of a flight.

@@ -17,47 +17,32 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Data = Annotated[
-    Path,
-    typer.Argument(
-        help="CSV file with columns x_m, r_m (or y_m, z_m), thrust_N, u_m_s, optionally v_m_s, w_m_s, "
-        "disk_diameter_m, in the jet's frame (x along the jet from the disk's middle); a text file of PIVlab, DaVis or "
-        "Tecplot with units in its names (x [mm], u [m/s]), of a plane through the jet's axis; or a folder of image "
-        "pairs *A, *B with a piv.yaml."
-    ),
-]
-Model = Annotated[str, typer.Option("--model", help="fitted, jet, jet-fitted or paper-calibrated.")]
-Diameter = Annotated[
-    float | None,
-    typer.Option("--disk-diameter-m", help="Diameter of the disk, if the CSV has no such column.", show_default=False),
-]
-Thrust = Annotated[
-    float | None,
-    typer.Option(
-        "--thrust", metavar="N", help="Thrust of all points in newtons, if no column says it.", show_default=False
-    ),
-]
-Held = Annotated[
-    list[float] | None,
-    typer.Option("--test-thrust", metavar="N", help="Hold this thrust out for the test; may be repeated. Else drawn."),
-]
-Seed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of the split and of the resamples.")]
-Resamples = Annotated[int, typer.Option("--bootstrap", min=0, max=10000, help="Resamples for the 95 % intervals.")]
-FitOut = Annotated[
-    Path | None, typer.Option("--out", help="Write the model here, for a scenario to take.", show_default=False)
-]
-
 
 @app.command("fit")
 def fit(
-    data: Data,
-    model: Model = "fitted",
-    disk_diameter_m: Diameter = None,
-    thrust: Thrust = None,
-    test_thrust: Held = None,
-    seed: Seed = 0,
-    bootstrap: Resamples = 200,
-    out: FitOut = None,
+    data: Annotated[
+        Path,
+        typer.Argument(
+            help="CSV file with columns x_m, r_m (or y_m, z_m), thrust_N, u_m_s, optionally v_m_s, w_m_s, "
+            "disk_diameter_m, in the jet's frame (x along the jet from the disk's middle); a text file of PIVlab, "
+            "DaVis or Tecplot with units in its names (x [mm], u [m/s]), of a plane through the jet's axis; or a "
+            "folder of image pairs *A, *B with a piv.yaml."
+        ),
+    ],
+    model: Annotated[str, typer.Option(help="fitted, jet, jet-fitted or paper-calibrated.")] = "fitted",
+    disk_diameter_m: Annotated[
+        float | None, typer.Option(help="Diameter of the disk, if the CSV has no such column.")
+    ] = None,
+    thrust: Annotated[
+        float | None, typer.Option(metavar="N", help="Thrust of all points in newtons, if no column says it.")
+    ] = None,
+    test_thrust: Annotated[
+        list[float] | None,
+        typer.Option(metavar="N", help="Hold this thrust out for the test; may be repeated. Else drawn."),
+    ] = None,
+    seed: Annotated[int, typer.Option(callback=seed_option, help="Seed of the split and of the resamples.")] = 0,
+    bootstrap: Annotated[int, typer.Option(min=0, max=10000, help="Resamples for the 95 % intervals.")] = 200,
+    out: Annotated[Path | None, typer.Option(help="Write the model here, for a scenario to take.")] = None,
     json: Json = False,
 ) -> None:
     """Calibrate a wake model: parameters with uncertainty, fitted on some thrusts and positions, tested on others.

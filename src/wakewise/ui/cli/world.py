@@ -12,10 +12,6 @@ from wakewise.ui.cli.options import Json, seed_option
 
 app = typer.Typer(help="Worlds: list, show what each is made of and why.", no_args_is_help=False, rich_markup_mode=None)
 
-Name = Annotated[str, typer.Argument(help="A world of the library; see `wakewise world list`.")]
-Seed = Annotated[
-    int | None, typer.Option("--seed", callback=seed_option, help="Show what this seed draws.", show_default=False)
-]
 _WIDTH = 100
 
 
@@ -37,7 +33,11 @@ def list_worlds(json: Json = False) -> None:
 
 
 @app.command("show")
-def show(name: Name, seed: Seed = None, json: Json = False) -> None:
+def show(
+    name: Annotated[str, typer.Argument(help="A world of the library; see `wakewise world list`.")],
+    seed: Annotated[int | None, typer.Option(callback=seed_option, help="Show what this seed draws.")] = None,
+    json: Json = False,
+) -> None:
     """Show a world: why it is flown, its fields, from where a seed draws them, and the source of each number."""
     from rich.table import Table
 

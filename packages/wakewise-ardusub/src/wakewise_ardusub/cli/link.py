@@ -32,41 +32,32 @@ app.command("sitl-autopilot")(link_sitl.sitl_autopilot)
 
 DEFAULT_VEHICLE = "bluerov2-heavy"
 
-LogFile = Annotated[
-    Path, typer.Argument(help="A telemetry log (.tlog), the autopilot's own (.BIN) or BlueOS's recording (.mcap).")
-]
-Flown = Annotated[
-    str | None,
-    typer.Option(
-        "--vehicle",
-        help="Library name or vehicle YAML file of the vehicle that was flown; bluerov2-heavy if not given.",
-        show_default=False,
-    ),
-]
-Out = Annotated[
-    Path | None, typer.Option("--out", help="Folder for table, figures and page; runs/log-NAME if not given.")
-]
-
-
-AnyVehicle = Annotated[
-    bool,
-    typer.Option(
-        "--any-vehicle",
-        help="Read the log of another vehicle than an ArduSub, too: attitude, height, outputs and voltage, without "
-        "thrusts, sticks and names of modes.",
-    ),
-]
-
 
 @app.command("log")
 def log(
-    file: LogFile,
-    vehicle: Flown = None,
+    file: Annotated[
+        Path, typer.Argument(help="A telemetry log (.tlog), the autopilot's own (.BIN) or BlueOS's recording (.mcap).")
+    ],
+    vehicle: Annotated[
+        str | None,
+        typer.Option(
+            help="Library name or vehicle YAML file of the vehicle that was flown; bluerov2-heavy if not given."
+        ),
+    ] = None,
     ahead: Ahead = 0.4,
     points: Points = None,
     wake_model: WakeModelName = "jet",
-    any_vehicle: AnyVehicle = False,
-    out: Out = None,
+    any_vehicle: Annotated[
+        bool,
+        typer.Option(
+            "--any-vehicle",
+            help="Read the log of another vehicle than an ArduSub, too: attitude, height, outputs and voltage, "
+            "without thrusts, sticks and names of modes.",
+        ),
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for table, figures and page; runs/log-NAME if not given.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Read a vehicle's log, however damaged, and say what gentler thrusts would have spared at each instant.

@@ -34,105 +34,84 @@ if TYPE_CHECKING:
 DEFAULT_VEHICLE = "bluerov2-heavy"
 LINE_S = 0.2
 
-Connection = Annotated[
-    str,
-    typer.Option(
-        "--connection",
-        metavar="PLACE",
-        help="Where the vehicle's MAVLink is: udpin:HOST:PORT waits for its router, udpout:HOST:PORT speaks first.",
-    ),
-]
-VehicleName = Annotated[str, typer.Option("--vehicle", help="Library name or vehicle YAML file.")]
-Method = Annotated[str, typer.Option("--method", help="How thrusts are chosen, such as wake-aware, instant or dp.")]
-System = Annotated[
-    int, typer.Option("--system", min=1, max=255, help="The vehicle's MAVLink system id, which its companion shares.")
-]
-TargetPlace = Annotated[
-    str | None,
-    typer.Option(
-        "--target",
-        metavar="N,E,D",
-        help="Where the middle of the target is, in m from the autopilot's origin: north, east, down.",
-        show_default=False,
-    ),
-]
-Ahead = Annotated[
-    float,
-    typer.Option(
-        "--ahead",
-        metavar="M",
-        help="Without --target: from the bow, as the session begins, to the middle of a ball of 0.5 m across.",
-    ),
-]
-Points = Annotated[
-    Path | None,
-    typer.Option(
-        "--points",
-        help="CSV with x_m, y_m, z_m from the middle of the vehicle as the session begins (forward, right, down) and "
-        "weight: what to spare instead of a ball.",
-        show_default=False,
-    ),
-]
-Relay = Annotated[
-    str | None,
-    typer.Option(
-        "--relay",
-        metavar="PLACE",
-        help="Stand between ground station and vehicle: where the ground station sends, such as udpin:0.0.0.0:14550. "
-        "Sticks go on let go while the companion drives. Without it the companion only listens to a copy.",
-        show_default=False,
-    ),
-]
-ListenOnly = Annotated[bool, typer.Option("--listen-only", help="Never engage, whatever anybody asks for.")]
-Buttons = Annotated[
-    str,
-    typer.Option(
-        "--buttons",
-        metavar="WHAT=N,...",
-        help="Buttons of the pilot's sticks, by number from 0: engage (which also releases), capture, scan, hold, "
-        "operator, precise, gain_up, gain_down. Those at which the autopilot itself acts (BTNn_FUNCTION) are refused; "
-        "on a fresh ArduSub 0 and 15 are free.",
-    ),
-]
-Camera = Annotated[
-    str | None,
-    typer.Option(
-        "--camera",
-        metavar="WAY",
-        help="What takes the photographs: mavlink (MAV_CMD_IMAGE_START_CAPTURE), digicam (MAV_CMD_DO_DIGICAM_CONTROL), "
-        "or run:PROGRAM, its {file} the photograph's path. Without it they are noted and not taken.",
-        show_default=False,
-    ),
-]
-Out = Annotated[
-    Path | None, typer.Option("--out", help="Folder for journal and record; runs/sea-VEHICLE-TIME if not given.")
-]
-Depths = Annotated[str, typer.Option("--depths", metavar="LEAST,MOST", help="Depths within which it drives (m).")]
-Fence = Annotated[
-    float, typer.Option("--fence", metavar="M", min=0.1, max=1000.0, help="Farthest from the target that it drives.")
-]
-Battery = Annotated[
-    float, typer.Option("--battery", metavar="V", min=0.0, max=100.0, help="Least voltage at which it drives; 0: any.")
-]
-
 
 def ardusub(
-    connection: Connection = "udpin:127.0.0.1:14560",
-    vehicle: VehicleName = DEFAULT_VEHICLE,
-    method: Method = "wake-aware",
-    system: System = 1,
-    target: TargetPlace = None,
-    ahead: Ahead = 0.4,
-    points: Points = None,
-    relay: Relay = None,
-    listen_only: ListenOnly = False,
-    buttons: Buttons = "",
-    camera: Camera = None,
-    depths: Depths = "0.2,50",
-    fence: Fence = 5.0,
-    battery: Battery = 0.0,
+    connection: Annotated[
+        str,
+        typer.Option(
+            metavar="PLACE",
+            help="Where the vehicle's MAVLink is: udpin:HOST:PORT waits for its router, udpout:HOST:PORT speaks first.",
+        ),
+    ] = "udpin:127.0.0.1:14560",
+    vehicle: Annotated[str, typer.Option(help="Library name or vehicle YAML file.")] = DEFAULT_VEHICLE,
+    method: Annotated[
+        str, typer.Option(help="How thrusts are chosen, such as wake-aware, instant or dp.")
+    ] = "wake-aware",
+    system: Annotated[
+        int, typer.Option(min=1, max=255, help="The vehicle's MAVLink system id, which its companion shares.")
+    ] = 1,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N,E,D",
+            help="Where the middle of the target is, in m from the autopilot's origin: north, east, down.",
+        ),
+    ] = None,
+    ahead: Annotated[
+        float,
+        typer.Option(
+            metavar="M",
+            help="Without --target: from the bow, as the session begins, to the middle of a ball of 0.5 m across.",
+        ),
+    ] = 0.4,
+    points: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV with x_m, y_m, z_m from the middle of the vehicle as the session begins (forward, right, down) "
+            "and weight: what to spare instead of a ball."
+        ),
+    ] = None,
+    relay: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PLACE",
+            help="Stand between ground station and vehicle: where the ground station sends, such as "
+            "udpin:0.0.0.0:14550. Sticks go on let go while the companion drives. Without it the companion only "
+            "listens to a copy.",
+        ),
+    ] = None,
+    listen_only: Annotated[
+        bool, typer.Option("--listen-only", help="Never engage, whatever anybody asks for.")
+    ] = False,
+    buttons: Annotated[
+        str,
+        typer.Option(
+            metavar="WHAT=N,...",
+            help="Buttons of the pilot's sticks, by number from 0: engage (which also releases), capture, scan, hold, "
+            "operator, precise, gain_up, gain_down. Those at which the autopilot itself acts (BTNn_FUNCTION) are "
+            "refused; on a fresh ArduSub 0 and 15 are free.",
+        ),
+    ] = "",
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WAY",
+            help="What takes the photographs: mavlink (MAV_CMD_IMAGE_START_CAPTURE), digicam "
+            "(MAV_CMD_DO_DIGICAM_CONTROL), or run:PROGRAM, its {file} the photograph's path. Without it they are "
+            "noted and not taken.",
+        ),
+    ] = None,
+    depths: Annotated[str, typer.Option(metavar="LEAST,MOST", help="Depths within which it drives (m).")] = "0.2,50",
+    fence: Annotated[
+        float, typer.Option(metavar="M", min=0.1, max=1000.0, help="Farthest from the target that it drives.")
+    ] = 5.0,
+    battery: Annotated[
+        float, typer.Option(metavar="V", min=0.0, max=100.0, help="Least voltage at which it drives; 0: any.")
+    ] = 0.0,
     sets: Sets = None,
-    out: Out = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for journal and record; runs/sea-VEHICLE-TIME if not given.")
+    ] = None,
     check: Check = False,
     params: Params = None,
     motor_test: MotorTest = False,

@@ -10,40 +10,31 @@ import typer
 from wakewise.ui.cli.console import ProgressBars, print_json
 from wakewise.ui.cli.options import Json
 
-Folder = Annotated[
-    Path | None,
-    typer.Option("--out", metavar="DIR", help="Write wakewise.lua and wakewise.params there.", show_default=False),
-]
-Upload = Annotated[
-    str | None,
-    typer.Option(
-        "--upload",
-        metavar="CONNECTION",
-        help="Put the script on the autopilot by MAVLink, such as udpin:0.0.0.0:14550; it is read back.",
-        show_default=False,
-    ),
-]
-System = Annotated[int, typer.Option("--system", min=1, max=255, help="The vehicle's MAVLink system id.")]
-Start = Annotated[
-    bool,
-    typer.Option(
-        "--start", help="With --upload: also set SCR_ENABLE to 1 and reboot the autopilot, if it is disarmed."
-    ),
-]
-Sitl = Annotated[
-    bool,
-    typer.Option("--sitl", help="With --out: also write sitl.params, for --defaults of ArduSub's simulator."),
-]
-Print = Annotated[bool, typer.Option("--params", help="Print what the autopilot is to be set to, and why.")]
-
 
 def install_script(
-    out: Folder = None,
-    upload: Upload = None,
-    start: Start = False,
-    sitl: Sitl = False,
-    system: System = 1,
-    params: Print = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write wakewise.lua and wakewise.params there.")
+    ] = None,
+    upload: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CONNECTION",
+            help="Put the script on the autopilot by MAVLink, such as udpin:0.0.0.0:14550; it is read back.",
+        ),
+    ] = None,
+    start: Annotated[
+        bool,
+        typer.Option(
+            "--start", help="With --upload: also set SCR_ENABLE to 1 and reboot the autopilot, if it is disarmed."
+        ),
+    ] = False,
+    sitl: Annotated[
+        bool, typer.Option("--sitl", help="With --out: also write sitl.params, for --defaults of ArduSub's simulator.")
+    ] = False,
+    system: Annotated[int, typer.Option(min=1, max=255, help="The vehicle's MAVLink system id.")] = 1,
+    params: Annotated[
+        bool, typer.Option("--params", help="Print what the autopilot is to be set to, and why.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Put the script that drives each motor on an ArduSub autopilot, or write it for doing so by hand.

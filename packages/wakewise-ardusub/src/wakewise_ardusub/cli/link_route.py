@@ -16,25 +16,22 @@ VEHICLE = "udpin:127.0.0.1:14540"
 OUTS = ("udpout:127.0.0.1:14550", "udpout:127.0.0.1:14560", "udpout:127.0.0.1:14570")
 LINE_S = 1.0
 
-Connection = Annotated[
-    str, typer.Option("--connection", metavar="PLACE", help="Where the autopilot is: udpin or udpout:HOST:PORT.")
-]
-Out = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--out",
-        metavar="PLACE",
-        help="Who shares it; may be repeated. udpout:127.0.0.1 at 14550 (ground station), 14560 (companion) and 14570 "
-        "(`wakewise link sitl`) if not given.",
-        show_default=False,
-    ),
-]
-Seconds = Annotated[
-    float | None, typer.Option("--seconds", min=0.1, help="End by itself after so long.", show_default=False)
-]
 
-
-def route(connection: Connection = VEHICLE, out: Out = None, seconds: Seconds = None, json: Json = False) -> None:
+def route(
+    connection: Annotated[
+        str, typer.Option(metavar="PLACE", help="Where the autopilot is: udpin or udpout:HOST:PORT.")
+    ] = VEHICLE,
+    out: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PLACE",
+            help="Who shares it; may be repeated. udpout:127.0.0.1 at 14550 (ground station), 14560 (companion) and "
+            "14570 (`wakewise link sitl`) if not given.",
+        ),
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="End by itself after so long.")] = None,
+    json: Json = False,
+) -> None:
     """Share an autopilot's MAVLink among several programs over UDP, until Ctrl-C: a router without settings.
 
     What comes from one goes to all others as it is. On a vehicle, BlueOS's MAVLink Endpoints do this.

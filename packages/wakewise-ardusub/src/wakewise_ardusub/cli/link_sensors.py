@@ -15,51 +15,29 @@ from wakewise.ui.cli.options import Json
 if TYPE_CHECKING:
     from wakewise_ardusub.sensors.sensor_polling import PolledSensor
 
-Depth = Annotated[
-    Path | None, typer.Option("--depth", metavar="BUS", help="I2C bus of an MS5837, /dev/i2c-1.", show_default=False)
-]
-DepthModel = Annotated[str, typer.Option("--depth-model", help="30BA (Bar30) or 02BA (Bar02).")]
-Imu = Annotated[
-    Path | None,
-    typer.Option("--imu", metavar="PORT", help="Serial port of a WitMotion JY901, /dev/ttyUSB0.", show_default=False),
-]
-Baud = Annotated[int, typer.Option("--baud", help="Of the inertial unit.")]
-Axes = Annotated[
-    str, typer.Option("--imu-axes", help="Where the unit's x, y and z point: forward, back, right, left, down, up.")
-]
-Poses = Annotated[
-    str | None,
-    typer.Option(
-        "--poses", metavar="PORT", help="UDP port, or ADDRESS:PORT, to which lines with poses come.", show_default=False
-    ),
-]
-Forward = Annotated[
-    str | None,
-    typer.Option(
-        "--forward",
-        metavar="HOST:PORT",
-        help="Hand poses on as MAVLink's VISION_POSITION_ESTIMATE, over UDP.",
-        show_default=False,
-    ),
-]
-Density = Annotated[float, typer.Option("--density", help="Of the water, kg/m3: 1000 fresh, 1025 salt.")]
-Zero = Annotated[bool, typer.Option("--zero", help="The vehicle is at the surface now: take its pressure for depth 0.")]
-Seconds = Annotated[
-    float | None, typer.Option("--seconds", help="End after so long; else on Ctrl-C.", show_default=False, min=0.1)
-]
-
 
 def sensors(
-    depth: Depth = None,
-    depth_model: DepthModel = "30BA",
-    imu: Imu = None,
-    baud: Baud = 9600,
-    imu_axes: Axes = "right,forward,up",
-    poses: Poses = None,
-    forward: Forward = None,
-    density: Density = 1000.0,
-    zero: Zero = False,
-    seconds: Seconds = None,
+    depth: Annotated[Path | None, typer.Option(metavar="BUS", help="I2C bus of an MS5837, /dev/i2c-1.")] = None,
+    depth_model: Annotated[str, typer.Option(help="30BA (Bar30) or 02BA (Bar02).")] = "30BA",
+    imu: Annotated[
+        Path | None, typer.Option(metavar="PORT", help="Serial port of a WitMotion JY901, /dev/ttyUSB0.")
+    ] = None,
+    baud: Annotated[int, typer.Option(help="Of the inertial unit.")] = 9600,
+    imu_axes: Annotated[
+        str, typer.Option(help="Where the unit's x, y and z point: forward, back, right, left, down, up.")
+    ] = "right,forward,up",
+    poses: Annotated[
+        str | None, typer.Option(metavar="PORT", help="UDP port, or ADDRESS:PORT, to which lines with poses come.")
+    ] = None,
+    forward: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="Hand poses on as MAVLink's VISION_POSITION_ESTIMATE, over UDP."),
+    ] = None,
+    density: Annotated[float, typer.Option(help="Of the water, kg/m3: 1000 fresh, 1025 salt.")] = 1000.0,
+    zero: Annotated[
+        bool, typer.Option("--zero", help="The vehicle is at the surface now: take its pressure for depth 0.")
+    ] = False,
+    seconds: Annotated[float | None, typer.Option(help="End after so long; else on Ctrl-C.", min=0.1)] = None,
     json: Json = False,
 ) -> None:
     """Show what depth sensor, inertial unit and senders of poses say, live: values, rates, and what goes wrong.

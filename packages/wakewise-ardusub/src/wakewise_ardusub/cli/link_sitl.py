@@ -26,81 +26,9 @@ if TYPE_CHECKING:
 DEFAULT_VEHICLE = "bluerov2-heavy"
 _STATION, _COMPANION, _WATCH = "127.0.0.1:14550", "127.0.0.1:14560", "127.0.0.1:14570"
 
-Port = Annotated[int, typer.Option("--port", help="UDP port that physics listens on; 0 lets the system choose.")]
-Host = Annotated[str, typer.Option("--host", help="Address it listens on; 0.0.0.0 lets other computers in.")]
-Rate = Annotated[
-    int | None,
-    typer.Option("--rate", metavar="HZ", help="Steps a second; as the firmware asks if not given.", show_default=False),
-]
-Params = Annotated[
-    Path | None,
-    typer.Option(
-        "--params",
-        help="The autopilot's .params: which output is which motor (SERVOn_FUNCTION), which turns the other way round "
-        "(MOT_n_DIRECTION). Motors are on outputs 1, 2, ... if not given.",
-        show_default=False,
-    ),
-]
-OwnClock = Annotated[
-    bool, typer.Option("--fast", help="Let the firmware run as fast as both can, not by the clock on the wall.")
-]
-Held = Annotated[
-    float,
-    typer.Option(
-        "--held",
-        metavar="S",
-        min=0.0,
-        help="How long the vehicle is held at the surface, so that ArduSub calibrates its depth sensor there, before "
-        "it is let down to its start; 0: it begins under water.",
-    ),
-]
-Watch = Annotated[
-    str,
-    typer.Option(
-        "--watch",
-        metavar="HOST:PORT",
-        help="Where a copy of the autopilot's MAVLink comes, whose depth is held against the truth; none: it is not.",
-    ),
-]
 Seconds = Annotated[
     float | None, typer.Option("--seconds", min=0.1, help="End by itself after so long.", show_default=False)
 ]
-Out = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--out",
-        metavar="HOST:PORT",
-        help=f"Where MAVLink goes; may be repeated. {_STATION} (ground station), {_COMPANION} (companion) and {_WATCH} "
-        "(`wakewise link sitl`, which compares depths) if not given.",
-        show_default=False,
-    ),
-]
-Behind_ = Annotated[
-    str | None,
-    typer.Option(
-        "--physics",
-        metavar="HOST:PORT",
-        help="Physics to fly in, such as `wakewise link sitl` at 127.0.0.1:9002; still water of its own if not given.",
-        show_default=False,
-    ),
-]
-AutopilotVehicle = Annotated[
-    str, typer.Option("--vehicle", help="Library name or vehicle YAML file; 6 or 8 thrusters.")
-]
-AutopilotParams = Annotated[
-    Path | None,
-    typer.Option("--params", help="Parameters in place of its own, .params or .parm.", show_default=False),
-]
-ScriptFile = Annotated[
-    Path | None,
-    typer.Option("--script", help="A Lua script in place of the one that is shipped.", show_default=False),
-]
-NoScript = Annotated[bool, typer.Option("--no-script", help="Without any script, as an autopilot is out of the box.")]
-PilotAshore = Annotated[
-    bool,
-    typer.Option("--pilot", help="With a pilot of its own, who arms, switches the script on and lets the sticks go."),
-]
-Loop = Annotated[float, typer.Option("--loop", metavar="HZ", help="Loops a second.")]
 
 
 def sitl(
@@ -109,13 +37,38 @@ def sitl(
     world: World = None,
     preset: Preset = "quick",
     sets: Sets = None,
-    port: Port = 9002,
-    host: Host = "127.0.0.1",
-    rate: Rate = None,
-    params: Params = None,
-    own_clock: OwnClock = False,
-    held: Held = 15.0,
-    watch: Watch = _WATCH,
+    port: Annotated[int, typer.Option(help="UDP port that physics listens on; 0 lets the system choose.")] = 9002,
+    host: Annotated[str, typer.Option(help="Address it listens on; 0.0.0.0 lets other computers in.")] = "127.0.0.1",
+    rate: Annotated[
+        int | None, typer.Option(metavar="HZ", help="Steps a second; as the firmware asks if not given.")
+    ] = None,
+    params: Annotated[
+        Path | None,
+        typer.Option(
+            help="The autopilot's .params: which output is which motor (SERVOn_FUNCTION), which turns the other way "
+            "round (MOT_n_DIRECTION). Motors are on outputs 1, 2, ... if not given."
+        ),
+    ] = None,
+    own_clock: Annotated[
+        bool, typer.Option("--fast", help="Let the firmware run as fast as both can, not by the clock on the wall.")
+    ] = False,
+    held: Annotated[
+        float,
+        typer.Option(
+            metavar="S",
+            min=0.0,
+            help="How long the vehicle is held at the surface, so that ArduSub calibrates its depth sensor there, "
+            "before it is let down to its start; 0: it begins under water.",
+        ),
+    ] = 15.0,
+    watch: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Where a copy of the autopilot's MAVLink comes, whose depth is held against the truth; none: it is "
+            "not.",
+        ),
+    ] = _WATCH,
     seconds: Seconds = None,
     json: Json = False,
 ) -> None:
@@ -169,14 +122,37 @@ def sitl(
 
 
 def sitl_autopilot(
-    vehicle: AutopilotVehicle = DEFAULT_VEHICLE,
-    physics: Behind_ = None,
-    out: Out = None,
-    params: AutopilotParams = None,
-    script: ScriptFile = None,
-    no_script: NoScript = False,
-    pilot: PilotAshore = False,
-    loop: Loop = 100.0,
+    vehicle: Annotated[
+        str, typer.Option(help="Library name or vehicle YAML file; 6 or 8 thrusters.")
+    ] = DEFAULT_VEHICLE,
+    physics: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Physics to fly in, such as `wakewise link sitl` at 127.0.0.1:9002; still water of its own if not "
+            "given.",
+        ),
+    ] = None,
+    out: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="HOST:PORT",
+            help=f"Where MAVLink goes; may be repeated. {_STATION} (ground station), {_COMPANION} (companion) and "
+            f"{_WATCH} (`wakewise link sitl`, which compares depths) if not given.",
+        ),
+    ] = None,
+    params: Annotated[Path | None, typer.Option(help="Parameters in place of its own, .params or .parm.")] = None,
+    script: Annotated[Path | None, typer.Option(help="A Lua script in place of the one that is shipped.")] = None,
+    no_script: Annotated[
+        bool, typer.Option("--no-script", help="Without any script, as an autopilot is out of the box.")
+    ] = False,
+    pilot: Annotated[
+        bool,
+        typer.Option(
+            "--pilot", help="With a pilot of its own, who arms, switches the script on and lets the sticks go."
+        ),
+    ] = False,
+    loop: Annotated[float, typer.Option(metavar="HZ", help="Loops a second.")] = 100.0,
     seconds: Seconds = None,
     json: Json = False,
 ) -> None:

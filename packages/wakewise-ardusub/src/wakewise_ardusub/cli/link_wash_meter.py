@@ -36,87 +36,67 @@ Points = Annotated[
 WakeModelName = Annotated[
     str, typer.Option("--wake-model", help="paper, paper-calibrated, fitted, linear, jet or jet-fitted.")
 ]
-Connection = Annotated[
-    str | None,
-    typer.Option(
-        "--connection",
-        metavar="ENDS",
-        help="udpin:HOST:PORT, where the vehicle's router sends to; or udpout:HOST:PORT of a server that answers.",
-        show_default=False,
-    ),
-]
 Vehicle = Annotated[
     str,
     typer.Option("--vehicle", help="Library name or vehicle YAML file."),
 ]
-Params = Annotated[
-    Path | None,
-    typer.Option(
-        "--params",
-        metavar="FILE",
-        help="The autopilot's parameters, as QGroundControl or `link log` writes them: channels and MOT_n_DIRECTION.",
-        show_default=False,
-    ),
-]
-Host = Annotated[
-    str,
-    typer.Option(
-        "--host", help="Address of the page. Any but this computer's own asks others for the token that is printed."
-    ),
-]
-NoToken = Annotated[
-    bool, typer.Option("--no-token", help="Let everybody look who reaches the page, as on a vehicle's own network.")
-]
-Port = Annotated[int, typer.Option("--port", help="Port of the page; 0 takes any that is free.", min=0, max=65535)]
-System = Annotated[
-    int | None,
-    typer.Option(
-        "--system",
-        min=1,
-        max=255,
-        help="MAVLink system id of the vehicle; the first with servo outputs if not given.",
-        show_default=False,
-    ),
-]
-Publish = Annotated[
-    bool,
-    typer.Option("--publish", help="Send WW_D and WW_SAVED as NAMED_VALUE_FLOAT, so that ground stations show them."),
-]
-Ask = Annotated[
-    bool, typer.Option("--ask", help="Ask the autopilot for SERVOn_FUNCTION and MOT_n_DIRECTION: it is read, not set.")
-]
-Out = Annotated[
-    Path | None,
-    typer.Option(
-        "--out", help="Folder for meter.csv and meter.json of the dive; none if not given.", show_default=False
-    ),
-]
-Write = Annotated[
-    Path | None,
-    typer.Option(
-        "--write",
-        metavar="FILE",
-        help="Write the vehicle as a craft file for the meter on a small computer, and end.",
-        show_default=False,
-    ),
-]
 
 
 def wash_meter(
-    connection: Connection = None,
+    connection: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ENDS",
+            help="udpin:HOST:PORT, where the vehicle's router sends to; or udpout:HOST:PORT of a server that answers.",
+        ),
+    ] = None,
     vehicle: Vehicle = "bluerov2-heavy",
     ahead: Ahead = 0.4,
     points: Points = None,
     wake_model: WakeModelName = "jet",
-    params: Params = None,
-    port: Port = 8765,
-    host: Host = "127.0.0.1",
-    no_token: NoToken = False,
-    system: System = None,
-    publish: Publish = False,
-    ask: Ask = False,
-    out: Out = None,
-    write: Write = None,
+    params: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The autopilot's parameters, as QGroundControl or `link log` writes them: channels and "
+            "MOT_n_DIRECTION.",
+        ),
+    ] = None,
+    port: Annotated[int, typer.Option(help="Port of the page; 0 takes any that is free.", min=0, max=65535)] = 8765,
+    host: Annotated[
+        str,
+        typer.Option(
+            help="Address of the page. Any but this computer's own asks others for the token that is printed."
+        ),
+    ] = "127.0.0.1",
+    no_token: Annotated[
+        bool, typer.Option("--no-token", help="Let everybody look who reaches the page, as on a vehicle's own network.")
+    ] = False,
+    system: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=255, help="MAVLink system id of the vehicle; the first with servo outputs if not given."
+        ),
+    ] = None,
+    publish: Annotated[
+        bool,
+        typer.Option(
+            "--publish", help="Send WW_D and WW_SAVED as NAMED_VALUE_FLOAT, so that ground stations show them."
+        ),
+    ] = False,
+    ask: Annotated[
+        bool,
+        typer.Option("--ask", help="Ask the autopilot for SERVOn_FUNCTION and MOT_n_DIRECTION: it is read, not set."),
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for meter.csv and meter.json of the dive; none if not given.")
+    ] = None,
+    write: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write the vehicle as a craft file for the meter on a small computer, and end."
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Show in a page, live, the wash of a vehicle's thrusters on its target, and what gentler thrusts would save.

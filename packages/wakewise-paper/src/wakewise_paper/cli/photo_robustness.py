@@ -12,7 +12,6 @@ from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table, write_page
 from wakewise.ui.cli.options import Json, Preset, Sets, TargetName
 
-Out = Annotated[Path, typer.Option("--out", help="Folder of the study; what is done there is not done again.")]
 Levels = Annotated[
     list[str] | None,
     typer.Option("--levels", metavar="FACTOR=A,B,...", help="Levels of silt (mg/L), blur (px) or particles (1/m3); "
@@ -24,7 +23,9 @@ def degrade(
     preset: Preset = "quick",
     target: TargetName = None,
     levels: Levels = None,
-    out: Out = Path("runs/degradation"),
+    out: Annotated[Path, typer.Option(help="Folder of the study; what is done there is not done again.")] = Path(
+        "runs/degradation"
+    ),
     sets: Sets = None,
     json: Json = False,
 ) -> None:

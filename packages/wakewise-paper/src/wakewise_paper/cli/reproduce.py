@@ -12,73 +12,54 @@ from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import ProgressBars, escaped, format_value, print_json, print_table, write_page
 from wakewise.ui.cli.options import Json
 
-Names = Annotated[
-    list[str],
-    typer.Argument(
-        metavar="TABLE",
-        help="dynamic, success, station, ablation, sediment, flow, solver, wake, field, operator, comparison, or all.",
-    ),
-]
-Trials = Annotated[
-    int | None,
-    typer.Option(
-        help="Seeds for each target in each world, from 1; 1 if neither this nor --budget is given.", show_default=False
-    ),
-]
-Budget = Annotated[
-    str | None,
-    typer.Option(help="Time for all of it, such as 30min, 2h or 90s: as many trials as fit.", show_default=False),
-]
-Worlds = Annotated[
-    str | None,
-    typer.Option(
-        "--world",
-        help="Where trials are made, with commas between: worlds of the library (`wakewise world list`), paper (its "
-        "own wake as the water: circular), lattice, caco3, field; each table's own if not given.",
-        show_default=False,
-    ),
-]
-Methods = Annotated[
-    str | None,
-    typer.Option(help="Only these, with commas between; each table's own if not given.", show_default=False),
-]
-Targets = Annotated[
-    str | None,
-    typer.Option(help="In place of the tables' own, with commas between; any target.", show_default=False),
-]
-Duration = Annotated[
-    float | None,
-    typer.Option(
-        "--duration",
-        help="Only so many seconds of each flight, to try it; scans are whole.",
-        min=1.0,
-        show_default=False,
-    ),
-]
-Out = Annotated[Path, typer.Option("--out", help="Folder for results.json and the page (or pages).")]
-Store = Annotated[Path, typer.Option("--store", help="Folder that keeps the trials, of all calls together.")]
-Workers = Annotated[int, typer.Option("--workers", help="Trials at a time.", min=1, max=1024)]
-Again = Annotated[bool, typer.Option("--again", help="Try trials anew that failed in an earlier run.")]
-Markdown = Annotated[
-    bool, typer.Option("--markdown", help="Write Markdown pages and small plots in place of the page with pictures.")
-]
-
 _UNITS = {"s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
 
 
 def reproduce(
-    names: Names,
-    trials: Trials = None,
-    budget: Budget = None,
-    worlds: Worlds = None,
-    methods: Methods = None,
-    targets: Targets = None,
-    duration: Duration = None,
-    out: Out = Path("runs/reproduce"),
-    store: Store = Path("runs/reproduce-trials"),
-    workers: Workers = 2,
-    again: Again = False,
-    markdown: Markdown = False,
+    names: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="TABLE",
+            help="dynamic, success, station, ablation, sediment, flow, solver, wake, field, operator, comparison, or "
+            "all.",
+        ),
+    ],
+    trials: Annotated[
+        int | None,
+        typer.Option(help="Seeds for each target in each world, from 1; 1 if neither this nor --budget is given."),
+    ] = None,
+    budget: Annotated[
+        str | None, typer.Option(help="Time for all of it, such as 30min, 2h or 90s: as many trials as fit.")
+    ] = None,
+    worlds: Annotated[
+        str | None,
+        typer.Option(
+            "--world",
+            help="Where trials are made, with commas between: worlds of the library (`wakewise world list`), paper "
+            "(its own wake as the water: circular), lattice, caco3, field; each table's own if not given.",
+        ),
+    ] = None,
+    methods: Annotated[
+        str | None, typer.Option(help="Only these, with commas between; each table's own if not given.")
+    ] = None,
+    targets: Annotated[
+        str | None, typer.Option(help="In place of the tables' own, with commas between; any target.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Only so many seconds of each flight, to try it; scans are whole.", min=1.0)
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for results.json and the page (or pages).")] = Path(
+        "runs/reproduce"
+    ),
+    store: Annotated[Path, typer.Option(help="Folder that keeps the trials, of all calls together.")] = Path(
+        "runs/reproduce-trials"
+    ),
+    workers: Annotated[int, typer.Option(help="Trials at a time.", min=1, max=1024)] = 2,
+    again: Annotated[bool, typer.Option("--again", help="Try trials anew that failed in an earlier run.")] = False,
+    markdown: Annotated[
+        bool,
+        typer.Option("--markdown", help="Write Markdown pages and small plots in place of the page with pictures."),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Make the paper's tables from trials of our own: paper, ours, interval, met or not.

@@ -11,23 +11,18 @@ from wakewise.ui.cli.console import ProgressBars, format_value, print_json, prin
 from wakewise.ui.cli.options import Json, seed_option
 
 Seed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of the split and of the resamples.")]
-ReportOut = Annotated[
-    Path | None, typer.Option("--out", help="Folder for wake.html and wake.json.", show_default=False)
-]
-Reference = Annotated[
-    Path, typer.Option("--data", help="Folder of reference data (the real jets).", envvar="WAKEWISE_DATA")
-]
-Quick = Annotated[bool, typer.Option("--quick", help="Coarser samples, no PIV.")]
-ThroughPiv = Annotated[
-    bool, typer.Option("--through-piv", help="Also see the lattice's swirling jet and the parcels through virtual PIV.")
-]
 
 
 def validate(
-    out: ReportOut = None,
-    data: Reference = Path("../shared/data"),
-    quick: Quick = False,
-    through_piv: ThroughPiv = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for wake.html and wake.json.")] = None,
+    data: Annotated[
+        Path, typer.Option(help="Folder of reference data (the real jets).", envvar="WAKEWISE_DATA")
+    ] = Path("../shared/data"),
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser samples, no PIV.")] = False,
+    through_piv: Annotated[
+        bool,
+        typer.Option("--through-piv", help="Also see the lattice's swirling jet and the parcels through virtual PIV."),
+    ] = False,
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
@@ -83,21 +78,14 @@ def _show_validation(values: dict[str, Any]) -> None:
         typer.echo(f"not computed: {key}: {reason}")
 
 
-Draws = Annotated[int, typer.Option("--draws", min=1, max=1000, help="Waters of the tank to train on, each drawn.")]
-Steps = Annotated[int, typer.Option("--steps", min=100, max=1_000_000, help="Steps of the training.")]
-NetworkOut = Annotated[
-    Path | None, typer.Option("--out", help="Write the network here; else it is judged and thrown away.")
-]
-Shipped = Annotated[bool, typer.Option("--shipped", help="Judge the network that ships instead of training one.")]
-HeldOut = Annotated[int, typer.Option("--held-out", min=1, max=100, help="Waters of the tank to judge on.")]
-
-
 def learn(
-    draws: Draws = 60,
-    steps: Steps = 8000,
-    out: NetworkOut = None,
-    shipped: Shipped = False,
-    held_out: HeldOut = 8,
+    draws: Annotated[int, typer.Option(min=1, max=1000, help="Waters of the tank to train on, each drawn.")] = 60,
+    steps: Annotated[int, typer.Option(min=100, max=1_000_000, help="Steps of the training.")] = 8000,
+    out: Annotated[Path | None, typer.Option(help="Write the network here; else it is judged and thrown away.")] = None,
+    shipped: Annotated[
+        bool, typer.Option("--shipped", help="Judge the network that ships instead of training one.")
+    ] = False,
+    held_out: Annotated[int, typer.Option(min=1, max=100, help="Waters of the tank to judge on.")] = 8,
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
@@ -137,21 +125,16 @@ def _show_rivals(result: dict[str, Any]) -> None:
     typer.echo(f"learned: {result['weights']} weights, {result['circular']}")
 
 
-World = Annotated[str, typer.Option("--world", help="World of the library to fly in.")]
-Method = Annotated[str, typer.Option("--method", help="Who holds the hover.")]
-Minutes = Annotated[float, typer.Option("--minutes", min=0.5, max=30.0, help="How long the hover is.")]
-HeldStill = Annotated[bool, typer.Option("--held", help="Hold the vehicle and let its bow thrusters push in turn.")]
-FlightSeed = Annotated[
-    int, typer.Option("--seed", callback=seed_option, help="Seed of the world, which draws the jets' width.")
-]
-
-
 def calibrate_flight(
-    world: World = "payload",
-    method: Method = "dp",
-    minutes: Minutes = 5.0,
-    seed: FlightSeed = 1,
-    held: HeldStill = False,
+    world: Annotated[str, typer.Option(help="World of the library to fly in.")] = "payload",
+    method: Annotated[str, typer.Option(help="Who holds the hover.")] = "dp",
+    minutes: Annotated[float, typer.Option(min=0.5, max=30.0, help="How long the hover is.")] = 5.0,
+    seed: Annotated[
+        int, typer.Option(callback=seed_option, help="Seed of the world, which draws the jets' width.")
+    ] = 1,
+    held: Annotated[
+        bool, typer.Option("--held", help="Hold the vehicle and let its bow thrusters push in turn.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Calibrate the jet from a hover, by flakes that the camera sees drift; its error against minutes."""
