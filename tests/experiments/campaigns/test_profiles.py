@@ -12,21 +12,20 @@ def test_on_one_stratum_it_is_mann_whitneys_u():
     """U over n m, ties counted half."""
     rng = np.random.default_rng(2)
     ours, theirs = np.round(rng.normal(0.0, 1.0, 14), 1), np.round(rng.normal(0.4, 1.0, 11), 1)
-    value, ends = probability_of_improvement({"a": ours}, {"a": theirs})
+    value = probability_of_improvement({"a": ours}, {"a": theirs})
     assert value == pytest.approx(mannwhitneyu(theirs, ours).statistic / (14 * 11))
-    assert ends.low < value < ends.high
 
 
 def test_strata_count_alike_however_many_trials_they_have():
     """A win on a target flown once weighs as much as a loss on one flown ten times."""
-    value, _ = probability_of_improvement({"a": [1.0], "b": [9.0] * 10}, {"a": [2.0], "b": [1.0] * 10})
+    value = probability_of_improvement({"a": [1.0], "b": [9.0] * 10}, {"a": [2.0], "b": [1.0] * 10})
     assert value == 0.5
 
 
 def test_which_side_is_better_is_the_callers():
     """Completeness is better where it is more."""
-    more, _ = probability_of_improvement({"a": [9.0]}, {"a": [1.0]}, less_is_better=False)
-    less, _ = probability_of_improvement({"a": [9.0]}, {"a": [1.0]})
+    more = probability_of_improvement({"a": [9.0]}, {"a": [1.0]}, less_is_better=False)
+    less = probability_of_improvement({"a": [9.0]}, {"a": [1.0]})
     assert (more, less) == (1.0, 0.0)
 
 

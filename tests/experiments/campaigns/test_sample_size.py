@@ -11,9 +11,9 @@ from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns.statistics import (
     pairs_needed,
     power_of_pairs,
+    share_interval,
     smallest_effect,
     trials_for_rate,
-    wilson,
 )
 
 
@@ -42,7 +42,7 @@ def test_the_smallest_effect_turns_it_round(n):
 def test_a_share_needs_many_trials():
     """98.5 % to 2 % either way."""
     n = trials_for_rate(0.985, 0.02)
-    low, high = wilson(round(0.985 * n), n)
+    low, high = share_interval(round(0.985 * n), n)
     assert high - low <= 0.04 and n > 100
 
 

@@ -76,12 +76,12 @@ def test_a_difference_is_over_pairs_alone_and_tested():
     assert (first["improvement"], second["met"]) == (1.0, True)
 
 
-def test_a_share_has_wilsons_interval():
+def test_a_share_has_an_exact_interval():
     """Of none failed it does not say that none will."""
     trials = [made("ours", k, {"success": 1.0}) for k in range(1, 6)]
     (row,) = rows_of([claim("share_pct", figure="success", paper=98.5, side="more")], trials)
     assert (row["ours"], row["met"], row["sure"]) == (100.0, True, False)
-    assert row["low"] == pytest.approx(56.6, abs=0.1)
+    assert row["low"] == pytest.approx(100.0 * 0.025**0.2)
 
 
 def test_how_much_repeats_differ_is_within_targets():

@@ -1,36 +1,32 @@
-"""Statistics of many trials: paired differences, shares, bootstrap intervals, several tests at once, sample sizes.
+"""Statistics of many trials: intervals of means, shares and ratios, tests of pairs, Holm's correction, sample sizes.
 
-SciPy computes Wilson's interval (`binomtest`), the paired t-test (`ttest_rel`), the signed-rank test (`wilcoxon`), the
-Mann-Whitney statistic (`mannwhitneyu`), the distributions behind power (`nct`) and the draws of every bootstrap
-(`bootstrap`). Ours are:
+SciPy computes exact intervals of shares (`binomtest`), the paired t-test (`ttest_rel`), the signed-rank test
+(`wilcoxon`), the Mann-Whitney statistic (`mannwhitneyu`) and the distributions behind intervals and power (`t`, `nct`).
+Ours are:
 
-- strata: `scipy.stats.bootstrap` draws each sample by itself, so a stratum is a sample of row numbers. Rows stay whole,
-  and a ratio whose denominator is 0 in a draw leaves that draw out, where SciPy would return NaN;
+- Student's interval of a mean within strata (Welch-Satterthwaite degrees of freedom), of a ratio of geometric means and
+  of a ratio of means (Fieller): SciPy has the first without strata alone;
 - Holm's correction: SciPy has Benjamini-Hochberg alone (`false_discovery_control`);
 - Hedges' correction, power of pairs and the number of trials needed: SciPy has `power` by simulation alone;
-- probability of improvement and performance profiles (Agarwal et al. 2021, doi 10.48550/arXiv.2108.13264), and
-  reductions by logarithms, which SciPy does not have.
+- probability of improvement and performance profiles (Agarwal et al. 2021, doi 10.48550/arXiv.2108.13264).
 
-Arrays in, plain records out. Nothing is drawn but from a given seed.
+There is no bootstrap: percentile intervals of 2, 5 and 21 pairs without a difference excluded zero in 50, 19 and 8 % of
+simulated cases instead of 5 %. The coverage of the intervals here is tested by simulation for 2 to 30 trials.
+Arrays in, plain records out.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, sqrt
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from scipy import optimize, special, stats
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-
-RESAMPLES = 4000
-Statistic = Callable[[Array], Array]
-"""From rows drawn, shape (draws, n, columns), to one value of each draw, shape (draws,)."""
 
 
 class Interval(NamedTuple):
@@ -40,78 +36,92 @@ class Interval(NamedTuple):
     high: float
 
 
-def wilson(successes: int, n: int, confidence: float = 0.95) -> Interval:
-    """Interval of a share from counts (Wilson 1927); of none or all it does not shrink to a point.
+def share_interval(successes: int, n: int, confidence: float = 0.95) -> Interval:
+    """Exact interval of a share from counts (Clopper and Pearson 1934): it covers at least as often as it says.
 
-    Raises
-    ------
-    InputError
-        If counts do not fit each other.
+    Raises InputError if counts do not fit each other.
     """
     if not 0 <= successes <= n or n < 1:
         raise InputError(f"share: {successes} of {n}, must be 0 to n of 1 or more")
-    found = stats.binomtest(successes, n).proportion_ci(confidence, method="wilson")
+    found = stats.binomtest(successes, n).proportion_ci(confidence, method="exact")
     return Interval(float(found.low), float(found.high))
 
 
-def mean_of(drawn: Array) -> Array:
-    """Mean of the first column, shape (draws,)."""
-    return np.asarray(drawn[:, :, 0].mean(axis=1))
+def mean_interval(
+    values: Sequence[float] | Array, strata: Sequence[Hashable] | None = None, *, confidence: float = 0.95
+) -> tuple[float, Interval | None]:
+    """Mean of trials, shape (n,), and its interval by Student's t, with the variance within strata.
+
+    `strata` name the stratum of each value, such as its target. If a stratum holds a single value, all are one stratum,
+    since nothing could vary within it. Degrees of freedom: Welch 1947, Satterthwaite 1946. The interval of a single
+    value is None. Of values with a long tail (log-normal of spread 1) it covers about 85 % where it says 95.
+
+    Raises InputError if there are no values, or one is not finite.
+    """
+    x = np.asarray(values, dtype=np.float64)
+    if x.ndim != 1 or len(x) == 0 or not np.isfinite(x).all():
+        raise InputError(f"mean: values of shape {x.shape}, must be finite and one or more")
+    mean, n = float(x.mean()), len(x)
+    if n < 2:
+        return mean, None
+    names = [""] * n if strata is None else list(strata)
+    groups = [x[[where == name for where in names]] for name in dict.fromkeys(names)]
+    if min(len(group) for group in groups) < 2:
+        groups = [x]
+    parts = np.array([len(group) * float(group.var(ddof=1)) / n**2 for group in groups])
+    if not parts.sum() > 0.0:
+        return mean, Interval(mean, mean)
+    freedom = float(parts.sum() ** 2 / (parts**2 / np.array([len(group) - 1.0 for group in groups])).sum())
+    half = float(stats.t.ppf(0.5 + 0.5 * confidence, freedom)) * sqrt(float(parts.sum()))
+    return mean, Interval(mean - half, mean + half)
 
 
-def ratio_of_sums(drawn: Array) -> Array:
-    """Sum of the first column over the sum of the second, shape (draws,); not finite where that is zero."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(drawn[:, :, 0].sum(axis=1) / drawn[:, :, 1].sum(axis=1))
-
-
-def stratified_bootstrap(
-    rows: Sequence[float] | Sequence[Sequence[float]] | Array,
+def geometric_ratio(
+    ours: Sequence[float] | Array,
+    theirs: Sequence[float] | Array,
     strata: Sequence[Hashable] | None = None,
-    statistic: Statistic = mean_of,
     *,
     confidence: float = 0.95,
-    resamples: int = RESAMPLES,
-    seed: int = 0,
 ) -> tuple[float, Interval | None]:
-    """A statistic of trials and its percentile interval, by drawing trials anew within each stratum.
+    """Ratio of the geometric means of pairs, shape (n,) each, and its interval: that of the mean logarithm of ratios.
 
-    `rows` have shape (n,) or (n, columns), finite; columns of one row stay together, so pairs stay pairs. `strata` name
-    the stratum of each row, such as its target. If a stratum holds a single row, all rows are one stratum, since
-    nothing could vary within it. The interval of a single row is None.
+    It has the stated coverage where pairs differ by factors, as speeds and energies of one seed do.
 
-    Raises
-    ------
-    InputError
-        If there are no rows, or one is not finite.
+    Raises InputError if there are no pairs, or a value is not finite and more than 0.
     """
-    values = np.asarray(rows, dtype=np.float64)
-    values = values[:, None] if values.ndim == 1 else values
-    if values.ndim != 2 or len(values) == 0 or not np.isfinite(values).all():
-        raise InputError(f"bootstrap: rows of shape {values.shape}, must be finite and one or more")
-    value = float(statistic(values[None])[0])
-    if len(values) < 2:
-        return value, None
-    names = [""] * len(values) if strata is None else list(strata)
-    groups = [np.flatnonzero([where == name for where in names]) for name in dict.fromkeys(names)]
-    if min(len(group) for group in groups) < 2:
-        groups = [np.arange(len(values))]
+    a, b = np.asarray(ours, dtype=np.float64), np.asarray(theirs, dtype=np.float64)
+    if a.shape != b.shape or not (a > 0.0).all() or not (b > 0.0).all():
+        raise InputError("ratio: values of pairs must be more than 0, one of each for every seed")
+    mean, ends = mean_interval(np.log(a / b), strata, confidence=confidence)
+    return float(np.exp(mean)), None if ends is None else Interval(float(np.exp(ends.low)), float(np.exp(ends.high)))
 
-    def drawn_statistic(*picked: Array, axis: int = -1) -> Array:
-        del axis  # the last: SciPy hands over row numbers of shape (draws, rows of a stratum)
-        return statistic(values[np.atleast_2d(np.concatenate(picked, axis=-1))])
 
-    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)  # draws that are not finite are left out below
-        drawn = stats.bootstrap(
-            groups, drawn_statistic, n_resamples=resamples, vectorized=True, method="percentile", rng=seed
-        ).bootstrap_distribution
-    drawn = drawn[np.isfinite(drawn)]
-    if len(drawn) == 0:
+def ratio_of_means(
+    ours: Sequence[float] | Array, theirs: Sequence[float] | Array, *, confidence: float = 0.95
+) -> tuple[float | None, Interval | None]:
+    """Ratio of the means of pairs, shape (n,) each, and Fieller's interval (1954, J. R. Statist. Soc. B 16, 175).
+
+    The ratio is None where the mean of theirs is not more than 0. The interval is None of one pair, and where the mean
+    of theirs is so unsure that no ratio is excluded on one side. It excludes 1 where the paired t-test rejects.
+
+    Raises InputError if there are no pairs.
+    """
+    a, b = np.asarray(ours, dtype=np.float64), np.asarray(theirs, dtype=np.float64)
+    if a.ndim != 1 or a.shape != b.shape or len(a) == 0:
+        raise InputError(f"ratio: shapes {a.shape} and {b.shape}, must be the same (n,) with n of 1 or more")
+    if not b.mean() > 0.0:
+        return None, None
+    value, n = float(a.mean() / b.mean()), len(a)
+    if n < 2:
         return value, None
-    tail = 50.0 * (1.0 - confidence)
-    low, high = np.percentile(drawn, [tail, 100.0 - tail])
-    return value, Interval(float(low), float(high))
+    scale = float(stats.t.ppf(0.5 + 0.5 * confidence, n - 1)) ** 2 / n
+    (v_aa, v_ab), (_, v_bb) = scale * np.cov(a, b, ddof=1)
+    # The ratios r with (mean of a - r b)^2 <= t^2 var(a - r b) / n.
+    square, middle, rest = float(b.mean() ** 2 - v_bb), float(a.mean() * b.mean() - v_ab), float(a.mean() ** 2 - v_aa)
+    if square <= 1e-12 * float(b.mean() ** 2):
+        return value, None
+    half = sqrt(max(0.0, middle**2 - square * rest))
+    return value, Interval((middle - half) / square, (middle + half) / square)
 
 
 # Reductions over pairs ---------------------------------------------------------------------------------------------
@@ -147,26 +157,23 @@ def log_reduction_pct(pairs: Pairs, unanswered: int = 0) -> tuple[float | None, 
     logs = [float(np.log(max(ours, LEAST_M_S) / max(theirs, LEAST_M_S))) for theirs, ours, _ in pairs]
     logs += [0.0] * unanswered
     strata = [where for _, _, where in pairs] + ["failed"] * unanswered
-    value, interval = stratified_bootstrap(logs, strata, lambda drawn: 100.0 * (1.0 - np.exp(mean_of(drawn))))
-    return value, interval, 100.0 * (1.0 - float(np.exp(max(logs))))
+    mean, ends = mean_interval(logs, strata)
+    log_ends = None if ends is None else Interval(float(np.exp(ends.low)), float(np.exp(ends.high)))
+    return *as_reduction(float(np.exp(mean)), log_ends), 100.0 * (1.0 - float(np.exp(max(logs))))
 
 
 def ratio(pairs: Pairs) -> tuple[float | None, Interval | None]:
-    """Sum of ours over the sum of theirs, and its interval; None where the sum of theirs is 0."""
-    values = np.array([(ours, theirs) for theirs, ours, _ in pairs], dtype=np.float64).reshape(-1, 2)
-    if len(values) == 0 or not values[:, 1].sum() > 0.0:
+    """Sum of ours over the sum of theirs, and its interval; None where the sum of theirs is not more than 0."""
+    if not pairs:
         return None, None
-    return stratified_bootstrap(values, [where for _, _, where in pairs], ratio_of_sums)
+    return ratio_of_means([ours for _, ours, _ in pairs], [theirs for theirs, _, _ in pairs])
 
 
 def reduction_pct(
-    base: Mapping[Any, Figures],
-    other: Mapping[Any, Figures],
-    figure: str,
-    strata: Mapping[Any, Hashable] | None = None,
+    base: Mapping[Any, Figures], other: Mapping[Any, Figures], figure: str
 ) -> tuple[float | None, Interval | None]:
     """Reduction of the mean of a figure, in percent of the base's, over the keys that both have; and its interval."""
-    return as_reduction(*ratio(pairs_of(base, other, figure, strata or {})))
+    return as_reduction(*ratio(pairs_of(base, other, figure, {})))
 
 
 def as_reduction(value: float | None, ends: Interval | None) -> tuple[float | None, Interval | None]:
@@ -188,7 +195,7 @@ def mean_figures(rows: Iterable[Figures], keys: Iterable[str], worst: Sequence[s
         if key in worst:
             answer[key], answer[f"{key}_interval"] = max(known, default=None), None
         else:
-            answer[key], answer[f"{key}_interval"] = stratified_bootstrap(known) if known else (None, None)
+            answer[key], answer[f"{key}_interval"] = mean_interval(known) if known else (None, None)
     return answer
 
 
@@ -322,6 +329,36 @@ def paired_test(ours: Sequence[float] | Array, theirs: Sequence[float] | Array, 
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class PairedComparison:
+    """Ratio of ours to theirs, its 95 % interval, and the test of the same quantity, so that they agree at 1.
+
+    `of` is what the ratio is of: geometric means, where all values are more than 0, or means. `ratio` is None where the
+    mean of theirs is not more than 0.
+    """
+
+    of: Literal["geometric means", "means"]
+    ratio: float | None
+    interval: Interval | None
+    test: PairedTest
+
+
+def compare_pairs(ours: Sequence[float] | Array, theirs: Sequence[float] | Array) -> PairedComparison:
+    """Compare pairs, shape (n,) each; row k of both is one seed.
+
+    Raises InputError as `paired_test` does.
+    """
+    a, b = np.asarray(ours, dtype=np.float64), np.asarray(theirs, dtype=np.float64)
+    test = paired_test(a, b)
+    if (a > 0.0).all() and (b > 0.0).all():
+        value, ends = geometric_ratio(a, b)
+        return PairedComparison(
+            of="geometric means", ratio=value, interval=ends, test=paired_test(np.log(a), np.log(b))
+        )
+    mean, ends = ratio_of_means(a, b)
+    return PairedComparison(of="means", ratio=mean, interval=ends, test=test)
+
+
 def hedges_correction(freedom: int) -> float:
     """J(m) = Gamma(m/2) / (sqrt(m/2) Gamma((m-1)/2)), by which d of m degrees of freedom is too large (Hedges 1981)."""
     if freedom < 2:
@@ -336,35 +373,19 @@ Groups = Mapping[Any, Sequence[float] | Array]
 """Values of trials by target, world or other stratum."""
 
 
-def probability_of_improvement(
-    ours: Groups, theirs: Groups, *, less_is_better: bool = True, seed: int = 0
-) -> tuple[float, Interval | None]:
-    """Probability that a trial of ours is better than one of theirs in a stratum drawn evenly, and its 95 % interval.
+def probability_of_improvement(ours: Groups, theirs: Groups, *, less_is_better: bool = True) -> float:
+    """Probability that a trial of ours is better than one of theirs in a stratum drawn evenly.
 
     Ties count half: Mann-Whitney's U over n m, averaged over strata. One half means neither is better.
 
-    Raises
-    ------
-    InputError
-        If they share no stratum.
+    Raises InputError if they share no stratum.
     """
     shared: list[Hashable] = [name for name in ours if name in theirs and len(ours[name]) and len(theirs[name])]
     if not shared:
         raise InputError("probability of improvement: the two methods share no stratum")
     sign = 1.0 if less_is_better else -1.0
     pairs = [(sign * np.asarray(ours[n], dtype=float), sign * np.asarray(theirs[n], dtype=float)) for n in shared]
-    wins = [_wins(a, b) for a, b in pairs]
-    value = float(np.mean([w.mean() for w in wins]))
-    if all(w.size == 1 for w in wins):
-        return value, None
-    rng = np.random.default_rng(seed)
-    drawn = np.zeros(RESAMPLES)
-    for won in wins:
-        n, m = won.shape
-        rows, columns = rng.integers(n, size=(RESAMPLES, n)), rng.integers(m, size=(RESAMPLES, m))
-        drawn += won[rows[:, :, None], columns[:, None, :]].mean(axis=(1, 2)) / len(wins)
-    low, high = np.percentile(drawn, [2.5, 97.5])
-    return value, Interval(float(low), float(high))
+    return float(np.mean([_wins(a, b).mean() for a, b in pairs]))
 
 
 def _wins(ours: Array, theirs: Array) -> Array:
@@ -429,7 +450,7 @@ def smallest_effect(n: int, power: float = 0.8, alpha: float = 0.05) -> float | 
 
 
 def trials_for_rate(rate: float, half_width: float = 0.05) -> int:
-    """Fewest trials after which Wilson's 95 % interval of a share about `rate` is no wider than twice this.
+    """Fewest trials after which the exact 95 % interval of a share about `rate` is no wider than twice this.
 
     Raises
     ------
@@ -440,7 +461,7 @@ def trials_for_rate(rate: float, half_width: float = 0.05) -> int:
         raise InputError(f"rate {rate}, half width {half_width}: must be within 0 and 1")
 
     def width(n: int) -> float:
-        low, high = wilson(round(rate * n), n)
+        low, high = share_interval(round(rate * n), n)
         return high - low
 
     n = 1

@@ -15,10 +15,8 @@ from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns.definition import FACTORS
 from wakewise.experiments.campaigns.statistics import (
     WORST,
-    paired_test,
+    compare_pairs,
     probability_of_improvement,
-    ratio_of_sums,
-    stratified_bootstrap,
 )
 from wakewise.experiments.campaigns.table import Results, varying_factors
 
@@ -106,16 +104,16 @@ def summarize(measure: ComparisonMetric, world: str, places: Sequence[Place]) ->
     told: dict[str, Any] = dict.fromkeys(("less_pct", "interval_pct", "p_t", "improvement", "energy_ratio"))
     if rival is not None:
         ours, theirs = (np.array([values[who][known] for known in both]) for who in (winner, rival))
-        if theirs.sum() > 0.0:
-            ratio, ends = stratified_bootstrap(np.column_stack([ours, theirs]), [k[0] for k in both], ratio_of_sums)
+        compared = compare_pairs(ours, theirs)
+        if compared.ratio is not None:
             sign = 1.0 if less else -1.0
-            told["less_pct"] = sign * 100.0 * (1.0 - ratio)
-            if ends is not None:
-                low, high = sorted(sign * 100.0 * (1.0 - end) for end in ends)
+            told["less_pct"] = sign * 100.0 * (1.0 - compared.ratio)
+            if compared.interval is not None:
+                low, high = sorted(sign * 100.0 * (1.0 - end) for end in compared.interval)
                 told["interval_pct"] = (low, high)
-        told["p_t"] = paired_test(ours, theirs).p_t
+        told["p_t"] = compared.test.p_t
         groups = [by_target(values[who], both) for who in (winner, rival)]
-        told["improvement"] = probability_of_improvement(*groups, less_is_better=less)[0]
+        told["improvement"] = probability_of_improvement(*groups, less_is_better=less)
         told["energy_ratio"] = _ratio(here, "energy_kJ", winner, rival, both)
         told["silt_ratio"] = _ratio(here, "ray_optical_depth", winner, rival, both)
     return MethodSummary(

@@ -18,13 +18,13 @@ from wakewise.experiments.campaigns.attempt_log import FINAL, RETRIED, Attempts
 from wakewise.experiments.campaigns.definition import FACTORS, CampaignPlan, PlanEntry, read_plan
 from wakewise.experiments.campaigns.index import listing
 from wakewise.experiments.campaigns.run import active_drivers
-from wakewise.experiments.campaigns.statistics import stratified_bootstrap, wilson
+from wakewise.experiments.campaigns.statistics import mean_interval, share_interval
 from wakewise.experiments.campaigns.store import CampaignStore, read_store
 from wakewise.experiments.campaigns.task import Figure
 
 State = Literal["done", "failed", "running", "waiting"]
 SHARES = ("success",)
-"""Figures that are yes or no; their interval is Wilson's. A trial that failed is no success."""
+"""Figures that are yes or no; their interval is exact. A trial that failed is no success."""
 HEADLINES = (
     "success",
     "rmse_mm",
@@ -135,7 +135,7 @@ def group_table(found: Results, by: Sequence[str] = (), figures: Sequence[str] =
     """A row per group: factors, trials, failures, and each figure's mean with its 95 % interval over trials.
 
     Means are over the trials that gave the figure; `n` says how many. Trials of several targets, worlds or vehicles in
-    one group are strata of the bootstrap.
+    one group are strata of the interval.
 
     Raises
     ------
@@ -212,7 +212,7 @@ def _mean(name: str, members: Sequence[TrialRecord], by: Sequence[str]) -> dict[
         return {"mean": None, "low": None, "high": None, "n": 0, "why": "no trial gave it"}
     inner = [factor for factor in ("target", "world", "vehicle", "variation") if factor not in by]
     strata = [tuple(one.entry.factors.get(factor) for factor in inner) for one, _ in known]
-    mean, interval = stratified_bootstrap([value for _, value in known], strata)
+    mean, interval = mean_interval([value for _, value in known], strata)
     if interval is None:
         return {"mean": mean, "low": None, "high": None, "n": 1, "why": "one trial has no interval"}
     return {"mean": mean, "low": interval.low, "high": interval.high, "n": len(known)}
@@ -224,5 +224,5 @@ def _share(name: str, members: Sequence[TrialRecord]) -> dict[str, Any]:
     if not ended:
         return {"mean": None, "low": None, "high": None, "n": 0, "why": "no trial has ended"}
     count = sum(bool(one.figures.get(name)) for one in ended)
-    interval = wilson(count, len(ended))
+    interval = share_interval(count, len(ended))
     return {"mean": count / len(ended), "low": interval.low, "high": interval.high, "n": len(ended)}

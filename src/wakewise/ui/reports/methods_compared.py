@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from wakewise.core.arrays import Array
 from wakewise.experiments.campaigns.pictures import MODEL, photographs_of
-from wakewise.experiments.campaigns.statistics import performance_profile, stratified_bootstrap
+from wakewise.experiments.campaigns.statistics import mean_interval, performance_profile
 from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place, worst_trials
 from wakewise.ui.reports.figures import NARROW_IN, WIDTH_IN
 from wakewise.ui.reports.page import error_scale, panel, parts, pictures, template
@@ -137,7 +137,7 @@ def methods_compared(
             colour = colours[method]
             spread = place + rng.uniform(-0.14, 0.14, len(values))
             axes.plot(values, spread, "o", color=colour, markersize=4, alpha=0.45, linewidth=0)
-            mean, ends = stratified_bootstrap(values, [t for t, _ in _known(places, world, figure, method)])
+            mean, ends = mean_interval(values, [t for t, _ in _known(places, world, figure, method)])
             axes.plot([mean], [place], "D", color=colour, markersize=7, zorder=3)
             if ends is not None:
                 axes.plot(ends, [place, place], color=colour, linewidth=2.4, zorder=2)

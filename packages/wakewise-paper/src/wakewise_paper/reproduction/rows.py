@@ -12,16 +12,15 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.experiments.campaigns.definition import PlannedTrial
 from wakewise.experiments.campaigns.statistics import (
-    RESAMPLES,
     WORST,
     Interval,
+    as_reduction,
+    compare_pairs,
     holm,
-    paired_test,
+    mean_interval,
     pairs_needed,
     probability_of_improvement,
-    ratio_of_sums,
-    stratified_bootstrap,
-    wilson,
+    share_interval,
 )
 from wakewise.experiments.campaigns.summary import by_target
 from wakewise.experiments.campaigns.task import TrialOutcome
@@ -33,6 +32,8 @@ Known = tuple[str, int]
 """Target and seed: what pairs are known by."""
 
 
+ORDER_DRAWS = 4000
+"""Draws of the bootstrap that says how often the means stand in the paper's order."""
 NOT_MADE = "not finished"
 """What a campaign says of a trial that it has not come to, or was stopped at."""
 
@@ -162,12 +163,18 @@ def _whole(claim: PublishedFigure, world: str, target: str | None, found: Row, q
     row |= {key: value for key, value in found.items() if key not in row}
     why = {} if "why" not in row else {"ours": row.pop("why")}
     if low is None:
-        why["low"] = why["high"] = "a single trial has no interval" if found["n"] == 1 else "not an estimate"
+        why["low"] = why["high"] = _without_interval(claim, found["n"])
     if row["paper"] is None:
         why["paper"] = row["paper_says"]
     if met is None:
         why["met"] = why.get("ours", "the paper's number is not quoted here")
     return row | {"why": why}
+
+
+def _without_interval(claim: PublishedFigure, n: int) -> str:
+    if n == 1:
+        return "a single trial has no interval"
+    return "too few pairs for their spread" if claim.reading == "less_pct" else "not an estimate"
 
 
 def _mean(claim: PublishedFigure, trials: TableTrials, target: str | None = None) -> Row | None:
@@ -178,12 +185,12 @@ def _mean(claim: PublishedFigure, trials: TableTrials, target: str | None = None
         why = "no trial gave it" if rows else "not flown"
         return {"ours": None, "low": None, "high": None, "n": 0, "failed": failed, "why": why}
     scaled = claim.scale * np.array(list(values.values()))
-    mean, ends = stratified_bootstrap(scaled, [known[0] for known in values])
+    mean, ends = mean_interval(scaled, [known[0] for known in values])
     return _told(mean, ends, len(values), failed)
 
 
 def _less_pct(claim: PublishedFigure, trials: TableTrials) -> Row | None:
-    """Ratio of means over pairs that both have, with the tests of the differences."""
+    """Ratio over pairs that both have, with the test of the same quantity."""
     assert claim.than is not None
     ours, theirs = (trials.values(method, claim.figure) for method in (claim.method, claim.than))
     both = [known for known in ours if known in theirs]
@@ -191,15 +198,14 @@ def _less_pct(claim: PublishedFigure, trials: TableTrials) -> Row | None:
     if not both:
         return {"ours": None, "low": None, "high": None, "n": 0, "failed": failed, "why": "no pair was flown"}
     a, b = (np.array([side[known] for known in both]) for side in (ours, theirs))
-    if not b.sum() > 0.0:
-        return {
-            "ours": None, "low": None, "high": None, "n": len(both), "failed": failed, "why": "nothing to be less than"
-        }  # fmt: skip
-    value, ends = stratified_bootstrap(np.column_stack([a, b]), [known[0] for known in both], ratio_of_sums)
-    turned = None if ends is None else Interval(100.0 * (1.0 - ends.high), 100.0 * (1.0 - ends.low))
-    test = paired_test(a, b)
-    better, _ = probability_of_improvement(*(by_target(side, both) for side in (ours, theirs)))
-    return _told(100.0 * (1.0 - value), turned, len(both), failed) | {
+    compared = compare_pairs(a, b)
+    value, turned = as_reduction(compared.ratio, compared.interval)
+    if value is None:
+        return _told(None, None, len(both), failed) | {"why": "nothing to be less than"}
+    test = compared.test
+    better = probability_of_improvement(*(by_target(side, both) for side in (ours, theirs)))
+    return _told(value, turned, len(both), failed) | {
+        "of": compared.of,
         "theirs": float(b.mean()),
         "own": float(a.mean()),
         "p_t": test.p_t,
@@ -216,7 +222,7 @@ def _share_pct(claim: PublishedFigure, trials: TableTrials) -> Row | None:
     if not values:
         return {"ours": None, "low": None, "high": None, "n": 0, "failed": 0, "why": "not flown"}
     good, n = round(sum(values.values())), len(values)
-    ends = wilson(good, n)
+    ends = share_interval(good, n)
     return _told(100.0 * good / n, Interval(100.0 * ends.low, 100.0 * ends.high), n, n - good)
 
 
@@ -245,7 +251,7 @@ def _order(claim: PublishedFigure, trials: TableTrials) -> Row | None:
     table = np.array([[side[known] for side in values] for known in both])
     means = table.mean(axis=0)
     ours = " > ".join(ORDER[k] for k in np.argsort(-means, kind="stable"))
-    drawn = table[np.random.default_rng(0).integers(len(table), size=(RESAMPLES, len(table)))].mean(axis=1)
+    drawn = table[np.random.default_rng(0).integers(len(table), size=(ORDER_DRAWS, len(table)))].mean(axis=1)
     share = 100.0 * float(_falls(drawn).mean()) if len(table) > 1 else None
     found = _told(share, None, len(both), 0) | {"our_order": ours, "met": bool(_falls(means[None])[0])}
     return found if share is not None else found | {"why": "a single block says only its own order"}
@@ -263,7 +269,7 @@ def _counted(claim: PublishedFigure, figures: Mapping[str, Any]) -> Row:
     n = round(float(plans))
     counts = {"converged_pct": "converged", "late_pct": "late"}
     if claim.figure in counts:
-        ends = wilson(round(float(figures[f"{claim.method}/{counts[claim.figure]}"])), n)
+        ends = share_interval(round(float(figures[f"{claim.method}/{counts[claim.figure]}"])), n)
         return {"low": 100.0 * ends.low, "high": 100.0 * ends.high, "n": n}
     if claim.figure == "ms_mean":
         half = 1.96 * float(figures[f"{claim.method}/ms_sd"]) / math.sqrt(n)

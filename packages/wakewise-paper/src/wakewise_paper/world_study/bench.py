@@ -2,7 +2,7 @@
 
 A short flight (hover on one orbit, part of a lower one, from a side that the seed draws) gives water, silt, sway,
 position and energy; a whole quick scan gives the model. Seed k is one world for all methods, so that flights are
-compared in pairs; intervals are 95 % of a bootstrap over seeds. A campaign makes and
+compared in pairs; intervals are 95 % by Student's t over seeds. A campaign makes and
 keeps flights and scans: a run that was stopped goes on, and a second one flies what is new.
 
 Emergent in these figures are: how jets decay, merge, meet walls and drift, within the laws that the tank is given

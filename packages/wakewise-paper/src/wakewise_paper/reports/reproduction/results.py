@@ -119,10 +119,11 @@ def _index(tables: Mapping[str, Mapping[str, Any]], note: str) -> str:
         "",
         "## How",
         "",
-        "Made by `wakewise reproduce`, which goes on where it was stopped and adds what is new. Intervals hold 95 %: a "
-        "bootstrap over trials within targets; Wilson's for shares. Differences are over pairs of one seed, "
-        "all methods in the same water. *Surely* met: the whole interval is on that side. No constant was tuned to the "
-        "paper's outcome. How each table is measured, and in which world: [reproduce.md](../reproduce.md).",
+        "Made by `wakewise reproduce`, which goes on where it was stopped and adds what is new. Intervals hold 95 %: "
+        "Student's t within targets for means and on logarithms for ratios, exact ones for shares. Differences are "
+        "over pairs of one seed, all methods in the same water. *Surely* met: the whole interval is on that side. No "
+        "constant was tuned to the paper's outcome. How each table is measured, and in which "
+        "world: [reproduce.md](../reproduce.md).",
         "",
         _power(tables),
         "",
