@@ -43,10 +43,7 @@ class Interval(NamedTuple):
 def wilson(successes: int, n: int, confidence: float = 0.95) -> Interval:
     """Interval of a share from counts (Wilson 1927); of none or all it does not shrink to a point.
 
-    Raises
-    ------
-    InputError
-        If counts do not fit each other.
+    Raises InputError if counts do not fit each other.
     """
     if not 0 <= successes <= n or n < 1:
         raise InputError(f"share: {successes} of {n}, must be 0 to n of 1 or more")
@@ -80,10 +77,7 @@ def stratified_bootstrap(
     the stratum of each row, such as its target. If a stratum holds a single row, all rows are one stratum, since
     nothing could vary within it. The interval of a single row is None.
 
-    Raises
-    ------
-    InputError
-        If there are no rows, or one is not finite.
+    Raises InputError if there are no rows, or one is not finite.
     """
     values = np.asarray(rows, dtype=np.float64)
     values = values[:, None] if values.ndim == 1 else values
@@ -198,10 +192,7 @@ def mean_figures(rows: Iterable[Figures], keys: Iterable[str], worst: Sequence[s
 def bonferroni(p: Sequence[float] | Array) -> Array:
     """Each p times how many there are, at most 1; shape (n,) in the order given.
 
-    Raises
-    ------
-    InputError
-        If one is not between 0 and 1.
+    Raises InputError if one is not between 0 and 1.
     """
     values = _checked(p)
     return np.asarray(np.minimum(1.0, len(values) * values))
@@ -210,10 +201,7 @@ def bonferroni(p: Sequence[float] | Array) -> Array:
 def holm(p: Sequence[float] | Array) -> Array:
     """Holm's step-down correction: never larger than Bonferroni's, as safe (Holm 1979, Scand. J. Statist. 6, 65).
 
-    Raises
-    ------
-    InputError
-        If one is not between 0 and 1.
+    Raises InputError if one is not between 0 and 1.
     """
     values = _checked(p)
     order = np.argsort(values, kind="stable")
@@ -248,10 +236,7 @@ def dropped(rows: Iterable[Row | None], figure: str) -> Array:
 def as_worst(rows: Iterable[Row | None], figure: str, worst: Mapping[str, float] = WORST) -> Array:
     """Values over all trials that were meant to be made, shape (n,); those without one count as the worst.
 
-    Raises
-    ------
-    KeyError
-        If no worst is stated for this figure: nobody knows what a failed flight's energy is.
+    Raises KeyError if no worst is stated for this figure, such as the energy of a failed flight.
     """
     least = worst[figure]
     known = (None if row is None else row.get(figure) for row in rows)
@@ -286,10 +271,7 @@ class PairedTest:
 def paired_test(ours: Sequence[float] | Array, theirs: Sequence[float] | Array, confidence: float = 0.95) -> PairedTest:
     """Test the differences of pairs, shape (n,) each and finite; row k of both is one seed.
 
-    Raises
-    ------
-    InputError
-        If there are no pairs, lengths differ, or a value is not finite.
+    Raises InputError if there are no pairs, lengths differ, or a value is not finite.
     """
     a, b = np.asarray(ours, dtype=np.float64), np.asarray(theirs, dtype=np.float64)
     if a.ndim != 1 or a.shape != b.shape or len(a) == 0:
@@ -343,10 +325,7 @@ def probability_of_improvement(
 
     Ties count half: Mann-Whitney's U over n m, averaged over strata. One half means neither is better.
 
-    Raises
-    ------
-    InputError
-        If they share no stratum.
+    Raises InputError if they share no stratum.
     """
     shared: list[Hashable] = [name for name in ours if name in theirs and len(ours[name]) and len(theirs[name])]
     if not shared:
@@ -375,10 +354,7 @@ def _wins(ours: Array, theirs: Array) -> Array:
 def performance_profile(values: Sequence[float] | Array, thresholds: Sequence[float] | Array) -> Array:
     """Share of trials whose figure is at most each threshold, shape of `thresholds`; a trial that is NaN never is.
 
-    Raises
-    ------
-    InputError
-        If there are no trials.
+    Raises InputError if there are no trials.
     """
     known = np.asarray(values, dtype=np.float64)
     if known.size == 0:
@@ -394,10 +370,7 @@ MOST = 100_000
 def power_of_pairs(d_z: float, n: int, alpha: float = 0.05) -> float:
     """Probability that n pairs show a true effect d_z by a two-sided paired t-test (noncentral t).
 
-    Raises
-    ------
-    InputError
-        With fewer than 2 pairs, or alpha not between 0 and 1.
+    Raises InputError with fewer than 2 pairs, or if alpha is not between 0 and 1.
     """
     if n < 2 or not 0.0 < alpha < 1.0:
         raise InputError(f"power: {n} pairs at alpha {alpha}, needs 2 or more and 0 to 1")
@@ -431,10 +404,7 @@ def smallest_effect(n: int, power: float = 0.8, alpha: float = 0.05) -> float | 
 def trials_for_rate(rate: float, half_width: float = 0.05) -> int:
     """Fewest trials after which Wilson's 95 % interval of a share about `rate` is no wider than twice this.
 
-    Raises
-    ------
-    InputError
-        If either is not within 0 and 1.
+    Raises InputError if either is not within 0 and 1.
     """
     if not 0.0 <= rate <= 1.0 or not 0.0 < half_width < 1.0:
         raise InputError(f"rate {rate}, half width {half_width}: must be within 0 and 1")

@@ -228,10 +228,7 @@ def allocation_figures(parts: Parts, steps: pl.DataFrame, instants: int = INSTAN
 
     Both by the wake model of `scenario.control.wake` over the target's own points, at the estimated poses.
 
-    Raises
-    ------
-    InputError
-        If the table lacks a command or an estimate.
+    Raises InputError if the table lacks a command or an estimate.
     """
     vehicle = parts.vehicle
     commands = [f"command_{i + 1}_N" for i in range(len(vehicle.thrusters))]

@@ -238,10 +238,7 @@ def drawing_svg(vehicle: AnyVehicle, *, titled: bool = True) -> str:
     a ring is a jet toward the reader and a cross one away from the reader. What a draft does not state is left out or
     dashed. `titled` puts the name and a line of figures on top.
 
-    Raises
-    ------
-    InputError
-        If the vehicle has no thruster places, that is, only a matrix.
+    Raises InputError if the vehicle has no thruster places, that is, only a matrix.
     """
     draft = as_draft(vehicle)
     if not draft.thrusters:

@@ -56,10 +56,7 @@ class Panel:
 def curve_svg(curve: ThrustCurve, supply_V: float) -> str:
     """Draw a thrust curve as one self-contained SVG; the chosen voltage is blue, those of the table are grey.
 
-    Raises
-    ------
-    InputError
-        If the voltage lies outside the table.
+    Raises InputError if the voltage lies outside the table.
     """
     at = curve.voltage(supply_V)
     low, high = curve.limits_N(at)
