@@ -88,6 +88,19 @@ class ParsedVehicle:
     derived: dict[str, str] = field(default_factory=dict)
     estimates: set[str] = field(default_factory=set)
 
+    @property
+    def origin(self) -> str:
+        """Kind and name of the file, as sources of groups begin."""
+        return f"{self.kind} {self.file.name}"
+
+
+def unit_axis(axis: Array, where: str) -> Array:
+    """An axis at unit length; refuses one of length 0."""
+    length = float(np.linalg.norm(axis))
+    if length < 1e-6:
+        raise PlacedError(f"{where}: axis {axis.tolist()} has length {length:g}, it must not be zero")
+    return axis / length
+
 
 def to_frd(matrix: Array) -> Array:
     """Turn a vector, shape (3,), or a tensor, (3, 3) or (6, 6), between FLU and FRD (its own inverse)."""

@@ -68,7 +68,7 @@ def read_thrusters(robot: Element, bodies: RobotDescription, density: float | No
         )
         rules.append(RULE if kind == "thruster" else SIMPLE_RULE)
         link = actuator.first("link")
-        if link is not None and short(link.attributes.get("name", "")) in {short(name) for name in turning}:
+        if link is not None and short(link.name) in {short(name) for name in turning}:
             steered.append(found.thrusters[-1].name)
     note_movable_thrusters(steered, found)
     old = sum(
@@ -84,7 +84,7 @@ def read_thrusters(robot: Element, bodies: RobotDescription, density: float | No
         doubt = QUESTION if "propeller" in others else ""
         found.notes.append(f"{doubt}not read: actuators that are no thrusters ({said})")
     if found.thrusters:
-        found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: actuators of type thruster"
+        found.derived["thruster_layout"] = f"{found.origin}: actuators of type thruster"
 
 
 def true(text: str | None) -> bool:
@@ -93,9 +93,9 @@ def true(text: str | None) -> bool:
 
 
 def _placed(actuator: Element, bodies: RobotDescription) -> ParsedThruster:
-    name = actuator.attributes.get("name", "") or f"line {actuator.place.line}"
+    name = actuator.name or f"line {actuator.place.line}"
     link_element = actuator.first("link")
-    link = bodies.link(link_element.attributes.get("name", "")) if link_element is not None else None
+    link = bodies.link(link_element.name) if link_element is not None else None
     if link is None:
         raise PlacedError(f"{actuator.place}: thruster {name} is on no link of the robot")
     X_BT = link.X_BL @ origin(actuator.first("origin"))
@@ -132,7 +132,7 @@ def _thruster(
         if kind and true(specs.attributes.get("inverted")) and "inverted_setpoint" not in specs.attributes:
             found.notes.append(
                 f"{QUESTION}thruster {thruster.name}: not read: inverted, which Stonefish ignores (it reads "
-                f"inverted_setpoint); is the thrust meant to be turned? ({specs.place.file.name}:{specs.place.line})"
+                f"inverted_setpoint); is the thrust meant to be turned? ({specs.place.short})"
             )
     left = propeller is not None and not true(propeller.attributes.get("right", "true"))
     if left != inverted:
@@ -255,14 +255,9 @@ class StonefishReader:
             self.notes.append(f"include left out: {fault}")
             return []
         if not path.is_file():
-            self.notes.append(
-                f"include left out, not found: {name[:80]} ({element.place.file.name}:{element.place.line})"
-            )
+            self.notes.append(f"include left out, not found: {name[:80]} ({element.place.short})")
             return []
-        inner = {
-            arg.attributes.get("name", ""): self._text(arg.attributes.get("value", ""), arguments)
-            for arg in element.all("arg")
-        }
+        inner = {arg.name: self._text(arg.attributes.get("value", ""), arguments) for arg in element.all("arg")}
         root = parse_xml(read_text(path), path)
         return self.robots(root, {**inner, **self.arguments}, depth + 1)
 
@@ -312,7 +307,7 @@ def read_stonefish(
     robot = max(robots, key=count)
     if len(robots) > 1:
         found.notes.append(f"robot {robot.attributes.get('name')}: taken out of {len(robots)} in the scenario")
-    found.name = robot.attributes.get("name", "") or found.name
+    found.name = robot.name or found.name
     weights: dict[str, _Weight] = {}
     bodies = _bodies(robot, weights)
     _mass(bodies, weights, found)
@@ -338,7 +333,7 @@ def _bodies(robot: Element, weights: dict[str, _Weight]) -> RobotDescription:
     links: dict[str, Link] = {}
     for i, element in enumerate(elements):
         name = element.attributes.get("name", f"link{i}")
-        links[name] = Link(element.attributes.get("name", ""), element.place)
+        links[name] = Link(element.name, element.place)
         weights[name] = _weight(element, name)
     steps: dict[str, tuple[str, Pose]] = {}
     joints: dict[str, Joint] = {}
@@ -346,7 +341,7 @@ def _bodies(robot: Element, weights: dict[str, _Weight]) -> RobotDescription:
         ends = joint.first("parent"), joint.first("child")
         if ends[0] is None or ends[1] is None:
             continue
-        parent, child = (end.attributes.get("name", "") for end in ends if end is not None)
+        parent, child = (end.name for end in ends if end is not None)
         steps[child] = (parent, origin(joint.first("origin")))
         name, kind = joint.attributes.get("name", f"joint{i}"), joint.attributes.get("type", "")
         joints[name] = Joint(name, kind, child, Pose(np.zeros(3)), None, joint.place, parent)
@@ -463,7 +458,7 @@ def _camera(robot: Element, bodies: RobotDescription, found: ParsedVehicle) -> N
     for sensor in robot.all("sensor"):
         if "camera" in sensor.attributes.get("type", ""):
             link_element = sensor.first("link")
-            link = bodies.link(link_element.attributes.get("name", "")) if link_element is not None else None
+            link = bodies.link(link_element.name) if link_element is not None else None
             if link is None:
                 continue
             found.X_BC = link.X_BL @ origin(sensor.first("origin"))
@@ -472,5 +467,5 @@ def _camera(robot: Element, bodies: RobotDescription, found: ParsedVehicle) -> N
                 degrees = number(specs.attributes["horizontal_fov"], specs.place, "horizontal_fov")
                 found.camera_fov_rad = math.radians(degrees)
             found.notes.append(f"camera: {sensor.attributes.get('name', 'camera')}")
-            found.derived["camera_mount"] = f"{found.kind} {found.file.name}: sensor"
+            found.derived["camera_mount"] = f"{found.origin}: sensor"
             return

@@ -44,7 +44,7 @@ def read_urdf(root: Element) -> RobotDescription:
     placed = {name: _joint(name, e, reached) for name, e in joints if _end(e, "parent") in reached}
     plugins = [p for gazebo in root.all("gazebo") for p in gazebo.all("plugin")]
     return RobotDescription(
-        name=root.attributes.get("name", "") or "vehicle",
+        name=root.name or "vehicle",
         base=base,
         links=reached,
         joints=placed,
@@ -54,7 +54,7 @@ def read_urdf(root: Element) -> RobotDescription:
 
 
 def _named(element: Element) -> str:
-    name = element.attributes.get("name", "").strip()
+    name = element.name.strip()
     if not name:
         raise PlacedError(f"{element.place}: <{element.tag}> without a name")
     return name
