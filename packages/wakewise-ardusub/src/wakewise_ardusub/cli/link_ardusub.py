@@ -224,7 +224,7 @@ def _carried(stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None)
     if ground_at is None:
         transport = open_transport(vehicle_at)
         stack.callback(transport.close)
-        return transport, lambda session: None  # noqa: ARG005
+        return transport, lambda _: None
     for option, end in (("--connection", vehicle_at), ("--relay", ground_at)):
         if end.way not in ("udpin", "udpout"):
             raise InputError(f"{option} {end.words}: the relay forwards udpin:HOST:PORT and udpout:HOST:PORT only")
