@@ -241,7 +241,7 @@ class _Notice:
 
     told = False
 
-    def __call__(self, done: float, total: float, note: str = "") -> None:  # noqa: ARG002  (progress is called so)
+    def __call__(self, done: float, total: float, _note: str = "") -> None:
         """Say once that kernels are compiled, and about how long that takes."""
         if not self.told and total > done:
             self.told = True
