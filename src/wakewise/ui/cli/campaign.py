@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, answer, format_value, interval, print_json, print_table
+from wakewise.ui.cli.console import ProgressBars, answer, format_value, interval, print_table
 from wakewise.ui.cli.options import Json, listed
 
 if TYPE_CHECKING:
@@ -100,11 +100,10 @@ def run_campaign(
             again=again,
         )
     found = results(folder)
-    if json:
-        print_json(status(found) | {"folder": str(folder), "groups": group_table(found)})
-    else:
-        _show_groups(found, group_table(found))
-        typer.echo(f"folder: {folder}; `wakewise campaign page {folder}` says who won, with pictures")
+    groups = group_table(found)
+    place = f"folder: {folder}; `wakewise campaign page {folder}` writes a page with the comparison and pictures"
+    result = status(found) | {"folder": str(folder), "groups": groups}
+    answer(json, result, partial(_show_groups, found, groups), place)
     unmade = [one for one in outcomes if one.figures is None and one.how == "computer"]
     if unmade:
         raise EnvironmentFailure(
@@ -189,11 +188,9 @@ def make_page(
     place = _folder(folder)
     found = results(place)
     page = write_campaign(found, place, out, compare)
-    if json:
-        judged = method_contrasts(paired_groups(found, compare))
-        print_json({"page": str(page), "glances": [asdict(one) | {"sure": one.sure} for _, one in judged]})
-        return
-    typer.echo(f"page: {page}")
+    judged = method_contrasts(paired_groups(found, compare))
+    glances = [asdict(one) | {"sure": one.sure} for _, one in judged]
+    answer(json, {"page": str(page), "glances": glances}, f"page: {page}")
 
 
 @app.command("example")
