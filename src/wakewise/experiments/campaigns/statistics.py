@@ -40,14 +40,14 @@ class Interval(NamedTuple):
     high: float
 
 
-def wilson(successes: int, n: int, confidence: float = 0.95) -> Interval:
-    """Interval of a share from counts (Wilson 1927); of none or all it does not shrink to a point.
+def wilson(successes: int, n: int) -> Interval:
+    """95 % interval of a share from counts (Wilson 1927); of none or all it does not shrink to a point.
 
     Raises InputError if counts do not fit each other.
     """
     if not 0 <= successes <= n or n < 1:
         raise InputError(f"share: {successes} of {n}, must be 0 to n of 1 or more")
-    found = stats.binomtest(successes, n).proportion_ci(confidence, method="wilson")
+    found = stats.binomtest(successes, n).proportion_ci(0.95, method="wilson")
     return Interval(float(found.low), float(found.high))
 
 
@@ -66,12 +66,8 @@ def stratified_bootstrap(
     rows: Sequence[float] | Sequence[Sequence[float]] | Array,
     strata: Sequence[Hashable] | None = None,
     statistic: Statistic = mean_of,
-    *,
-    confidence: float = 0.95,
-    resamples: int = RESAMPLES,
-    seed: int = 0,
 ) -> tuple[float, Interval | None]:
-    """A statistic of trials and its percentile interval, by drawing trials anew within each stratum.
+    """A statistic of trials and its 95 % percentile interval, by drawing trials anew within each stratum.
 
     `rows` have shape (n,) or (n, columns), finite; columns of one row stay together, so pairs stay pairs. `strata` name
     the stratum of each row, such as its target. If a stratum holds a single row, all rows are one stratum, since
@@ -98,13 +94,12 @@ def stratified_bootstrap(
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.simplefilter("ignore", stats.DegenerateDataWarning)  # draws that are not finite are left out below
         drawn = stats.bootstrap(
-            groups, drawn_statistic, n_resamples=resamples, vectorized=True, method="percentile", rng=seed
+            groups, drawn_statistic, n_resamples=RESAMPLES, vectorized=True, method="percentile", rng=0
         ).bootstrap_distribution
     drawn = drawn[np.isfinite(drawn)]
     if len(drawn) == 0:
         return value, None
-    tail = 50.0 * (1.0 - confidence)
-    low, high = np.percentile(drawn, [tail, 100.0 - tail])
+    low, high = np.percentile(drawn, [2.5, 97.5])
     return value, Interval(float(low), float(high))
 
 
@@ -154,13 +149,10 @@ def ratio(pairs: Pairs) -> tuple[float | None, Interval | None]:
 
 
 def reduction_pct(
-    base: Mapping[Any, Figures],
-    other: Mapping[Any, Figures],
-    figure: str,
-    strata: Mapping[Any, Hashable] | None = None,
+    base: Mapping[Any, Figures], other: Mapping[Any, Figures], figure: str
 ) -> tuple[float | None, Interval | None]:
     """Reduction of the mean of a figure, in percent of the base's, over the keys that both have; and its interval."""
-    return as_reduction(*ratio(pairs_of(base, other, figure, strata or {})))
+    return as_reduction(*ratio(pairs_of(base, other, figure, {})))
 
 
 def as_reduction(value: float | None, ends: Interval | None) -> tuple[float | None, Interval | None]:
@@ -233,12 +225,12 @@ def dropped(rows: Iterable[Row | None], figure: str) -> Array:
     return np.array([float(v) for v in known if v is not None and np.isfinite(v)], dtype=np.float64)
 
 
-def as_worst(rows: Iterable[Row | None], figure: str, worst: Mapping[str, float] = WORST) -> Array:
+def as_worst(rows: Iterable[Row | None], figure: str) -> Array:
     """Values over all trials that were meant to be made, shape (n,); those without one count as the worst.
 
     Raises KeyError if no worst is stated for this figure, such as the energy of a failed flight.
     """
-    least = worst[figure]
+    least = WORST[figure]
     known = (None if row is None else row.get(figure) for row in rows)
     return np.array([least if v is None or not np.isfinite(v) else float(v) for v in known], dtype=np.float64)
 
@@ -381,24 +373,24 @@ def power_of_pairs(d_z: float, n: int, alpha: float = 0.05) -> float:
     return float((1.0 if isnan(above) else above) + (0.0 if isnan(below) else below))
 
 
-def pairs_needed(d_z: float, power: float = 0.8, alpha: float = 0.05) -> int | None:
-    """Fewest pairs with which an effect d_z is shown with that chance; None beyond a hundred thousand."""
+def pairs_needed(d_z: float, power: float = 0.8) -> int | None:
+    """Fewest pairs with which an effect d_z is shown with that chance at alpha 0.05; None beyond a hundred thousand."""
     low, high = 1, 2
-    while power_of_pairs(d_z, high, alpha) < power:
+    while power_of_pairs(d_z, high) < power:
         low, high = high, 2 * high
         if high > MOST:
             return None
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (low, middle) if power_of_pairs(d_z, middle, alpha) >= power else (middle, high)
+        low, high = (low, middle) if power_of_pairs(d_z, middle) >= power else (middle, high)
     return high
 
 
-def smallest_effect(n: int, power: float = 0.8, alpha: float = 0.05) -> float | None:
-    """Smallest d_z that n pairs show with that chance; None of fewer than 2."""
+def smallest_effect(n: int) -> float | None:
+    """Smallest d_z that n pairs show with a chance of 80 % at alpha 0.05; None of fewer than 2."""
     if n < 2:
         return None
-    return float(optimize.brentq(lambda d: power_of_pairs(d, n, alpha) - power, 1e-6, 100.0))
+    return float(optimize.brentq(lambda d: power_of_pairs(d, n) - 0.8, 1e-6, 100.0))
 
 
 def trials_for_rate(rate: float, half_width: float = 0.05) -> int:

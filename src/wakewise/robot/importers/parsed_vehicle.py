@@ -183,14 +183,14 @@ def make_draft(found: ParsedVehicle, convention: str, thrust: str) -> VehicleDra
     return draft
 
 
-def symmetrised(matrix: Array, notes: list[str], what: str = "added mass") -> Array:
-    """The symmetric half of a matrix; says by how much it was not symmetric."""
+def symmetrised(matrix: Array, notes: list[str]) -> Array:
+    """The symmetric half of an added mass, with a note on by how much it was not symmetric."""
     skew = float(np.abs(matrix - matrix.T).max())
     if skew == 0.0:
         return matrix
     i, j = np.unravel_index(int(np.argmax(np.abs(matrix - matrix.T))), matrix.shape)
     notes.append(
-        f"{what}: not symmetric, entry ({i + 1}, {j + 1}) differs from its mirror image by {skew:.3g} "
+        f"added mass: not symmetric, entry ({i + 1}, {j + 1}) differs from its mirror image by {skew:.3g} "
         f"(largest entry {np.abs(matrix).max():.6g}); the mean of the two is taken"
     )
     return 0.5 * (matrix + matrix.T)
