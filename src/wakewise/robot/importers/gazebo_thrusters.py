@@ -12,7 +12,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle, unit_axis
-from wakewise.robot.importers.robot_description import THRUSTER_NAME, Joint, RobotDescription, moving_parts
+from wakewise.robot.importers.robot_description import THRUSTER_NAME, Joint, RobotDescription, moving_parts, short
 from wakewise.robot.importers.urdf import origin
 from wakewise.robot.importers.xml import Element, PlacedError, SourceLocation, number, numbers
 
@@ -136,11 +136,6 @@ def on_joint(joint: Joint, bodies: RobotDescription) -> ParsedThruster:
     return ParsedThruster(name, where_on(joint, bodies), unit_axis(axis, where), joint.place, joint.X_BJ.R)
 
 
-def short(name: str) -> str:
-    """A link's name without namespaces."""
-    return name.replace("::", "/").rpartition("/")[2] or name
-
-
 def _uuv(plugin: Element, bodies: RobotDescription) -> ParsedThruster:
     link_name, joint_name = plugin.value("linkName"), plugin.value("jointName")
     joint = bodies.joint(joint_name) if joint_name else None
@@ -222,9 +217,9 @@ def read_thrusters(bodies: RobotDescription, found: ParsedVehicle) -> None:
             order.append(identity)
     _drop_repeats(found, order)
     for plugin in unknown:
-        inner = len(plugin.all("thruster"))
+        inner, title = len(plugin.all("thruster")), plugin.name or plugin.attributes.get("filename") or "without a name"
         found.notes.append(
-            f"{QUESTION}not read: plugin {_title(plugin)}, of a form that is not known"
+            f"{QUESTION}not read: plugin {title[:80]}, of a form that is not known"
             + (f", with {inner} thrusters in it" if inner else "")
             + f" ({plugin.place.short})"
         )

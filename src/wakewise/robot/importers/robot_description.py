@@ -90,15 +90,16 @@ class RobotDescription:
 
     def link(self, name: str) -> Link | None:
         """A link by name, with or without its scope."""
-        return self.links.get(name) or next((v for k, v in self.links.items() if _tail(k) == _tail(name)), None)
+        return self.links.get(name) or next((v for k, v in self.links.items() if short(k) == short(name)), None)
 
     def joint(self, name: str) -> Joint | None:
         """A joint by name, with or without its scope."""
-        return self.joints.get(name) or next((v for k, v in self.joints.items() if _tail(k) == _tail(name)), None)
+        return self.joints.get(name) or next((v for k, v in self.joints.items() if short(k) == short(name)), None)
 
 
-def _tail(name: str) -> str:
-    return name.replace("::", "/").rpartition("/")[2]
+def short(name: str) -> str:
+    """A name without its scope."""
+    return name.replace("::", "/").rpartition("/")[2] or name
 
 
 def pose_of(xyz: Array, rpy: Array) -> Pose:

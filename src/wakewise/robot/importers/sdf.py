@@ -185,23 +185,20 @@ class _Reader:
         return self._pose(relative, (*through, key)) @ pose
 
     def _joint(self, key: str, element: Element, X_BM: Pose) -> Joint:
-        scope = key.rpartition("::")[0]
+        scope = "".join(key.rpartition("::")[:2])
         X_BJ = X_BM @ self._pose(key, ())
-        child = (f"{scope}::" if scope else "") + (element.value("child") or "")
-        axis_element = element.first("axis")
         axis: Array | None = None
         place = element.place
+        axis_element = element.first("axis")
         if axis_element is not None:
-            xyz = axis_element.first("xyz")
-            place = (xyz or axis_element).place
-            text = "0 0 1" if xyz is None else xyz.text.strip() or "0 0 1"
-            axis = numbers(text, place, f"axis of joint {key}", 3)
-            frame = None if xyz is None else xyz.attributes.get("expressed_in")
+            xyz = axis_element.child("xyz")
+            place = xyz.place
+            frame = xyz.attributes.get("expressed_in")
             if axis_element.value("use_parent_model_frame") in {"1", "true"}:
                 frame = "__model__"
-            X_BF = X_BM @ self._pose((f"{scope}::" if scope else "") + frame, ()) if frame else X_BJ
-            axis = X_BF.R @ axis
-        parent = (f"{scope}::" if scope else "") + (element.value("parent") or "")
+            X_BF = X_BM @ self._pose(scope + frame, ()) if frame else X_BJ
+            axis = X_BF.R @ numbers(xyz.text.strip() or "0 0 1", place, f"axis of joint {key}", 3)
+        child, parent = (scope + (element.value(end) or "") for end in ("child", "parent"))
         return Joint(key, element.attributes.get("type", ""), child, X_BJ, axis, place, parent)
 
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
-from wakewise.robot.importers.gazebo_thrusters import short, words
+from wakewise.robot.importers.gazebo_thrusters import words
 from wakewise.robot.importers.parsed_vehicle import ParsedVehicle, symmetrised
-from wakewise.robot.importers.robot_description import PART_NAME, RobotDescription, inertia_matrix
+from wakewise.robot.importers.robot_description import PART_NAME, RobotDescription, inertia_matrix, short
 from wakewise.robot.importers.safe_yaml_nodes import YamlNode
 from wakewise.robot.importers.xml import Element, PlacedError, SourceLocation, number, numbers
 
