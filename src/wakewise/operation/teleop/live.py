@@ -227,27 +227,22 @@ _NO_WATER = ScalarGrid(origin_W_m=np.zeros(3), spacing_m=1.0, values=np.zeros((0
 class LiveFlight:
     """Flies parts until it is told to stop; one thread flies, any other may ask and tell.
 
+    Raises InputError if the folder holds another trial, or a flight already.
+
     Parameters
     ----------
-    parts : Parts
     folder : Path or None
         Becomes a trial folder; None keeps nothing.
     paced : bool
         By the clock; without it as fast as it goes.
     watch : callable, optional
         Called as `(step, witness)` at each step in the flying thread, after the record: it must not take long.
-
     water_every_s : float
         How often the water at the target is measured.
     shutter : Shutter, optional
         Says when photographs are taken and when the flight is over; by default when it is asked.
     checked : bool
         Hold the parts against their scenario's tank first (see `Parts.preflight`); who flies elsewhere has done so.
-
-    Raises
-    ------
-    InputError
-        If the folder holds another trial, or a flight already.
     """
 
     def __init__(

@@ -204,10 +204,7 @@ def print_example() -> None:
 def _engine(name: str, scheduler: str | None, workers: int | None) -> TrialExecutor:
     """The engine that the options name.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name, or the options do not fit.
+    Raises InputError if there is none of that name, or the options do not fit.
     """
     from wakewise.core.errors import InputError
     from wakewise.core.settings import guess

@@ -49,11 +49,7 @@ def open_scene(vehicle: Vehicle, points_W_m: Array) -> ViserScene | None:
 class ViserScene:
     """A scene that is kept up to date; all of it in world NED.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    points_W_m : ndarray, shape (n, 3)
-        Places on the target.
+    `points_W_m`, shape (n, 3): places on the target.
     """
 
     def __init__(self, vehicle: Vehicle, points_W_m: Array) -> None:

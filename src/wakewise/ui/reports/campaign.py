@@ -34,10 +34,7 @@ def write_campaign(found: Results, folder: Path, out: Path | None = None, compar
     `folder` is the campaign's folder with the pictures. `out` is the file, or a folder for campaign.html; `folder` if
     not given. `compare` is the factor that is compared; if empty the first in which trials differ, methods first.
 
-    Raises
-    ------
-    InputError
-        If `compare` is no factor.
+    Raises InputError if `compare` is no factor.
     """
     page = campaign_page(found, folder, compare)
     path = folder / PAGE if out is None else out if out.suffix == ".html" else out / PAGE
