@@ -37,7 +37,7 @@ def note_all(folder: Path) -> None:
     job = ""
 
     class Compilations(events.Listener):
-        def on_start(self, event: Any) -> None:  # noqa: ARG002
+        def on_start(self, _event: Any) -> None:
             open_calls.append(time.process_time())
 
         def on_end(self, event: Any) -> None:
@@ -78,7 +78,7 @@ def _plan(folder: Path) -> None:
     _ = parts.region
 
 
-def _fly(folder: Path) -> None:  # noqa: ARG001
+def _fly(_folder: Path) -> None:
     import wakewise as ww
 
     ww.fly(_scenario())
@@ -98,7 +98,7 @@ def _reconstruct(folder: Path) -> None:
     ww.trial(_scenario(), folder / "trial")
 
 
-def _more(folder: Path) -> None:  # noqa: ARG001
+def _more(_folder: Path) -> None:
     import wakewise as ww
 
     for method in ww.methods():

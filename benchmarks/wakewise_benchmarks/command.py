@@ -14,7 +14,7 @@ import typer
 
 from wakewise.ui.cli.commands import STUDIES, CliCommand
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, write_page
-from wakewise.ui.cli.options import Json
+from wakewise.ui.cli.options import Json, listed, numbers
 from wakewise_paper.cli.bench_operator import show_operator
 from wakewise_paper.cli.bench_wash import show_gentle
 from wakewise_paper.cli.bench_worlds import show_worlds
@@ -138,11 +138,11 @@ def bench(
                 data=data if data.is_dir() else None,
                 progress=progress,
                 seeds=seeds or _SEEDS.get(each, 10),
-                methods=_listed(methods),
-                scenarios=_listed(scenarios),
-                mechanisms=_listed(mechanisms),
-                worlds=_listed(worlds),
-                w_tracks=_numbers("--w-tracks", w_tracks),
+                methods=listed(methods) or None,
+                scenarios=listed(scenarios) or None,
+                mechanisms=listed(mechanisms) or None,
+                worlds=listed(worlds) or None,
+                w_tracks=numbers("--w-tracks", w_tracks) or None,
                 models=models,
                 judge=judge,
                 bound=bound,
@@ -188,31 +188,6 @@ def _list(benches: Mapping[str, str], json: bool) -> None:
     for name, what in sorted(benches.items()):
         typer.echo(f"{name:<{width}}  {lasts[name]:<7}  {what}")
     typer.echo("\nwakewise bench NAME runs one, wakewise bench all runs all of them, one after another: many hours")
-
-
-def _listed(text: str) -> tuple[str, ...] | None:
-    """Names between commas; None for none given."""
-    names = tuple(part.strip() for part in text.split(",") if part.strip())
-    return names or None
-
-
-def _numbers(option: str, text: str) -> tuple[float, ...] | None:
-    """Numbers between commas; None for none given.
-
-    Raises
-    ------
-    InputError
-        If one is not a number.
-    """
-    from wakewise.core.errors import InputError
-
-    found = []
-    for part in _listed(text) or ():
-        try:
-            found.append(float(part))
-        except ValueError:
-            raise InputError(f"{option}: '{part}' is not a number, such as 5 or 1,5,20") from None
-    return tuple(found) or None
 
 
 def _show(result: dict[str, Any], indent: str) -> None:

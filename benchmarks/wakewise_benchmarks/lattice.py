@@ -48,7 +48,7 @@ def make_sweep(cells: tuple[int, int, int], there: int) -> Callable[[Lattice, fl
     STREAM = (NX + 2) * PLANE
     FROM, TO = (1 - there) * 19 * STREAM, there * 19 * STREAM
     pulled = [int(FROM + i * STREAM - c @ (PLANE, ROW, 1)) for i, c in enumerate(VELOCITIES)]
-    A, B, C, D, E, F, G, H, I, J, K, L, M, N, O, P, Q, R, S = pulled  # noqa: E741
+    A, B, C, D, E, F, G, H, J, K, L, M, N, P, Q, R, S, T, U = pulled
 
     @njit(fastmath=True, error_model="numpy", boundscheck=False)
     def pull(f: Lattice, at: int) -> Populations:
@@ -61,17 +61,17 @@ def make_sweep(cells: tuple[int, int, int], there: int) -> Callable[[Lattice, fl
             f[F + at],
             f[G + at],
             f[H + at],
-            f[I + at],
             f[J + at],
             f[K + at],
             f[L + at],
             f[M + at],
             f[N + at],
-            f[O + at],
             f[P + at],
             f[Q + at],
             f[R + at],
             f[S + at],
+            f[T + at],
+            f[U + at],
         )
 
     @njit(fastmath=True, error_model="numpy", boundscheck=False)

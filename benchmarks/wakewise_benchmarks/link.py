@@ -173,13 +173,14 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
             spare=ProtectedRegion(),
             session=7,
         )
-        estimated = session.gate.estimated
+        gate: Any = session.gate
+        estimated = gate.estimated
 
         def watched(estimate: Any) -> None:
             steps_s.append(time.monotonic())
             estimated(estimate)
 
-        session.gate.estimated = watched  # type: ignore[method-assign]
+        gate.estimated = watched
         other.start()
         try:
             session.start()

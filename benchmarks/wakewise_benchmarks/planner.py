@@ -20,7 +20,7 @@ import sys
 import time
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -118,8 +118,16 @@ class IpoptReference:
         size = stages * planner.model.thrusters
         shape = self._shape
 
-        class Callback(casadi.Callback):  # type: ignore[misc]  # casadi, which is optional, has no types
-            """Base of the three functions that IPOPT asks for."""
+        if TYPE_CHECKING:  # casadi, which is optional, has no types
+
+            class Callback:
+                """Base of the three functions that IPOPT asks for."""
+
+                def construct(self, name: str, options: dict[str, object]) -> None: ...
+
+                def __call__(self, *arguments: object) -> Any: ...
+        else:
+            Callback = casadi.Callback
 
         class Gradient(Callback):
             def __init__(self) -> None:

@@ -80,7 +80,9 @@ def test_the_pid_is_told_that_its_wrench_was_not_made(ahead_m: float, saturates:
     bad = np.full(len(LOWER), 400.0)
     guard = with_failsafe(Scripted(bad), VEHICLE, ControlSettings())
     told: list[bool] = []
-    pid = guard.failsafe.pid
+    failsafe = guard.failsafe
+    assert failsafe is not None
+    pid = failsafe.pid
     plain = pid.wrench
 
     class Listening:
@@ -91,6 +93,7 @@ def test_the_pid_is_told_that_its_wrench_was_not_made(ahead_m: float, saturates:
             state, wrench = plain(*args, saturated=saturated, **kwargs)
             return state, wrench if not saturates else 1e3 * np.eye(6)[0] + 0.0 * wrench
 
-    heard = replace(guard, failsafe=replace(guard.failsafe, pid=Listening()))  # type: ignore[type-var]
+    listening: Any = Listening()
+    heard = replace(guard, failsafe=replace(failsafe, pid=listening))
     flown(heard, 4, ahead_m)
     assert told == [False, saturates, saturates, saturates]

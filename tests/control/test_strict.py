@@ -59,7 +59,9 @@ def stepped(answer: Any, **options: Any) -> Command:
 
 
 def planned(fault: Exception, **options: Any) -> str | None:
-    return PlanFailsafe(planner=Asked(fault), deadline_s=1.0, **options).ask(lambda: None, None, 0.0).trouble  # type: ignore[arg-type, return-value]
+    planner: Any = Asked(fault)
+    problem: Any = None
+    return PlanFailsafe(planner=planner, deadline_s=1.0, **options).ask(lambda: problem, None, 0.0).trouble
 
 
 def flown(fault: Exception, strict: bool) -> Command:
@@ -98,12 +100,13 @@ def test_a_vehicle_in_the_water_keeps_its_thrusts_whatever_is_set(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The variable is for simulated worlds, which wait; where the deadline is enforced it is not heeded."""
+    planner: Any = Asked(KeyError())
     for value, wished in (("1", True), ("0", False), ("", False)):
         monkeypatch.setenv(STRICT, value)
         assert is_strict() is wished
         assert with_failsafe(Method(None), VEHICLE, ControlSettings()).failsafe.strict is wished
         assert with_failsafe(Method(None), VEHICLE, ControlSettings(), enforce=True).failsafe.strict is False
-        assert PlanFailsafe(planner=Asked(KeyError()), deadline_s=1.0).strict is False  # type: ignore[arg-type]
+        assert PlanFailsafe(planner=planner, deadline_s=1.0).strict is False
     monkeypatch.setenv(STRICT, "1")
     assert "IndexError" in str(stepped(IndexError("x"), enforce=True).fallback)
 

@@ -69,6 +69,10 @@ def test_what_is_wrong_with_input_or_program_is_no_failure_of_the_computer(fault
     assert not is_full(fault)
 
 
+def _divide(one: int, other: int) -> float:
+    return one / other
+
+
 def test_what_was_merely_being_handled_is_no_cause() -> None:
     """A mistake made while a missing file was handled stays a mistake; one made on a full disk is the disk's."""
     for number, is_found in ((errno.ENOENT, False), (errno.ENOSPC, True)):
@@ -76,7 +80,7 @@ def test_what_was_merely_being_handled_is_no_cause() -> None:
             try:
                 raise OSError(number, "met before")
             except OSError:
-                raise ZeroDivisionError  # noqa: B904  (as a program with a mistake does)
+                _divide(1, 0)
         except ZeroDivisionError as fault:
             assert (environment_failure(fault) is not None) is is_found
 

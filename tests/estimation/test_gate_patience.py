@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -56,8 +57,8 @@ def test_the_models_white_error_counts_over_the_period_of_the_sensor(
     """Over a longer period a white acceleration averages out: its variance goes with one over the period."""
     used: list[float] = []
 
-    def listening(*args: object) -> float:
-        used.append(float(args[7]))  # type: ignore[arg-type]
+    def listening(*args: Any) -> float:
+        used.append(float(args[7]))
         return 0.0
 
     monkeypatch.setattr(eskf, "correct_by_force", listening)

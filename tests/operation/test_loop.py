@@ -1,7 +1,9 @@
 """The loop and its recorder, on a plant simple enough to know by heart."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -34,13 +36,13 @@ class Perfect:
     def init(self, start: BodyState | None = None) -> int:
         return 0
 
-    def step(self, *arguments: object) -> object:
+    def step(self, *arguments: Any) -> Any:
         if len(arguments) == 2:
             self.commands.append(np.asarray(arguments[0]))
             return (Measurement(time_s=0.0),)
         if isinstance(arguments[-1], Goal):
             self.state = BodyState(X_WB=arguments[-1].X_WB, nu_B=arguments[-1].nu_B)
-            count = int(arguments[0]) + 1  # type: ignore[call-overload]
+            count = int(arguments[0]) + 1
             return count, Command(thrusts_N=np.full(2, float(count)), wrench_B=np.zeros(6))
         return 0, self.state
 
@@ -64,9 +66,9 @@ def flown(witnessed: bool = True, plant: Perfect | None = None) -> tuple[FlightR
     )
     run_loop(
         pilot=RoutePilot(route=ROUTE, aim=X_BC),
-        controller=everything,  # type: ignore[arg-type]
-        estimator=everything,  # type: ignore[arg-type]
-        plant=everything,  # type: ignore[arg-type]
+        controller=everything,
+        estimator=everything,
+        plant=everything,
         witness=witness,
         start=everything.state,
         thrusters=2,
@@ -97,10 +99,10 @@ def test_a_goal_that_the_controller_changed_is_recorded_and_aims_the_camera() ->
         def aim(self, tilt_rad: float) -> None:
             self.aimed.append(tilt_rad)
 
-        def step(self, *arguments: object) -> object:
+        def step(self, *arguments: Any) -> Any:
             answer = super().step(*arguments)
-            if isinstance(arguments[-1], Goal) and int(arguments[0]) % 2:  # type: ignore[call-overload]
-                count, command = answer  # type: ignore[misc]
+            if isinstance(arguments[-1], Goal) and int(arguments[0]) % 2:
+                count, command = answer
                 goal = replace(arguments[-1], tilt_rad=0.25, X_WB=Pose(np.full(3, 7.0)))
                 return count, replace(command, goal=goal)
             return answer
@@ -155,10 +157,10 @@ def test_at_sea_nobody_knows_the_truth() -> None:
     assert int(frame["exposing"].sum()) == 4
 
 
-class NeverRead(list):  # type: ignore[type-arg]
+class NeverRead(list[Any]):
     """A list that may grow and must not be gone through."""
 
-    def __iter__(self):  # type: ignore[no-untyped-def]
+    def __iter__(self) -> Iterator[Any]:
         raise AssertionError("the whole record was read at one step")
 
 
@@ -193,9 +195,9 @@ def test_the_estimator_is_told_what_was_flown() -> None:
     )
     run_loop(
         pilot=RoutePilot(route=ROUTE, aim=X_BC),
-        controller=everything,  # type: ignore[arg-type]
-        estimator=spy,  # type: ignore[arg-type]
-        plant=everything,  # type: ignore[arg-type]
+        controller=everything,
+        estimator=spy,
+        plant=everything,
         witness=None,
         start=everything.state,
         thrusters=2,
@@ -215,7 +217,7 @@ class Diverging(Perfect):
         super().__init__()
         self.part, self.value, self.steps = part, value, 0
 
-    def step(self, *arguments: object) -> object:
+    def step(self, *arguments: Any) -> Any:
         self.steps += 1
         late = self.steps > 30
         made = super().step(*arguments)
@@ -223,7 +225,7 @@ class Diverging(Perfect):
             Pose(np.full(3, self.value))
             self.state = BodyState(X_WB=self.state.X_WB, nu_B=np.full(6, self.value))
         if late and self.part == "controller" and isinstance(arguments[-1], Goal):
-            return made[0], Command(thrusts_N=np.full(2, self.value), wrench_B=np.zeros(6))  # type: ignore[index]
+            return made[0], Command(thrusts_N=np.full(2, self.value), wrench_B=np.zeros(6))
         if late and self.part == "estimator" and len(arguments) == 4 and not isinstance(arguments[-1], Goal):
             return 0, BodyState(X_WB=self.state.X_WB, nu_B=np.full(6, self.value))
         return made

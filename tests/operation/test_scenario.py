@@ -175,8 +175,10 @@ def leaves(model: type[BaseModel], prefix: str = "") -> list[str]:
     names: list[str] = []
     for name, field in model.model_fields.items():
         kind = field.annotation
-        group = isinstance(kind, type) and issubclass(kind, BaseModel)
-        names += leaves(kind, f"{prefix}{name}.") if group else [f"{prefix}{name}"]  # type: ignore[arg-type]
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            names += leaves(kind, f"{prefix}{name}.")
+        else:
+            names.append(f"{prefix}{name}")
     return names
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import daqp
 import numpy as np
@@ -15,6 +16,7 @@ from wakewise.planning import check_start
 from wakewise.planning import qp as qp_module
 from wakewise.planning.obstacles import Surroundings
 from wakewise.planning.planner import Planner
+from wakewise.planning.problem import Horizon
 from wakewise.planning.qp import BoxQP
 
 SIZE = 24
@@ -69,8 +71,8 @@ def test_a_plan_beyond_either_limit_is_not_flown(side: str, breaks: bool) -> Non
     """At a thruster's limit it is; beyond, forward or reverse, it is counted as breaking limits."""
 
     class Bold(Planner):
-        def plan(self, *args: object, **how: object) -> object:
-            plan = super().plan(*args, **how)  # type: ignore[arg-type]
+        def plan(self, *args: Any, **how: Any) -> Horizon:
+            plan = super().plan(*args, **how)
             commands = np.array(plan.commands_N)
             limit = getattr(self.model.table, side)[0]
             commands[1, 0] = limit * (1.01 if breaks else 1.0)

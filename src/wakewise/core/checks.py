@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from numbers import Real
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, SupportsIndex, TypeVar, cast
 
 from wakewise.core.errors import InputError
 
@@ -49,7 +49,7 @@ def whole_number(value: object, name: str, lowest: int | None = None, highest: i
     try:
         if type(value).__name__ in ("bool", "bool_"):
             raise TypeError
-        number = operator.index(value)  # type: ignore[arg-type]
+        number = operator.index(cast("SupportsIndex", value))
     except TypeError:
         raise InputError(f"{name}: {quoted(value)}, must be a whole number") from None
     if (lowest is not None and number < lowest) or (highest is not None and number > highest):

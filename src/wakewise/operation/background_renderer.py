@@ -32,12 +32,8 @@ _NEEDED = ("target", "route")
 class BackgroundRenderer:
     """Takes exposures during a flight and has them rendered into a trial's folder; use it in a `with` statement.
 
-    Parameters
-    ----------
-    parts : Parts
-        Where target or route were given in Python, nothing is done: the other process could not make them.
-    folder : Path
-        Of the trial.
+    `parts`: where target or route were given in Python, nothing is done: the other process could not make them.
+    `folder`: of the trial.
     """
 
     def __init__(self, parts: Parts, folder: Path) -> None:

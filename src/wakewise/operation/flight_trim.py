@@ -36,17 +36,9 @@ def hover_mask(steps: pl.DataFrame) -> BoolArray:
 def flight_trim(vehicle: Vehicle, steps: pl.DataFrame) -> HoverTrim:
     """What the hovers of a flight say of the trim of its vehicle.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-        As it was believed to be, ballast included.
-    steps : DataFrame
-        Its record, as in steps.parquet.
+    `vehicle`: as it was believed to be, ballast included. `steps`: its record, as in steps.parquet.
 
-    Raises
-    ------
-    InputError
-        If the record holds no load (it is of an older version), or no hover of two seconds.
+    Raises InputError if the record holds no load (it is of an older version), or no hover of two seconds.
     """
     n = len(vehicle.thrusters)
     needed = [*LOAD, *(f"command_{i + 1}_N" for i in range(n))]
@@ -73,10 +65,7 @@ def flight_trim(vehicle: Vehicle, steps: pl.DataFrame) -> HoverTrim:
 def folder_trim(folder: Path) -> tuple[Parts, HoverTrim]:
     """The same of a trial's folder, and the parts that were flown.
 
-    Raises
-    ------
-    InputError
-        If it is no trial's folder, or as `flight_trim`.
+    Raises InputError if it is no trial's folder, or as `flight_trim`.
     """
     if not (folder / "steps.parquet").is_file() or not (folder / "scenario.yaml").is_file():
         raise InputError(f"{folder}: not the folder of a trial that was flown, needs scenario.yaml and steps.parquet")

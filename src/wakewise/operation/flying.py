@@ -155,9 +155,11 @@ def fly(
 ) -> Flight:
     """Fly the parts once, from the beginning of their world; flown again they give the same flight.
 
+    Raises InputError if the parts do not fit each other, or the duration is not at least one control step; StageError
+    if a part from outside, other than the controller, ends the flight.
+
     Parameters
     ----------
-    flight : Parts or Scenario
     duration_s : float, optional
         Only the first part of the mission.
     progress : callable
@@ -174,13 +176,6 @@ def fly(
     Returns
     -------
     Flight
-
-    Raises
-    ------
-    InputError
-        If the parts do not fit each other, or the duration is not at least one control step.
-    StageError
-        If a part from outside, other than the controller, ends the flight.
 
     Examples
     --------
@@ -224,10 +219,7 @@ def fly(
 def parts_of(flight: Parts | Scenario) -> Parts:
     """The parts themselves, or those of a scenario.
 
-    Raises
-    ------
-    InputError
-        If it is neither.
+    Raises InputError if it is neither.
     """
     if isinstance(flight, Scenario):
         return flight.parts()
@@ -241,7 +233,7 @@ class _Notice:
 
     told = False
 
-    def __call__(self, done: float, total: float, note: str = "") -> None:  # noqa: ARG002  (progress is called so)
+    def __call__(self, done: float, total: float, _note: str = "") -> None:
         """Say once that kernels are compiled, and about how long that takes."""
         if not self.told and total > done:
             self.told = True
@@ -294,10 +286,7 @@ def loop_of(
 def name_external_parts(parts: Parts, recorder: FlightRecorder) -> Iterator[None]:
     """Name the parts from outside, where there are any, as what may have ended a flight.
 
-    Raises
-    ------
-    StageError
-        In place of what was raised.
+    Raises StageError in place of what was raised.
     """
     try:
         yield
@@ -324,10 +313,7 @@ def fly_trial(
     log.mcap, for viewers, is written where the extra `logs` is installed; a trial asks for it beforehand. `exposed` is
     called with each exposure as it is recorded (see `fly`).
 
-    Raises
-    ------
-    StageError
-        If the flight ended with no exposure.
+    Raises StageError if the flight ended with no exposure.
     """
     flight = fly(parts, progress=progress, exposed=exposed)
     made, planned = len(flight.recorder.exposures), len(parts.route.exposures_s)

@@ -108,11 +108,8 @@ def run_loop(
     Before each step `stop` is asked, then `pace` may wait until that time of the flight has come; `sent` is called
     when a step's thrusts go to the plant. What a flight is does not hang on any of them.
 
-    Raises
-    ------
-    StageError
-        If the simulation diverges: a part gives numbers that are not finite, or a vehicle faster than any; which part,
-        and when, is named.
+    Raises StageError if the simulation diverges: a part gives numbers that are not finite, or a vehicle faster than
+    any; which part, and when, is named.
     """
     control_state, filter_state = controller.init(), estimator.init(start)
     estimate, thrusts, aim = start, np.zeros(thrusters), getattr(plant, "aim", None)

@@ -85,7 +85,6 @@ class FlightRecorder:
         How many true poses are kept across each exposure.
     metered : int
         How many true poses are kept from before each exposure, for automatic exposure.
-    thrusters : int
     witness : Witness or None
         Without one, true columns and water columns are NaN and no exposure is rendered.
     water_every_s : float

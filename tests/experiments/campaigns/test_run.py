@@ -9,6 +9,7 @@ import json
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import cheap
 import pytest
@@ -194,10 +195,10 @@ def test_what_is_made_says_of_what(tmp_path: Path) -> None:
         ({"retries": -1}, "retries: -1, allowed 0 to 100"),
     ],
 )
-def test_bounds_that_nothing_can_keep_are_refused(tmp_path: Path, bounds: dict[str, float], words: str) -> None:
+def test_bounds_that_nothing_can_keep_are_refused(tmp_path: Path, bounds: dict[str, Any], words: str) -> None:
     """In one line, before anything is begun."""
     with pytest.raises(InputError, match=words):
-        run(cheap.adding(1), tmp_path / "c", ProcessExecutor(1), **bounds)  # type: ignore[arg-type]
+        run(cheap.adding(1), tmp_path / "c", ProcessExecutor(1), **bounds)
     assert not (tmp_path / "c").exists()
 
 

@@ -9,6 +9,7 @@ import sys
 import threading
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -55,9 +56,9 @@ def test_a_claim_of_a_process_that_nobody_has_waited_for_is_taken_over(tmp_path:
 
 
 @pytest.mark.parametrize("change", [{"start": 1}, {"boot": "another start of the computer"}])
-def test_a_number_given_anew_is_not_taken_for_its_holder(tmp_path: Path, change: dict[str, object]) -> None:
+def test_a_number_given_anew_is_not_taken_for_its_holder(tmp_path: Path, change: dict[str, Any]) -> None:
     """A process of the same number that started at another time, or in another run of the computer, is another."""
-    _write(tmp_path, replace(this_process(), **change))  # type: ignore[arg-type]
+    _write(tmp_path, replace(this_process(), **change))
     assert trial_lock.holder_of(tmp_path) is not None
     assert trial_lock.acquire_lock(tmp_path)
 

@@ -1,6 +1,7 @@
 """A flight without an end, told from outside what to do."""
 
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 import pytest
@@ -13,7 +14,7 @@ from wakewise.operation.loop import Step
 SCENARIO = load_scenario("quick", None, {"method": "dp"})
 
 
-def flown(folder: Path | None, steps: int, captures: tuple[int, ...] = (), **more: object) -> LiveFlight:
+def flown(folder: Path | None, steps: int, captures: tuple[int, ...] = (), **more: Any) -> LiveFlight:
     """A flight of so many steps, with photographs asked for at some."""
 
     def watch(step: Step, witness: TruthProvider | None) -> None:
@@ -23,7 +24,7 @@ def flown(folder: Path | None, steps: int, captures: tuple[int, ...] = (), **mor
         if number == steps - 1:
             flight.stop()
 
-    flight = LiveFlight(SCENARIO.parts(), folder=folder, paced=False, watch=watch, **more)  # type: ignore[arg-type]
+    flight = LiveFlight(SCENARIO.parts(), folder=folder, paced=False, watch=watch, **more)
     flight.start()
     flight.join(120.0)
     assert not flight.running

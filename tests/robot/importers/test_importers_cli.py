@@ -65,9 +65,9 @@ def test_out_is_a_vehicle_file(file: Path, tmp_path: Path) -> None:
     [
         (["--frame", "ENU"], "frame 'ENU': allowed auto, FLU, FRD"),
         (["--thrust-direction", "up"], "thrust direction 'up': allowed"),
-        (["--package", "nodir"], "allowed form --package NAME=DIR"),
+        (["--package", "nodir"], "--package nodir: allowed is NAME=DIR"),
         (["--package", "a=/does/not/exist"], "package a: .* is not a folder"),
-        (["--arg", "a=1"], "allowed form --arg NAME:=VALUE"),
+        (["--arg", "a=1"], "--arg a=1: allowed is NAME:=VALUE"),
         (["--arg", "a:=1"], "has no xacro arguments"),
         (["--matrix", "/does/not/exist"], "not found or not a file"),
     ],

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,10 +18,10 @@ from wakewise.robot.vehicles import VehicleDraft
 SIX = nps.arrays(np.float64, (6, 6), elements=st.floats(-10, 10))
 
 
-def imported(folder: Path, text: str, name: str = "rov.sdf", **options: object) -> VehicleDraft:
+def imported(folder: Path, text: str, name: str = "rov.sdf", **options: Any) -> VehicleDraft:
     path = folder / name
     path.write_text(text)
-    return import_vehicle(path, **options)  # type: ignore[arg-type]
+    return import_vehicle(path, **options)
 
 
 @given(SIX, nps.arrays(np.float64, 6, elements=st.floats(-10, 10)))

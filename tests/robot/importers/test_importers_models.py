@@ -3,6 +3,7 @@
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -180,9 +181,10 @@ def test_frame_and_thrust_direction_can_be_told() -> None:
     along = import_vehicle(path, thrust="-z")
     np.testing.assert_allclose(along.allocation_matrix, auto.allocation_matrix, atol=1e-12)
     assert "told" in along.notes[1]
-    for wrong in ({"convention": "ENU"}, {"thrust": "up"}):
+    refused: list[dict[str, Any]] = [{"convention": "ENU"}, {"thrust": "up"}]
+    for wrong in refused:
         with pytest.raises(InputError, match="allowed"):
-            import_vehicle(path, **wrong)  # type: ignore[arg-type]
+            import_vehicle(path, **wrong)
 
 
 def test_a_matrix_of_another_vehicle_is_refused(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Names of thrusters say where left, front and up are, and so the frame that their places are read in."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,10 +24,10 @@ def listed(names: list[str], places: np.ndarray = PLACES, axes: np.ndarray = AXE
     return before + "thrusters:\n" + "".join(rows)
 
 
-def imported(folder: Path, text: str, **options: str) -> VehicleDraft:
+def imported(folder: Path, text: str, **options: Any) -> VehicleDraft:
     path = folder / "t.yaml"
     path.write_text(text)
-    return import_vehicle(path, **options)  # type: ignore[arg-type]
+    return import_vehicle(path, **options)
 
 
 def doubts(draft: VehicleDraft) -> list[str]:
@@ -152,13 +153,13 @@ LINK = """<link name="{name}"/><joint name="{name}_joint" type="fixed"><parent l
 BASE = '<robot name="r"><link name="base_link"><inertial><mass value="9"/></inertial></link>'
 
 
-def links(folder: Path, rpys: list[str], extra: str = "", **options: str) -> VehicleDraft:
+def links(folder: Path, rpys: list[str], extra: str = "", **options: Any) -> VehicleDraft:
     text = ""
     for i, rpy in enumerate(rpys):
         text += LINK.format(name=f"thruster_{i}", xyz=f"{0.1 * (i % 3)} {0.2 * (-1) ** i} 0", rpy=rpy)
     path = folder / "r.urdf"
     path.write_text(f"{BASE}{text}{extra}</robot>")
-    return import_vehicle(path, **options)  # type: ignore[arg-type]
+    return import_vehicle(path, **options)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,10 +26,10 @@ MOMENTS_FIRST = WRENCH[[3, 4, 5, 0, 1, 2]]
 DOWN = "body_frame: base_link_frd\n"
 
 
-def imported(folder: Path, text: str, **options: str) -> VehicleDraft:
+def imported(folder: Path, text: str, **options: Any) -> VehicleDraft:
     path = folder / "m.yaml"
     path.write_text(text)
-    return import_vehicle(path, **options)  # type: ignore[arg-type]
+    return import_vehicle(path, **options)
 
 
 @pytest.mark.parametrize("n", [6, 7])

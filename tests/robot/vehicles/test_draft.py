@@ -1,6 +1,7 @@
 """Drafts: what a file does not say stays unsaid, what it says is refused where a vehicle would refuse it."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +13,9 @@ EMPTY = VehicleDraft(name="x", title="X", source="nowhere", does_not_claim="anyt
 SPUN = np.eye(3) + np.eye(3, k=1)
 
 
-def thruster(**changes: object) -> ThrusterDraft:
-    values: dict[str, object] = {"name": "T", "p_BT_m": np.zeros(3), "axis_B": np.array([0.0, 0.0, 1.0])}
-    return ThrusterDraft(**(values | changes))  # type: ignore[arg-type]
+def thruster(**changes: Any) -> ThrusterDraft:
+    values: dict[str, Any] = {"name": "T", "p_BT_m": np.zeros(3), "axis_B": np.array([0.0, 0.0, 1.0])}
+    return ThrusterDraft(**(values | changes))
 
 
 def test_an_empty_draft_lacks_everything_and_cannot_fly() -> None:
@@ -96,9 +97,9 @@ def test_an_added_mass_off_by_rounding_is_made_symmetric_and_that_is_said() -> N
         ({"thrusters": (thruster(),), "shipped_matrix": np.zeros((6, 2))}, r"allowed \(6, 1\)"),
     ],
 )
-def test_an_impossible_value_is_refused(changes: dict[str, object], words: str) -> None:
+def test_an_impossible_value_is_refused(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        replace(EMPTY, **changes)  # type: ignore[arg-type]
+        replace(EMPTY, **changes)
 
 
 @pytest.mark.parametrize(
@@ -112,7 +113,7 @@ def test_an_impossible_value_is_refused(changes: dict[str, object], words: str) 
         ({"time_constant_s": float("nan")}, "time_constant_s"),
     ],
 )
-def test_an_impossible_thruster_is_refused(changes: dict[str, object], words: str) -> None:
+def test_an_impossible_thruster_is_refused(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         thruster(**changes)
 

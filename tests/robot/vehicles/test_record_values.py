@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,7 +40,7 @@ NONSENSE = (
 )
 ROV = load_vehicle("paper-tilting")
 DRAFT = load_draft("paper-tilting")
-RECORDS = [
+RECORDS: list[Any] = [
     ROV,
     DRAFT,
     ROV.thrusters[0],
@@ -53,17 +54,17 @@ RECORDS = [
 ]
 
 
-def kinds() -> list[tuple[object, str]]:
-    return [(record, field.name) for record in RECORDS for field in fields(record)]  # type: ignore[arg-type]
+def kinds() -> list[tuple[Any, str]]:
+    return [(record, field.name) for record in RECORDS for field in fields(record)]
 
 
 @pytest.mark.parametrize(
     ("record", "field"), kinds(), ids=lambda value: value if isinstance(value, str) else type(value).__name__
 )
-def test_any_value_in_any_field_is_taken_or_refused_by_its_name(record: object, field: str) -> None:
+def test_any_value_in_any_field_is_taken_or_refused_by_its_name(record: Any, field: str) -> None:
     for value in NONSENSE:
         try:
-            replace(record, **{field: value})  # type: ignore[type-var]
+            replace(record, **{field: value})
         except InputError as fault:
             named = str(fault).replace("_", " ")
             short = field.replace("_", " ").removesuffix(" rad s").removesuffix(" rad")
@@ -109,9 +110,9 @@ def test_any_value_in_any_field_is_taken_or_refused_by_its_name(record: object, 
         (ROV.hydrodynamics, "added_mass", "six"),
     ],
 )
-def test_what_no_vehicle_has_is_refused(record: object, field: str, value: object) -> None:
+def test_what_no_vehicle_has_is_refused(record: Any, field: str, value: object) -> None:
     with pytest.raises(InputError):
-        replace(record, **{field: value})  # type: ignore[type-var]
+        replace(record, **{field: value})
 
 
 def test_all_records_of_a_vehicle_are_among_those_tried() -> None:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -136,7 +137,7 @@ def test_the_depth_picture_is_that_of_rays_through_triangles() -> None:
 @pytest.mark.parametrize(
     "wrong", [{"incidence_rad": 2.0}, {"pixel_m": 0.0}, {"apart_rad": (0.5, 0.1)}, {"apart_rad": (0.0, 0.1)}]
 )
-def test_needs_that_cannot_be_are_refused(wrong: dict[str, object]) -> None:
+def test_needs_that_cannot_be_are_refused(wrong: dict[str, Any]) -> None:
     """An incidence beyond a right angle, a pixel of no size, angles that do not rise."""
     with pytest.raises(InputError, match="allowed"):
-        VisibilityCriteria(**wrong)  # type: ignore[arg-type]
+        VisibilityCriteria(**wrong)

@@ -1,6 +1,7 @@
 """Every size, seed and depth that is given for a target is used or refused, and a misspelt name has a guess."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,18 +47,18 @@ def test_a_mesh_file_is_scaled_and_has_no_seed(box: str) -> None:
 
 
 @pytest.mark.parametrize("bed_z_m", [-5.0, 0.0, float("nan"), float("inf"), "1", True, None])
-def test_a_bed_lies_below_the_surface(bed_z_m: object, box: str) -> None:
+def test_a_bed_lies_below_the_surface(bed_z_m: Any, box: str) -> None:
     for kind in ("brain", box):
         with pytest.raises(InputError, match="bed_z_m"):
-            ww.load_target(kind, bed_z_m=bed_z_m)  # type: ignore[arg-type]
+            ww.load_target(kind, bed_z_m=bed_z_m)
 
 
 @pytest.mark.parametrize("seed", [-1, MAX_SEED + 1, 2**200, 1.0, True, "1", None])
-def test_a_seed_is_a_whole_number_of_64_bits(seed: object) -> None:
+def test_a_seed_is_a_whole_number_of_64_bits(seed: Any) -> None:
     with pytest.raises(InputError, match="seed"):
-        ww.load_target("brain", seed=seed)  # type: ignore[arg-type]
+        ww.load_target("brain", seed=seed)
     with pytest.raises(InputError, match="seed"):
-        coral("plate", seed)  # type: ignore[arg-type]
+        coral("plate", seed)
     if seed not in (1.0, "1"):  # in a file those are the number one
         for field in ("seed", "target.seed"):
             with pytest.raises(InputError, match=field):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -68,10 +69,13 @@ def test_every_command_writes_its_report_under_guard():
     assert found == PAGE_IS_THE_RESULT
 
 
+NOTHING: Any = None
+
+
 def test_a_fault_is_told_in_a_line_with_its_place():
     """A fault of the program with kind and line, one that is foreseen with its words; Ctrl-C goes through."""
     with report_attempt() as attempt:
-        float(None)  # type: ignore[arg-type]
+        float(NOTHING)
     assert attempt.fault is not None and "\n" not in attempt.fault
     assert attempt.fault.startswith("TypeError: float()") and "(test_failing_reports.py:" in attempt.fault
     with report_attempt() as attempt:
@@ -87,7 +91,7 @@ def test_a_fault_is_told_in_a_line_with_its_place():
 
 
 def broken(*_: object, **__: object) -> None:
-    float(None)  # type: ignore[arg-type]
+    float(NOTHING)
 
 
 @pytest.fixture

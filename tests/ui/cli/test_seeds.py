@@ -1,5 +1,7 @@
 """A seed on the command line is a whole number from 0 to 2^63 - 1; any other is refused in one line."""
 
+from typing import Any
+
 import pytest
 import typer
 
@@ -28,11 +30,11 @@ def test_a_seed_out_of_range_is_refused(words: list[str], seed: str, capsys: pyt
 def test_every_seed_of_a_command_is_checked() -> None:
     """Each option called --seed has the check."""
 
-    def options(command: object) -> list[object]:
+    def options(command: Any) -> list[Any]:
         inner = getattr(command, "commands", {})
         own = [p for p in getattr(command, "params", []) if "--seed" in p.opts]
         return own + [option for child in inner.values() for option in options(child)]
 
     found = options(typer.main.get_command(app))
     assert len(found) > 5
-    assert all(option.callback is not None for option in found)  # type: ignore[attr-defined]
+    assert all(option.callback is not None for option in found)

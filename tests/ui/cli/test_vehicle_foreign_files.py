@@ -50,7 +50,7 @@ def test_show_places_the_thruster_where_the_options_say(tmp_path: Path) -> None:
         (["--frame", "FLU"], "vehicle bluerov2-heavy: needs no frame"),
         (["--thrust-direction", "reversed"], "needs no thrust direction"),
         (["--arg", "x:=1"], "needs no arguments"),
-        (["--arg", "x=1"], "allowed form --arg NAME:=VALUE"),
+        (["--arg", "x=1"], "--arg x=1: allowed is NAME:=VALUE"),
     ],
 )
 def test_options_for_foreign_files_are_refused_for_our_own(options: list[str], match: str) -> None:

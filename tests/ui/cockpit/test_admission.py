@@ -9,17 +9,19 @@ import socket
 import time
 from collections.abc import Iterator
 from contextlib import AsyncExitStack, ExitStack, suppress
+from typing import Any
 
 import pytest
 from rehearsal import Rehearsal
 from test_server import Page, _opening, page
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.typing import Origin
 
 from wakewise.ui.cockpit.server import MOST_CLIENTS, CockpitServer
 from wakewise.ui.web.origin_check import PER_ADDRESS
 
-ORIGIN = "http://rov.example"
+ORIGIN = Origin("http://rov.example")
 
 
 @pytest.fixture
@@ -120,11 +122,11 @@ def test_of_too_many_pages_the_last_pilot_still_gets_in(server: CockpitServer) -
 def test_the_token_is_asked_at_the_handshake(guarded: CockpitServer) -> None:
     """Without it no socket opens, so that none can wait; the same request without a socket is answered in words."""
     home = f"127.0.0.1:{guarded.port}"
-    right: list[dict[str, object]] = [
+    right: list[dict[str, Any]] = [
         {"subprotocols": ["wakewise", f"token.{guarded.token}"]},
         {"additional_headers": {"X-Wakewise-Token": guarded.token}},
     ]
-    wrong: list[dict[str, object]] = [
+    wrong: list[dict[str, Any]] = [
         {},
         {"subprotocols": ["wakewise"]},
         {"subprotocols": ["wakewise", "token.guess"]},
@@ -134,11 +136,11 @@ def test_the_token_is_asked_at_the_handshake(guarded: CockpitServer) -> None:
     async def tries() -> None:
         for more in wrong:
             with pytest.raises(InvalidStatus) as refusal:
-                await connect(f"ws://{home}/ws", origin=ORIGIN, **more)  # type: ignore[arg-type]
+                await connect(f"ws://{home}/ws", origin=ORIGIN, **more)
             assert refusal.value.response.status_code == 401
         assert guarded.clients == {}
         for more in right:
-            async with connect(f"ws://{home}/ws", origin=ORIGIN, **more) as one:  # type: ignore[arg-type]
+            async with connect(f"ws://{home}/ws", origin=ORIGIN, **more) as one:
                 await one.send(json.dumps({"type": "hello", "token": None, "name": "x", "wants": "helm"}))
                 assert (await Page(one).helm())["yours"]
 

@@ -17,6 +17,7 @@ import pytest
 from rehearsal import Rehearsal
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.typing import Origin
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cockpit import server as server_module
@@ -94,7 +95,7 @@ class Page:
 @asynccontextmanager
 async def page(server: CockpitServer, wants: str = "watch", **hello: Any) -> AsyncIterator[Page]:
     home = f"127.0.0.1:{server.port}"
-    async with connect(f"ws://{home}/ws", origin=f"http://{home}", max_queue=None, close_timeout=1) as socket:  # type: ignore[arg-type]
+    async with connect(f"ws://{home}/ws", origin=Origin(f"http://{home}"), max_queue=None, close_timeout=1) as socket:
         one = Page(socket)
         await one.say(**({"type": "hello", "token": None, "name": wants, "wants": wants} | hello))
         await one.helm()
@@ -130,11 +131,15 @@ def test_the_page_is_served_under_this_computers_names_alone(server: CockpitServ
 
 def test_another_sites_page_may_not_open_the_socket(server: CockpitServer) -> None:
     """Neither a foreign Origin nor a foreign Host."""
+    foreign: list[dict[str, Any]] = [
+        {"origin": "http://evil.example"},
+        {"additional_headers": {"Host": "evil.example"}},
+    ]
 
     async def tries() -> None:
-        for more in ({"origin": "http://evil.example"}, {"additional_headers": {"Host": "evil.example"}}):
+        for more in foreign:
             with pytest.raises((InvalidStatus, ConnectionClosed)):
-                async with connect(f"ws://127.0.0.1:{server.port}/ws", **more):  # type: ignore[arg-type]
+                async with connect(f"ws://127.0.0.1:{server.port}/ws", **more):
                     pass
 
     asyncio.run(tries())

@@ -9,6 +9,7 @@ import asyncio
 import json
 import os
 import socket
+from collections.abc import AsyncIterable
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,6 @@ def test_a_flight_leaves_memory_as_it_is(tmp_path: Path) -> None:
     assert grows_mb < MOST_MB_PER_MINUTE
 
 
-async def _drain(socket: object) -> None:
-    async for _ in socket:  # type: ignore[attr-defined]
+async def _drain(socket: AsyncIterable[object]) -> None:
+    async for _ in socket:
         pass

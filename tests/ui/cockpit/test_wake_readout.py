@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -48,7 +50,8 @@ def test_the_rms_speed_is_that_of_the_whole_region(parts: Parts, gauges: WakeRea
 @pytest.mark.parametrize(("direct_m_s", "saved"), [(2e-3, 75.0), (0.9 * STILL_M_S, None), (0.0, None)])
 def test_of_still_water_nothing_is_saved(gauges: WakeReadout, direct_m_s: float, saved: float | None) -> None:
     """Where direct thrusts leave the water as good as still there is no share to tell, not one of 0 %."""
-    instruments = StateEncoder(gauges, None)  # type: ignore[arg-type]
+    no_recorder: Any = None
+    instruments = StateEncoder(gauges, no_recorder)
     direct = gauges.view.total_weight * direct_m_s**2
     instruments._both.append((0.25 * direct, direct))
     assert instruments.saved_pct == (None if saved is None else pytest.approx(saved))

@@ -9,6 +9,7 @@ from pathlib import Path
 from unittest.mock import MagicMock, patch
 
 import numpy as np
+import pytest
 import trimesh
 import yaml
 
@@ -26,12 +27,14 @@ def test_the_scene_is_east_north_up() -> None:
     assert np.linalg.det(R_UW) > 0
 
 
-def test_the_scene_is_one_page_and_keeps_standard_output_clean(made_up: Path, capfd: object) -> None:
+def test_the_scene_is_one_page_and_keeps_standard_output_clean(
+    made_up: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     """The greeting of viser does not reach the command line's answer."""
     html = scene_html(read_trial(made_up), None)
     assert html is not None
     assert html.lstrip().lower().startswith("<!doctype html")
-    assert capfd.readouterr().out == ""  # type: ignore[attr-defined]
+    assert capfd.readouterr().out == ""
 
 
 def layers(trial: Trial, errors: ModelErrors | None) -> tuple[dict[str, bool], MagicMock]:

@@ -35,19 +35,29 @@ class MotorDrivenVehicle(Protocol):
     """
 
     @property
-    def name(self) -> str: ...  # noqa: D102
+    def name(self) -> str:
+        """Name used in messages."""
+        ...
 
     @property
-    def thrusters(self) -> Sequence[Any]: ...  # noqa: D102
+    def thrusters(self) -> Sequence[Any]:
+        """Thrusters in the order of the motors."""
+        ...
 
     @property
-    def thrust_lower_N(self) -> Array: ...  # noqa: D102
+    def thrust_lower_N(self) -> Array:
+        """Least thrust of each thruster, shape (n,), N."""
+        ...
 
     @property
-    def thrust_upper_N(self) -> Array: ...  # noqa: D102
+    def thrust_upper_N(self) -> Array:
+        """Largest thrust of each thruster, shape (n,), N."""
+        ...
 
     @property
-    def curve(self) -> Any: ...  # noqa: D102
+    def curve(self) -> Any:
+        """Thrust curve of the motors, or the record that names its table; None without one."""
+        ...
 
 
 def channels_of_motors(parameters: Mapping[str, float]) -> dict[int, list[int]]:

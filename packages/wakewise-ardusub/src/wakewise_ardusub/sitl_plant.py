@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, cast
 
 import numpy as np
 
@@ -36,6 +36,14 @@ if TYPE_CHECKING:
 _GRAVITY_W_M_S2 = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
+class _PushedPlant(Plant, Protocol):
+    """A plant that takes a wrench from outside, as that of the surface."""
+
+    def push(self, wrench_B: Array) -> None:
+        """Apply a wrench, shape (6,), in B, until the next call."""
+        ...
+
+
 class PlantBody:
     """A plant with a witness, as `wakewise_ardusub.physics.SimulatedBody`.
 
@@ -55,7 +63,7 @@ class PlantBody:
         self.state = witness.observe().state
         """Where it is and how it moves."""
         self._v_W_m_s = _velocity_W(self.state)
-        self._push: Callable[[Array], None] | None = None if surface is None else plant.push  # type: ignore[attr-defined]
+        self._push: Callable[[Array], None] | None = None if surface is None else cast("_PushedPlant", plant).push
 
     def step(self, thrusts_N: Array, dt_s: float) -> PhysicsState:
         """Hold commanded thrusts, shape (n,), for `dt_s`."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,6 +14,7 @@ from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link import protocol
 from wakewise_ardusub.link.checks import (
+    Answer,
     CheckInputs,
     CheckResult,
     MotorObservation,
@@ -46,14 +48,14 @@ RIGHT = CheckInputs(vehicle=HEAVY, parameters=PARAMETERS, system=1, heard=HEARD)
 DATA = Path(os.environ.get("WAKEWISE_DATA", "")) / "ardusub"
 
 
-def _seen(**answers: str) -> MotorResults:
+def _seen(**answers: Answer) -> MotorResults:
     seen = {
         int(key[1:]): MotorObservation(
             motor=int(key[1:]),
             pulse_us=1560,
             direction=float(DIRECTIONS[int(key[1:]) - 1]),
             expected="ahead",
-            answer=answer,  # type: ignore[arg-type]
+            answer=answer,
         )
         for key, answer in answers.items()
     }
@@ -65,7 +67,7 @@ def _with(**parameters: float | None) -> CheckInputs:
     return dataclasses.replace(RIGHT, parameters=changed)
 
 
-def _heard(**fields: object) -> CheckInputs:
+def _heard(**fields: Any) -> CheckInputs:
     return dataclasses.replace(RIGHT, heard=dataclasses.replace(HEARD, **fields))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from array import array
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -59,7 +59,7 @@ class Logger:
 class Node:
     """What a node asks of rclpy: parameters with a type each, topics, timers, a clock and a log."""
 
-    overrides: dict[str, Any] = {}  # noqa: RUF012
+    overrides: ClassVar[dict[str, Any]] = {}
 
     def __init__(self, name: str) -> None:
         self.name, self.clock, self.logger = name, Clock(), Logger()
@@ -177,15 +177,15 @@ def install(patch: pytest.MonkeyPatch) -> None:
 
     for package in sorted({name.partition("/")[0] for name in defined if "/msg/" in name}):
         patch.setitem(sys.modules, package, ModuleType(package))
-        messages = ModuleType(f"{package}.msg")
-        messages.__getattr__ = lambda word, package=package: make(f"{package}/msg/{word}")  # type: ignore[method-assign]
+        messages: Any = ModuleType(f"{package}.msg")
+        messages.__getattr__ = lambda word, package=package: make(f"{package}/msg/{word}")
         patch.setitem(sys.modules, f"{package}.msg", messages)
-    ros, node, qos = ModuleType("rclpy"), ModuleType("rclpy.node"), ModuleType("rclpy.qos")
-    clock = ModuleType("rclpy.clock")
-    node.Node, qos.qos_profile_sensor_data = Node, object()  # type: ignore[attr-defined]
-    qos.QoSProfile = SimpleNamespace  # type: ignore[attr-defined]
-    qos.DurabilityPolicy = SimpleNamespace(TRANSIENT_LOCAL="transient local")  # type: ignore[attr-defined]
-    qos.ReliabilityPolicy = SimpleNamespace(RELIABLE="reliable")  # type: ignore[attr-defined]
-    clock.Clock, clock.ClockType = Clock, SimpleNamespace(STEADY_TIME="STEADY_TIME")  # type: ignore[attr-defined]
-    for module in (ros, node, qos, clock):
+    modules: list[Any] = [ModuleType(name) for name in ("rclpy", "rclpy.node", "rclpy.qos", "rclpy.clock")]
+    _, node, qos, clock = modules
+    node.Node, qos.qos_profile_sensor_data = Node, object()
+    qos.QoSProfile = SimpleNamespace
+    qos.DurabilityPolicy = SimpleNamespace(TRANSIENT_LOCAL="transient local")
+    qos.ReliabilityPolicy = SimpleNamespace(RELIABLE="reliable")
+    clock.Clock, clock.ClockType = Clock, SimpleNamespace(STEADY_TIME="STEADY_TIME")
+    for module in modules:
         patch.setitem(sys.modules, module.__name__, module)

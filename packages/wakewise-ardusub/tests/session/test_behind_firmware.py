@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -114,9 +116,9 @@ def test_a_vehicle_cannot_leave_the_water() -> None:
 
 
 @pytest.mark.parametrize("water", [Tank, QuasiSteadyWater, LatticeWater])
-def test_every_plant_of_this_package_can_be_given_a_surface(water: type) -> None:
+def test_every_plant_of_this_package_can_be_given_a_surface(water: Any) -> None:
     """Each world begins with one of these; a plant of others without `push` has none, which is said."""
-    assert SitlPlant.has_surface(water)  # type: ignore[arg-type]
+    assert SitlPlant.has_surface(water)
     assert not SitlPlant.has_surface(Sledge())
     parts = Scenario.preset("quick").parts()
     assert "can rise out of its water" in SitlPlant(parts=parts.replace(world=World())).ready(lambda *_: None)

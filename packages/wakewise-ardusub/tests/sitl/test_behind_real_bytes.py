@@ -39,7 +39,7 @@ from wakewise_ardusub.link.protocol import (
 )
 from wakewise_ardusub.link.script import script_text
 from wakewise_ardusub.physics import FreeWater, PhysicsServer, PulseTable, SimulatedBody
-from wakewise_ardusub.physics.datagrams import PORT
+from wakewise_ardusub.physics.datagrams import PORT, PhysicsState
 from wakewise_ardusub.physics.physics import LOOPBACK, open_socket, serve
 from wakewise_ardusub.physics.surface import LoweringBody
 from wakewise_ardusub.sitl.companion_harness import CompanionHarness
@@ -135,10 +135,15 @@ class Ashore:
         return 0.0 if self.physics.motion is None else self.physics.motion.time_s
 
     @property
+    def motion(self) -> PhysicsState:
+        """The vehicle's, as physics knows it."""
+        assert self.physics.motion is not None
+        return self.physics.motion
+
+    @property
     def depth_m(self) -> float:
         """As physics knows it."""
-        assert self.physics.motion is not None
-        return float(self.physics.motion.p_WB_m[2])
+        return float(self.motion.p_WB_m[2])
 
     @property
     def off_m(self) -> float:
@@ -345,7 +350,8 @@ def test_sticks_move_the_vehicle_as_the_frame_means(ashore: Ashore) -> None:
 def test_the_warden_drives_by_consent_and_lets_go_when_the_sticks_fall_silent(ashore: Ashore) -> None:
     """The whole companion but its controller: what it asks for, the position it needs, consent, loss, silence."""
     wide = EngagementLimits(depth_m=(-10.0, 100.0), distance_m=1000.0, tilt_rad=4.0, speed_m_s=10.0)
-    aboard = CompanionHarness(ashore, limits=wide)  # type: ignore[arg-type]
+    session: Any = ashore  # has what the harness needs of an InProcessSession
+    aboard = CompanionHarness(session, limits=wide)
     ashore.enable()
     ashore.arm(True)
 
@@ -399,12 +405,12 @@ def test_depth_hold_is_handed_back_where_the_vehicle_is(ashore: Ashore) -> None:
     ashore.run(5.0)
     ashore.streams = False
     ashore.run(0.4)
-    handed_back, heading = ashore.depth_m, float(ashore.physics.motion.q_WB[3])  # type: ignore[union-attr]
+    handed_back, heading = ashore.depth_m, ashore.motion.q_WB[3]
     after = []
     for _ in range(80):
         ashore.run(0.1)
         after.append(ashore.depth_m - handed_back)
-    turned = float(ashore.physics.motion.q_WB[3]) - heading  # type: ignore[union-attr]
+    turned = float(ashore.motion.q_WB[3] - heading)
     print(f"down by {handed_back - held:.2f} m, then {min(after):+.3f} to {max(after):+.3f} m, turned {turned:+.3f}")
     assert handed_back - held > 0.15
     assert min(after) > -0.05

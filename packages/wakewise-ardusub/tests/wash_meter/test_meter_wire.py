@@ -21,7 +21,7 @@ from wakewise_ardusub.vehicle_summary import VehicleSummary
 from wakewise_ardusub.wash_meter.meter import KEPT_S, DiveRecord, MeterReading, WashHistory
 from wakewise_ardusub.wash_meter.run import MeterSettings
 from wakewise_ardusub.wash_meter.vehicle_listener import MavlinkSocket, TimedMessage, VehicleListener
-from wakewise_ardusub.wash_savings import WashSavings
+from wakewise_ardusub.wash_savings import Shares, WashSavings
 
 
 def heard_within(wire: MavlinkSocket, seconds: float, enough: int) -> list[TimedMessage]:
@@ -95,8 +95,8 @@ def reading(time_s: float, flown: float, gentle: float) -> MeterReading:
         thrusts_N=dict.fromkeys(("flown", "least", "gentle"), craft_thrusts),
         disturbance={"flown": flown, "least": flown, "gentle": gentle},
     )
-    speeds = {"flown": 0.2, "least": 0.2, "gentle": 0.1}
-    return MeterReading(time_s=time_s, savings=savings, peak_m_s=speeds, rms_m_s=speeds)  # type: ignore[arg-type]
+    speeds: dict[Shares, float] = {"flown": 0.2, "least": 0.2, "gentle": 0.1}
+    return MeterReading(time_s=time_s, savings=savings, peak_m_s=speeds, rms_m_s=speeds)
 
 
 def test_the_past_is_a_mean_of_each_second_with_gaps() -> None:

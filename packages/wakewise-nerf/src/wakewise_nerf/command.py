@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +10,7 @@ import typer
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.commands import PHOTOGRAPHS, CliCommand
-from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table
+from wakewise.ui.cli.console import ProgressBars, answer, print_table
 from wakewise.ui.cli.options import Json, seed_option
 
 
@@ -78,19 +79,9 @@ def nerf(
             progress=progress,
         )
     figures = {"profile": chosen} | figures
-    if json:
-        print_json(figures)
-        return
-    from rich.table import Table
-
-    table = Table(title=f"{model}, profile {chosen}" + (" (a demonstration)" if chosen == "cpu" else ""))
-    table.add_column("figure")
-    table.add_column("value", justify="right")
-    for key, value in figures.items():
-        if isinstance(value, (int, float, str)) or value is None:
-            table.add_row(key, format_value(value))
-    print_table(table)
-    typer.echo(f"field: {folder}")
+    rows = [(key, value) for key, value in figures.items() if isinstance(value, (int, float, str)) or value is None]
+    title = f"{model}, profile {chosen}" + (" (a demonstration)" if chosen == "cpu" else "")
+    answer(json, figures, partial(print_table, "tn", ("figure", "value"), rows, title), f"field: {folder}")
 
 
 def _ball(text: str) -> tuple[list[float], float]:

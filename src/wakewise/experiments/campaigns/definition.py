@@ -8,7 +8,6 @@ files by their bytes and packages by their source, so that a controller that was
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,19 +29,15 @@ from wakewise.core.settings import Seed, Settings
 from wakewise.experiments.campaigns.flights import FLY, MODEL
 from wakewise.experiments.campaigns.store import open_store, read_store
 from wakewise.experiments.campaigns.task import FLIES, PHOTOGRAPHS, Task, function_named, source_version
+from wakewise.experiments.trials.dataset.checksums import sha256_of
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
 from wakewise.scene.targets import coral_kinds
-
-_LARGEST = 2**20  # bytes that are read at once
 
 
 def external_parts(scenario: Scenario) -> dict[str, str]:
     """Parts that come from elsewhere, each with what says its version.
 
-    Raises
-    ------
-    InputError
-        If a controller or a file cannot be found or read.
+    Raises InputError if a controller or a file cannot be found or read.
     """
     found = dict(scenario.parts().external_parts)
     if scenario.method not in MAKERS:
@@ -67,22 +62,12 @@ def external_parts(scenario: Scenario) -> dict[str, str]:
     return found
 
 
-def check_loadable(scenario: Scenario) -> None:
-    """Load vehicle and target, which takes a moment; raises InputError if there is none of that name or file."""
-    parts = scenario.parts()
-    _ = parts.vehicle, parts.target
-
-
 def digest(path: Path) -> str:
     """Hash of a file."""
-    whole = hashlib.sha256()
     try:
-        with path.open("rb") as file:
-            while block := file.read(_LARGEST):
-                whole.update(block)
+        return sha256_of(path)
     except OSError as fault:
         raise InputError(f"{path}: cannot be read, {fault.strerror}") from None
-    return whole.hexdigest()
 
 
 def module_digest(module: str) -> str:
@@ -223,10 +208,7 @@ class PlannedTrial:
 def load_campaign(path: Path) -> Campaign:
     """Read a campaign file.
 
-    Raises
-    ------
-    InputError
-        In one line: the file, the field, what was found and what would be right.
+    Raises InputError, which names the file, the field, what was found and what is allowed.
     """
     tree = yaml_file(path)
     if not isinstance(tree, dict):
@@ -245,10 +227,7 @@ def check_campaign(tree: Mapping[str, Any], source: str = "campaign") -> Campaig
 def planned_trials(campaign: Campaign, source: str = "campaign") -> list[PlannedTrial]:
     """All trials of a campaign, seed by seed, so that one that is stopped has whole seeds of everything.
 
-    Raises
-    ------
-    InputError
-        If there are too many, or a combination is no scenario; the combination and the field are named.
+    Raises InputError if there are too many, or a combination is no scenario; the combination and the field are named.
     """
     outside: dict[str, str] = {}
     for name in (*campaign.setup, *campaign.probes):
@@ -307,7 +286,8 @@ def _resolved(
         scenario = load_scenario(campaign.preset, None, dict(cell.fields) | {"seed": seed})
         loaded = f"{scenario.vehicle} {scenario.ballast} {scenario.target}"
         if loaded not in there:
-            check_loadable(scenario)
+            parts = scenario.parts()
+            _ = parts.vehicle, parts.target
             there.add(loaded)
         return scenario, external_parts(scenario)
     except InputError as fault:
@@ -325,16 +305,10 @@ def _trial(campaign: Campaign, cell: _Cell, scenario: Scenario, outside: dict[st
             settings[name] = value
     if outside:
         settings["outside"] = outside
-    shown = [str(value) for key, value in factors.items() if _tells_apart(campaign, key)]
+    alike = [key for key in ("vehicle", "variation") if len(getattr(campaign, f"{key}s")) <= 1]
+    shown = [str(value) for key, value in factors.items() if key not in alike]
     task = Task(name="/".join(shown), work=_WORK[campaign.stages], settings=settings, sources=_SOURCES[campaign.stages])
     return PlannedTrial(task=task, factors=factors)
-
-
-def _tells_apart(campaign: Campaign, factor: str) -> bool:
-    """Whether a factor belongs into the names of trials."""
-    if factor in ("vehicle", "variation"):
-        return len(getattr(campaign, f"{factor}s")) > 1
-    return True
 
 
 def example() -> str:
@@ -363,12 +337,6 @@ retries: 2                        # tries after a process that died or was ended
 """
 
 
-def nearest_name_hint(name: str, known: list[str]) -> str:
-    """A hint at the nearest of some names, for messages."""
-    close = difflib.get_close_matches(name, known, 1)
-    return f"did you mean {close[0]}? " if close else ""
-
-
 PLAN = "plan.json"
 
 
@@ -395,10 +363,7 @@ class CampaignPlan:
 def keep_campaign(folder: Path, campaign: Campaign, trials: Sequence[PlannedTrial]) -> None:
     """Write the plan of a campaign file into its folder, in place of an earlier one of the same version.
 
-    Raises
-    ------
-    InputError
-        If what is there was made by other sources: figures of two versions are no comparison.
+    Raises InputError if what is there was made by other sources: figures of two versions are no comparison.
     """
     sources = source_version(trials[0].task.sources)
     if (folder / PLAN).exists():
@@ -414,10 +379,7 @@ def keep_campaign(folder: Path, campaign: Campaign, trials: Sequence[PlannedTria
 def keep_plan(folder: Path, name: str, trials: Sequence[PlannedTrial], campaign: Mapping[str, Any]) -> None:
     """Write what a folder was made for: `wakewise campaign status|table|page` read it.
 
-    Raises
-    ------
-    InputError
-        If the folder holds something that is no campaign.
+    Raises InputError if the folder holds something that is no campaign.
     """
     open_store(folder)
     told = {
@@ -433,23 +395,13 @@ def keep_plan(folder: Path, name: str, trials: Sequence[PlannedTrial], campaign:
 def read_plan(folder: Path) -> CampaignPlan:
     """The plan of a campaign's folder.
 
-    Raises
-    ------
-    InputError
-        If there is no campaign, or one of another version.
+    Raises InputError if there is no campaign, or one of another version.
     """
     read_store(folder)
     path = folder / PLAN
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
-        trials = tuple(PlanEntry(key=one["key"], name=one["name"], factors=one["factors"]) for one in told["trials"])
-        return CampaignPlan(
-            name=told["name"],
-            campaign=told["campaign"],
-            wakewise=told["wakewise"],
-            sources=told["sources"],
-            trials=trials,
-        )
+        return CampaignPlan(**told | {"trials": tuple(PlanEntry(**one) for one in told["trials"])})
     except FileNotFoundError:
         raise InputError(f"{folder}: no campaign file was run here, its {PLAN} is missing") from None
     except (OSError, ValueError, KeyError, TypeError):

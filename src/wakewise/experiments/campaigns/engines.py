@@ -66,11 +66,7 @@ class TrialExecutor(Protocol):
 class ProcessExecutor:
     """Processes of this computer, started anew (no forks), each of which makes one trial after the other.
 
-    As many as there are cores if `workers` is not given.
-
-    Raises
-    ------
-    InputError
+    As many as there are cores if `workers` is not given. Raises InputError if `workers` is out of range.
     """
 
     workers: int | None = None
@@ -130,11 +126,8 @@ class DaskExecutor:
     """Workers of a Dask cluster.
 
     `scheduler` is the address of a scheduler, or its scheduler file; a cluster on this computer is made if not given,
-    with `workers` workers, one per core if not given. Of a running cluster at most `workers` are used.
-
-    Raises
-    ------
-    MissingExtra, InputError
+    with `workers` workers, one per core if not given. Of a running cluster at most `workers` are used. Raises
+    MissingExtra without the extra `dask`, and InputError if `workers` is out of range.
     """
 
     scheduler: str | None = None
@@ -149,10 +142,8 @@ class DaskExecutor:
     def crew(self, driver: Path) -> Iterator[WorkerPool]:
         """Threads of the cluster's workers.
 
-        Raises
-        ------
-        InputError
-            If the address does not answer, or a worker does not see the campaign's folder, or has other sources.
+        Raises InputError if the address does not answer, or a worker does not see the campaign's folder, or has other
+        sources.
         """
         import dask
 

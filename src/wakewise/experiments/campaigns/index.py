@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 
@@ -58,7 +59,9 @@ def listing(store: CampaignStore) -> dict[str, IndexEntry]:
         if kept is not None and kept[0] == stamp:
             found[key] = kept[1]
         else:
-            found[key], fresh = _look(store.place(key)), True
+            place = store.place(key)
+            figures, took_s = read_figures(place) or (None, 0.0)
+            found[key], fresh = IndexEntry(key, figures, took_s, read_attempts(place)), True
     if fresh:
         # A full disk, which polars tells in either way, or a folder of others: the cache only costs time.
         with suppress(OSError, pl.exceptions.ComputeError):
@@ -88,13 +91,6 @@ def _stat(path: str) -> tuple[int, int]:
     return told.st_mtime_ns, told.st_size
 
 
-def _look(place: Path) -> IndexEntry:
-    kept = read_figures(place)
-    return IndexEntry(
-        place.name, None if kept is None else kept[0], 0.0 if kept is None else kept[1], read_attempts(place)
-    )
-
-
 def _read(path: Path) -> dict[str, tuple[_Stamp, IndexEntry]]:
     """What the cache holds; nothing if it cannot be read."""
     try:
@@ -102,26 +98,18 @@ def _read(path: Path) -> dict[str, tuple[_Stamp, IndexEntry]]:
         if table.schema != pl.Schema(_SCHEMA):
             return {}
         rows = table.rows(named=True)
-        return {row["key"]: (_stamp_of(row), _listed_of(row)) for row in rows}
+        return {
+            row["key"]: ((row["figures_ns"], row["figures_bytes"], row["attempts_bytes"]), _listed_of(row))
+            for row in rows
+        }
     except (OSError, pl.exceptions.PolarsError, ValueError):
         return {}
 
 
-def _stamp_of(row: dict[str, object]) -> _Stamp:
-    return int(str(row["figures_ns"])), int(str(row["figures_bytes"])), int(str(row["attempts_bytes"]))
-
-
-def _listed_of(row: dict[str, object]) -> IndexEntry:
-    figures, how = row["figures"], row["how"]
-    told = Attempts(
-        begun=int(str(row["begun"])),
-        failed=int(str(row["failed"])),
-        how=attempt_log.parse_outcome(how),
-        reason=None if row["reason"] is None else str(row["reason"]),
-    )
-    return IndexEntry(
-        str(row["key"]), None if figures is None else json.loads(str(figures)), float(str(row["took_s"])), told
-    )
+def _listed_of(row: dict[str, Any]) -> IndexEntry:
+    attempts = Attempts(row["begun"], row["failed"], attempt_log.parse_outcome(row["how"]), row["reason"])
+    figures = None if row["figures"] is None else json.loads(row["figures"])
+    return IndexEntry(row["key"], figures, row["took_s"], attempts)
 
 
 def _write(path: Path, rows: Iterable[tuple[_Stamp, IndexEntry]]) -> None:

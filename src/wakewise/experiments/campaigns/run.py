@@ -70,12 +70,8 @@ def run(
     `stop` is asked a few times a second: true ends what is under way and returns, as does the instant `until`
     (`time.monotonic`, s). `again` tries trials anew that failed in an earlier run.
 
-    Raises
-    ------
-    InputError
-        If the folder holds something else or results of another version.
-    EnvironmentFailure
-        If the disk is full; what was finished is kept, and the same call goes on.
+    Raises InputError if the folder holds something else or results of another version. Raises EnvironmentFailure if the
+    disk is full; what was finished is kept, and the same call goes on.
     """
     check_bounds(timeout_s, memory_MB, retries)
     with report_full_disk(folder):
@@ -88,12 +84,7 @@ def run(
 
 
 def check_bounds(timeout_s: float | None, memory_MB: float | None, retries: int) -> None:
-    """Refuse bounds that nothing can keep.
-
-    Raises
-    ------
-    InputError
-    """
+    """Raise InputError for a bound that cannot be kept."""
     for name, value, unit in (("timeout", timeout_s, "s"), ("memory", memory_MB, "MB")):
         if value is not None and not value > 0.0:
             raise InputError(f"{name}: {value:g} {unit}, must be more than 0")

@@ -36,21 +36,21 @@ class Interval(NamedTuple):
     high: float
 
 
-def share_interval(successes: int, n: int, confidence: float = 0.95) -> Interval:
-    """Exact interval of a share from counts (Clopper and Pearson 1934): it covers at least as often as it says.
+def share_interval(successes: int, n: int) -> Interval:
+    """Exact 95 % interval of a share from counts (Clopper and Pearson 1934): it covers at least as often as it says.
 
     Raises InputError if counts do not fit each other.
     """
     if not 0 <= successes <= n or n < 1:
         raise InputError(f"share: {successes} of {n}, must be 0 to n of 1 or more")
-    found = stats.binomtest(successes, n).proportion_ci(confidence, method="exact")
+    found = stats.binomtest(successes, n).proportion_ci(0.95, method="exact")
     return Interval(float(found.low), float(found.high))
 
 
 def mean_interval(
-    values: Sequence[float] | Array, strata: Sequence[Hashable] | None = None, *, confidence: float = 0.95
+    values: Sequence[float] | Array, strata: Sequence[Hashable] | None = None
 ) -> tuple[float, Interval | None]:
-    """Mean of trials, shape (n,), and its interval by Student's t, with the variance within strata.
+    """Mean of trials, shape (n,), and its 95 % interval by Student's t, with the variance within strata.
 
     `strata` name the stratum of each value, such as its target. If a stratum holds a single value, all are one stratum,
     since nothing could vary within it. Degrees of freedom: Welch 1947, Satterthwaite 1946. The interval of a single
@@ -72,7 +72,7 @@ def mean_interval(
     if not parts.sum() > 0.0:
         return mean, Interval(mean, mean)
     freedom = float(parts.sum() ** 2 / (parts**2 / np.array([len(group) - 1.0 for group in groups])).sum())
-    half = float(stats.t.ppf(0.5 + 0.5 * confidence, freedom)) * sqrt(float(parts.sum()))
+    half = float(stats.t.ppf(0.975, freedom)) * sqrt(float(parts.sum()))
     return mean, Interval(mean - half, mean + half)
 
 
@@ -80,10 +80,8 @@ def geometric_ratio(
     ours: Sequence[float] | Array,
     theirs: Sequence[float] | Array,
     strata: Sequence[Hashable] | None = None,
-    *,
-    confidence: float = 0.95,
 ) -> tuple[float, Interval | None]:
-    """Ratio of the geometric means of pairs, shape (n,) each, and its interval: that of the mean logarithm of ratios.
+    """Ratio of the geometric means of pairs, shape (n,) each, and its 95 % interval: that of the mean log ratio.
 
     It has the stated coverage where pairs differ by factors, as speeds and energies of one seed do.
 
@@ -92,14 +90,14 @@ def geometric_ratio(
     a, b = np.asarray(ours, dtype=np.float64), np.asarray(theirs, dtype=np.float64)
     if a.shape != b.shape or not (a > 0.0).all() or not (b > 0.0).all():
         raise InputError("ratio: values of pairs must be more than 0, one of each for every seed")
-    mean, ends = mean_interval(np.log(a / b), strata, confidence=confidence)
+    mean, ends = mean_interval(np.log(a / b), strata)
     return float(np.exp(mean)), None if ends is None else Interval(float(np.exp(ends.low)), float(np.exp(ends.high)))
 
 
 def ratio_of_means(
-    ours: Sequence[float] | Array, theirs: Sequence[float] | Array, *, confidence: float = 0.95
+    ours: Sequence[float] | Array, theirs: Sequence[float] | Array
 ) -> tuple[float | None, Interval | None]:
-    """Ratio of the means of pairs, shape (n,) each, and Fieller's interval (1954, J. R. Statist. Soc. B 16, 175).
+    """Ratio of the means of pairs, shape (n,) each, and Fieller's 95 % interval (1954, J. R. Statist. Soc. B 16, 175).
 
     The ratio is None where the mean of theirs is not more than 0. The interval is None of one pair, and where the mean
     of theirs is so unsure that no ratio is excluded on one side. It excludes 1 where the paired t-test rejects.
@@ -114,7 +112,7 @@ def ratio_of_means(
     value, n = float(a.mean() / b.mean()), len(a)
     if n < 2:
         return value, None
-    scale = float(stats.t.ppf(0.5 + 0.5 * confidence, n - 1)) ** 2 / n
+    scale = float(stats.t.ppf(0.975, n - 1)) ** 2 / n
     (v_aa, v_ab), (_, v_bb) = scale * np.cov(a, b, ddof=1)
     # The ratios r with (mean of a - r b)^2 <= t^2 var(a - r b) / n.
     square, middle, rest = float(b.mean() ** 2 - v_bb), float(a.mean() * b.mean() - v_ab), float(a.mean() ** 2 - v_aa)
@@ -205,10 +203,7 @@ def mean_figures(rows: Iterable[Figures], keys: Iterable[str], worst: Sequence[s
 def bonferroni(p: Sequence[float] | Array) -> Array:
     """Each p times how many there are, at most 1; shape (n,) in the order given.
 
-    Raises
-    ------
-    InputError
-        If one is not between 0 and 1.
+    Raises InputError if one is not between 0 and 1.
     """
     values = _checked(p)
     return np.asarray(np.minimum(1.0, len(values) * values))
@@ -217,10 +212,7 @@ def bonferroni(p: Sequence[float] | Array) -> Array:
 def holm(p: Sequence[float] | Array) -> Array:
     """Holm's step-down correction: never larger than Bonferroni's, as safe (Holm 1979, Scand. J. Statist. 6, 65).
 
-    Raises
-    ------
-    InputError
-        If one is not between 0 and 1.
+    Raises InputError if one is not between 0 and 1.
     """
     values = _checked(p)
     order = np.argsort(values, kind="stable")
@@ -252,15 +244,12 @@ def dropped(rows: Iterable[Row | None], figure: str) -> Array:
     return np.array([float(v) for v in known if v is not None and np.isfinite(v)], dtype=np.float64)
 
 
-def as_worst(rows: Iterable[Row | None], figure: str, worst: Mapping[str, float] = WORST) -> Array:
+def as_worst(rows: Iterable[Row | None], figure: str) -> Array:
     """Values over all trials that were meant to be made, shape (n,); those without one count as the worst.
 
-    Raises
-    ------
-    KeyError
-        If no worst is stated for this figure: nobody knows what a failed flight's energy is.
+    Raises KeyError if no worst is stated for this figure, such as the energy of a failed flight.
     """
-    least = worst[figure]
+    least = WORST[figure]
     known = (None if row is None else row.get(figure) for row in rows)
     return np.array([least if v is None or not np.isfinite(v) else float(v) for v in known], dtype=np.float64)
 
@@ -290,13 +279,10 @@ class PairedTest:
     g_z: float | None = None
 
 
-def paired_test(ours: Sequence[float] | Array, theirs: Sequence[float] | Array, confidence: float = 0.95) -> PairedTest:
+def paired_test(ours: Sequence[float] | Array, theirs: Sequence[float] | Array) -> PairedTest:
     """Test the differences of pairs, shape (n,) each and finite; row k of both is one seed.
 
-    Raises
-    ------
-    InputError
-        If there are no pairs, lengths differ, or a value is not finite.
+    Raises InputError if there are no pairs, lengths differ, or a value is not finite.
     """
     a, b = np.asarray(ours, dtype=np.float64), np.asarray(theirs, dtype=np.float64)
     if a.ndim != 1 or a.shape != b.shape or len(a) == 0:
@@ -314,7 +300,7 @@ def paired_test(ours: Sequence[float] | Array, theirs: Sequence[float] | Array, 
         p_t = 1.0 if mean == 0.0 else 0.0
         return PairedTest(n=n, mean=mean, low=mean, high=mean, p_t=p_t, p_wilcoxon=p_wilcoxon)
     test = stats.ttest_rel(a, b)
-    ends = test.confidence_interval(confidence)
+    ends = test.confidence_interval(0.95)
     d_z = mean / spread
     return PairedTest(
         n=n,
@@ -396,10 +382,7 @@ def _wins(ours: Array, theirs: Array) -> Array:
 def performance_profile(values: Sequence[float] | Array, thresholds: Sequence[float] | Array) -> Array:
     """Share of trials whose figure is at most each threshold, shape of `thresholds`; a trial that is NaN never is.
 
-    Raises
-    ------
-    InputError
-        If there are no trials.
+    Raises InputError if there are no trials.
     """
     known = np.asarray(values, dtype=np.float64)
     if known.size == 0:
@@ -415,10 +398,7 @@ MOST = 100_000
 def power_of_pairs(d_z: float, n: int, alpha: float = 0.05) -> float:
     """Probability that n pairs show a true effect d_z by a two-sided paired t-test (noncentral t).
 
-    Raises
-    ------
-    InputError
-        With fewer than 2 pairs, or alpha not between 0 and 1.
+    Raises InputError with fewer than 2 pairs, or if alpha is not between 0 and 1.
     """
     if n < 2 or not 0.0 < alpha < 1.0:
         raise InputError(f"power: {n} pairs at alpha {alpha}, needs 2 or more and 0 to 1")
@@ -429,33 +409,30 @@ def power_of_pairs(d_z: float, n: int, alpha: float = 0.05) -> float:
     return float((1.0 if isnan(above) else above) + (0.0 if isnan(below) else below))
 
 
-def pairs_needed(d_z: float, power: float = 0.8, alpha: float = 0.05) -> int | None:
-    """Fewest pairs with which an effect d_z is shown with that chance; None beyond a hundred thousand."""
+def pairs_needed(d_z: float, power: float = 0.8) -> int | None:
+    """Fewest pairs with which an effect d_z is shown with that chance at alpha 0.05; None beyond a hundred thousand."""
     low, high = 1, 2
-    while power_of_pairs(d_z, high, alpha) < power:
+    while power_of_pairs(d_z, high) < power:
         low, high = high, 2 * high
         if high > MOST:
             return None
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (low, middle) if power_of_pairs(d_z, middle, alpha) >= power else (middle, high)
+        low, high = (low, middle) if power_of_pairs(d_z, middle) >= power else (middle, high)
     return high
 
 
-def smallest_effect(n: int, power: float = 0.8, alpha: float = 0.05) -> float | None:
-    """Smallest d_z that n pairs show with that chance; None of fewer than 2."""
+def smallest_effect(n: int) -> float | None:
+    """Smallest d_z that n pairs show with a chance of 80 % at alpha 0.05; None of fewer than 2."""
     if n < 2:
         return None
-    return float(optimize.brentq(lambda d: power_of_pairs(d, n, alpha) - power, 1e-6, 100.0))
+    return float(optimize.brentq(lambda d: power_of_pairs(d, n) - 0.8, 1e-6, 100.0))
 
 
 def trials_for_rate(rate: float, half_width: float = 0.05) -> int:
     """Fewest trials after which the exact 95 % interval of a share about `rate` is no wider than twice this.
 
-    Raises
-    ------
-    InputError
-        If either is not within 0 and 1.
+    Raises InputError if either is not within 0 and 1.
     """
     if not 0.0 <= rate <= 1.0 or not 0.0 < half_width < 1.0:
         raise InputError(f"rate {rate}, half width {half_width}: must be within 0 and 1")

@@ -73,10 +73,7 @@ class CampaignStore:
 def open_store(folder: Path) -> CampaignStore:
     """The store in a folder, which is made if it is not there.
 
-    Raises
-    ------
-    InputError
-        If the folder holds something else, or a store of another version.
+    Raises InputError if the folder holds something else, or a store of another version.
     """
     path = folder / _STORE
     if folder.exists() and not folder.is_dir():
@@ -94,10 +91,7 @@ def open_store(folder: Path) -> CampaignStore:
 def read_store(folder: Path) -> CampaignStore:
     """The store that is in a folder.
 
-    Raises
-    ------
-    InputError
-        If there is none, or one of another version.
+    Raises InputError if there is none, or one of another version.
     """
     path = folder / _STORE
     try:
@@ -113,12 +107,7 @@ def read_store(folder: Path) -> CampaignStore:
 
 @contextmanager
 def report_full_disk(folder: Path) -> Iterator[None]:
-    """Tell of a disk that is full, whoever met it, in a line that says what to do.
-
-    Raises
-    ------
-    EnvironmentFailure
-    """
+    """Raise EnvironmentFailure, with what to do, where the block meets a full disk."""
     try:
         yield
     except Exception as fault:  # all but a full disk is raised again
@@ -139,10 +128,7 @@ def read_figures(place: Path) -> tuple[dict[str, Figure], float] | None:
 def write_figures(place: Path, figures: Mapping[str, Any], took_s: float) -> None:
     """Keep a trial's figures: with this it is finished, whatever happens next.
 
-    Raises
-    ------
-    TypeError
-        If one is neither a number nor a word nor None.
+    Raises TypeError if one is neither a number nor a word nor None.
     """
     write_json(place / FIGURES, {"figures": plain_figures(figures), "took_s": round(took_s, 3)}, lasting=True)
 

@@ -20,7 +20,7 @@ from wakewise.experiments.campaigns.engines import ProcessExecutor, TrialExecuto
 from wakewise.experiments.campaigns.flights import FLY
 from wakewise.experiments.campaigns.run import run
 from wakewise.experiments.campaigns.store import open_store
-from wakewise.experiments.campaigns.task import Figures, Task, TrialOutcome
+from wakewise.experiments.campaigns.task import Figures, Task
 from wakewise.experiments.trials.timing import BenchOptions
 
 K = TypeVar("K", bound=Hashable)
@@ -141,13 +141,13 @@ def run_study(
     found = dict(zip(trials, outcomes, strict=True))
     return StudyResult(
         {key: numbers(one.figures) for key, one in found.items() if one.figures is not None},
-        {key: _failure(trials[key], one) for key, one in found.items() if one.figures is None},
+        {
+            key: FlightFailure(one.world, one.method, one.seed, found[key].reason or "not flown")
+            for key, one in trials.items()
+            if found[key].figures is None
+        },
         frozenset(key for key, one in found.items() if one.known and one.figures is not None),
     )
-
-
-def _failure(trial: PlannedTrial, outcome: TrialOutcome) -> FlightFailure:
-    return FlightFailure(trial.world, trial.method, trial.seed, outcome.reason or "not flown")
 
 
 def numbers(figures: Figures) -> dict[str, float | None]:
@@ -158,10 +158,7 @@ def numbers(figures: Figures) -> dict[str, float | None]:
 def selected(what: str, wished: Sequence[str] | None, allowed: Sequence[str]) -> tuple[str, ...]:
     """The wished names in the order of `allowed`; all if None.
 
-    Raises
-    ------
-    InputError
-        If one is not allowed.
+    Raises InputError if one is not allowed.
     """
     for name in wished or ():
         if name not in allowed:

@@ -180,25 +180,18 @@ MEASURES = (
 _LEADING = ("rmse_mm", "target_speed_mean_m_s")
 
 
-def comparable(found: Results) -> tuple[str, ...]:
-    """Factors of which trials have several, methods first; `method` alone where they differ in nothing but seeds."""
-    return varying_factors(found.plan)
-
-
 def paired_groups(found: Results, compare: str = "") -> list[Place]:
     """Trials that have ended, as `summarize` compares them: `method` is the compared factor, `world` what else differs.
 
-    Raises
-    ------
-    InputError
-        If `compare` is no factor of a campaign that can be compared.
+    Raises InputError if `compare` is no factor of a campaign that can be compared.
     """
-    compare = compare or comparable(found)[0]
+    varying = varying_factors(found.plan)
+    compare = compare or varying[0]
     if compare not in FACTORS or compare == "seed":
         allowed = ", ".join(factor for factor in FACTORS if factor != "seed")
         raise InputError(f"--compare: '{compare}', allowed: {allowed}")
-    apart = [factor for factor in comparable(found) if factor not in (compare, "target")]
-    told: list[dict[str, Any]] = []
+    apart = [factor for factor in varying if factor not in (compare, "target")]
+    told: list[Place] = []
     for one in found.made:
         if one.state not in ("done", "failed"):
             continue
@@ -217,7 +210,7 @@ def paired_groups(found: Results, compare: str = "") -> list[Place]:
                 "reason": one.reason,
             }
         )
-    return list(told)
+    return told
 
 
 def measures(found: list[Place]) -> list[ComparisonMetric]:

@@ -67,10 +67,7 @@ class Results:
 def results(folder: Path) -> Results:
     """What has become of a campaign.
 
-    Raises
-    ------
-    InputError
-        If there is no campaign, or one of another version.
+    Raises InputError if there is no campaign, or one of another version.
     """
     plan, store = read_plan(folder), read_store(folder)
     listed = listing(store)
@@ -137,10 +134,7 @@ def group_table(found: Results, by: Sequence[str] = (), figures: Sequence[str] =
     Means are over the trials that gave the figure; `n` says how many. Trials of several targets, worlds or vehicles in
     one group are strata of the interval.
 
-    Raises
-    ------
-    InputError
-        If a factor or a figure is not there.
+    Raises InputError if a factor or a figure is not there.
     """
     by = tuple(by) or varying_factors(found.plan)
     for name in by:
@@ -170,10 +164,7 @@ def write_table(found: Results, path: Path) -> None:
 
     In CSV a word that a spreadsheet would read as a formula has an apostrophe before it.
 
-    Raises
-    ------
-    InputError
-        If the file's ending is neither.
+    Raises InputError if the file's ending is neither.
     """
     if path.suffix not in (".parquet", ".csv"):
         raise InputError(f"--write {path}: must end in .parquet or .csv")

@@ -46,10 +46,7 @@ _ROOT = Path(__file__).parents[2]
 def source_version(parts: tuple[str, ...] = FLIES) -> str:
     """Hash of source files: files or folders below this package, or `PACKAGE:PATH` below another installed one.
 
-    Raises
-    ------
-    InputError
-        If there is no such part.
+    Raises InputError if there is no such part.
     """
     digest = hashlib.sha256()
     for part in parts:
@@ -89,10 +86,7 @@ class Task:
     values, all that the function is told, its seed with it; `sources` are the parts whose source can change the
     figures.
 
-    Raises
-    ------
-    InputError
-        If the settings are no plain values.
+    Raises InputError if the settings are no plain values.
     """
 
     name: str
@@ -149,10 +143,7 @@ class TrialOutcome:
 def function_named(name: str) -> Callable[..., Any]:
     """The function, or class, that ``package.module:function`` names.
 
-    Raises
-    ------
-    InputError
-        If it cannot be imported.
+    Raises InputError if it cannot be imported.
     """
     found: Callable[..., Any] = load("work", name, name)
     return found

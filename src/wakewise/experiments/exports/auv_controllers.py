@@ -36,10 +36,7 @@ def tam_yaml(
     each thruster, in FRD. `limits_N` are lowest and highest thrusts, shape (n,) each, which the controller does not
     know: they go into the comments. `frame`, a key of `FRAMES`, are the axes of the matrix that is written.
 
-    Raises
-    ------
-    InputError
-        If the frame is not known.
+    Raises InputError if the frame is not known.
     """
     if frame not in FRAMES:
         raise InputError(f"--frame: '{frame}', allowed are {', '.join(FRAMES)}")

@@ -43,10 +43,7 @@ OBSERVATION = np.dtype([("pixel", "<f8", 2), ("point", "<u8")])
 def read_points(path: Path) -> SparsePoints:
     """Points, colours and errors of a points3D.bin, and where photographs saw them if images.bin lies beside it.
 
-    Raises
-    ------
-    InputError
-        If a file holds less than it promises.
+    Raises InputError if a file holds less than it promises.
     """
     data = path.read_bytes()
     at, numbers, points, colours, errors = 8, [], [], [], []

@@ -43,10 +43,7 @@ def write_bag(
 
     `folder` must not exist; the file inside is named after it. `bodies` and `cameras` are keyed by `WHO`.
 
-    Raises
-    ------
-    InputError
-        If a time is negative, which ROS cannot hold, or a photograph is neither JPEG nor PNG.
+    Raises InputError if a time is negative, which ROS cannot hold, or a photograph is neither JPEG nor PNG.
     """
     store = get_typestore(Stores.ROS2_HUMBLE)
     make = _Messages(store.types)

@@ -31,10 +31,7 @@ def held_out_names(names: Sequence[str], one_in: int, seed: int) -> tuple[str, .
     The names are in the order in which the photographs were taken, so that held-out views are spread over the path.
     Of two photographs and more at least one is held out, and at least one is not. `one_in` 0 holds none out.
 
-    Raises
-    ------
-    InputError
-        If `one_in` is 1 or negative.
+    Raises InputError if `one_in` is 1 or negative.
     """
     if one_in < 0 or one_in == 1:
         raise InputError(f"--held-out {one_in}: must be 0 (none) or one photograph in 2 and more")

@@ -127,17 +127,10 @@ def coverage_figures(parts: Parts, photos: pl.DataFrame, cloud_W_m: Array | None
 def measure_coverage(folder: Path) -> dict[str, Any]:
     """The guide on a finished trial, for benches: what it said, what came of it, what a photograph cost it.
 
-    Returns
-    -------
-    dict
-        coverage_predicted_pct, coverage_sure_pct, completeness_pct, coverage_agreement_pct, coverage_trivial_pct
-        (agreement of the better of "all" and "nothing"), coverage_ms_per_photo (thread CPU, median; the first
-        photograph, which loads kernels, left out), coverage_ms_per_photo_max, photos, blurred.
-
-    Raises
-    ------
-    InputError
-        If the folder is not one of a trial with a model.
+    Returns coverage_predicted_pct, coverage_sure_pct, completeness_pct, coverage_agreement_pct, coverage_trivial_pct
+    (agreement of the better of "all" and "nothing"), coverage_ms_per_photo (thread CPU, median; the first photograph,
+    which loads kernels, left out), coverage_ms_per_photo_max, photos, blurred. Raises InputError if the folder is not
+    one of a trial with a model.
     """
     for name in ("scenario.yaml", "images.csv", "dense.ply"):
         if not (folder / name).is_file():
@@ -166,16 +159,8 @@ def measure_coverage(folder: Path) -> dict[str, Any]:
 def measure_cost(parts: Parts) -> dict[str, float]:
     """What the guide costs on a mission's own viewpoints, for benches without a trial: no flight, no photograph.
 
-    Returns
-    -------
-    dict
-        coverage_predicted_pct of the planned viewpoints, coverage_ms_per_photo and coverage_ms_per_photo_max (thread
-        CPU; the first, which loads kernels, left out).
-
-    Raises
-    ------
-    InputError
-        If the mission plans no photograph.
+    Returns coverage_predicted_pct of the planned viewpoints, coverage_ms_per_photo and coverage_ms_per_photo_max
+    (thread CPU; the first, which loads kernels, left out). Raises InputError if the mission plans no photograph.
     """
     spent_ms: list[float] = []
     shots: list[Shot] = [(X_WC, None) for X_WC in parts.route.X_WC_planned]

@@ -74,12 +74,8 @@ def export_trial(
     origin lies. Of nerfstudio and colmap, one photograph in `held_out` (8) is held out from training, drawn by `seed`
     (0); 0 holds none out.
 
-    Raises
-    ------
-    InputError
-        If a word is not known, or the folder lacks what is asked for.
-    MissingExtra
-        If rosbag2 is asked for and rosbags is not installed.
+    Raises InputError if a word is not known, or the folder lacks what is asked for. Raises MissingExtra if rosbag2 is
+    asked for and rosbags is not installed.
     """
     if to not in EXPORTS:
         raise InputError(f"--to: '{to}', allowed are {', '.join(EXPORTS)}, dataset and, for a vehicle, auv_controllers")

@@ -223,15 +223,12 @@ def add_reference_values(gathering: MetricsCollector, parts: Parts, steps: pl.Da
         gathering.missing(("grain_threshold_Pa",), "neither bed nor water holds loose grains (tank.silt)")
 
 
-def allocation_figures(parts: Parts, steps: pl.DataFrame, instants: int = INSTANTS) -> Figures:
+def allocation_figures(parts: Parts, steps: pl.DataFrame) -> Figures:
     """Mean D of the thrusts commanded, and of the least thrusts that make the same wrenches from the same poses.
 
     Both by the wake model of `scenario.control.wake` over the target's own points, at the estimated poses.
 
-    Raises
-    ------
-    InputError
-        If the table lacks a command or an estimate.
+    Raises InputError if the table lacks a command or an estimate.
     """
     vehicle = parts.vehicle
     commands = [f"command_{i + 1}_N" for i in range(len(vehicle.thrusters))]
@@ -239,7 +236,7 @@ def allocation_figures(parts: Parts, steps: pl.DataFrame, instants: int = INSTAN
     lost = [name for name in (*commands, *places, *turns) if name not in steps.columns]
     if lost:
         raise InputError(f"steps: no column {lost[0]}, needs commands and estimates of every step")
-    picks = np.unique(np.linspace(0, steps.height - 1, min(instants, steps.height)).astype(int))
+    picks = np.unique(np.linspace(0, steps.height - 1, min(INSTANTS, steps.height)).astype(int))
     some = steps[picks]
     thrusts, p, q = (some.select(names).to_numpy().astype(np.float64) for names in (commands, places, turns))
     known = np.isfinite(np.column_stack([thrusts, p, q])).all(axis=1)
@@ -256,13 +253,13 @@ def allocation_figures(parts: Parts, steps: pl.DataFrame, instants: int = INSTAN
     return {"disturbance_flown": float(np.mean(flown)), "disturbance_least_thrusts": float(np.mean(least))}
 
 
-def ambient_speed_m_s(parts: Parts, time_s: Array, looks: int = LOOKS) -> float:
+def ambient_speed_m_s(parts: Parts, time_s: Array) -> float:
     """Mean speed of the water's own motion over the surface points of a region and the times of a flight."""
     region = parts.region
     surface = region.points_W_m[region.distance_m <= 0.0]
     points = surface if len(surface) else region.points_W_m
     ambient = tank_ambient(parts.scenario.tank, parts.seeds.tank())
-    when = np.linspace(float(time_s[0]), min(float(time_s[-1]), ambient.end_s), looks)
+    when = np.linspace(float(time_s[0]), min(float(time_s[-1]), ambient.end_s), LOOKS)
     return float(np.mean([np.linalg.norm(ambient.velocity(points, float(t)), axis=1).mean() for t in when]))
 
 

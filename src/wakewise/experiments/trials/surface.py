@@ -87,10 +87,7 @@ class SurfaceMaker:
 
         Without anything to do meanwhile it is made in this process, which costs no second loading of libraries.
 
-        Raises
-        ------
-        EnvironmentFailure
-            If the disk is full, or a file cannot be read or written.
+        Raises EnvironmentFailure if the disk is full, or a file cannot be read or written.
         """
         if not self._wanted:
             return

@@ -60,18 +60,9 @@ def size_figures(
     `cloud_W_m`, shape (n, 3), are the model's points in its own frame; `mesh` and `crop` the truth and what counts of
     it; the centres, shape (3,) each, where each photograph was taken from, by the model in its own frame and in truth.
 
-    Returns
-    -------
-    dict
-        By how much the model is too large, from the spread of its camera centres; and `rmse_mm` of the model brought to
-        the truth's frame and size by them.
-
-    Raises
-    ------
-    InputError
-        If fewer than three photographs are in both, or they were taken from one line.
-    StageError
-        If the model so brought does not lie about the truth.
+    Returns by how much the model is too large, from the spread of its camera centres; and `rmse_mm` of the model
+    brought to the truth's frame and size by them. Raises InputError if fewer than three photographs are in both, or
+    they were taken from one line. Raises StageError if the model so brought does not lie about the truth.
     """
     names = sorted(model_centres.keys() & true_centres.keys())
     if len(names) < 3:
@@ -127,14 +118,9 @@ def run_trial(
     With `meanwhile` another process makes them: it is called with "mesh" and with "colours" while that is at work, not
     where they are there already or there is no such process.
 
-    Raises
-    ------
-    InputError
-        If the scenario cannot be flown, or the folder holds another trial, or another run is at it.
-    MissingExtra
-        Without the extras `photos` and `logs`.
-    EnvironmentFailure
-        If the disk is full, or a file cannot be read or written; the stages before it are kept.
+    Raises InputError if the scenario cannot be flown, or the folder holds another trial, or another run is at it.
+    Raises MissingExtra without the extras `photos` and `logs`. Raises EnvironmentFailure if the disk is full, or a
+    file cannot be read or written; the stages before it are kept.
     """
     need("a trial", "photos", "logs")
     watch = watch or SilentProgress()
@@ -149,7 +135,7 @@ def run_trial(
         with watch.stage("compile") as progress:
             compile_kernels(JOBS, progress)
     with BackgroundRenderer(parts, folder) as darkroom:
-        if not _is_flown(folder):
+        if not ((folder / "steps.parquet").exists() or has_parts(folder)):
             if not _by_hand(parts):
                 darkroom.ready()  # loads and makes its scene while this process looks through the parts
             _ = parts.pilot, parts.preflight
@@ -197,11 +183,6 @@ def _figures(
     result = gathering.finish()
     write_json(folder / "metrics.json", result)
     return result
-
-
-def _is_flown(folder: Path) -> bool:
-    """Whether a folder holds a flight, if only its parts."""
-    return (folder / "steps.parquet").exists() or has_parts(folder)
 
 
 def _by_hand(parts: Parts) -> bool:
@@ -264,10 +245,7 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
     that does not come about is a result too, so its reason is kept instead of its figures. That the disk is full is no
     result.
 
-    Raises
-    ------
-    EnvironmentFailure
-        If the disk is full, or a file cannot be read or written.
+    Raises EnvironmentFailure if the disk is full, or a file cannot be read or written.
     """
     photos = pl.read_csv(folder / "images.csv")
     names = photos["name"].to_list()

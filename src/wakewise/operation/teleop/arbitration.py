@@ -65,14 +65,8 @@ def camera_on_target(
 ) -> AttitudeReference:
     """Attitude and tilt with which a body at a place keeps its camera on a target: tilt first, pitch beyond its stops.
 
-    Parameters
-    ----------
-    place_W_m, velocity_W_m_s, target_W_m : ndarray, shape (3,)
-    yaw_rad : float
-        Heading now, which stays right over the target, where none is better.
-    aim : CameraAim
-    dt_s : float
-        Over which the rates are taken.
+    `place_W_m`, `velocity_W_m_s`, `target_W_m`: shape (3,) each. `yaw_rad`: heading now, which stays right over the
+    target, where none is better. `dt_s`: over which the rates are taken.
     """
     angles, tilt = _watching(place_W_m, yaw_rad, target_W_m, aim)
     if not velocity_W_m_s.any():
@@ -208,15 +202,7 @@ def steer_attitude(
 ) -> MotionReference:
     """The motion with attitude and tilt a step on: by the sticks where they are held, else by the assist, else level.
 
-    Parameters
-    ----------
-    motion : MotionReference
-    state : OperatorSettings
-    axes : ndarray, shape (5,)
-        See `wakewise.operation.teleop.input.CONTROL_AXES`.
-    target_W_m : ndarray, shape (3,)
-    aim : CameraAim
-    dt_s : float
+    `axes`, shape (5,): see `wakewise.operation.teleop.input.CONTROL_AXES`. `target_W_m`: shape (3,).
     """
     turn, rise, place = float(axes[3]), float(axes[4]), motion.place_W_m
     yaw = float(motion.angles_rad[2])

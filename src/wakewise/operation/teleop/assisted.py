@@ -62,9 +62,6 @@ class AssistedPilot:
 
     Parameters
     ----------
-    source : ControlSource
-    desk : OperatorState
-    mission : ResumableMission
     target_W_m : ndarray, shape (3,)
         What the camera is kept on, and the middle of orbits.
     dt_s : float
@@ -87,7 +84,6 @@ class AssistedPilot:
     state : OperatorSettings
         What was set at the last step: the controller goes by it, so that a change from another thread in the middle of
         a step counts for the next one, and the record of a flight gives the same flight.
-    motion : MotionReference
     """
 
     source: ControlSource
@@ -272,14 +268,8 @@ class AssistedPilot:
 def assisted(parts: Parts, source: ControlSource, desk: OperatorState, begin: OperatorSettings | None = None) -> Parts:
     """Parts that hands and a desk fly: the pilot is the assisted one, the controller heeds the desk at each step.
 
-    Parameters
-    ----------
-    parts : Parts
-        Their route is the mission that the mode `scan` flies.
-    source : ControlSource
-    desk : OperatorState
-    begin : DeskState, optional
-        What the desk is set to at time zero of each flight; None: it stays as it is.
+    `parts`: their route is the mission that the mode `scan` flies. `begin`: what the desk is set to at time zero of
+    each flight; None: it stays as it is.
 
     Returns
     -------

@@ -115,7 +115,7 @@ class PhotoTrigger:
         """Have a photograph taken at the next step."""
         self._asked.set()
 
-    def leg_name(self, time_s: float) -> str:  # noqa: ARG002  (of the moment that the pilot knows)
+    def leg_name(self, _time_s: float) -> str:
         """What the pilot says that it does."""
         return str(getattr(self._parts.pilot, "leg", BY_HAND))
 
@@ -126,7 +126,7 @@ class PhotoTrigger:
                 self._asked.set()
             self.over |= what == "stop"
 
-    def shutter_s(self, number: int, time_s: float, dt_s: float) -> float | None:  # noqa: ARG002
+    def shutter_s(self, _number: int, time_s: float, _dt_s: float) -> float | None:
         """Now, if a photograph was asked for and the last one is long enough ago."""
         self.time_s = time_s
         self.heed()
@@ -194,7 +194,7 @@ class RealTimePacer:
         """When this time of the flight has come, by the clock; before the first step the flight begins now."""
         return (self._clock() if self._origin_s is None else self._origin_s) + time_s
 
-    def sent(self, time_s: float) -> None:  # noqa: ARG002  (run_loop hands it over)
+    def sent(self, _time_s: float) -> None:
         """Take note that the thrusts which answer what was read at `pace` go to the plant."""
         k = self._steps % KEPT
         self._reaction[k] = self._clock() - self._read_at_s
@@ -227,27 +227,22 @@ _NO_WATER = ScalarGrid(origin_W_m=np.zeros(3), spacing_m=1.0, values=np.zeros((0
 class LiveFlight:
     """Flies parts until it is told to stop; one thread flies, any other may ask and tell.
 
+    Raises InputError if the folder holds another trial, or a flight already.
+
     Parameters
     ----------
-    parts : Parts
     folder : Path or None
         Becomes a trial folder; None keeps nothing.
     paced : bool
         By the clock; without it as fast as it goes.
     watch : callable, optional
         Called as `(step, witness)` at each step in the flying thread, after the record: it must not take long.
-
     water_every_s : float
         How often the water at the target is measured.
     shutter : Shutter, optional
         Says when photographs are taken and when the flight is over; by default when it is asked.
     checked : bool
         Hold the parts against their scenario's tank first (see `Parts.preflight`); who flies elsewhere has done so.
-
-    Raises
-    ------
-    InputError
-        If the folder holds another trial, or a flight already.
     """
 
     def __init__(
@@ -384,10 +379,10 @@ class LiveFlight:
         """Whether somebody said stop, or the program has ended round its flight."""
         return self._told_to_stop.is_set() or self._shutter.over or not threading.main_thread().is_alive()
 
-    def _prepare(self, done: float, total: float, note: str = "") -> None:  # noqa: ARG002
+    def _prepare(self, _done: float, _total: float, note: str = "") -> None:
         self.preparing = note or self.preparing
 
-    def _exposed(self, number: int, exposure: ExposureRecord) -> None:  # noqa: ARG002
+    def _exposed(self, _number: int, exposure: ExposureRecord) -> None:
         self._exposures.append(replace(exposure, silt=_NO_WATER, flakes=None))
 
 

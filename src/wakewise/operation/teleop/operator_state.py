@@ -35,6 +35,8 @@ TRANSIT, DELICATE = 10.0, 2.0
 class OperatorSettings:
     """What is set.
 
+    Raises InputError if a value is none of these, naming field, value and range.
+
     Parameters
     ----------
     mode : "operator", "hold" or "scan"
@@ -51,11 +53,6 @@ class OperatorSettings:
         The camera is kept on the target: by its tilt joint first, then by the body.
     orbit : bool
         The sticks move the camera along the sphere about the target; forward changes its radius.
-
-    Raises
-    ------
-    InputError
-        If a value is none of these, naming field, value and range.
     """
 
     mode: Mode = "hold"
@@ -104,10 +101,7 @@ class OperatorState:
     def set(self, **changes: Any) -> OperatorSettings:
         """Change some fields; returns what is set then.
 
-        Raises
-        ------
-        InputError
-            Naming field, value and range; nothing is changed then.
+        Raises InputError, naming field, value and range; nothing is changed then.
         """
         for name in changes:
             if name not in FIELDS:
@@ -156,12 +150,8 @@ class TrackingWeightMeaning:
 def meaning(w_track: float, measured: Mapping[float, tuple[float, float]] | None = None) -> TrackingWeightMeaning:
     """What a `w_track` means, from what was measured.
 
-    Parameters
-    ----------
-    w_track : float
-    measured : mapping, optional
-        By w_track: velocity deviation and disturbance saved against direct allocation, in percent. In between they are
-        interpolated over the logarithm, beyond they stay as at the end.
+    `measured`: by w_track: velocity deviation and disturbance saved against direct allocation, in percent. In between
+    they are interpolated over the logarithm, beyond they stay as at the end.
     """
     if not measured:
         return TrackingWeightMeaning(regime=tracking_regime(w_track))

@@ -23,11 +23,7 @@ AFTER_S = 3.0
 class ReplayedPhotoTrigger(PhotoTrigger):
     """Opens when it did in a flight before, whatever hands ask for, and ends with it.
 
-    Parameters
-    ----------
-    parts : Parts
-    steps : polars.DataFrame
-        The columns `time_s` and `exposing` of the flight's steps.parquet.
+    `steps`: the columns `time_s` and `exposing` of the flight's steps.parquet.
     """
 
     def __init__(self, parts: Parts, steps: pl.DataFrame) -> None:
@@ -62,10 +58,7 @@ def replay_input(parts: Parts, folder: Path) -> None:
 
     A record ends with its flight, a script `AFTER_S` after its last entry, unless "stop" is pressed before.
 
-    Raises
-    ------
-    InputError
-        If it names none, or they cannot be read.
+    Raises InputError if it names none, or they cannot be read.
     """
     if parts.scenario.control_log is None:
         _ = parts.pilot  # which says so
@@ -81,20 +74,11 @@ def replay_input(parts: Parts, folder: Path) -> None:
 def replay_of(folder: Path, out: Path | None, parts: Parts | Scenario | None = None) -> LiveFlight:
     """A flight that flies again what a folder's hands did, as fast as it goes; begin it with `start`.
 
-    Parameters
-    ----------
-    folder : Path
-        Of a flight by hand.
-    out : Path or None
-        What the flight leaves goes there.
-    parts : Parts or Scenario, optional
-        Where it is flown; by default where it was, which gives the same flight. Hands see nothing: elsewhere, or with
-        another method, they do the same and the vehicle is somewhere else.
+    `folder`: of a flight by hand. `out`: what the flight leaves goes there. `parts`: where it is flown; by default
+    where it was, which gives the same flight. Hands see nothing: elsewhere, or with another method, they do the same
+    and the vehicle is somewhere else.
 
-    Raises
-    ------
-    InputError
-        If the folder holds no flight by hand, or `out` holds another trial.
+    Raises InputError if the folder holds no flight by hand, or `out` holds another trial.
     """
     for name in ("scenario.yaml", TRACE_FILE, "steps.parquet"):
         if not (folder / name).exists():

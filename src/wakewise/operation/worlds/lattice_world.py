@@ -67,26 +67,20 @@ class _Water:
 class LatticeWater:
     """A `Plant` and its own `TruthProvider`: vehicle and sensors of the tank in the lattice's water.
 
+    Raises InputError if the settings ask for water that this is not, or the vehicle starts outside the box.
+
     Parameters
     ----------
     vehicle : Vehicle
         True parameters.
     target : Target
         Standing on the bed; it is rigid here.
-    settings : TankSettings
-    start : BodyState
     rng : numpy Generator
         Its children serve sensors, probes and the disks' loads.
     half_size_m : float
         The box reaches this far to each side of the target.
-    cell_m : float
     tilt_rad : float
         Where the joint of the camera, if it has one, stands at the start.
-
-    Raises
-    ------
-    InputError
-        If the settings ask for water that this is not, or the vehicle starts outside the box.
     """
 
     def __init__(

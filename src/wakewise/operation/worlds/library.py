@@ -91,10 +91,7 @@ def own_file(name: str) -> str:
 def load_world(name: str) -> NamedWorld:
     """A world of the library.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name, or its file is not one.
+    Raises InputError if there is none of that name, or its file is not one.
     """
     if name not in world_names():
         hint = own_file(name) or guess(name, world_names())
@@ -116,10 +113,7 @@ def _text(name: str) -> str:
 def parse_world(name: str, text: str) -> NamedWorld:
     """A world from the text of its file.
 
-    Raises
-    ------
-    InputError
-        Naming the field, what was found and what is allowed.
+    Raises InputError, naming the field, what was found and what is allowed.
     """
     try:
         return NamedWorld(name=name, file=WorldFile.model_validate(read_yaml(text)))

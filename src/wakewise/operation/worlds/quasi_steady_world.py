@@ -83,19 +83,8 @@ def lattice_jets(table: MeanField, density_kg_m3: float) -> Jets:
 class QuasiSteadyWater:
     """A `Plant` and its own `TruthProvider`: plant and sensors of the tank, water without memory.
 
-    Parameters
-    ----------
-    jets : Jets
-    vehicle : Vehicle
-        True parameters.
-    target : Target
-    settings : TankSettings
-        Of which water and silt are not used.
-    start : BodyState
-    rng : numpy Generator
-        Its children serve sensors, probes and ambient water.
-    tilt_rad : float
-        Where the joint of the camera, if it has one, stands at the start.
+    `vehicle`: true parameters. `settings`: of which water and silt are not used. `rng`: its children serve sensors,
+    probes and ambient water. `tilt_rad`: where the joint of the camera, if it has one, stands at the start.
     """
 
     def __init__(

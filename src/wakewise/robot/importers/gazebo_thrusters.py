@@ -11,8 +11,8 @@ import re
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle
-from wakewise.robot.importers.robot_description import THRUSTER_NAME, Joint, RobotDescription, moving_parts
+from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle, unit_axis
+from wakewise.robot.importers.robot_description import THRUSTER_NAME, Joint, RobotDescription, moving_parts, short
 from wakewise.robot.importers.urdf import origin
 from wakewise.robot.importers.xml import Element, PlacedError, SourceLocation, number, numbers
 
@@ -29,7 +29,7 @@ DIAMETERS_M = (0.005, 2.0)
 
 def words(plugin: Element) -> str:
     """What a plugin calls itself, in lower case."""
-    return (plugin.attributes.get("filename", "") + " " + plugin.attributes.get("name", "")).lower()
+    return (plugin.attributes.get("filename", "") + " " + plugin.name).lower()
 
 
 def plugin_thrusters(
@@ -71,7 +71,7 @@ def _orca(plugin: Element, bodies: RobotDescription, found: ParsedVehicle) -> li
     thrusters: list[ParsedThruster] = []
     for i, element in enumerate(plugin.all("thruster")):
         X_BT = link.X_BL @ origin(element.first("origin"))
-        ahead, astern = number_in(element, "pos_force"), number_in(element, "neg_force")
+        ahead, astern = element.number("pos_force"), element.number("neg_force")
         ahead, astern = 50.0 if ahead is None else ahead, 40.0 if astern is None else astern
         label = element.attributes.get("name") or f"thruster{i}"
         if ahead * astern <= 0.0:
@@ -88,15 +88,8 @@ def _orca(plugin: Element, bodies: RobotDescription, found: ParsedVehicle) -> li
             f"{QUESTION}places of thrusters are from the origin of link {short(link.name)}, as the plugin's text says; "
             f"Gazebo counts them from its centre of mass, {np.round(link.p_LG_m, 4).tolist()} m away"
         )
-    found.derived["thruster_limits"] = f"{found.kind} {found.file.name}: pos_force and neg_force of the plugin"
+    found.derived["thruster_limits"] = f"{found.origin}: pos_force and neg_force of the plugin"
     return thrusters
-
-
-def _checked_axis(axis: Array, where: str) -> Array:
-    length = float(np.linalg.norm(axis))
-    if length < 1e-6:
-        raise PlacedError(f"{where}: axis {axis.tolist()} has length {length:g}, it must not be zero")
-    return axis / length
 
 
 def _gz(plugin: Element, bodies: RobotDescription) -> ParsedThruster:
@@ -106,11 +99,11 @@ def _gz(plugin: Element, bodies: RobotDescription) -> ParsedThruster:
         what = "is not in the file" if joint is None else "has no axis"
         raise PlacedError(f"{plugin.place}: thruster plugin: joint {name} {what}")
     thruster = on_joint(joint, bodies)
-    diameter = number_in(plugin, "propeller_diameter")
+    diameter = plugin.number("propeller_diameter")
     if diameter is not None:
         thruster.disk_area_m2 = disk_area_m2(diameter, plugin.place)
     if (plugin.value("use_angvel_cmd") or "false").lower() not in {"true", "1"}:
-        high, low = number_in(plugin, "max_thrust_cmd"), number_in(plugin, "min_thrust_cmd")
+        high, low = plugin.number("max_thrust_cmd"), plugin.number("min_thrust_cmd")
         thruster.max_forward_N = high if high is not None and high >= 0.0 else None
         thruster.max_reverse_N = -low if low is not None and low <= 0.0 else None
     return thruster
@@ -140,12 +133,7 @@ def on_joint(joint: Joint, bodies: RobotDescription) -> ParsedThruster:
     axis = joint.axis if joint.axis is not None else joint.X_BJ.R[:, 0]
     where = f"{joint.place}: joint {joint.name}"
     name = short(joint.child)
-    return ParsedThruster(name, where_on(joint, bodies), _checked_axis(axis, where), joint.place, joint.X_BJ.R)
-
-
-def short(name: str) -> str:
-    """A link's name without namespaces."""
-    return name.replace("::", "/").rpartition("/")[2] or name
+    return ParsedThruster(name, where_on(joint, bodies), unit_axis(axis, where), joint.place, joint.X_BJ.R)
 
 
 def _uuv(plugin: Element, bodies: RobotDescription) -> ParsedThruster:
@@ -162,7 +150,7 @@ def _uuv(plugin: Element, bodies: RobotDescription) -> ParsedThruster:
         raise PlacedError(f"{plugin.place}: thruster plugin: neither link {link_name} nor its joint is in the file")
     dynamics = plugin.first("dynamics")
     if dynamics is not None:
-        lag = number_in(dynamics, "timeConstant")
+        lag = dynamics.number("timeConstant")
         thruster.time_constant_s = 0.0 if (dynamics.value("type") or "").lower() == "zeroorder" else lag
     _uuv_limits(plugin, thruster)
     return thruster
@@ -170,16 +158,15 @@ def _uuv(plugin: Element, bodies: RobotDescription) -> ParsedThruster:
 
 def _uuv_limits(plugin: Element, thruster: ParsedThruster) -> None:
     """Limits: stated thrusts first, then the ends of a thrust table, then the command's ends through the curve."""
-    high, low = number_in(plugin, "thrustMax"), number_in(plugin, "thrustMin")
+    high, low = plugin.number("thrustMax"), plugin.number("thrustMin")
     conversion = plugin.first("conversion")
-    clamp_high, clamp_low = number_in(plugin, "clampMax"), number_in(plugin, "clampMin")
-    gain = number_in(plugin, "gain")
+    clamp_high, clamp_low = plugin.number("clampMax"), plugin.number("clampMin")
+    gain = plugin.number("gain")
     gain = 1.0 if gain is None else gain
     if conversion is not None:
-        outputs = conversion.first("outputValues")
-        constant = number_in(conversion, "rotorConstant")
-        if outputs is not None and outputs.text.strip():
-            table = numbers(outputs.text, outputs.place, "outputValues")
+        table = conversion.numbers("outputValues")
+        constant = conversion.number("rotorConstant")
+        if table is not None:
             high = float(table.max()) if high is None else high
             low = float(table.min()) if low is None else low
         elif constant is not None:
@@ -187,17 +174,10 @@ def _uuv_limits(plugin: Element, thruster: ParsedThruster) -> None:
             if len(ends) == 2:
                 high = max(ends) if high is None else high
                 low = min(ends) if low is None else low
-    efficiency = number_in(plugin, "thrust_efficiency")
+    efficiency = plugin.number("thrust_efficiency")
     scale = efficiency if efficiency is not None and 0.0 < efficiency <= 1.0 else 1.0
     thruster.max_forward_N = scale * high if high is not None and high >= 0.0 else None
     thruster.max_reverse_N = -scale * low if low is not None and low <= 0.0 else None
-
-
-def number_in(element: Element, tag: str) -> float | None:
-    """Number in the first child with this tag; None if there is none."""
-    text = element.value(tag)
-    child = element.first(tag)
-    return None if text is None or child is None else number(text, child.place, tag)
 
 
 NAME_RULE = "inferred from names: positive thrust pushes along the axis of each joint that is called a thruster"
@@ -237,16 +217,16 @@ def read_thrusters(bodies: RobotDescription, found: ParsedVehicle) -> None:
             order.append(identity)
     _drop_repeats(found, order)
     for plugin in unknown:
-        inner = len(plugin.all("thruster"))
+        inner, title = len(plugin.all("thruster")), plugin.name or plugin.attributes.get("filename") or "without a name"
         found.notes.append(
-            f"{QUESTION}not read: plugin {_title(plugin)}, of a form that is not known"
+            f"{QUESTION}not read: plugin {title[:80]}, of a form that is not known"
             + (f", with {inner} thrusters in it" if inner else "")
-            + f" ({plugin.place.file.name}:{plugin.place.line})"
+            + f" ({plugin.place.short})"
         )
     if found.thrusters:
         found.thrusters = [t for _, t in sorted(zip(order, found.thrusters, strict=True), key=lambda pair: pair[0])]
         found.thrust_rule = "; ".join(dict.fromkeys(rules))
-        found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: thruster plugins and their joints"
+        found.derived["thruster_layout"] = f"{found.origin}: thruster plugins and their joints"
         _question_undriven(bodies, found)
         turning = {short(name) for name in moving_parts(bodies)}
         carried = {short(joint.child): short(joint.parent) for joint in bodies.joints.values()}
@@ -329,7 +309,7 @@ def _by_name(bodies: RobotDescription, unknown: list[Element], found: ParsedVehi
         why = "the file's thruster plugin is not read" if unknown else "no thruster plugin in the file"
         found.notes.append(f"{QUESTION}{why}: {found.guessed}, and which way they push is a guess")
         found.thrusters.sort(key=lambda t: [int(n) for n in _NUMBERED.findall(t.name)])
-        found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: joints with thruster names"
+        found.derived["thruster_layout"] = f"{found.origin}: joints with thruster names"
 
 
 def _one_each(joints: list[Joint], bodies: RobotDescription, found: ParsedVehicle) -> list[Joint]:
@@ -402,7 +382,7 @@ def _ardupilot(bodies: RobotDescription, found: ParsedVehicle) -> None:
             joint = bodies.joint(control.value("jointName") or "")
             if joint is None or "thrust" not in (control.value("cmd_topic") or ""):
                 continue
-            multiplier, offset = number_in(control, "multiplier"), number_in(control, "offset")
+            multiplier, offset = control.number("multiplier"), control.number("offset")
             thruster = next((t for t in found.thrusters if t.name == short(joint.child)), None)
             if thruster is None or multiplier is None:
                 continue
@@ -414,7 +394,7 @@ def _ardupilot(bodies: RobotDescription, found: ParsedVehicle) -> None:
                 reversed_names.append(thruster.name)
     if limited:
         found.notes.append(f"thrust limits of {limited} thrusters: the range that ArduPilot's plugin commands")
-        found.derived["thruster_limits"] = f"{found.kind} {found.file.name}: ArduPilot plugin, multiplier and offset"
+        found.derived["thruster_limits"] = f"{found.origin}: ArduPilot plugin, multiplier and offset"
     if reversed_names:
         found.notes.append(
             f"ArduPilot's plugin turns the command round for {', '.join(reversed_names)}; "

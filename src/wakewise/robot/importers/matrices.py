@@ -148,7 +148,7 @@ def read_yaml(root: YamlNode, name: str, found: ParsedVehicle, rows: WrenchOrder
             f"and no vehicle parameters under a key that is known{said}"
         )
     if alike and not (geometry or matrix):
-        where = f"{alike[0][1].place.file.name}:{alike[0][1].place.line}"
+        where = alike[0][1].place.short
         names = ", ".join(title(path) for path, _ in alike[:4])
         found.notes.append(
             f"{QUESTION}not read: {names}, which look like thrusters in a form that is not known ({where})"
@@ -217,7 +217,7 @@ def _frame(root: YamlNode, entries: Entries, found: ParsedVehicle, *, geometry: 
             return ("FLU", why) if lift_m > 0.0 else ("FRD", why)
     if len(spoken) == 1:
         frame, place = next(iter(spoken.items()))
-        why = f"inferred: a comment says so, no key does ({place.file.name}:{place.line})"
+        why = f"inferred: a comment says so, no key does ({place.short})"
         return ("FRD", why) if frame == "FRD" else ("FLU", why)
     what = "thruster positions" if geometry else "the matrix"
     if found.thrusters or found.matrix is not None:
@@ -249,7 +249,7 @@ def _named_frame(entries: Entries, found: ParsedVehicle) -> tuple[Frame, str] | 
     best = min(rank for rank, *_ in ranked)
     ranked = [entry for entry in ranked if entry[0] == best]
     _, frame, key, item = ranked[0]
-    said = f"{key} is {item.value} ({item.place.file.name}:{item.place.line})"
+    said = f"{key} is {item.value} ({item.place.short})"
     for _, other, name, against in ranked[1:]:
         if other != frame and best == 0:
             raise PlacedError(
@@ -258,7 +258,7 @@ def _named_frame(entries: Entries, found: ParsedVehicle) -> tuple[Frame, str] | 
         if other != frame:
             found.notes.append(
                 f"{QUESTION}frames differ: {said}, which is taken, and {name} is {against.value} "
-                f"({against.place.file.name}:{against.place.line})"
+                f"({against.place.short})"
             )
             break
     item.seen = True
@@ -311,7 +311,7 @@ def _matrix(root: YamlNode, entries: Entries, found: ParsedVehicle, rows: Wrench
         if order is not None and order.throttle:
             how = "inferred" if order.why.startswith("inferred") else "detected"
             found.frame, found.frame_why = "FRD", f"{how}: {key} is of throttle, up, and lateral, to the right"
-        found.notes.append(f"allocation matrix: {key}, 6 x {n} ({item.place.file.name}:{item.place.line})")
+        found.notes.append(f"allocation matrix: {key}, 6 x {n} ({item.place.short})")
         return True
     return False
 
@@ -372,4 +372,4 @@ def _stated_order(root: YamlNode, path: tuple[str, ...], item: YamlNode, entries
     if len(spoken) != 1:
         return None
     order, place = next(iter(spoken.values()))
-    return replace(order, why=f"inferred: a comment says so, {place.file.name}:{place.line}")
+    return replace(order, why=f"inferred: a comment says so, {place.short}")

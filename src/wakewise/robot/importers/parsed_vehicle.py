@@ -88,6 +88,19 @@ class ParsedVehicle:
     derived: dict[str, str] = field(default_factory=dict)
     estimates: set[str] = field(default_factory=set)
 
+    @property
+    def origin(self) -> str:
+        """Kind and name of the file, as sources of groups begin."""
+        return f"{self.kind} {self.file.name}"
+
+
+def unit_axis(axis: Array, where: str) -> Array:
+    """An axis at unit length; refuses one of length 0."""
+    length = float(np.linalg.norm(axis))
+    if length < 1e-6:
+        raise PlacedError(f"{where}: axis {axis.tolist()} has length {length:g}, it must not be zero")
+    return axis / length
+
 
 def to_frd(matrix: Array) -> Array:
     """Turn a vector, shape (3,), or a tensor, (3, 3) or (6, 6), between FLU and FRD (its own inverse)."""
@@ -170,14 +183,14 @@ def make_draft(found: ParsedVehicle, convention: str, thrust: str) -> VehicleDra
     return draft
 
 
-def symmetrised(matrix: Array, notes: list[str], what: str = "added mass") -> Array:
-    """The symmetric half of a matrix; says by how much it was not symmetric."""
+def symmetrised(matrix: Array, notes: list[str]) -> Array:
+    """The symmetric half of an added mass, with a note on by how much it was not symmetric."""
     skew = float(np.abs(matrix - matrix.T).max())
     if skew == 0.0:
         return matrix
     i, j = np.unravel_index(int(np.argmax(np.abs(matrix - matrix.T))), matrix.shape)
     notes.append(
-        f"{what}: not symmetric, entry ({i + 1}, {j + 1}) differs from its mirror image by {skew:.3g} "
+        f"added mass: not symmetric, entry ({i + 1}, {j + 1}) differs from its mirror image by {skew:.3g} "
         f"(largest entry {np.abs(matrix).max():.6g}); the mean of the two is taken"
     )
     return 0.5 * (matrix + matrix.T)

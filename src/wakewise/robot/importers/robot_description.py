@@ -90,15 +90,16 @@ class RobotDescription:
 
     def link(self, name: str) -> Link | None:
         """A link by name, with or without its scope."""
-        return self.links.get(name) or next((v for k, v in self.links.items() if _tail(k) == _tail(name)), None)
+        return self.links.get(name) or next((v for k, v in self.links.items() if short(k) == short(name)), None)
 
     def joint(self, name: str) -> Joint | None:
         """A joint by name, with or without its scope."""
-        return self.joints.get(name) or next((v for k, v in self.joints.items() if _tail(k) == _tail(name)), None)
+        return self.joints.get(name) or next((v for k, v in self.joints.items() if short(k) == short(name)), None)
 
 
-def _tail(name: str) -> str:
-    return name.replace("::", "/").rpartition("/")[2]
+def short(name: str) -> str:
+    """A name without its scope."""
+    return name.replace("::", "/").rpartition("/")[2] or name
 
 
 def pose_of(xyz: Array, rpy: Array) -> Pose:
@@ -126,42 +127,23 @@ def checked_mass(text: str | None, place: SourceLocation, link: str) -> float:
     return mass
 
 
-def shape_volume(tag: str, sizes: dict[str, Array]) -> float | None:
-    """Volume of a primitive shape; None for a mesh or anything else."""
-    radius = float(sizes["radius"][0]) if "radius" in sizes else 0.0
-    length = float(sizes["length"][0]) if "length" in sizes else 0.0
+def _measures(tag: str, sizes: dict[str, Array]) -> tuple[float | None, Array | None]:
+    """Volume of a primitive shape, and half the sides of the box round it, whose axis is z; None of anything else."""
+    radius, length = (float(sizes[key][0]) if key in sizes else 0.0 for key in ("radius", "length"))
     match tag:
         case "box" if "size" in sizes:
-            return float(np.prod(sizes["size"]))
+            return float(np.prod(sizes["size"])), 0.5 * sizes["size"]
         case "sphere":
-            return 4.0 / 3.0 * np.pi * radius**3
+            return 4.0 / 3.0 * np.pi * radius**3, np.full(3, radius)
         case "cylinder":
-            return float(np.pi * radius**2 * length)
+            return np.pi * radius**2 * length, np.array([radius, radius, 0.5 * length])
         case "capsule":
-            return float(np.pi * radius**2 * (length + 4.0 / 3.0 * radius))
+            volume = np.pi * radius**2 * (length + 4.0 / 3.0 * radius)
+            return volume, np.array([radius, radius, 0.5 * length + radius])
         case "ellipsoid" if "radii" in sizes:
-            return float(4.0 / 3.0 * np.pi * np.prod(sizes["radii"]))
+            return float(4.0 / 3.0 * np.pi * np.prod(sizes["radii"])), sizes["radii"]
         case _:
-            return None
-
-
-def shape_half(tag: str, sizes: dict[str, Array]) -> Array | None:
-    """Half the sides of the box round a primitive shape, whose axis is z; None for a mesh or anything else."""
-    radius = float(sizes["radius"][0]) if "radius" in sizes else 0.0
-    length = float(sizes["length"][0]) if "length" in sizes else 0.0
-    match tag:
-        case "box" if "size" in sizes:
-            return 0.5 * sizes["size"]
-        case "sphere":
-            return np.full(3, radius)
-        case "cylinder":
-            return np.array([radius, radius, 0.5 * length])
-        case "capsule":
-            return np.array([radius, radius, 0.5 * length + radius])
-        case "ellipsoid" if "radii" in sizes:
-            return sizes["radii"]
-        case _:
-            return None
+            return None, None
 
 
 def collision_shape(X_LS: Pose, geometry: Element | None) -> CollisionShape:
@@ -175,7 +157,7 @@ def collision_shape(X_LS: Pose, geometry: Element | None) -> CollisionShape:
         text = shape.attributes.get(key) or shape.value(key)
         if text is not None:
             sizes[key] = numbers(text, shape.place, f"{shape.tag} {key}", count)
-    return CollisionShape(X_LS, shape_volume(shape.tag, sizes), shape_half(shape.tag, sizes))
+    return CollisionShape(X_LS, *_measures(shape.tag, sizes))
 
 
 def read_mass(bodies: RobotDescription, found: ParsedVehicle) -> None:
@@ -188,7 +170,7 @@ def read_mass(bodies: RobotDescription, found: ParsedVehicle) -> None:
         names = ", ".join(link.name for link in computed[:4])
         found.notes.append(
             f"{QUESTION}mass: not taken: the simulator computes that of {names} "
-            f"from shapes and densities (inertial auto) ({computed[0].place.file.name}:{computed[0].place.line})"
+            f"from shapes and densities (inertial auto) ({computed[0].place.short})"
         )
         return
     weighed = [link for link in bodies.links.values() if link.mass_kg is not None]
@@ -234,7 +216,7 @@ def read_mass(bodies: RobotDescription, found: ParsedVehicle) -> None:
             f"{QUESTION}mass: {', '.join(unstated[:6])} states no inertial, for which Gazebo takes 1 kg each "
             f"({len(unstated)} kg in all); not counted"
         )
-    where = f"{heaviest.place.file.name}:{heaviest.place.line}"
+    where = heaviest.place.short
     found.derived["body"] = found.derived["inertia"] = (
         f"{found.kind} {where}: link {heaviest.name} and all others as one body"
     )
@@ -242,25 +224,26 @@ def read_mass(bodies: RobotDescription, found: ParsedVehicle) -> None:
 
 def moving_parts(bodies: RobotDescription) -> set[str]:
     """Links beyond a joint that moves, thrusters' own apart: an arm, not the hull."""
-    edges: dict[str, list[tuple[str, bool]]] = {}
+    joined: dict[str, list[str]] = {}
+    rigid: dict[str, list[str]] = {}
     for joint in bodies.joints.values():
         parent, child = (link.name if (link := bodies.link(end)) else end for end in (joint.parent, joint.child))
         moves = joint.kind in _MOVING and not THRUSTER_NAME.search(joint.child + " " + joint.name)
-        edges.setdefault(parent, []).append((child, moves))
-        edges.setdefault(child, []).append((parent, moves))
-    still, waiting = {bodies.base}, [bodies.base]
+        for edges in (joined,) if moves else (joined, rigid):
+            edges.setdefault(parent, []).append(child)
+            edges.setdefault(child, []).append(parent)
+    still = _reached({bodies.base}, rigid)
+    return _reached(still, joined) - still
+
+
+def _reached(start: set[str], edges: dict[str, list[str]]) -> set[str]:
+    """Where edges lead to from some places, these included."""
+    reached, waiting = set(start), list(start)
     while waiting:
-        for there, moves in edges.get(waiting.pop(), []):
-            if not moves and there not in still:
-                still.add(there)
-                waiting.append(there)
-    reached, waiting = set(still), list(still)
-    while waiting:
-        for there, _ in edges.get(waiting.pop(), []):
-            if there not in reached:
-                reached.add(there)
-                waiting.append(there)
-    return reached - still
+        new = set(edges.get(waiting.pop(), [])) - reached
+        reached |= new
+        waiting += new
+    return reached
 
 
 def _require_inertia(link: Link) -> None:
@@ -285,7 +268,7 @@ def read_camera(bodies: RobotDescription, found: ParsedVehicle) -> None:
     found.camera_fov_rad = camera.fov_rad
     more = f", the first of {len(bodies.cameras)}" if len(bodies.cameras) > 1 else ""
     found.notes.append(f"camera: {camera.name}{more}")
-    found.derived["camera_mount"] = f"{found.kind} {found.file.name}: sensor {camera.name}"
+    found.derived["camera_mount"] = f"{found.origin}: sensor {camera.name}"
 
 
 def read_displacement(bodies: RobotDescription, found: ParsedVehicle) -> None:
@@ -311,7 +294,7 @@ def read_displacement(bodies: RobotDescription, found: ParsedVehicle) -> None:
     found.displaced_volume_m3 = volume
     found.p_buoyancy_m = np.asarray(moment, dtype=np.float64) / volume
     found.notes.append(f"displaced volume: inferred from {len(shapes)} collision shapes, as Gazebo's buoyancy does")
-    found.derived["buoyancy"] = f"{found.kind} {found.file.name}: collision shapes"
+    found.derived["buoyancy"] = f"{found.origin}: collision shapes"
     found.estimates.add("buoyancy")
 
 
@@ -359,7 +342,7 @@ def _read_size(bodies: RobotDescription, found: ParsedVehicle) -> None:
     found.size_m = 2.0 * reach
     found.notes.append(f"size: {kind} of link {base.name}, {box} m; an estimate, such shapes are drawn for collisions")
     where = f"size_m: an estimate by {kind} of link {base.name}"
-    known = found.derived.get("body", f"{found.kind} {found.file.name}")
+    known = found.derived.get("body", found.origin)
     found.derived["body"] = f"{known}; {where}"
     found.estimates.add("body")
 
@@ -386,4 +369,4 @@ def _read_camera_link(bodies: RobotDescription, found: ParsedVehicle) -> None:
     found.notes.append(
         f"camera: by the name of link {link.name}{more}, taken to look along {looks}; no sensor states it"
     )
-    found.derived["camera_mount"] = f"{found.kind} {found.file.name}: link {link.name}, by its name"
+    found.derived["camera_mount"] = f"{found.origin}: link {link.name}, by its name"

@@ -60,7 +60,7 @@ def _models(root: Element) -> list[Element]:
 
 def _thruster_count(model: Element) -> tuple[int, int]:
     plugins = [e for e in model.walk() if e.tag == "plugin"]
-    text = [(p.attributes.get("filename", "") + p.attributes.get("name", "")).lower() for p in plugins]
+    text = [(p.attributes.get("filename", "") + p.name).lower() for p in plugins]
     return sum("thruster" in t for t in text), len(plugins)
 
 
@@ -70,7 +70,7 @@ def _included(element: Element, folders: PackagePaths, notes: list[str], depth: 
     if depth > 5:
         raise PlacedError(f"{element.place}: includes within one another more than 5 deep")
     if uri.startswith(("http:", "https:")) or not uri:
-        notes.append(f"include left out, not on this disk: {uri[:80]} ({element.place.file.name}:{element.place.line})")
+        notes.append(f"include left out, not on this disk: {uri[:80]} ({element.place.short})")
         return []
     name = uri if "://" in uri else f"model://{uri}"
     try:
@@ -82,7 +82,7 @@ def _included(element: Element, folders: PackagePaths, notes: list[str], depth: 
         return []
     path = folder / "model.sdf" if folder.is_dir() else folder
     if not path.is_file():
-        notes.append(f"include left out, not found: {uri[:80]} ({element.place.file.name}:{element.place.line})")
+        notes.append(f"include left out, not found: {uri[:80]} ({element.place.short})")
         return []
     root = parse_xml(read_text(path), path)
     return _models(root)
@@ -102,7 +102,7 @@ class _Reader:
         self.includes = 0
 
     def read(self) -> RobotDescription:
-        name = self.model.attributes.get("name", "") or "vehicle"
+        name = self.model.name or "vehicle"
         self._collect(self.model, "", 0)
         if not self.links:
             raise PlacedError(f"{self.model.place}: model {name} holds no link{left_out(self.notes)}")
@@ -123,7 +123,7 @@ class _Reader:
         if depth > 5:
             raise PlacedError(f"{model.place}: models within one another more than 5 deep")
         for element in model.children:
-            key = scope + element.attributes.get("name", "")
+            key = scope + element.name
             if element.tag in {"link", "joint", "frame"}:
                 if not element.attributes.get("name"):
                     raise PlacedError(f"{element.place}: <{element.tag}> without a name")
@@ -185,23 +185,20 @@ class _Reader:
         return self._pose(relative, (*through, key)) @ pose
 
     def _joint(self, key: str, element: Element, X_BM: Pose) -> Joint:
-        scope = key.rpartition("::")[0]
+        scope = "".join(key.rpartition("::")[:2])
         X_BJ = X_BM @ self._pose(key, ())
-        child = (f"{scope}::" if scope else "") + (element.value("child") or "")
-        axis_element = element.first("axis")
         axis: Array | None = None
         place = element.place
+        axis_element = element.first("axis")
         if axis_element is not None:
-            xyz = axis_element.first("xyz")
-            place = (xyz or axis_element).place
-            text = "0 0 1" if xyz is None else xyz.text.strip() or "0 0 1"
-            axis = numbers(text, place, f"axis of joint {key}", 3)
-            frame = None if xyz is None else xyz.attributes.get("expressed_in")
+            xyz = axis_element.child("xyz")
+            place = xyz.place
+            frame = xyz.attributes.get("expressed_in")
             if axis_element.value("use_parent_model_frame") in {"1", "true"}:
                 frame = "__model__"
-            X_BF = X_BM @ self._pose((f"{scope}::" if scope else "") + frame, ()) if frame else X_BJ
-            axis = X_BF.R @ axis
-        parent = (f"{scope}::" if scope else "") + (element.value("parent") or "")
+            X_BF = X_BM @ self._pose(scope + frame, ()) if frame else X_BJ
+            axis = X_BF.R @ numbers(xyz.text.strip() or "0 0 1", place, f"axis of joint {key}", 3)
+        child, parent = (scope + (element.value(end) or "") for end in ("child", "parent"))
         return Joint(key, element.attributes.get("type", ""), child, X_BJ, axis, place, parent)
 
 

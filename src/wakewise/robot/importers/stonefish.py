@@ -16,7 +16,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.robot.importers.expressions import evaluate
-from wakewise.robot.importers.gazebo_thrusters import disk_area_m2, note_movable_thrusters, short
+from wakewise.robot.importers.gazebo_thrusters import disk_area_m2, note_movable_thrusters
 from wakewise.robot.importers.packages import PackagePaths
 from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle
 from wakewise.robot.importers.robot_description import (
@@ -26,6 +26,7 @@ from wakewise.robot.importers.robot_description import (
     checked_mass,
     moving_parts,
     read_mass,
+    short,
 )
 from wakewise.robot.importers.urdf import origin
 from wakewise.robot.importers.xml import Element, PlacedError, SourceLocation, number, numbers, parse_xml, read_text
@@ -55,7 +56,7 @@ def read_thrusters(robot: Element, bodies: RobotDescription, density: float | No
     link, or a number is not one.
     """
     rules: list[str] = []
-    turning = moving_parts(bodies)
+    turning = {short(name) for name in moving_parts(bodies)}
     steered: list[str] = []
     others: dict[str, int] = {}
     for actuator in robot.all("actuator"):
@@ -67,14 +68,13 @@ def read_thrusters(robot: Element, bodies: RobotDescription, density: float | No
             _thruster(actuator, bodies, density, found) if kind == "thruster" else _simple(actuator, bodies)
         )
         rules.append(RULE if kind == "thruster" else SIMPLE_RULE)
-        link = actuator.first("link")
-        if link is not None and short(link.attributes.get("name", "")) in {short(name) for name in turning}:
+        if short(actuator.child("link").name) in turning:
             steered.append(found.thrusters[-1].name)
     note_movable_thrusters(steered, found)
     old = sum(
-        actuator.first("thrust_model") is None and specs is not None and "max_rpm" in specs.attributes
+        actuator.first("thrust_model") is None and "max_rpm" in actuator.child("specs").attributes
         for actuator in robot.all("actuator")
-        if (specs := actuator.first("specs")) is not None and actuator.attributes.get("type") == "thruster"
+        if actuator.attributes.get("type") == "thruster"
     )
     if old:
         found.notes.append(f"not read: thrust_coeff and max_rpm of {old} thrusters in the form before thrust models")
@@ -84,7 +84,7 @@ def read_thrusters(robot: Element, bodies: RobotDescription, density: float | No
         doubt = QUESTION if "propeller" in others else ""
         found.notes.append(f"{doubt}not read: actuators that are no thrusters ({said})")
     if found.thrusters:
-        found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: actuators of type thruster"
+        found.derived["thruster_layout"] = f"{found.origin}: actuators of type thruster"
 
 
 def true(text: str | None) -> bool:
@@ -93,28 +93,28 @@ def true(text: str | None) -> bool:
 
 
 def _placed(actuator: Element, bodies: RobotDescription) -> ParsedThruster:
-    name = actuator.attributes.get("name", "") or f"line {actuator.place.line}"
-    link_element = actuator.first("link")
-    link = bodies.link(link_element.attributes.get("name", "")) if link_element is not None else None
+    name = actuator.name or f"line {actuator.place.line}"
+    link = _link_of(actuator, bodies)
     if link is None:
         raise PlacedError(f"{actuator.place}: thruster {name} is on no link of the robot")
     X_BT = link.X_BL @ origin(actuator.first("origin"))
     return ParsedThruster(short(name), X_BT.p_m, X_BT.R[:, 0], actuator.place, X_BT.R)
 
 
+def _link_of(element: Element, bodies: RobotDescription) -> Link | None:
+    """The link that an actuator or a sensor names; None if it names none of the robot."""
+    named = element.first("link")
+    return None if named is None else bodies.link(named.name)
+
+
 def _simple(actuator: Element, bodies: RobotDescription) -> ParsedThruster:
     """An ideal force along +x of its frame; a propeller's hand turns what is drawn, not what pushes."""
-    thruster, specs = _placed(actuator, bodies), actuator.first("specs")
-    if specs is None:
-        return thruster
+    thruster, specs = _placed(actuator, bodies), actuator.child("specs")
     if true(specs.attributes.get("inverted")):
         thruster.axis = -thruster.axis
     for prefix in ("", "thrust_"):
-        ends = [specs.attributes.get(f"{side}_{prefix}limit") for side in ("lower", "upper")]
-        if None in ends:
-            continue
-        low, high = (number(text or "", specs.place, "limit of the thrust") for text in ends)
-        if low <= 0.0 <= high and low < high:
+        low, high = (specs.number_attribute(f"{s}_{prefix}limit", "limit of the thrust") for s in ("lower", "upper"))
+        if low is not None and high is not None and low <= 0.0 <= high and low < high:
             thruster.max_forward_N, thruster.max_reverse_N = high, -low
     return thruster
 
@@ -123,28 +123,24 @@ def _thruster(
     actuator: Element, bodies: RobotDescription, density: float | None, found: ParsedVehicle
 ) -> ParsedThruster:
     thruster = _placed(actuator, bodies)
-    specs, propeller, model = (actuator.first(tag) for tag in ("specs", "propeller", "thrust_model"))
-    kind = "" if model is None else model.attributes.get("type", "")
-    inverted = False
-    if specs is not None:
-        # Scenarios of before the thrust models said inverted; with a model Stonefish reads inverted_setpoint only.
-        inverted = true(specs.attributes.get("inverted_setpoint", specs.attributes.get("inverted") if not kind else ""))
-        if kind and true(specs.attributes.get("inverted")) and "inverted_setpoint" not in specs.attributes:
-            found.notes.append(
-                f"{QUESTION}thruster {thruster.name}: not read: inverted, which Stonefish ignores (it reads "
-                f"inverted_setpoint); is the thrust meant to be turned? ({specs.place.file.name}:{specs.place.line})"
-            )
-    left = propeller is not None and not true(propeller.attributes.get("right", "true"))
+    specs, propeller, model = (actuator.child(tag) for tag in ("specs", "propeller", "thrust_model"))
+    kind = model.attributes.get("type", "")
+    # Scenarios of before the thrust models said inverted; with a model Stonefish reads inverted_setpoint only.
+    inverted = true(specs.attributes.get("inverted_setpoint", specs.attributes.get("inverted") if not kind else ""))
+    if kind and true(specs.attributes.get("inverted")) and "inverted_setpoint" not in specs.attributes:
+        found.notes.append(
+            f"{QUESTION}thruster {thruster.name}: not read: inverted, which Stonefish ignores (it reads "
+            f"inverted_setpoint); is the thrust meant to be turned? ({specs.place.short})"
+        )
+    left = not true(propeller.attributes.get("right", "true"))
     if left != inverted:
         thruster.axis = -thruster.axis
-    diameter = None
-    if propeller is not None and propeller.attributes.get("diameter") is not None:
-        diameter = number(propeller.attributes["diameter"], propeller.place, "diameter")
+    diameter = propeller.number_attribute("diameter")
+    if diameter is not None:
         thruster.disk_area_m2 = disk_area_m2(diameter, propeller.place)
     steady = _lag(actuator, thruster)
-    text = None if specs is None else specs.attributes.get("max_setpoint")
-    top = None if text is None or specs is None else abs(number(text, specs.place, "max_setpoint"))
-    along = None if model is None else _thrusts(model, top or 1.0, diameter, density)
+    top = abs(specs.number_attribute("max_setpoint") or 0.0)
+    along = _thrusts(model, top or 1.0, diameter, density)
     if along is None:
         return thruster
     if max(along) <= 0.0 and min(along) < 0.0:
@@ -174,10 +170,7 @@ def _thrusts(model: Element, top: float, diameter: float | None, density: float 
     """Thrusts in newton, both positive, of the rotor turning at +top and at -top; None where the file tells neither."""
 
     def value(tag: str, key: str) -> float | None:
-        element = model.first(tag)
-        if element is None or key not in element.attributes:
-            return None
-        return number(element.attributes[key], element.place, f"{tag} {key}")
+        return model.child(tag).number_attribute(key, f"{tag} {key}")
 
     forward, reverse = value("thrust_coeff", "forward"), value("thrust_coeff", "reverse")
     match model.attributes.get("type"):
@@ -255,14 +248,9 @@ class StonefishReader:
             self.notes.append(f"include left out: {fault}")
             return []
         if not path.is_file():
-            self.notes.append(
-                f"include left out, not found: {name[:80]} ({element.place.file.name}:{element.place.line})"
-            )
+            self.notes.append(f"include left out, not found: {name[:80]} ({element.place.short})")
             return []
-        inner = {
-            arg.attributes.get("name", ""): self._text(arg.attributes.get("value", ""), arguments)
-            for arg in element.all("arg")
-        }
+        inner = {arg.name: self._text(arg.attributes.get("value", ""), arguments) for arg in element.all("arg")}
         root = parse_xml(read_text(path), path)
         return self.robots(root, {**inner, **self.arguments}, depth + 1)
 
@@ -312,7 +300,7 @@ def read_stonefish(
     robot = max(robots, key=count)
     if len(robots) > 1:
         found.notes.append(f"robot {robot.attributes.get('name')}: taken out of {len(robots)} in the scenario")
-    found.name = robot.attributes.get("name", "") or found.name
+    found.name = robot.name or found.name
     weights: dict[str, _Weight] = {}
     bodies = _bodies(robot, weights)
     _mass(bodies, weights, found)
@@ -325,8 +313,8 @@ def read_stonefish(
 
 def _density(root: Element) -> float | None:
     """Density of the scenario's water, kg/m^3."""
-    water = next((e for e in root.walk() if e.tag == "water" and "density" in e.attributes), None)
-    return None if water is None else number(water.attributes["density"], water.place, "density of the water")
+    water = next((e for e in root.walk() if e.tag == "water" and "density" in e.attributes), root)
+    return water.number_attribute("density", "density of the water") if water.tag == "water" else None
 
 
 def _bodies(robot: Element, weights: dict[str, _Weight]) -> RobotDescription:
@@ -338,7 +326,7 @@ def _bodies(robot: Element, weights: dict[str, _Weight]) -> RobotDescription:
     links: dict[str, Link] = {}
     for i, element in enumerate(elements):
         name = element.attributes.get("name", f"link{i}")
-        links[name] = Link(element.attributes.get("name", ""), element.place)
+        links[name] = Link(element.name, element.place)
         weights[name] = _weight(element, name)
     steps: dict[str, tuple[str, Pose]] = {}
     joints: dict[str, Joint] = {}
@@ -346,7 +334,7 @@ def _bodies(robot: Element, weights: dict[str, _Weight]) -> RobotDescription:
         ends = joint.first("parent"), joint.first("child")
         if ends[0] is None or ends[1] is None:
             continue
-        parent, child = (end.attributes.get("name", "") for end in ends if end is not None)
+        parent, child = (end.name for end in ends if end is not None)
         steps[child] = (parent, origin(joint.first("origin")))
         name, kind = joint.attributes.get("name", f"joint{i}"), joint.attributes.get("type", "")
         joints[name] = Joint(name, kind, child, Pose(np.zeros(3)), None, joint.place, parent)
@@ -462,15 +450,13 @@ def _camera(robot: Element, bodies: RobotDescription, found: ParsedVehicle) -> N
     """First camera; Stonefish gives camera frames OpenCV axes, so the mount needs no turn."""
     for sensor in robot.all("sensor"):
         if "camera" in sensor.attributes.get("type", ""):
-            link_element = sensor.first("link")
-            link = bodies.link(link_element.attributes.get("name", "")) if link_element is not None else None
+            link = _link_of(sensor, bodies)
             if link is None:
                 continue
             found.X_BC = link.X_BL @ origin(sensor.first("origin"))
-            specs = sensor.first("specs")
-            if specs is not None and "horizontal_fov" in specs.attributes:
-                degrees = number(specs.attributes["horizontal_fov"], specs.place, "horizontal_fov")
+            degrees = sensor.child("specs").number_attribute("horizontal_fov")
+            if degrees is not None:
                 found.camera_fov_rad = math.radians(degrees)
             found.notes.append(f"camera: {sensor.attributes.get('name', 'camera')}")
-            found.derived["camera_mount"] = f"{found.kind} {found.file.name}: sensor"
+            found.derived["camera_mount"] = f"{found.origin}: sensor"
             return

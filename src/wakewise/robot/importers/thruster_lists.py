@@ -13,7 +13,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.robot.importers.angles import read_angles, unit_of
-from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle
+from wakewise.robot.importers.parsed_vehicle import QUESTION, ParsedThruster, ParsedVehicle, unit_axis
 from wakewise.robot.importers.robot_description import pose_of
 from wakewise.robot.importers.safe_yaml_nodes import YamlNode
 from wakewise.robot.importers.thruster_checks import is_unit, require_count
@@ -82,7 +82,7 @@ def read_list(entries: Entries, found: ParsedVehicle) -> tuple[str, ...]:
                 raise PlacedError(f"{p.item.place}: {p.name} has a position but no direction, which is needed too")
             given = p.item.get("name", "id")
             label = p.name if given is None else given.words() or p.name
-            axis = unit_axis(p.axis, p.item, p.name)
+            axis = unit_axis(p.axis, f"{p.item.place}: {p.name}")
             if p.R is None:
                 require_direction(p.axis, p.item, p.name)
             thruster = ParsedThruster(label, p.p_m, axis, p.item.place, p.R)
@@ -138,7 +138,7 @@ def _tell(flipped: list[str], bounded: dict[str, None], found: ParsedVehicle) ->
         )
     if bounded:
         found.notes.append(f"thrust limits: {', '.join(bounded)} of each thruster, taken as newtons")
-        found.derived["thruster_limits"] = f"{found.kind} {found.file.name}: {', '.join(bounded)}"
+        found.derived["thruster_limits"] = f"{found.origin}: {', '.join(bounded)}"
 
 
 def _numbered(entries: Entries) -> Entries:
@@ -251,14 +251,6 @@ def _quaternion(item: YamlNode, name: str) -> Array:
     return Pose(np.zeros(3), np.array([w, x, y, z]) / length).R
 
 
-def unit_axis(axis: Array, item: YamlNode, name: str) -> Array:
-    """An axis of length 1; refuses one of length 0."""
-    length = float(np.linalg.norm(axis))
-    if length < 1e-6:
-        raise PlacedError(f"{item.place}: {name}: axis {axis.tolist()} has length {length:g}, it must not be zero")
-    return axis / length
-
-
 def require_direction(row: Array, item: YamlNode, name: str) -> None:
     """Refuse what stands as a direction and can only be angles: entries of a twelfth of a half turn, or of degrees."""
     length = float(np.linalg.norm(row))
@@ -300,7 +292,7 @@ def read_geometry(entries: Entries, found: ParsedVehicle) -> bool:
             raise PlacedError(f"{positions.place}: thruster positions without directions, which are needed too")
         return False
     _limits(entries, within, found)
-    found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: thruster positions and directions"
+    found.derived["thruster_layout"] = f"{found.origin}: thruster positions and directions"
     return True
 
 
@@ -335,7 +327,7 @@ def _from_matrices(positions: YamlNode, directions: YamlNode, key: str, entries:
         Rs = [pose_of(np.zeros(3), row).R for row in rows]
         axes = np.stack([R[:, 0] for R in Rs if R is not None], axis=1)
     for i, name in enumerate(names):
-        axis = unit_axis(axes[:, i], directions, name)
+        axis = unit_axis(axes[:, i], f"{directions.place}: {name}")
         if not turned:
             require_direction(axes[:, i], directions, name)
         found.thrusters.append(ParsedThruster(name, places[:, i], axis, directions.place, Rs[i]))
@@ -464,4 +456,4 @@ def _limits(entries: Entries, within: tuple[str, ...], found: ParsedVehicle) -> 
         return
     for thruster in found.thrusters:
         thruster.max_forward_N, thruster.max_reverse_N = forward, reverse
-    found.derived["thruster_limits"] = f"{found.kind} {found.file.name}:{high.place.line}"
+    found.derived["thruster_limits"] = f"{found.origin}:{high.place.line}"

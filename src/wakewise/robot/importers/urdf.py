@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.robot.importers.angles import require_radians
 from wakewise.robot.importers.robot_description import (
@@ -18,6 +17,7 @@ from wakewise.robot.importers.robot_description import (
     collision_shape,
     inertia_matrix,
     pose_of,
+    short,
 )
 from wakewise.robot.importers.xml import Element, PlacedError, number, numbers
 
@@ -44,7 +44,7 @@ def read_urdf(root: Element) -> RobotDescription:
     placed = {name: _joint(name, e, reached) for name, e in joints if _end(e, "parent") in reached}
     plugins = [p for gazebo in root.all("gazebo") for p in gazebo.all("plugin")]
     return RobotDescription(
-        name=root.attributes.get("name", "") or "vehicle",
+        name=root.name or "vehicle",
         base=base,
         links=reached,
         joints=placed,
@@ -54,15 +54,14 @@ def read_urdf(root: Element) -> RobotDescription:
 
 
 def _named(element: Element) -> str:
-    name = element.attributes.get("name", "").strip()
+    name = element.name.strip()
     if not name:
         raise PlacedError(f"{element.place}: <{element.tag}> without a name")
     return name
 
 
 def _end(joint: Element, which: str) -> str:
-    end = joint.first(which)
-    name = end.attributes.get("link", "").strip() if end is not None else ""
+    name = joint.child(which).attributes.get("link", "").strip()
     if not name:
         raise PlacedError(f"{joint.place}: joint {joint.attributes.get('name')} names no {which} link")
     return name
@@ -75,12 +74,10 @@ def origin(element: Element | None) -> Pose:
     xyz, rpy = element.attributes.get("xyz"), element.attributes.get("rpy")
     return pose_of(
         np.zeros(3) if xyz is None else numbers(xyz, element.place, "origin xyz", 3),
-        np.zeros(3) if rpy is None else require_radians(_rpy(rpy, element), element.place, "origin rpy"),
+        np.zeros(3)
+        if rpy is None
+        else require_radians(numbers(rpy, element.place, "origin rpy", 3), element.place, "origin rpy"),
     )
-
-
-def _rpy(text: str, element: Element) -> Array:
-    return numbers(text, element.place, "origin rpy", 3)
 
 
 def _link(element: Element, name: str) -> Link:
@@ -88,8 +85,7 @@ def _link(element: Element, name: str) -> Link:
     inertial = element.first("inertial")
     if inertial is not None:
         link.place = inertial.place
-        mass = inertial.first("mass")
-        link.mass_kg = checked_mass(mass.attributes.get("value") if mass else None, inertial.place, name)
+        link.mass_kg = checked_mass(inertial.child("mass").attributes.get("value"), inertial.place, name)
         at = origin(inertial.first("origin"))
         link.p_LG_m = at.p_m
         inertia = inertial.first("inertia")
@@ -118,7 +114,7 @@ def _parents(joints: list[tuple[str, Element]], links: dict[str, Link]) -> dict[
 def _base_link(links: dict[str, Link], parents: dict[str, str]) -> str:
     own = [name for name in links if not PART_NAME.search(name)]
     for name in [*own, *links]:
-        if name.replace("::", "/").rpartition("/")[2] == "base_link":
+        if short(name) == "base_link":
             return name
     bases = [name for name in own if name.endswith("base_link")]
     if bases:
@@ -156,13 +152,10 @@ def _joint(name: str, element: Element, links: dict[str, Link]) -> Joint:
     child = _end(element, "child")
     X_BJ = links[child].X_BL
     kind = element.attributes.get("type", "")
-    axis_element = element.first("axis")
-    axis = None
+    stated, axis = element.child("axis"), None
     if kind in {"revolute", "continuous", "prismatic"}:
-        xyz = axis_element.attributes.get("xyz", "1 0 0") if axis_element is not None else "1 0 0"
-        axis = X_BJ.R @ numbers(xyz, (axis_element or element).place, f"axis of joint {name}", 3)
-    place = (axis_element or element).place
-    return Joint(name, kind, child, X_BJ, axis, place, _end(element, "parent"))
+        axis = X_BJ.R @ numbers(stated.attributes.get("xyz", "1 0 0"), stated.place, f"axis of joint {name}", 3)
+    return Joint(name, kind, child, X_BJ, axis, stated.place, _end(element, "parent"))
 
 
 def _cameras(root: Element, links: dict[str, Link]) -> list[CameraSensor]:
@@ -185,9 +178,7 @@ def camera(sensor: Element, X_BL: Pose) -> CameraSensor:
 
 def pose_element(element: Element) -> tuple[Pose, str]:
     """Pose of a `<pose>` of SDF, the frame it is relative to ("" if not said); identity if there is none."""
-    pose = element.first("pose")
-    if pose is None:
-        return Pose(np.zeros(3)), ""
+    pose = element.child("pose")
     relative = pose.attributes.get("relative_to", "") or pose.attributes.get("frame", "")
     if not pose.text.strip():
         return Pose(np.zeros(3)), relative

@@ -155,7 +155,7 @@ class XacroExpander:
             if not self.skip_missing:
                 raise PlacedError(f"{fault} (--skip-missing leaves it out)") from fault
             self.missing.append(name)
-            self.notes.append(f"include left out, not found: {written} ({place.file.name}:{place.line})")
+            self.notes.append(f"include left out, not found: {written} ({place.short})")
             return []
         if path in self._including:
             raise PlacedError(f"{place}: include {written}: includes itself")
@@ -235,7 +235,7 @@ class XacroExpander:
     def _by(self, macro: Macro) -> str:
         """Where a macro was defined, if in another package than the file's own."""
         whence = self.folders.whence(macro.body.place.file)
-        return f" (defined in {macro.body.place.file.name}:{macro.body.place.line}{whence})" if whence else ""
+        return f" (defined in {macro.body.place.short}{whence})" if whence else ""
 
     def _read_beside_missing(self) -> None:
         """Take macros from the files that lie where a missing include should be."""
@@ -250,7 +250,7 @@ class XacroExpander:
                 root = parse_xml(read_text(path), path)
                 taken = []
                 for element in root.walk():
-                    macro = element.attributes.get("name", "")
+                    macro = element.name
                     if element.tag == "xacro:macro" and macro not in self.macros:
                         self._define(element, Scope(None))
                         taken.append(macro)

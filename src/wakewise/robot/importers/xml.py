@@ -37,6 +37,11 @@ class SourceLocation:
         """As compilers write it: `file:line`."""
         return f"{self.file}:{self.line}"
 
+    @property
+    def short(self) -> str:
+        """The same without folders, for notes."""
+        return f"{self.file.name}:{self.line}"
+
 
 class PlacedError(InputError):
     """A fault whose message already says file and line; a file's own words in it are cut to a readable length."""
@@ -63,10 +68,33 @@ class Element:
         """First child with this tag."""
         return next((child for child in self.children if child.tag == tag), None)
 
+    def child(self, tag: str) -> Element:
+        """First child with this tag; an empty element in this place if there is none."""
+        return self.first(tag) or Element(tag, {}, self.place)
+
     def value(self, tag: str) -> str | None:
         """Stripped text of the first child with this tag; None if there is none or it is empty."""
-        child = self.first(tag)
-        return child.text.strip() or None if child is not None else None
+        return self.child(tag).text.strip() or None
+
+    @property
+    def name(self) -> str:
+        """Its attribute `name`; "" if there is none."""
+        return self.attributes.get("name", "")
+
+    def number(self, tag: str) -> float | None:
+        """Number in the first child with this tag; None if there is none. Raises InputError if it is no number."""
+        text = self.value(tag)
+        return None if text is None else number(text, self.child(tag).place, tag)
+
+    def numbers(self, tag: str, count: int | None = None) -> Array | None:
+        """Numbers in the first child with this tag; None if there are none."""
+        text = self.value(tag)
+        return None if text is None else numbers(text, self.child(tag).place, tag, count)
+
+    def number_attribute(self, key: str, what: str = "") -> float | None:
+        """Number in an attribute, which messages call `what` or by its key; None if there is none."""
+        text = self.attributes.get(key)
+        return None if text is None else number(text, self.place, what or key)
 
     def walk(self) -> Iterator[Element]:
         """The element and everything below it, parents first."""

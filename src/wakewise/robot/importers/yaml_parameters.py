@@ -12,17 +12,19 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
-from wakewise.robot.importers.gazebo_thrusters import short, words
+from wakewise.robot.importers.gazebo_thrusters import words
 from wakewise.robot.importers.parsed_vehicle import ParsedVehicle, symmetrised
-from wakewise.robot.importers.robot_description import PART_NAME, RobotDescription, inertia_matrix
+from wakewise.robot.importers.robot_description import PART_NAME, RobotDescription, inertia_matrix, short
 from wakewise.robot.importers.safe_yaml_nodes import YamlNode
-from wakewise.robot.importers.xml import Element, PlacedError, number, numbers
+from wakewise.robot.importers.xml import Element, PlacedError, SourceLocation, number, numbers
 
 _FORCES = "xyzkmn"
 _SPEEDS = "UVWPQR"
-_ADDED = re.compile(r"([xyzkmn])Dot([UVWPQR])$")
-_LINEAR = re.compile(r"([xyzkmn])([UVWPQR])$")
-_QUADRATIC = re.compile(r"([xyzkmn])([UVWPQR])(?:abs)?([UVWPQR])$")
+_COEFFICIENTS = {
+    "added": re.compile(r"([xyzkmn])Dot([UVWPQR])$"),
+    "linear": re.compile(r"([xyzkmn])([UVWPQR])$"),
+    "quadratic": re.compile(r"([xyzkmn])([UVWPQR])(?:abs)?([UVWPQR])$"),
+}
 
 
 def read_water(bodies: RobotDescription, found: ParsedVehicle) -> None:
@@ -72,7 +74,7 @@ def store(
     found: ParsedVehicle, *, added: Array | None = None, linear: Array | None = None, quadratic: Array | None = None
 ) -> None:
     """Check the three matrices of coefficients, whatever their sign, and keep the usable ones."""
-    where = f"{found.kind} {found.file.name}"
+    where = found.origin
     for name, matrix in (("added mass", added), ("linear damping", linear), ("quadratic damping", quadratic)):
         if matrix is not None and not np.any(matrix):
             found.notes.append(f"{name}: the file states zeros")
@@ -99,34 +101,23 @@ def store(
 
 
 def _gz(plugin: Element, found: ParsedVehicle) -> None:
-    added, linear, quadratic = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((6, 6))
-    seen: set[str] = set()
+    matrices: dict[str, Array] = {}
     odd = []
     for element in plugin.children:
-        tag = element.tag
-        if match := _ADDED.match(tag):
-            matrix, column = added, match[2]
-        elif match := _LINEAR.match(tag):
-            matrix, column = linear, match[2]
-        elif match := _QUADRATIC.match(tag):
-            if match[2] != match[3]:
-                odd.append(tag)
+        for kind, pattern in _COEFFICIENTS.items():
+            match = pattern.match(element.tag)
+            if match is None:
                 continue
-            matrix, column = quadratic, match[2]
-        else:
-            continue
-        value = number(element.text.strip() or "0", element.place, tag)
-        i, j = _FORCES.index(match[1]), _SPEEDS.index(column)
-        matrix[i, j] += value
-        seen.add("added" if matrix is added else "linear" if matrix is linear else "quadratic")
+            if kind == "quadratic" and match[2] != match[3]:
+                odd.append(element.tag)
+                break
+            value = number(element.text.strip() or "0", element.place, element.tag)
+            matrix = matrices.setdefault(kind, np.zeros((6, 6)))
+            matrix[_FORCES.index(match[1]), _SPEEDS.index(match[2])] += value
+            break
     if odd:
         found.notes.append(f"quadratic damping of two speeds is left out: {', '.join(odd[:8])}")
-    store(
-        found,
-        added=added if "added" in seen else None,
-        linear=linear if "linear" in seen else None,
-        quadratic=quadratic if "quadratic" in seen else None,
-    )
+    store(found, **matrices)
     density = plugin.value("water_density")
     if density is not None:
         found.notes.append(f"water density of the file: {density} kg/m3")
@@ -138,8 +129,6 @@ def _fluid_added_mass(bodies: RobotDescription, found: ParsedVehicle) -> None:
     if not holders or (found.added_mass is not None and np.any(found.added_mass)):
         return
     heaviest = max(holders, key=lambda link: link.mass_kg or 0.0)
-    if heaviest.added_mass is None:
-        return
     store(found, added=heaviest.added_mass)
     found.notes.append(f"added mass: fluid_added_mass of link {heaviest.name}")
 
@@ -148,10 +137,10 @@ def _uuv(plugin: Element, bodies: RobotDescription, found: ParsedVehicle) -> Non
     blocks = plugin.all("link")
     if not blocks:
         return
-    base = [b for b in blocks if short(b.attributes.get("name", "")) == short(bodies.base)]
+    base = [b for b in blocks if short(b.name) == short(bodies.base)]
     block = (base or blocks)[0]
     if len(blocks) > 1:
-        others = ", ".join(short(b.attributes.get("name", "")) for b in blocks if b is not block)
+        others = ", ".join(short(b.name) for b in blocks if b is not block)
         found.notes.append(
             f"hydrodynamics: those of link {short(block.attributes.get('name', ''))}; not of {others[:120]}"
         )
@@ -163,7 +152,7 @@ def _uuv(plugin: Element, bodies: RobotDescription, found: ParsedVehicle) -> Non
             size = numbers(" ".join(side or "" for side in sides), box.place, "box", 3)
             if np.all(size > 0.0):
                 found.size_m = size
-                found.derived["body"] = f"{found.kind} {found.file.name}: box of the underwater object plugin"
+                found.derived["body"] = f"{found.origin}: box of the underwater object plugin"
     model = block.first("hydrodynamic_model")
     if model is None:
         return
@@ -178,39 +167,38 @@ def _uuv(plugin: Element, bodies: RobotDescription, found: ParsedVehicle) -> Non
 
 
 def _block(model: Element, tag: str) -> Array | None:
-    """A 6 x 6 matrix from 36 numbers in rows, or from 6 as its diagonal."""
-    element = model.first(tag)
-    if element is None or not element.text.strip():
-        return None
-    values = numbers(element.text, element.place, tag)
-    if len(values) == 36:
-        return values.reshape(6, 6)
-    if len(values) == 6:
-        return np.diag(values)
-    raise PlacedError(f"{element.place}: {tag} has {len(values)} numbers, must have 6 or 36")
+    values, element = model.numbers(tag), model.first(tag)
+    return None if values is None or element is None else _six_by_six(values, element.place, tag)
+
+
+def _six_by_six(values: Array, place: SourceLocation, what: str) -> Array:
+    """A matrix from 36 numbers in rows, or from 6 as its diagonal."""
+    if len(values) not in (6, 36):
+        raise PlacedError(f"{place}: {what} has {len(values)} numbers, must have 6 or 36")
+    return values.reshape(6, 6) if len(values) == 36 else np.diag(values)
+
+
+def _positive(element: Element, tag: str) -> float | None:
+    """Number in the first child with this tag, which must be more than 0; None if there is none."""
+    value = element.number(tag)
+    if value is not None and value <= 0.0:
+        raise PlacedError(f"{(element.first(tag) or element).place}: {tag} is {value:g}, must be more than 0")
+    return value
 
 
 def _uuv_buoyancy(block: Element, plugin: Element, bodies: RobotDescription, found: ParsedVehicle) -> None:
-    link = bodies.link(block.attributes.get("name", ""))
-    where = f"{found.kind} {found.file.name}: underwater object plugin"
-    volume = block.first("volume")
-    if volume is not None and volume.text.strip():
-        value = number(volume.text.strip(), volume.place, "volume")
-        if value <= 0.0:
-            raise PlacedError(f"{volume.place}: volume is {value:g}, must be more than 0")
-        found.displaced_volume_m3 = value
+    link = bodies.link(block.name)
+    where = f"{found.origin}: underwater object plugin"
+    volume_m3 = _positive(block, "volume")
+    if volume_m3 is not None:
+        found.displaced_volume_m3 = volume_m3
         found.derived["buoyancy"] = where
-    density = plugin.first("fluid_density")
     neutral = (block.value("neutrally_buoyant") or "0").lower() in {"1", "true"}
-    if neutral and link is not None and link.mass_kg and density is not None and density.text.strip():
-        value = number(density.text.strip(), density.place, "fluid_density")
-        if value <= 0.0:
-            raise PlacedError(f"{density.place}: fluid_density is {value:g}, must be more than 0")
-        found.displaced_volume_m3 = link.mass_kg / value
+    if neutral and link is not None and link.mass_kg and (density := _positive(plugin, "fluid_density")) is not None:
+        found.displaced_volume_m3 = link.mass_kg / density
         found.notes.append("displaced volume: mass over density, since the file says the vehicle is neutral")
-    centre = block.first("center_of_buoyancy")
-    if centre is not None and centre.text.strip():
-        point = numbers(centre.text, centre.place, "center_of_buoyancy", 3)
+    point = block.numbers("center_of_buoyancy", 3)
+    if point is not None:
         found.p_buoyancy_m = point if link is None else link.X_BL.apply(point)
         found.derived["buoyancy"] = where
 
@@ -246,12 +234,12 @@ def read_parameters(entries: Entries, found: ParsedVehicle) -> bool:
     """
     known = len(found.derived)
     entries = _of_the_vehicle(entries, found)
-    where = f"{found.kind} {found.file.name}"
+    where = found.origin
     mass = _number(entries, _MASS)
     if mass is not None:
         value, item = mass
         if value == 0.0 and find(entries, ("mass",)) is None:
-            found.notes.append(f"mass: 0, so it is not stated ({item.place.file.name}:{item.place.line})")
+            found.notes.append(f"mass: 0, so it is not stated ({item.place.short})")
         elif value <= 0.0:
             raise PlacedError(f"{item.place}: mass is {value:g}, must be more than 0")
         else:
@@ -318,12 +306,7 @@ def _six(entries: Entries, keys: Sequence[str]) -> Array | None:
     item = find(entries, keys)
     if item is None or not item.items():
         return None
-    values = item.numbers(keys[0])
-    if len(values) == 36:
-        return values.reshape(6, 6)
-    if len(values) == 6:
-        return np.diag(values)
-    raise PlacedError(f"{item.place}: {keys[0]} has {len(values)} numbers, must have 6 or 36")
+    return _six_by_six(item.numbers(keys[0]), item.place, keys[0])
 
 
 def _inertia(entries: Entries, found: ParsedVehicle) -> None:
@@ -341,7 +324,7 @@ def _inertia(entries: Entries, found: ParsedVehicle) -> None:
     else:
         return
     _require_definite(found.inertia_kg_m2, item)
-    found.derived["inertia"] = f"{found.kind} {found.file.name}:{item.place.line}"
+    found.derived["inertia"] = f"{found.origin}:{item.place.line}"
 
 
 def _require_definite(inertia: Array, item: YamlNode) -> None:
@@ -360,7 +343,7 @@ def _from_mass_matrix(item: YamlNode, found: ParsedVehicle) -> None:
     inertia = matrix[3:, 3:]
     _require_definite(inertia, item)
     found.mass_kg = mass
-    found.derived["body"] = found.derived["inertia"] = f"{found.kind} {found.file.name}:{item.place.line}"
+    found.derived["body"] = found.derived["inertia"] = f"{found.origin}:{item.place.line}"
     coupling = matrix[3:, :3] / mass
     skewness = float(np.abs(coupling + coupling.T).max())
     # m S(r): the moment about the origin of a force at the centre of gravity (Fossen 2021, eq. 3.42).

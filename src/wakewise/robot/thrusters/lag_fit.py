@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
@@ -208,7 +208,7 @@ def identify_lag(
         best = min(fits, key=lambda fit: fit.cost)
         block = _ripple_block(record, best)
         if block > 1 and record.time_s.size // block >= FEWEST_SAMPLES:
-            record = _with_block(record, block)
+            record = replace(record, block=block)
             fits = [_fit(family, record) for family in FAMILIES]
     measured = record.averages(record.thrust_N)
     spread = float(np.sum((measured - measured.mean()) ** 2))
@@ -304,12 +304,6 @@ def _record(time_s: ArrayLike, command: ArrayLike, thrust_N: ArrayLike, average_
         asked, thrust = np.interp(even, time, asked), np.interp(even, time, thrust)
     block = 1 if average_s is None else max(1, round(average_s / dt_s))
     return _Record(time_s=even, command=asked, thrust_N=thrust, dt_s=dt_s, block=block)
-
-
-def _with_block(record: _Record, block: int) -> _Record:
-    return _Record(
-        time_s=record.time_s, command=record.command, thrust_N=record.thrust_N, dt_s=record.dt_s, block=block
-    )
 
 
 def _lagged(model: LagModel, delay_s: float, command: Array, dt_s: float) -> Array:

@@ -64,8 +64,8 @@ class FirstOrderLag:
         return np.atleast_1d(np.asarray(commands, dtype=np.float64))[None, :]
 
     def step(self, state: Array, commands: ArrayLike, dt_s: float) -> Array:
-        """Exponential approach; see `LagModel.step`."""
-        target = np.asarray(commands, dtype=np.float64)
+        """Exponential approach to the settled state; see `LagModel.step`."""
+        target = self.rest(commands)
         return np.asarray(target + np.exp(-dt_s / self.time_constant_s) * (state - target))
 
     def thrust(self, state: Array) -> Array:
@@ -80,19 +80,14 @@ class FirstOrderLag:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RotorLag:
+class RotorLag(FirstOrderLag):
     """A rotor whose speed lags, and thrust as the square of speed: dn/dt = (n_command - n) / time constant, T ~ n|n|.
 
     Thrust as the square of propeller speed at rest in still water is in e.g. T. Fossen, Handbook of Marine Craft
     Hydrodynamics and Motion Control, 2nd ed. 2021, section 9. The state is the signed root of thrust.
     """
 
-    time_constant_s: float
-
     name = "rotor, thrust as speed squared"
-
-    def __post_init__(self) -> None:
-        _positive("time_constant_s", self.time_constant_s)
 
     @property
     def mean_delay_s(self) -> float:
@@ -101,12 +96,7 @@ class RotorLag:
 
     def rest(self, commands: ArrayLike) -> Array:
         """State, shape (1, n): the signed roots of thrust."""
-        return _signed_root(np.atleast_1d(np.asarray(commands, dtype=np.float64)))[None, :]
-
-    def step(self, state: Array, commands: ArrayLike, dt_s: float) -> Array:
-        """Exponential approach of the speed; see `LagModel.step`."""
-        target = _signed_root(np.asarray(commands, dtype=np.float64))
-        return np.asarray(target + np.exp(-dt_s / self.time_constant_s) * (state - target))
+        return _signed_root(super().rest(commands))
 
     def thrust(self, state: Array) -> Array:
         """Square of the state, with its sign."""
@@ -114,7 +104,7 @@ class RotorLag:
 
     def response(self, commands: Array, dt_s: float) -> Array:
         """See `LagModel.response`."""
-        speed = FirstOrderLag(time_constant_s=self.time_constant_s).response(_signed_root(commands), dt_s)
+        speed = super().response(_signed_root(commands), dt_s)
         return speed * np.abs(speed)
 
 
@@ -173,20 +163,19 @@ class SecondOrderLag:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SplitLag:
+class SplitLag(FirstOrderLag):
     """A part of the thrust follows at once and the rest by a first-order lag: (1 + share tau s) / (1 + tau s).
 
     A share above 1 overshoots and sinks back, as thrust does while the water in the duct has yet to speed up
     (A. Healey et al., IEEE J. Oceanic Eng. 20, 1995, 354); a share below 1 leaves a slow tail.
     """
 
-    time_constant_s: float
     direct_share: float
 
     name = "first order with a direct share"
 
     def __post_init__(self) -> None:
-        _positive("time_constant_s", self.time_constant_s)
+        super().__post_init__()
         _positive("direct_share", self.direct_share)
 
     @property
@@ -210,7 +199,7 @@ class SplitLag:
 
     def response(self, commands: Array, dt_s: float) -> Array:
         """See `LagModel.response`."""
-        lagged = FirstOrderLag(time_constant_s=self.time_constant_s).response(commands, dt_s)
+        lagged = super().response(commands, dt_s)
         direct = np.append(commands[:1], commands[:-1])
         return np.asarray(self.direct_share * direct + (1.0 - self.direct_share) * lagged)
 

@@ -112,32 +112,15 @@ class ThrustCurve:
 
     def delivered_N(self, thrust_N: ArrayLike, supply_V: float | None = None) -> Array:
         """Thrust that a wished thrust turns into: limited, and rounded below the first step; any shape."""
-        return self._along(
-            thrust_N,
-            supply_V,
-            lambda sign, side, share, mix: sign * np.interp(share, side.share, mix(side.thrust_N)),
-            at_rest=0.0,
-        )
+        return self._signed("thrust_N", thrust_N, supply_V)
 
     def rpm(self, thrust_N: ArrayLike, supply_V: float | None = None) -> Array:
         """Rotor speed in revolutions per minute at delivered thrusts of any shape; negative in reverse."""
-        self._require("rpm", self.forward.rpm, self.reverse.rpm)
-        return self._along(
-            thrust_N,
-            supply_V,
-            lambda sign, side, share, mix: sign * np.interp(share, side.share, mix(side.rpm)),
-            at_rest=0.0,
-        )
+        return self._signed("rpm", thrust_N, supply_V)
 
     def power_W(self, thrust_N: ArrayLike, supply_V: float | None = None) -> Array:
         """Electrical power at delivered thrusts of any shape; none at rest, since tables leave standby out."""
-        self._require("power_W", self.forward.power_W, self.reverse.power_W)
-        return self._along(
-            thrust_N,
-            supply_V,
-            lambda _, side, share, mix: np.interp(share, side.share, mix(side.power_W)),
-            at_rest=0.0,
-        )
+        return np.abs(self._signed("power_W", thrust_N, supply_V))
 
     def limits_N(self, supply_V: float | None = None) -> tuple[float, float]:
         """Lowest (negative) and highest thrust at a voltage."""
@@ -202,9 +185,16 @@ class ThrustCurve:
             result = np.where(runs, value(sign, side, _shares(target, thrusts, side.share), mix), result)
         return result
 
-    def _require(self, field: str, *tables: Array | None) -> None:
-        if any(table is None for table in tables):
+    def _signed(self, field: str, thrust_N: ArrayLike, supply_V: float | None) -> Array:
+        """A column of the table at delivered thrusts, negative in reverse, 0 at rest."""
+        if getattr(self.forward, field) is None or getattr(self.reverse, field) is None:
             raise InputError(f"thrust curve {self.name}: its table has no column {field}")
+        return self._along(
+            thrust_N,
+            supply_V,
+            lambda sign, side, share, mix: sign * np.interp(share, side.share, mix(getattr(side, field))),
+            at_rest=0.0,
+        )
 
 
 Mix = Callable[[Array | None], Array]

@@ -322,7 +322,7 @@ def _side(cleaned: list[_Cleaned], sign: float, notes: list[str]) -> CurveSide:
     """One direction of all voltages on the union of their knots, so that no reading is lost."""
     silent, first, last, sides = [], [], [], []
     # At rest speed and power are zero, but only a table that has the column says so.
-    columns_known = [True, *(any(np.any(np.isfinite(c)) for c in column) for column in _optional(cleaned))]
+    columns_known = [True] + [any(np.isfinite(getattr(c, name)).any() for c in cleaned) for name in ("rpm", "power_W")]
     at_rest = np.where(columns_known, 0.0, math.nan)[:, None]
     for rows in cleaned:
         edge = rows.silent_us[1] if sign > 0.0 else rows.silent_us[0]
@@ -361,10 +361,6 @@ def _side(cleaned: list[_Cleaned], sign: float, notes: list[str]) -> CurveSide:
     )
 
 
-def _optional(cleaned: list[_Cleaned]) -> tuple[list[Array], list[Array]]:
-    return [rows.rpm for rows in cleaned], [rows.power_W for rows in cleaned]
-
-
 def _onto(share: Array, part: Array, values: Array) -> Array:
     known = np.isfinite(values)
     if not np.any(known):
@@ -372,6 +368,7 @@ def _onto(share: Array, part: Array, values: Array) -> Array:
     return np.asarray(np.interp(share, part[known], values[known]))
 
 
+@lru_cache(maxsize=8)
 def library_curve(name: str) -> ThrustCurve:
     """Read a thrust curve that comes with the package, such as `t200`.
 
@@ -379,7 +376,8 @@ def library_curve(name: str) -> ThrustCurve:
     """
     if name not in curve_names():
         raise InputError(f"thrust curve {name!r}: not in the library, allowed {', '.join(curve_names())}")
-    return _library_curve(name)
+    text = (resources.files("wakewise.robot.thrusters") / "data" / f"{name}.csv").read_text("utf-8")
+    return parse_thrust_table(text, f"{name}.csv", name)
 
 
 def curve_names() -> list[str]:
@@ -400,9 +398,3 @@ def load_curve(name_or_path: str) -> ThrustCurve:
         names = ", ".join(curve_names())
         raise InputError(f"thrust curve {name_or_path!r}: not in the library, allowed {names} or the path of a .csv")
     return read_thrust_table(path)
-
-
-@lru_cache(maxsize=8)
-def _library_curve(name: str) -> ThrustCurve:
-    text = (resources.files("wakewise.robot.thrusters") / "data" / f"{name}.csv").read_text("utf-8")
-    return parse_thrust_table(text, f"{name}.csv", name)

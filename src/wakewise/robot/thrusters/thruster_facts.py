@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -117,7 +118,7 @@ def lag_facts(fit: LagFit) -> dict[str, Any]:
         "residual_rms_N": fit.residual_rms_N,
         "average_s": fit.average_s,
         "window_s": list(fit.window_s),
-        "models": [{"name": c.name, "r2": c.r2, "bic": c.bic, "mean_delay_s": c.mean_delay_s} for c in fit.candidates],
+        "models": [asdict(candidate) for candidate in fit.candidates],
         "why": why,
     }
 

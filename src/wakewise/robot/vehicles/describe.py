@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -82,18 +82,7 @@ def check_report(vehicle: AnyVehicle, comparison: MatrixComparison | None = None
             }
             for f in lost
         ],
-        "mixing_disagreements": [
-            {
-                "row": d.row,
-                "thruster": d.thruster,
-                "name": d.name,
-                "stated": d.stated,
-                "geometry": d.geometry,
-                "fault": d.fault,
-                "text": d.text,
-            }
-            for d in (found.disagreements if found else ())
-        ],
+        "mixing_disagreements": [{**asdict(d), "text": d.text} for d in (found.disagreements if found else ())],
         "mixing": None
         if found is None
         else {
@@ -154,24 +143,13 @@ def describe(vehicle: AnyVehicle) -> dict[str, Any]:
         ],
         "allocation_matrix": draft.allocation_matrix.tolist(),
         "limits_N": None if limits is None else {"lower": limits[0].tolist(), "upper": limits[1].tolist()},
-        "provenance": [{"group": p.group, "source": p.source, "estimate": p.estimate} for p in draft.provenance],
-        **{key: report[key] for key in _SHARED},
+        "provenance": [asdict(p) for p in draft.provenance],
+        **{key: value for key, value in report.items() if key not in _LISTED},
     }
 
 
-_SHARED = (
-    "rank",
-    "under_actuated",
-    "actuation",
-    "null_space",
-    "achievable_wrench",
-    "failures",
-    "mixing_disagreements",
-    "mixing",
-    "missing",
-    "notes",
-    "why",
-)
+_LISTED = ("name", "title", "thrusters", "thruster_names", "failure_rank")
+"""Fields of the check that a description lists in its own way."""
 
 
 def summary_line(draft: VehicleDraft) -> str:

@@ -6,9 +6,9 @@ What a vehicle needs for a flight: its fields in words, and by the names that a 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -41,8 +41,6 @@ from wakewise.robot.vehicles.vehicle import (
     thrust_steps,
     tuple_of,
 )
-
-T = TypeVar("T")
 
 PLACEHOLDER = "_"
 """What a vehicle file has in place of a number that is to be filled in."""
@@ -81,13 +79,6 @@ THRUSTER_WORDS = {
     "disk_area_m2": "disk",
     "time_constant_s": "lag",
 }
-
-
-def required(value: T | None) -> T:
-    """A value that was found to be there."""
-    if value is None:
-        raise InputError("vehicle: is not whole")
-    return value
 
 
 ROUNDING = 1e-3
@@ -229,42 +220,10 @@ class VehicleDraft:
 
     @classmethod
     def of(cls, vehicle: Vehicle) -> VehicleDraft:
-        """Say what a whole vehicle says, as a draft with nothing missing."""
-        water = vehicle.hydrodynamics
-        return cls(
-            name=vehicle.name,
-            title=vehicle.title,
-            source=vehicle.source,
-            does_not_claim=vehicle.does_not_claim,
-            size_m=vehicle.size_m,
-            mass_kg=vehicle.mass_kg,
-            inertia_kg_m2=vehicle.inertia_kg_m2,
-            displaced_volume_m3=vehicle.displaced_volume_m3,
-            p_BG_m=vehicle.p_BG_m,
-            p_BB_m=vehicle.p_BB_m,
-            added_mass=water.added_mass,
-            linear_damping=water.linear_damping,
-            quadratic_damping=water.quadratic_damping,
-            thrusters=tuple(
-                ThrusterDraft(
-                    name=t.name,
-                    p_BT_m=t.p_BT_m,
-                    axis_B=t.axis_B,
-                    max_forward_N=t.max_forward_N,
-                    max_reverse_N=t.max_reverse_N,
-                    disk_area_m2=t.disk_area_m2,
-                    time_constant_s=t.time_constant_s,
-                )
-                for t in vehicle.thrusters
-            ),
-            curve=vehicle.curve,
-            least_thrust=vehicle.least_thrust,
-            drag_cases=vehicle.drag_cases,
-            X_BC=vehicle.X_BC,
-            tilt=vehicle.tilt,
-            camera_fov_rad=vehicle.camera_fov_rad,
-            provenance=vehicle.provenance,
-        )
+        """A whole vehicle as a draft with nothing missing."""
+        values = _shared_values(vehicle, cls) | _shared_values(vehicle.hydrodynamics, cls)
+        values["thrusters"] = tuple(ThrusterDraft(**_shared_values(t, ThrusterDraft)) for t in vehicle.thrusters)
+        return cls(**values)
 
     def _round_added_mass(self) -> None:
         """Take the mean of two halves that differ by no more than rounding, and say so."""
@@ -358,40 +317,12 @@ class VehicleDraft:
         Raises InputError if something is missing; the message lists it.
         """
         self.require_whole()
-        return Vehicle(
-            name=self.name,
-            title=self.title,
-            source=self.source,
-            does_not_claim=self.does_not_claim,
-            size_m=required(self.size_m),
-            mass_kg=required(self.mass_kg),
-            inertia_kg_m2=required(self.inertia_kg_m2),
-            displaced_volume_m3=required(self.displaced_volume_m3),
-            p_BG_m=required(self.p_BG_m),
-            p_BB_m=required(self.p_BB_m),
-            hydrodynamics=Hydrodynamics(
-                added_mass=required(self.added_mass),
-                linear_damping=required(self.linear_damping),
-                quadratic_damping=required(self.quadratic_damping),
-            ),
-            thrusters=tuple(_whole(t) for t in self.thrusters),
-            X_BC=required(self.X_BC),
-            tilt=self.tilt,
-            curve=self.curve,
-            least_thrust=self.least_thrust,
-            drag_cases=self.drag_cases,
-            camera_fov_rad=required(self.camera_fov_rad),
-            provenance=self.provenance,
-        )
+        values = _shared_values(self, Vehicle)
+        values["hydrodynamics"] = Hydrodynamics(**_shared_values(self, Hydrodynamics))
+        values["thrusters"] = tuple(Thruster(**_shared_values(t, Thruster)) for t in self.thrusters)
+        return Vehicle(**values)
 
 
-def _whole(draft: ThrusterDraft) -> Thruster:
-    return Thruster(
-        name=draft.name,
-        p_BT_m=draft.p_BT_m,
-        axis_B=draft.axis_B,
-        max_forward_N=required(draft.max_forward_N),
-        max_reverse_N=required(draft.max_reverse_N),
-        disk_area_m2=required(draft.disk_area_m2),
-        time_constant_s=required(draft.time_constant_s),
-    )
+def _shared_values(record: Any, kind: type[Any]) -> dict[str, Any]:
+    """Values of a record under the fields that another kind of record has too."""
+    return {field.name: getattr(record, field.name) for field in fields(kind) if hasattr(record, field.name)}

@@ -12,7 +12,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.core.settings import Faults, Settings
-from wakewise.robot.vehicles.draft import ThrusterDraft, VehicleDraft, required
+from wakewise.robot.vehicles.draft import ThrusterDraft, VehicleDraft
 from wakewise.robot.vehicles.hydrodynamics import DragCase
 from wakewise.robot.vehicles.vehicle import CurveChoice, LeastThrust, Provenance, TiltJoint
 
@@ -314,22 +314,20 @@ class VehicleFile(Settings):
                 notes=tuple(self.notes),
             )
         faults.tell()
-        return required(draft)
+        assert draft is not None
+        return draft
 
     def _thruster(self, mount: Mount) -> ThrusterDraft:
         limits, disk, lag = self.thruster_limits, self.thruster_disk, self.thruster_lag
-        forward = None if limits is None else limits.max_forward_N
-        reverse = None if limits is None else limits.max_reverse_N
-        diameter = None if disk is None else disk.diameter_m
-        delay = None if lag is None else lag.time_constant_s
+        diameter_m = _own_or(mount.disk_diameter_m, disk, "diameter_m")
         return ThrusterDraft(
             name=mount.name,
             p_BT_m=np.array(mount.position_m),
             axis_B=np.array(mount.axis),
-            max_forward_N=first(mount.max_forward_N, forward),
-            max_reverse_N=first(mount.max_reverse_N, reverse),
-            disk_area_m2=_area(first(mount.disk_diameter_m, diameter)),
-            time_constant_s=first(mount.time_constant_s, delay),
+            max_forward_N=_own_or(mount.max_forward_N, limits, "max_forward_N"),
+            max_reverse_N=_own_or(mount.max_reverse_N, limits, "max_reverse_N"),
+            disk_area_m2=None if diameter_m is None else 0.25 * math.pi * diameter_m**2,
+            time_constant_s=_own_or(mount.time_constant_s, lag, "time_constant_s"),
         )
 
 
@@ -355,9 +353,9 @@ def both(name_a: str, a: Any, name_b: str, b: Any) -> tuple[Any, Any] | None:
     return a, b
 
 
-def first(own: float | None, shared: float | None) -> float | None:
+def _own_or(own: float | None, group: ParameterGroup | None, field: str) -> float | None:
     """The mount's own figure, else the group's."""
-    return shared if own is None else own
+    return own if own is not None or group is None else getattr(group, field)
 
 
 def vector(value: list[float] | None) -> Array | None:
@@ -369,10 +367,6 @@ def _inertia(group: Inertia) -> Array:
     xx, yy, zz = group.moments_kg_m2
     xy, xz, yz = group.products_kg_m2
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _area(diameter_m: float | None) -> float | None:
-    return None if diameter_m is None else 0.25 * math.pi * diameter_m**2
 
 
 def _pose(mount: CameraMount) -> Pose:

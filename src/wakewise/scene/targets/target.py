@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -118,5 +118,7 @@ def is_mesh_file(kind: str | Path) -> bool:
 
 def _place(kind: str | Path) -> tuple[str, Path]:
     """A target's name as text, and the path that it is if it is one."""
-    path = path_of(kind, "target")
-    return kind if isinstance(kind, str) else str(path), Path(os.path.expanduser(path))  # noqa: PTH111  (never raises)
+    path = expanded = path_of(kind, "target")
+    with contextlib.suppress(RuntimeError):  # a user without a home keeps the tilde
+        expanded = path.expanduser()
+    return kind if isinstance(kind, str) else str(path), expanded

@@ -151,17 +151,13 @@ def allocate(
 
 
 def _show(vehicle: Vehicle, gentle: Allocation, least: Allocation, figures: dict[str, Any]) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    for heading in ("thruster", "least thrusts", "", "gentle", ""):
-        table.add_column(heading, justify="left" if heading in ("thruster", "") else "right")
+    rows = []
     most = max(1e-9, *(abs(float(T)) for a in (gentle, least) for T in a.thrusts_N))
     for i, thruster in enumerate(vehicle.thrusters):
         name = f"{i + 1} {thruster.name}" + (" (failed)" if thruster.name in figures["failed"] else "")
         old, new = float(least.thrusts_N[i]), float(gentle.thrusts_N[i])
-        table.add_row(name, _newton(old), _bar(old, most), _newton(new), _bar(new, most))
-    print_table(table)
+        rows.append((name, _newton(old), _bar(old, most), _newton(new), _bar(new, most)))
+    print_table("tntnt", ("thruster", "least thrusts", "", "gentle", ""), rows, box=None, pad_edge=False)
     before, after = figures["disturbance_pinv"], figures["disturbance"]
     typer.echo(
         f"\ndisturbance D   {format_value(before)} (m/s)^2 before, {format_value(after)} after" + _saved(before, after)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table
+from wakewise.ui.cli.console import ProgressBars, answer, format_value, print_table
 from wakewise.ui.cli.options import Json
 
 Out = Annotated[
@@ -53,22 +54,12 @@ def calibrate(
         write_text(out, cameras_txt(found))
     elif out is not None:
         write_json(out, figures)
-    if json:
-        print_json(figures)
-        return
-    from rich.table import Table
-
-    table = Table(title=str(photos))
-    table.add_column("figure")
-    table.add_column("value", justify="right")
+    cells: list[tuple[str, Any]] = []
     for key, value in figures.items():
         if isinstance(value, dict):
-            for name, each in value.items():
-                table.add_row(f"{key}: {name}", format_value(each))
-        elif isinstance(value, list):
-            table.add_row(key, ", ".join(format_value(each) for each in value))
+            cells += [(f"{key}: {name}", each) for name, each in value.items()]
         else:
-            table.add_row(key, format_value(value))
-    print_table(table)
-    if out is not None:
-        typer.echo(f"camera: {out}; reconstruct PHOTOS --camera {out} begins with it")
+            cells.append((key, ", ".join(map(format_value, value)) if isinstance(value, list) else value))
+    camera = None if out is None else f"camera: {out}; reconstruct PHOTOS --camera {out} begins with it"
+    table = partial(print_table, "tn", ("figure", "value"), cells, str(photos))
+    answer(json, figures, table, camera)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, escaped, format_value, print_json, print_table
-from wakewise.ui.cli.options import Json
+from wakewise.ui.cli.console import ProgressBars, answer, format_value, interval, print_table
+from wakewise.ui.cli.options import Json, listed
 
 if TYPE_CHECKING:
     from wakewise.experiments.campaigns.engines import TrialExecutor
@@ -99,11 +100,10 @@ def run_campaign(
             again=again,
         )
     found = results(folder)
-    if json:
-        print_json(status(found) | {"folder": str(folder), "groups": group_table(found)})
-    else:
-        _show_groups(found, group_table(found))
-        typer.echo(f"folder: {folder}; `wakewise campaign page {folder}` says who won, with pictures")
+    groups = group_table(found)
+    place = f"folder: {folder}; `wakewise campaign page {folder}` writes a page with the comparison and pictures"
+    result = status(found) | {"folder": str(folder), "groups": groups}
+    answer(json, result, partial(_show_groups, found, groups), place)
     unmade = [one for one in outcomes if one.figures is None and one.how == "computer"]
     if unmade:
         raise EnvironmentFailure(
@@ -120,10 +120,7 @@ def show_status(folder: Folder, json: Json = False) -> None:
     from wakewise.experiments.campaigns.table import results, status
 
     told = status(results(_folder(folder)))
-    if json:
-        print_json(told)
-        return
-    typer.echo(
+    counts = (
         f"{told['name']}: {told['done']} of {told['trials']} trials done, {told['running']} at work, "
         f"{told['waiting']} waiting, {told['failed']} failed"
     )
@@ -132,8 +129,7 @@ def show_status(folder: Folder, json: Json = False) -> None:
         words += f"; {told['trial_s']:.0f} s a trial"
     if told["others"]:
         words += f"; {told['others']} trials in the folder are not the file's any more"
-    typer.echo(words)
-    _show_failures(told["failures"])
+    answer(json, told, counts, words, partial(_show_failures, told["failures"]))
 
 
 @app.command("table")
@@ -157,13 +153,11 @@ def show_table(
     from wakewise.experiments.campaigns.table import failures, group_table, results, write_table
 
     found = results(_folder(folder))
-    groups = group_table(found, _listed(by), _listed(figures))
+    groups = group_table(found, listed(by), listed(figures))
     if write is not None:
         write_table(found, write)
-    if json:
-        print_json({"name": found.plan.name, "groups": groups, "failures": failures(found)})
-        return
-    _show_groups(found, groups)
+    result = {"name": found.plan.name, "groups": groups, "failures": failures(found)}
+    answer(json, result, partial(_show_groups, found, groups))
 
 
 @app.command("page")
@@ -194,11 +188,9 @@ def make_page(
     place = _folder(folder)
     found = results(place)
     page = write_campaign(found, place, out, compare)
-    if json:
-        judged = method_contrasts(paired_groups(found, compare))
-        print_json({"page": str(page), "glances": [asdict(one) | {"sure": one.sure} for _, one in judged]})
-        return
-    typer.echo(f"page: {page}")
+    judged = method_contrasts(paired_groups(found, compare))
+    glances = [asdict(one) | {"sure": one.sure} for _, one in judged]
+    answer(json, {"page": str(page), "glances": glances}, f"page: {page}")
 
 
 @app.command("example")
@@ -212,13 +204,10 @@ def print_example() -> None:
 def _engine(name: str, scheduler: str | None, workers: int | None) -> TrialExecutor:
     """The engine that the options name.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name, or the options do not fit.
+    Raises InputError if there is none of that name, or the options do not fit.
     """
     from wakewise.core.errors import InputError
-    from wakewise.experiments.campaigns.definition import nearest_name_hint
+    from wakewise.core.settings import guess
     from wakewise.experiments.campaigns.engines import ProcessExecutor
 
     if name == "dask":
@@ -226,9 +215,7 @@ def _engine(name: str, scheduler: str | None, workers: int | None) -> TrialExecu
 
         return DaskExecutor(scheduler, workers)
     if name != "processes":
-        raise InputError(
-            f"--engine: '{name}', {nearest_name_hint(name, ['processes', 'dask'])}allowed: processes, dask"
-        )
+        raise InputError(f"--engine: '{name}', {guess(name, ['processes', 'dask'])}allowed: processes, dask")
     if scheduler is not None:
         raise InputError("--scheduler: only with --engine dask")
     return ProcessExecutor(workers)
@@ -244,46 +231,31 @@ def _folder(path: Path) -> Path:
     return path
 
 
-def _listed(text: str) -> tuple[str, ...]:
-    return tuple(part.strip() for part in text.split(",") if part.strip())
-
-
 def _show_groups(found: Results, groups: list[dict[str, Any]]) -> None:
     """A row per group, then what failed."""
-    from rich.table import Table
-
     from wakewise.experiments.campaigns.table import failures
     from wakewise.experiments.trials import UNITS
 
-    done = found.count("done")
-    table = Table(
-        title=f"{found.plan.name}: {done} of {len(found.made)} trials; mean and 95 % interval", title_justify="left"
-    )
     factors = [key for key in groups[0] if key not in ("trials", "done", "failed", "figures")]
     names = list(groups[0]["figures"])
-    for factor in factors:
-        table.add_column(factor, no_wrap=True)
-    table.add_column("trials", justify="right")
-    for name in names:
-        unit = UNITS.get(name, "")
-        table.add_column(
-            f"{name} [{unit}]" if unit and not name.endswith(unit.replace("/", "_")) else name, justify="right"
-        )
+    units = {name: UNITS.get(name, "") for name in names}
+    heads = [
+        f"{name} [{unit}]" if unit and not name.endswith(unit.replace("/", "_")) else name
+        for name, unit in units.items()
+    ]
+    rows = []
     for group in groups:
         lost = f" ({group['failed']} failed)" if group["failed"] else ""
         cells = [_cell(group["figures"][name]) for name in names]
-        table.add_row(*(escaped(str(group[f])) for f in factors), f"{group['done']}/{group['trials']}{lost}", *cells)
-    print_table(table)
+        rows.append((*(str(group[f]) for f in factors), f"{group['done']}/{group['trials']}{lost}", *cells))
+    title = f"{found.plan.name}: {found.count('done')} of {len(found.made)} trials; mean and 95 % interval"
+    print_table("T" * len(factors) + "n", (*factors, "trials", *heads), rows, title)
     _show_failures(failures(found))
 
 
 def _cell(figure: dict[str, Any]) -> str:
-    if figure["mean"] is None:
-        return format_value(None)
-    mean = format_value(float(figure["mean"]))
-    return (
-        mean if figure["low"] is None else f"{mean} ({format_value(figure['low'])} to {format_value(figure['high'])})"
-    )
+    mean = format_value(None if figure["mean"] is None else float(figure["mean"]))
+    return mean if figure["low"] is None else f"{mean} ({interval(figure['low'], figure['high'])})"
 
 
 def _show_failures(failed: list[dict[str, Any]]) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, print_json
+from wakewise.ui.cli.console import ProgressBars, answer
 from wakewise.ui.cli.options import Json
 
 
@@ -40,9 +40,4 @@ def colour(
     into = out or photos.with_name(f"{photos.resolve().name}-colour")
     with ProgressBars().stage("colour") as progress:
         done = correct_photos(folder, into, model=model, progress=progress)
-    if json:
-        print_json(done.summary() | {"folder": str(into)})
-        return
-    for line in done.words():
-        typer.echo(line)
-    typer.echo(f"photographs: {into}")
+    answer(json, done.summary() | {"folder": str(into)}, *done.words(), f"photographs: {into}")

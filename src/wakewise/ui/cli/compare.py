@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, format_value, no_report, print_json, print_table, unit_suffix
+from wakewise.ui.cli.console import ProgressBars, no_report, print_json, print_table, unit_suffix
 from wakewise.ui.cli.options import (
     Json,
     Out,
@@ -20,6 +20,7 @@ from wakewise.ui.cli.options import (
     Vehicle,
     World,
     default_folder,
+    listed,
     overrides,
 )
 
@@ -62,7 +63,7 @@ def compare(
     from wakewise.experiments.trials import UNITS
     from wakewise.operation import load_scenario
 
-    names = [name.strip() for name in methods.split(",") if name.strip()]
+    names = listed(methods)
     if len(names) != len(set(names)) or len(names) < 2:
         hint = f"; one alone is `wakewise scan --method {names[0]}`" if len(names) == 1 else ""
         raise InputError(f"--methods: '{methods}', must be two or more different names such as dp,wake-aware{hint}")
@@ -75,23 +76,13 @@ def compare(
         print_json(figures)
         no_report(result.report_fault)
         return
-    from rich.table import Table
-
-    table = Table(title=f"{scenarios[names[0]].name}, seed {scenarios[names[0]].seed}")
-    table.add_column("figure")
-    for name in names:
-        table.add_column(name, justify="right")
-    table.add_column("unit")
-    for key in _ROWS:
-        table.add_row(
-            key, *(format_value(figures["methods"][name][key]) for name in names), unit_suffix(key, UNITS[key])
-        )
-    table.add_section()
-    for key in figures["ratios"][names[0]]:
-        if key != "why":
-            table.add_row(
-                f"{key} ratio", *(format_value(figures["ratios"][name][key]) for name in names), f"to {names[0]}"
-            )
-    print_table(table)
+    rows = [(key, *(figures["methods"][name][key] for name in names), unit_suffix(key, UNITS[key])) for key in _ROWS]
+    rows += [
+        (f"{key} ratio", *(figures["ratios"][name][key] for name in names), f"to {names[0]}")
+        for key in figures["ratios"][names[0]]
+        if key != "why"
+    ]
+    title = f"{scenarios[names[0]].name}, seed {scenarios[names[0]].seed}"
+    print_table("t" + "n" * len(names) + "t", ("figure", *names, "unit"), rows, title)
     if no_report(result.report_fault):
         typer.echo(f"report: {result.report}")

@@ -11,17 +11,17 @@ import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
+
+import typer
 
 from wakewise.ui.cli.signals import INTERRUPTED
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
 
 
 HEARTBEAT_S = 30.0
@@ -141,20 +141,41 @@ def status_line(line: str) -> None:
     sys.stderr.flush()
 
 
-def print_table(table: Table) -> None:
-    """Print a table on standard output."""
-    from rich.console import Console
+def answer(json: bool, figures: Any, *shown: str | Callable[[], None] | None) -> None:
+    """Print the result of a command: one JSON object with `json`, else lines of text and what callables print."""
+    if json:
+        print_json(figures)
+        return
+    for part in shown:
+        if callable(part):
+            part()
+        elif part is not None:
+            typer.echo(part)
 
+
+def print_table(
+    kinds: str, columns: Sequence[str], rows: Iterable[Iterable[Any]], title: str | None = None, **look: Any
+) -> None:
+    """Print a table on standard output.
+
+    `kinds` has a letter for each column, of which the last holds for all columns that follow: t for text, T for text on
+    one line, n for numbers. Text is printed without markup, other values by `format_value`. `look` are options of
+    `rich.table.Table`.
+    """
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=title and escape(title), title_justify="left", **look)
+    for column, kind in zip(columns, kinds.ljust(len(columns), kinds[-1]), strict=True):
+        side: Literal["left", "right"] = "right" if kind == "n" else "left"
+        table.add_column(column, justify=side, no_wrap=kind == "T", overflow="fold")
+    for row in rows:
+        table.add_row(*(cell if isinstance(cell, Text) else Text(format_value(cell)) for cell in row))
     console = Console(highlight=False)
     # A pipe or a file has no width to fit into.
     Console(highlight=False, width=console.width if console.is_terminal else 140).print(table)
-
-
-def escaped(words: str) -> Text:
-    """Words of a file as they stand: what looks like markup in them is none."""
-    from rich.text import Text
-
-    return Text(words)
 
 
 def format_value(value: Any) -> str:
@@ -168,6 +189,11 @@ def format_value(value: Any) -> str:
             return f"{value:.2g}"
         return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}" if abs(value) < 10 else f"{value:.1f}"
     return str(value)
+
+
+def interval(low: float | None, high: float | None, unknown: str = "") -> str:
+    """An interval as people read it; `unknown` where there is none."""
+    return unknown if low is None else f"{format_value(low)} to {format_value(high)}"
 
 
 _IN_NAMES = {"m/s": "m_s", "%": "pct", "1/m": "per_m", "1/s": "per_s"}

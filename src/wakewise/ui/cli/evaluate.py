@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError, StageError
-from wakewise.ui.cli.console import format_value, print_json, print_table
+from wakewise.ui.cli.console import print_json, print_table
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
@@ -361,12 +361,5 @@ def _against_depths(points: Array, depth_maps: Path | None, cameras: Path | None
 
 def _print_figures(title: str, figures: Mapping[str, Any], meanings: Mapping[str, str]) -> None:
     """A table of figures with what each is."""
-    from rich.table import Table
-
-    table = Table(title=title)
-    table.add_column("figure")
-    table.add_column("value", justify="right")
-    table.add_column("what it is")
-    for key, value in figures.items():
-        table.add_row(key, format_value(value), meanings[key])
-    print_table(table)
+    rows = [(key, value, meanings[key]) for key, value in figures.items()]
+    print_table("tnt", ("figure", "value", "what it is"), rows, title)

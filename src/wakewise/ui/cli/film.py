@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, print_json, write_page
+from wakewise.ui.cli.console import ProgressBars, answer, write_page
 from wakewise.ui.cli.options import Json
 
 
@@ -67,10 +67,7 @@ def film(
             write_film(trial, path, seconds=seconds, fps=fps, view=view, progress=progress)
         if path.parent == trial and path.name in FILMS and (trial / "report.html").is_file():
             write_page("report", lambda: write_report(trial))
-    if json:
-        print_json({"file": str(path), "size_MB": path.stat().st_size / 1e6})
-        return
-    typer.echo(f"{'rows' if rows else 'film'}: {path}")
+    answer(json, {"file": str(path), "size_MB": path.stat().st_size / 1e6}, f"{'rows' if rows else 'film'}: {path}")
 
 
 def _times(text: str) -> tuple[float, ...]:

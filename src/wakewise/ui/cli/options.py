@@ -59,6 +59,65 @@ TargetSize = Annotated[
     float | None,
     typer.Option("--target-size", metavar="M", help="Scale a mesh file's largest extent to this.", show_default=False),
 ]
+VehicleFrame = Annotated[str, typer.Option("--frame", help="Body axes of the file: auto, FLU or FRD.")]
+ThrustDirection = Annotated[
+    str,
+    typer.Option(
+        "--thrust-direction",
+        help="auto (the format's rule), reversed, or an axis of each thruster's own frame: +x, -x, +y, -y, +z, -z.",
+    ),
+]
+XacroArguments = Annotated[
+    list[str] | None, typer.Option("--arg", metavar="NAME:=VALUE", help="A xacro argument; may be repeated.")
+]
+MatrixRows = Annotated[
+    str | None,
+    typer.Option(
+        "--rows",
+        metavar="NAMES",
+        help="What the six rows of a matrix are, in the file's order, such as roll,pitch,yaw,x,y,z.",
+        show_default=False,
+    ),
+]
+XacroPackages = Annotated[
+    list[str] | None,
+    typer.Option("--package", metavar="NAME=DIR", help="Where a package of a xacro file is; may be repeated."),
+]
+SkipMissing = Annotated[bool, typer.Option("--skip-missing", help="Leave out xacro includes that are not there.")]
+
+
+def pairs(option: str, form: str, given: list[str] | None) -> dict[str, str]:
+    """Values of a repeated option by their names; `form` is NAME=VALUE, with another word or mark.
+
+    Raises InputError if one is not of this form, or a name comes twice.
+    """
+    from wakewise.core.errors import InputError
+
+    found: dict[str, str] = {}
+    for text in given or []:
+        name, mark, value = text.partition(":=" if ":=" in form else "=")
+        if not (name and mark and value) or name in found:
+            raise InputError(f"{option} {text}: allowed is {form}, each name once")
+        found[name] = value
+    return found
+
+
+def listed(text: str | None) -> tuple[str, ...]:
+    """Words between commas."""
+    return tuple(word.strip() for word in (text or "").split(",") if word.strip())
+
+
+def numbers(option: str, text: str) -> tuple[float, ...]:
+    """Numbers between commas; raises InputError if one is none."""
+    from wakewise.core.errors import InputError
+
+    found = []
+    for word in listed(text):
+        try:
+            found.append(float(word))
+        except ValueError:
+            raise InputError(f"{option}: '{word}' is not a number, such as 5 or 1,5,20") from None
+    return tuple(found)
 
 
 def default_folder(scenario: Scenario, what: str) -> Path:

@@ -17,10 +17,7 @@ _MOST_BYTES = 20_000_000
 def read_points(path: Path, vehicle: Vehicle, X_WB: Pose) -> tuple[Array, Array]:
     """Points, shape (n, 3), in the frame that X_WB places the vehicle in, and weights, shape (n,), of a CSV file.
 
-    Raises
-    ------
-    InputError
-        If the file holds no such points, or one lies inside the vehicle's box.
+    Raises InputError if the file holds no such points, or one lies inside the vehicle's box.
     """
     import csv
 

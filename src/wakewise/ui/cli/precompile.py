@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, print_json
+from wakewise.ui.cli.console import ProgressBars, answer
 from wakewise.ui.cli.options import Json
 
 
@@ -28,9 +28,6 @@ def warm(
     took_s = time.perf_counter() - began
     for line in made.amiss:
         typer.echo(f"not compiled: {line}", err=True)
-    if json:
-        print_json({"kernels": made.kernels, "not_compiled": list(made.amiss), "wall_s": took_s, "was_warm": there})
-    elif there:
-        typer.echo("all kernels were compiled before")
-    else:
-        typer.echo(f"{made.kernels} kernels compiled and kept, {took_s:.0f} s")
+    figures = {"kernels": made.kernels, "not_compiled": list(made.amiss), "wall_s": took_s, "was_warm": there}
+    compiled = f"{made.kernels} kernels compiled and kept, {took_s:.0f} s"
+    answer(json, figures, "all kernels were compiled before" if there else compiled)

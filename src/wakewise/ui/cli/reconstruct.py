@@ -9,15 +9,15 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from wakewise import __version__
-from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table
-from wakewise.ui.cli.options import Json
+from wakewise.ui.cli.console import ProgressBars, answer, print_table
+from wakewise.ui.cli.options import Json, pairs
 from wakewise.ui.cli.reconstruct_options import (
     BarOption,
     BarsFile,
@@ -174,7 +174,7 @@ def reconstruct_photos(
     check_kinds(write, "dense" if no_mesh and until is None else until)
     request = request_of(bar, bars, masks, crop, until, fixes, photos)
     # Whatever was given is read before anything is made, whether this run needs it or not.
-    lenses, patterns = _lenses(camera), _named("--lens", "left='L_*'", lens) or None
+    lenses, patterns = _lenses(camera), pairs("--lens", "NAME=PATTERN such as left='L_*'", lens) or None
     references = read_reference_cameras(reference_cameras) if reference_cameras else None
     known = read_known_cameras(cameras) if cameras else None
     photos = frames_of(photos, out)
@@ -226,22 +226,13 @@ def reconstruct_photos(
     for line in write_outputs(write, out, photos, model, remake):
         log.say(line)
         typer.echo(line, err=json)
-    if json:
-        print_json(figures)
-        return
-    from rich.table import Table
-
-    table = Table(title=str(photos))
-    table.add_column("figure")
-    table.add_column("value", justify="right")
-    for key, value in figures.items():
-        if isinstance(value, (int, float)) or (value is None and key not in ("suspicion", "poses_refused")):
-            table.add_row(key, format_value(value))
-    print_table(table)
-    for line in scale_lines(model):
-        typer.echo(line)
-    typer.echo(verdict(model))
-    typer.echo(f"model: {out}")
+    rows = [
+        (key, value)
+        for key, value in figures.items()
+        if isinstance(value, (int, float)) or (value is None and key not in ("suspicion", "poses_refused"))
+    ]
+    table = partial(print_table, "tn", ("figure", "value"), rows, str(photos))
+    answer(json, figures, table, *scale_lines(model), verdict(model), f"model: {out}")
 
 
 def verdict(model: Model) -> str:
@@ -296,23 +287,6 @@ def _some(names: list[str]) -> str:
     return ", ".join(names) if len(names) <= MOST_NAMED else f"{', '.join(names[:3])} ... {names[-1]} ({len(names)})"
 
 
-def _named(option: str, example: str, given: list[str] | None) -> dict[str, str]:
-    """NAME=VALUE, each, as a dictionary.
-
-    Raises
-    ------
-    InputError
-        If one is not of that form, or a name comes twice.
-    """
-    out: dict[str, str] = {}
-    for words in given or []:
-        name, mark, value = words.partition("=")
-        if not (mark and name and value) or name in out:
-            raise InputError(f"{option} {words}: must be NAME=VALUE, each name once, such as {example}")
-        out[name] = value
-    return out
-
-
 def _lenses(given: list[str] | None) -> Lens | dict[str, Lens] | None:
     """One lens of all photos, or lenses by name."""
     from wakewise.vision.reconstruction import read_lens
@@ -321,4 +295,7 @@ def _lenses(given: list[str] | None) -> Lens | dict[str, Lens] | None:
         return None
     if len(given) == 1 and ("=" not in given[0] or Path(given[0]).exists()):
         return read_lens(Path(given[0]))
-    return {name: read_lens(Path(path)) for name, path in _named("--camera", "left=left/cameras.txt", given).items()}
+    return {
+        name: read_lens(Path(path))
+        for name, path in pairs("--camera", "LENS=PATH such as left=left/cameras.txt", given).items()
+    }

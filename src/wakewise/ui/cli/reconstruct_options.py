@@ -202,10 +202,7 @@ Remake = Callable[[Path, Path, Mapping[str, "Array"], Any], "Model"]
 def check_kinds(kinds: list[str] | None, until: str | None) -> None:
     """Refuse kinds that there are not, or that need what was not asked for.
 
-    Raises
-    ------
-    InputError
-        Says which, and what is allowed.
+    Raises InputError, which says which, and what is allowed.
     """
     for kind in kinds or []:
         if kind not in KINDS:

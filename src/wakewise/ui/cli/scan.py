@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import (
-    ProgressBars,
-    format_value,
-    no_report,
-    print_json,
-    print_table,
-    unique_reasons,
-    unit_suffix,
-)
+from wakewise.ui.cli.console import ProgressBars, no_report, print_json, print_table, unique_reasons, unit_suffix
 from wakewise.ui.cli.options import (
     Json,
     Out,
@@ -126,14 +118,8 @@ def _say_trim(folder: Path) -> None:
 
 def _print_figures(scenario: Scenario, figures: dict[str, Any]) -> None:
     """The headlines of a trial as a table, and why some are missing."""
-    from rich.table import Table
-
-    table = Table(title=f"{scenario.method}, {Path(scenario.target.kind).stem}, seed {scenario.seed}")
-    table.add_column("figure")
-    table.add_column("value", justify="right")
-    table.add_column("unit")
-    for key in _HEADLINES:
-        table.add_row(key, format_value(figures[key]), unit_suffix(key, figures["units"][key]))
-    print_table(table)
+    rows = [(key, figures[key], unit_suffix(key, figures["units"][key])) for key in _HEADLINES]
+    title = f"{scenario.method}, {Path(scenario.target.kind).stem}, seed {scenario.seed}"
+    print_table("tnt", ("figure", "value", "unit"), rows, title)
     for line in unique_reasons(figures["why"], _HEADLINES):
         typer.echo(line)

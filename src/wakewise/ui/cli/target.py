@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wakewise.ui.cli.console import print_json
+from wakewise.ui.cli.console import answer
 from wakewise.ui.cli.options import Json, TargetSize, seed_option
 
 if TYPE_CHECKING:
@@ -100,25 +100,23 @@ def show(
         "sway": _sway(standing),
         "out": None if out is None else str(out),
     }
-    if json:
-        print_json(facts)
-        return
     length, width, height = (1e3 * value for value in mesh.extent_m)
     volume = f", volume {1e6 * mesh.volume_m3:.0f} cm3" if mesh.is_closed else ""
     thick = ", ".join(f"p{round(100 * q)} {1e3 * np.quantile(found.thickness_m, q):.1f}" for q in quantiles)
-    typer.echo(f"{name}: {length:.0f} x {width:.0f} x {height:.0f} mm, {len(mesh.faces):,} triangles")
-    typer.echo(f"{'watertight' if mesh.is_closed else 'open'}, surface {1e4 * area_m2:.0f} cm2{volume}")
-    typer.echo(f"thickness (mm): {thick}")
-    typer.echo(f"delicate (score 0.5 or more): {facts['delicate_share_pct']:.1f} % of the surface")
+    lines = [
+        f"{name}: {length:.0f} x {width:.0f} x {height:.0f} mm, {len(mesh.faces):,} triangles",
+        f"{'watertight' if mesh.is_closed else 'open'}, surface {1e4 * area_m2:.0f} cm2{volume}",
+        f"thickness (mm): {thick}",
+        f"delicate (score 0.5 or more): {facts['delicate_share_pct']:.1f} % of the surface",
+    ]
     if given is not None:
-        typer.echo(f"marked: {len(given.weights)} places, {facts['marked_share_pct']:.1f} % of the vertices")
-    typer.echo(f"region: {facts['region_on_surface']} points on the surface, {points} in all")
+        lines.append(f"marked: {len(given.weights)} places, {facts['marked_share_pct']:.1f} % of the vertices")
+    lines.append(f"region: {facts['region_on_surface']} points on the surface, {points} in all")
     if isinstance(sway := facts["sway"], dict):
         bends = ", ".join(f"{way:.2g} at {speed}" for speed, way in sway["tip_mm"].items())
         stems = f"{sway['stems']} stem{'s' if sway['stems'] != 1 else ''}"
-        typer.echo(f"sways: {stems}, from {sway['frequency_Hz']:.2g} Hz; tip in a stream of m/s (mm): {bends}")
-    if out is not None:
-        typer.echo(f"written: {out}")
+        lines.append(f"sways: {stems}, from {sway['frequency_Hz']:.2g} Hz; tip in a stream of m/s (mm): {bends}")
+    answer(json, facts, *lines, None if out is None else f"written: {out}")
 
 
 def _sway(target: Target) -> dict[str, object] | None:

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from wakewise.ui.cli import vehicle_import, vehicle_thruster, vehicle_trim
-from wakewise.ui.cli.console import escaped, format_value, print_json, print_table
-from wakewise.ui.cli.options import Json
-
-if TYPE_CHECKING:
-    from wakewise.robot.vehicles import VehicleDraft
+from wakewise.ui.cli.console import answer, print_json, print_table
+from wakewise.ui.cli.options import (
+    Json,
+    MatrixRows,
+    SkipMissing,
+    ThrustDirection,
+    VehicleFrame,
+    XacroArguments,
+    XacroPackages,
+)
+from wakewise.ui.cli.vehicle_import import foreign_vehicle
 
 app = typer.Typer(
     help="Vehicles: list, show, check, import; their thrusters.", no_args_is_help=False, rich_markup_mode=None
@@ -23,11 +29,6 @@ app.command("lag")(vehicle_thruster.lag)
 app.command("trim")(vehicle_trim.trim)
 
 Name = Annotated[str, typer.Argument(help="Library name, vehicle file, or a file that `vehicle import` can read.")]
-SkipMissing = Annotated[bool, typer.Option("--skip-missing", help="Leave out xacro includes that are not there.")]
-Packages = Annotated[
-    list[str] | None,
-    typer.Option("--package", metavar="NAME=DIR", help="Where a package of a xacro file is; may be repeated."),
-]
 
 
 @app.command("list")
@@ -36,23 +37,19 @@ def list_vehicles(json: Json = False) -> None:
     from wakewise.robot.vehicles import allocation_rank, draft_names, load_draft, summary_line
 
     drafts = [load_draft(name) for name in draft_names()]
-    if json:
-        rows = [
-            {
-                "name": draft.name,
-                "title": draft.title,
-                "thrusters": len(draft.thruster_names),
-                "rank": allocation_rank(draft),
-                "can_fly": not draft.missing,
-                "missing": list(draft.missing),
-            }
-            for draft in drafts
-        ]
-        print_json({"vehicles": rows})
-        return
+    rows = [
+        {
+            "name": draft.name,
+            "title": draft.title,
+            "thrusters": len(draft.thruster_names),
+            "rank": allocation_rank(draft),
+            "can_fly": not draft.missing,
+            "missing": list(draft.missing),
+        }
+        for draft in drafts
+    ]
     width = max(len(draft.name) for draft in drafts)
-    for draft in drafts:
-        typer.echo(f"{draft.name:<{width}}  {summary_line(draft)}")
+    answer(json, {"vehicles": rows}, *(f"{draft.name:<{width}}  {summary_line(draft)}" for draft in drafts))
 
 
 @app.command("show")
@@ -62,12 +59,12 @@ def show(
         Path | None, typer.Option(help="Also write a drawing (.svg) or a page (.html) to this file.")
     ] = None,
     drawing: Annotated[Path | None, typer.Option(help="Also write an SVG drawing to this file.")] = None,
-    frame: vehicle_import.Frame = "auto",
-    thrust_direction: vehicle_import.Thrust = "auto",
-    package: Packages = None,
-    arg: vehicle_import.Arguments = None,
+    frame: VehicleFrame = "auto",
+    thrust_direction: ThrustDirection = "auto",
+    package: XacroPackages = None,
+    arg: XacroArguments = None,
     skip_missing: SkipMissing = False,
-    rows: vehicle_import.Rows = None,
+    rows: MatrixRows = None,
     json: Json = False,
 ) -> None:
     """Show a vehicle: thrusters, rank, what redundancy it has, limits, where the figures are from."""
@@ -76,7 +73,7 @@ def show(
     from wakewise.robot.vehicles import describe, parameters
     from wakewise.ui.reports.vehicle import drawing_svg, vehicle_page
 
-    draft = _found(vehicle, frame, thrust_direction, package, arg, rows, skip_missing=skip_missing)
+    draft = foreign_vehicle(vehicle, frame, thrust_direction, package, arg, skip_missing, rows)
     facts = describe(draft)
     for option, path in (("--out", out), ("--drawing", drawing)):
         if path is not None and path.is_dir():
@@ -93,7 +90,7 @@ def show(
     typer.echo(f"{draft.title}\n")
     _print_thrusters(facts)
     table = [[p.quantity, p.value or "missing", p.unit, "estimate" if p.estimate else ""] for p in parameters(draft)]
-    _print_rows("parameters", ["quantity", "value", "unit", ""], table, left=4)
+    print_table("t", ["quantity", "value", "unit", ""], table, "parameters")
     _print_allocation(facts)
     for group in facts["provenance"]:
         typer.echo(f"source of {group['group'].replace('_', ' ')}: {' '.join(group['source'].split())}")
@@ -116,12 +113,12 @@ def check(
             "or the word ardusub for ArduSub's frame.",
         ),
     ] = None,
-    frame: vehicle_import.Frame = "auto",
-    thrust_direction: vehicle_import.Thrust = "auto",
-    package: Packages = None,
-    arg: vehicle_import.Arguments = None,
+    frame: VehicleFrame = "auto",
+    thrust_direction: ThrustDirection = "auto",
+    package: XacroPackages = None,
+    arg: XacroArguments = None,
     skip_missing: SkipMissing = False,
-    rows: vehicle_import.Rows = None,
+    rows: MatrixRows = None,
     json: Json = False,
 ) -> None:
     """Check a vehicle's thrusters: rank, null space, achievable wrench, single failures, stated matrix."""
@@ -129,7 +126,7 @@ def check(
     from wakewise.robot.vehicles import check_report
 
     own_rows = rows if matrix is None else None
-    draft = _found(vehicle, frame, thrust_direction, package, arg, own_rows, skip_missing=skip_missing)
+    draft = foreign_vehicle(vehicle, frame, thrust_direction, package, arg, skip_missing, own_rows)
     facts = check_report(draft, None if matrix is None else compare_with(draft, matrix, rows))
     if json:
         print_json(facts)
@@ -137,7 +134,7 @@ def check(
     typer.echo(f"{draft.title}\n")
     _print_allocation(facts)
     table = [[failure["thruster"], failure["name"], failure["rank"], failure["words"]] for failure in facts["failures"]]
-    _print_rows("if one thruster fails", ["", "thruster", "rank", "what is left"], table, left=4)
+    print_table("t", ["", "thruster", "rank", "what is left"], table, "if one thruster fails")
     found = facts["mixing"]
     if found is not None:
         typer.echo(f"{found['stated_by']}: {found['agree']} of {found['compared']} entries agree with the geometry")
@@ -160,13 +157,13 @@ def _print_thrusters(facts: dict[str, Any]) -> None:
             t["name"],
             *(f"{value:z.3f}" for value in t["position_m"]),
             " ".join(f"{value:+z.3f}" for value in t["axis"]),
-            format_value(t["max_forward_N"]),
-            format_value(t["max_reverse_N"]),
+            t["max_forward_N"],
+            t["max_reverse_N"],
         ]
         for t in facts["thrusters"]
     ]
     columns = ["", "name", "x m", "y m", "z m", "force axis", "forward N", "reverse N"]
-    _print_rows("thrusters (body frame: x forward, y right, z down)", columns, rows, left=2)
+    print_table("ttnnntn", columns, rows, "thrusters (body frame: x forward, y right, z down)")
 
 
 def _print_allocation(facts: dict[str, Any]) -> None:
@@ -181,8 +178,8 @@ def _print_allocation(facts: dict[str, Any]) -> None:
         return
     columns = ["axis", "lowest", "highest", "unit", "lowest, others free", "highest, others free"]
     keys = ("lowest", "highest", "unit", "lowest_others_free", "highest_others_free")
-    rows = [[axis, *(format_value(w[key]) for key in keys)] for axis, w in wrench.items()]
-    _print_rows("achievable wrench, the other five axes at zero", columns, rows, left=1)
+    rows = [[axis, *(w[key] for key in keys)] for axis, w in wrench.items()]
+    print_table("tnntn", columns, rows, "achievable wrench, the other five axes at zero")
 
 
 def _print_lacks(facts: dict[str, Any]) -> None:
@@ -190,50 +187,3 @@ def _print_lacks(facts: dict[str, Any]) -> None:
         typer.echo(f"missing, so it cannot fly: {', '.join(facts['missing'])}")
     for note in facts["notes"]:
         typer.echo(f"note: {' '.join(note.split())}")
-
-
-def _print_rows(title: str, columns: list[str], rows: list[list[Any]], left: int) -> None:
-    """A table whose first `left` columns are words and the others figures."""
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left")
-    for index, column in enumerate(columns):
-        table.add_column(column, justify="left" if index < left or column in ("unit", "force axis") else "right")
-    for row in rows:
-        table.add_row(*(escaped(str(value)) for value in row))
-    print_table(table)
-
-
-def _found(
-    vehicle: str,
-    frame: str,
-    thrust_direction: str,
-    package: list[str] | None,
-    arg: list[str] | None,
-    rows: str | None,
-    *,
-    skip_missing: bool,
-) -> VehicleDraft:
-    from wakewise.robot.importers import find_vehicle
-
-    return find_vehicle(
-        vehicle,
-        convention=frame,
-        thrust=thrust_direction,
-        packages=_folders(package),
-        arguments=vehicle_import.pairs(arg, ":=", "--arg NAME:=VALUE"),
-        skip_missing=skip_missing,
-        rows=rows,
-    )
-
-
-def _folders(packages: list[str] | None) -> dict[str, Path]:
-    from wakewise.core.errors import InputError
-
-    folders = {}
-    for item in packages or []:
-        name, equals, folder = item.partition("=")
-        if not name or not equals or not folder:
-            raise InputError(f"--package {item}: allowed is NAME=DIR")
-        folders[name] = Path(folder)
-    return folders

@@ -2,39 +2,28 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import escaped, format_value, print_json, print_table
-from wakewise.ui.cli.options import Json
+from wakewise.ui.cli.console import answer, print_table
+from wakewise.ui.cli.options import (
+    Json,
+    MatrixRows,
+    SkipMissing,
+    ThrustDirection,
+    VehicleFrame,
+    XacroArguments,
+    XacroPackages,
+    pairs,
+)
 
 if TYPE_CHECKING:
     from wakewise.robot.vehicles import VehicleDraft
     from wakewise.robot.vehicles.mixing import MatrixComparison
-
-Frame = Annotated[str, typer.Option("--frame", help="Body axes of the file: auto, FLU or FRD.")]
-Thrust = Annotated[
-    str,
-    typer.Option(
-        "--thrust-direction",
-        help="auto (the format's rule), reversed, or an axis of each thruster's own frame: +x, -x, +y, -y, +z, -z.",
-    ),
-]
-Arguments = Annotated[
-    list[str] | None, typer.Option("--arg", metavar="NAME:=VALUE", help="A xacro argument; may be repeated.")
-]
-Rows = Annotated[
-    str | None,
-    typer.Option(
-        "--rows",
-        metavar="NAMES",
-        help="What the six rows of a matrix are, in the file's order, such as roll,pitch,yaw,x,y,z.",
-        show_default=False,
-    ),
-]
 
 
 def import_file(
@@ -48,19 +37,15 @@ def import_file(
         Path | None,
         typer.Option(help="Write what was found as a vehicle file, what a flight needs beside as comments to fill in."),
     ] = None,
-    frame: Frame = "auto",
-    thrust_direction: Thrust = "auto",
+    frame: VehicleFrame = "auto",
+    thrust_direction: ThrustDirection = "auto",
     matrix: Annotated[
         Path | None, typer.Option(help="Matrix that the project ships, to hold against the geometry.")
     ] = None,
-    package: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=DIR", help="Where a package is; may be repeated.")
-    ] = None,
-    arg: Arguments = None,
-    skip_missing: Annotated[
-        bool, typer.Option("--skip-missing", help="Leave out xacro includes that are not there.")
-    ] = False,
-    rows: Rows = None,
+    package: XacroPackages = None,
+    arg: XacroArguments = None,
+    skip_missing: SkipMissing = False,
+    rows: MatrixRows = None,
     like: Annotated[
         str | None,
         typer.Option(
@@ -76,7 +61,6 @@ def import_file(
     docs/vehicle-file.md explains every field of what --out writes.
     """
     from wakewise.core.files import write_text
-    from wakewise.robot.importers import find_vehicle
     from wakewise.robot.vehicles import blank_fields, completed, draft_yaml, load_draft
     from wakewise.robot.vehicles.mixing import compare_matrix
 
@@ -85,46 +69,42 @@ def import_file(
             raise InputError(f"--out {out}: is a folder, must be a file")
         if out.suffix not in (".yaml", ".yml"):
             raise InputError(f"--out {out}: must end in .yaml, by which a vehicle file is known")
-    draft = find_vehicle(
-        str(file),
-        convention=frame,
-        thrust=thrust_direction,
-        matrix=matrix,
-        packages={name: Path(folder) for name, folder in pairs(package, "=", "--package NAME=DIR").items()},
-        arguments=pairs(arg, ":=", "--arg NAME:=VALUE"),
-        skip_missing=skip_missing,
-        rows=rows,
-    )
+    draft = foreign_vehicle(str(file), frame, thrust_direction, package, arg, skip_missing, rows, matrix)
     draft = draft if like is None else completed(draft, load_draft(like))
     comparison = None
     if draft.thrusters and draft.shipped_matrix is not None:
         comparison = compare_matrix(draft, draft.shipped_matrix, str(matrix or file))
     if out is not None:
         write_text(out, draft_yaml(draft, blank_fields(draft)))
-    if json:
-        print_json(_facts(draft, comparison, out))
-    else:
-        _tell(draft, comparison, out)
+    answer(json, _facts(draft, comparison, out), partial(_show, draft, comparison, out))
 
 
-def pairs(given: list[str] | None, mark: str, form: str) -> dict[str, str]:
-    """Names and values of a repeated option.
+def foreign_vehicle(
+    vehicle: str,
+    frame: str,
+    thrust_direction: str,
+    package: list[str] | None,
+    arg: list[str] | None,
+    skip_missing: bool,
+    rows: str | None,
+    matrix: Path | None = None,
+) -> VehicleDraft:
+    """The vehicle of a name or file, read as the options of the same names say."""
+    from wakewise.robot.importers import find_vehicle
 
-    Raises
-    ------
-    InputError
-        If one has no name or no mark between the two.
-    """
-    pairs: dict[str, str] = {}
-    for text in given or []:
-        name, found, value = text.partition(mark)
-        if not found or not name:
-            raise InputError(f"{text!r}: allowed form {form}")
-        pairs[name] = value
-    return pairs
+    return find_vehicle(
+        vehicle,
+        convention=frame,
+        thrust=thrust_direction,
+        matrix=matrix,
+        packages={name: Path(folder) for name, folder in pairs("--package", "NAME=DIR", package).items()},
+        arguments=pairs("--arg", "NAME:=VALUE", arg),
+        skip_missing=skip_missing,
+        rows=rows,
+    )
 
 
-def _said(draft: VehicleDraft, topic: str) -> str | None:
+def _note(draft: VehicleDraft, topic: str) -> str | None:
     return next((note.removeprefix(topic) for note in draft.notes if note.startswith(topic)), None)
 
 
@@ -136,8 +116,8 @@ def _facts(draft: VehicleDraft, comparison: MatrixComparison | None, out: Path |
     return {
         "name": draft.name,
         "source": draft.source,
-        "frame": _said(draft, "frame: "),
-        "thrust_direction": _said(draft, "thrust direction: "),
+        "frame": _note(draft, "frame: "),
+        "thrust_direction": _note(draft, "thrust direction: "),
         "thrusters": [
             {
                 "name": t.name,
@@ -195,25 +175,18 @@ def _row(values: Any) -> str:
     return "  ".join(f"{value:.5g}" for value in values)
 
 
-def _tell(draft: VehicleDraft, comparison: MatrixComparison | None, out: Path | None) -> None:
-    from rich.table import Table
-
+def _show(draft: VehicleDraft, comparison: MatrixComparison | None, out: Path | None) -> None:
     typer.echo(f"{draft.title}\n")
-    table = Table(title="found (body frame: x forward, y right, z down)")
-    table.add_column("field")
-    table.add_column("value")
-    for name, _, text in _numbers(draft):
-        table.add_row(name, text)
-    print_table(table)
+    fields = [(name, text) for name, _, text in _numbers(draft)]
+    print_table("t", ("field", "value"), fields, "found (body frame: x forward, y right, z down)")
     if draft.thrusters:
-        table = Table(title="thrusters")
-        for column in ("name", "x m", "y m", "z m", "force axis", "forward N", "reverse N", "disk m2", "lag s"):
-            table.add_column(column, justify="left" if column in ("name", "force axis") else "right")
+        rows = []
         for t in draft.thrusters:
             axis = " ".join(f"{value:+z.3f}" for value in t.axis_B)
             limits = (t.max_forward_N, t.max_reverse_N, t.disk_area_m2, t.time_constant_s)
-            table.add_row(escaped(t.name), *(f"{v:z.3f}" for v in t.p_BT_m), axis, *(format_value(v) for v in limits))
-        print_table(table)
+            rows.append((t.name, *(f"{v:z.3f}" for v in t.p_BT_m), axis, *limits))
+        columns = ("name", "x m", "y m", "z m", "force axis", "forward N", "reverse N", "disk m2", "lag s")
+        print_table("tnnntn", columns, rows, "thrusters")
     for note in draft.notes:
         typer.echo(f"  {note}")
     typer.echo(f"missing: {', '.join(draft.missing) or 'nothing'}")

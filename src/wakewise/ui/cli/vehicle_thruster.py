@@ -102,24 +102,17 @@ def lag(
     typer.echo(f"R2 {facts['r2_raw']:.4f} against raw samples, from {start:g} to {end:g} s")
     if facts["average_s"] > 0.0:
         typer.echo(
-            f"R2 {facts['r2']:.4f} against averages over {facts['average_s']:.3g} s, which themselves reach", nl=False
+            f"R2 {facts['r2']:.4f} against averages over {facts['average_s']:.3g} s, which themselves reach "
+            f"{facts['r2_ceiling']:.4f} against the raw samples"
         )
-        typer.echo(f" {facts['r2_ceiling']:.4f} against the raw samples")
     for model in facts["models"]:
         typer.echo(f"  {model['name']:<34}averaged R2 {model['r2']:.4f}   BIC {model['bic']:.1f}")
 
 
 def _print_rows(title: str, rows: list[dict[str, Any]], *, wished: bool = False) -> None:
-    from rich.table import Table as RichTable
-
-    printed = RichTable(title=title)
-    for column in (*(("wished N",) if wished else ()), "pulse us", "thrust N", "rpm", "power W"):
-        printed.add_column(column, justify="right")
-    for row in rows:
-        figures = [row["pwm_us"], row["thrust_N"], row["rpm"], row["power_W"]]
-        cells = [
-            "—" if value is None else f"{value:z.{digits}f}"
-            for value, digits in zip(figures, (0, 2, 0, 1), strict=True)
-        ]
-        printed.add_row(*((f"{row['wished_N']:z.2f}",) if wished else ()), *cells)
-    print_table(printed)
+    columns = {"wished N": ("wished_N", 2)} if wished else {}
+    columns |= {"pulse us": ("pwm_us", 0), "thrust N": ("thrust_N", 2), "rpm": ("rpm", 0), "power W": ("power_W", 1)}
+    cells = [
+        [None if row[key] is None else f"{row[key]:z.{digits}f}" for key, digits in columns.values()] for row in rows
+    ]
+    print_table("n", list(columns), cells, title)

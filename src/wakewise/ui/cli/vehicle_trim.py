@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wakewise.ui.cli.console import print_json, print_table
+from wakewise.ui.cli.console import answer, print_json, print_table
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
@@ -69,24 +69,19 @@ def _from_flight(folder: Path, write: Path | None, json: bool) -> None:
     if write is not None:
         tree = {"ballast": [block.model_dump(mode="json") for block in blocks]}
         write_text(write, f"# {found.words}\n" + yaml.safe_dump(tree, sort_keys=False))
-    if json:
-        print_json(
-            {
-                "vehicle": parts.vehicle.name,
-                "net_weight_N": found.heavy_N,
-                "net_weight_std_N": found.weight_std_N,
-                "moment_forward_Nm": float(found.moment_Nm[0]),
-                "moment_starboard_Nm": float(found.moment_Nm[1]),
-                "moment_std_Nm": [float(value) for value in found.moment_std_Nm],
-                "blocks": [block.model_dump(mode="json") for block in found.blocks],
-                "ballast": [block.model_dump(mode="json") for block in blocks],
-                "advice": found.advice,
-            }
-        )
-        return
-    typer.echo(f"{parts.vehicle.title}: {found.words}")
-    if write is not None:
-        typer.echo(f"ballast: {write} (fly with it: wakewise scan {write})")
+    figures = {
+        "vehicle": parts.vehicle.name,
+        "net_weight_N": found.heavy_N,
+        "net_weight_std_N": found.weight_std_N,
+        "moment_forward_Nm": float(found.moment_Nm[0]),
+        "moment_starboard_Nm": float(found.moment_Nm[1]),
+        "moment_std_Nm": [float(value) for value in found.moment_std_Nm],
+        "blocks": [block.model_dump(mode="json") for block in found.blocks],
+        "ballast": [block.model_dump(mode="json") for block in blocks],
+        "advice": found.advice,
+    }
+    written = None if write is None else f"ballast: {write} (fly with it: wakewise scan {write})"
+    answer(json, figures, f"{parts.vehicle.title}: {found.words}", written)
 
 
 def _for_mission(
@@ -129,33 +124,23 @@ def _for_mission(
         )
         return
     where = f"{len(poses)} poses, trim known to {unknown_N:g} N"
-    _print_ballasts(
-        f"{body.title}: water speed at the target in mm/s (by the wake model), {where}", advice, _speed_mm_s
-    )
+    speeds = f"{body.title}: water speed at the target in mm/s (by the wake model), {where}"
+    _print_ballasts(speeds, advice, lambda row: 1e3 * row.speed_m_s)
     _print_ballasts(f"thrust to hold its poses in N, {where}", advice, lambda row: row.thrust_N)
     _print_ballasts("of it down in N", advice, lambda row: row.down_N)
     typer.echo(f"advice: {advice.words}")
     typer.echo(advice.wake_words)
 
 
-def _speed_mm_s(row: TrimRow) -> float:
-    return 1e3 * row.speed_m_s
-
-
 def _print_ballasts(title: str, advice: TrimAdvice, value: Callable[[TrimRow], float]) -> None:
     """A figure of each ballast, by net buoyancy and centre of gravity; what is now and what is advised are marked."""
-    from rich.table import Table
-
     shifts = sorted({row.shift_mm for row in advice.rows})
-    table = Table(title=title, title_justify="left")
-    table.add_column("floats with N", justify="right")
-    for shift in shifts:
-        table.add_column(f"CG {shift:+z.0f} mm", justify="right")
+    rows = []
     for float_N in sorted({row.float_N for row in advice.rows}):
         found = {row.shift_mm: row for row in advice.rows if row.float_N == float_N}
         cells = (f"{_mark(advice, found[shift])}{value(found[shift]):z.2f}" for shift in shifts)
-        table.add_row(f"{float_N:+z.2f}", *cells)
-    print_table(table)
+        rows.append((f"{float_N:+z.2f}", *cells))
+    print_table("n", ("floats with N", *(f"CG {shift:+z.0f} mm" for shift in shifts)), rows, title)
 
 
 def _mark(advice: TrimAdvice, row: TrimRow) -> str:

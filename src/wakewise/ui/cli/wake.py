@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import format_value, print_json, print_table
+from wakewise.ui.cli.console import answer, interval, print_table
 from wakewise.ui.cli.options import Json, seed_option
 
 app = typer.Typer(
@@ -76,33 +77,20 @@ def fit(
         "disk_diameter_m": samples.disk_diameter_m,
         "momentum_flux_over_thrust": asdict(law),
     }
-    if json:
-        print_json(result | {"out": None if out is None else str(out)})
-        return
-    _show_fit(result, law.words)
-    if out is not None:
-        typer.echo(f"written: {out}")
+    written = None if out is None else f"written: {out}"
+    answer(json, result | {"out": out and str(out)}, partial(_show_fit, result, law.words), written)
 
 
 def _show_fit(result: dict[str, Any], law: str) -> None:
-    from rich.table import Table
-
-    table = Table(title=f"{result['model']}, {result['points']} points")
-    for column in ("parameter", "value", "standard error", "95 % of resamples"):
-        table.add_column(column, justify="left" if column == "parameter" else "right")
+    rows = []
     for name, figure in result["parameters"].items():
-        span = "—" if figure["low"] is None else f"{format_value(figure['low'])} to {format_value(figure['high'])}"
-        error = "held" if figure["held"] else format_value(figure["standard_error"])
-        table.add_row(name, format_value(figure["value"]), error, span)
-    print_table(table)
-    table = Table()
-    for column in ("", "R2 in A (core)", "R2 in B (wake)", "bias beyond 0.4 m, %", "points"):
-        table.add_column(column, justify="left" if not column else "right")
-    for part in ("train", "test"):
-        scores = result[part]
-        row = (format_value(scores[key]) for key in ("r2_core", "r2_wake", "bias_far_pct", "points"))
-        table.add_row(part, *row)
-    print_table(table)
+        error = "held" if figure["held"] else figure["standard_error"]
+        rows.append((name, figure["value"], error, interval(figure["low"], figure["high"], "—")))
+    columns = ("parameter", "value", "standard error", "95 % of resamples")
+    print_table("tn", columns, rows, f"{result['model']}, {result['points']} points")
+    keys = ("r2_core", "r2_wake", "bias_far_pct", "points")
+    scores = [(part, *(result[part][key] for key in keys)) for part in ("train", "test")]
+    print_table("tn", ("", "R2 in A (core)", "R2 in B (wake)", "bias beyond 0.4 m, %", "points"), scores)
     typer.echo(f"momentum flux over thrust: {law}")
     typer.echo(f"split: {result['split']}")
     for warning in result["warnings"]:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import print_json, print_table
+from wakewise.ui.cli.console import answer, print_json, print_table
 from wakewise.ui.cli.options import Json, seed_option
 
 app = typer.Typer(help="Worlds: list, show what each is made of and why.", no_args_is_help=False, rich_markup_mode=None)
@@ -23,13 +23,11 @@ def list_worlds(json: Json = False) -> None:
 
     default = load_scenario("quick", None, {}).world
     worlds = [load_world(name) for name in world_names()]
-    if json:
-        rows = [{"name": world.name, "title": world.file.title, "why": world.file.why} for world in worlds]
-        print_json({"worlds": rows, "default_world": default})
-        return
+    rows = [{"name": world.name, "title": world.file.title, "why": world.file.why} for world in worlds]
     width = max(len(world.name) for world in worlds)
-    for world in worlds:
-        typer.echo(f"{world.name:<{width}}  {world.file.title}{' (of the presets)' if world.name == default else ''}")
+    marks = {default: " (of the presets)"}
+    lines = (f"{world.name:<{width}}  {world.file.title}{marks.get(world.name, '')}" for world in worlds)
+    answer(json, {"worlds": rows, "default_world": default}, *lines)
 
 
 @app.command("show")
@@ -39,8 +37,6 @@ def show(
     json: Json = False,
 ) -> None:
     """Show a world: why it is flown, its fields, from where a seed draws them, and the source of each number."""
-    from rich.table import Table
-
     from wakewise.operation.scenario.randomization import sample_fields
     from wakewise.operation.worlds.library import load_world
 
@@ -56,14 +52,13 @@ def show(
         return
     typer.echo(f"{name}: {world.file.title}\n")
     typer.echo(textwrap.fill(world.file.why, _WIDTH) + "\n")
-    table = Table(show_lines=True)
-    for column in ("field", "value", *(() if seed is None else (f"seed {seed}",)), "source"):
-        table.add_column(column)
+    rows = []
     for dotted, entry in world.file.fields.items():
         value = _shown(entry.value) if entry.randomize is None else f"drawn: {entry.randomize}"
         now = () if seed is None else (_shown(drawn.get(dotted, entry.value)),)
-        table.add_row(dotted, value, *now, " ".join(entry.source.split()))
-    print_table(table)
+        rows.append((dotted, value, *now, " ".join(entry.source.split())))
+    columns = ("field", "value", *(() if seed is None else (f"seed {seed}",)), "source")
+    print_table("t", columns, rows, show_lines=True)
 
 
 def _shown(value: Any) -> str:

@@ -114,14 +114,8 @@ OLD_S = 0.3
 async def show_pictures(show: ViewModel, clients: Callable[[], Iterable[Client]], seen: asyncio.Event) -> None:
     """Draw pictures for as long as somebody looks, until cancelled.
 
-    Parameters
-    ----------
-    show : ViewModel
-        Its `picture` is called in a thread.
-    clients : callable
-        Who may look now.
-    seen : asyncio.Event
-        Set when a client has shown a picture.
+    `show`: its `picture` is called in a thread. `clients`: who may look now. `seen`: set when a client has shown a
+    picture.
     """
     clock = asyncio.get_running_loop()
     while True:

@@ -185,12 +185,8 @@ class ControlOwnership:
 class ControlMailbox:
     """The helm of one flight, and the sticks as the flight reads them.
 
-    Parameters
-    ----------
-    clock : callable
-        Seconds that never go back.
-    device : ControlSource, optional
-        Sticks at this computer. They take the helm when it is free and they move; pulled out, they give it back.
+    `clock`: seconds that never go back. `device`: sticks at this computer. They take the helm when it is free and they
+    move; pulled out, they give it back.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, device: ControlSource | None = None) -> None:

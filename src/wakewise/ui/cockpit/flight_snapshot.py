@@ -53,16 +53,8 @@ class FlightSnapshot:
 class SnapshotRecorder:
     """Called as `(step, witness)` at each step; `now` is the newest moment, for any thread.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    points_W_m : ndarray, shape (n, 3)
-        Where the true water is asked, if the witness knows.
-    dt_s : float
-    given : callable
-        Called when the step's thrusts are on their way.
-    asked : callable
-        Velocity that is asked for in W, shape (3,).
+    `points_W_m`, shape (n, 3): where the true water is asked, if the witness knows. `given`: called when the step's
+    thrusts are on their way. `asked`: velocity that is asked for in W, shape (3,).
     """
 
     def __init__(

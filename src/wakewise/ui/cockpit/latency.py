@@ -60,19 +60,10 @@ def measure(
 ) -> LoopTiming:
     """Fly for a while with a page that holds the helm.
 
-    Parameters
-    ----------
-    scenario : Scenario
-    flight_s : float
-    pictures : bool
-        Whether the page looks at the camera's picture.
-    busy : int
-        Processes that do nothing but keep a core busy meanwhile.
+    `pictures`: whether the page looks at the camera's picture. `busy`: processes that do nothing but keep a core busy
+    meanwhile.
 
-    Raises
-    ------
-    StageError
-        If no flight came about.
+    Raises StageError if no flight came about.
     """
     session = CockpitSession(scenario, None, pictures=pictures)
     server = CockpitServer(session)

@@ -96,14 +96,8 @@ class PictureWidth:
 class LiveCamera:
     """Draws views on request, one at a time.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Its target, camera, light and water.
-    target : Target, optional
-        In place of the scenario's own.
-    widths_px : tuple of int
-        Of its pictures, widest first; the height follows from the scenario's.
+    `scenario`: its target, camera, light and water. `target`: in place of the scenario's own. `widths_px`: of its
+    pictures, widest first; the height follows from the scenario's.
     """
 
     def __init__(
@@ -126,10 +120,7 @@ class LiveCamera:
     def draw(self, view: CameraState, timeout_s: float = 2.0) -> bytes | None:
         """Draw a view as a JPEG; None while the scene is not ready, or where a picture does not come in time.
 
-        Raises
-        ------
-        StageError
-            If the process has ended.
+        Raises StageError if the process has ended.
         """
         with self._lock:
             if self._process is None:

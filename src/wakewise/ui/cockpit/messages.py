@@ -89,7 +89,7 @@ class InvalidMessage:
 Message = Hello | ControlRequest | ControlConsent | StickMessage | ButtonPress | SettingsChange | PictureAck
 
 
-class _Wrong(Exception):  # noqa: N818  (it never leaves this file)
+class _InvalidError(Exception):
     pass
 
 
@@ -109,14 +109,14 @@ def read_message(raw: str | bytes) -> Message | InvalidMessage:
         return InvalidMessage(why=f"type: {_shown(kind)}, allowed {', '.join(_READERS)}")
     try:
         return reader(told)
-    except _Wrong as fault:
+    except _InvalidError as fault:
         return InvalidMessage(why=f"{kind}: {fault}")
 
 
 def _hello(told: dict[str, Any]) -> Hello:
     wants = told.get("wants", "watch")
     if wants not in ("helm", "watch"):
-        raise _Wrong(f"wants {_shown(wants)}, allowed helm, watch")
+        raise _InvalidError(f"wants {_shown(wants)}, allowed helm, watch")
     token, lease = (None if told.get(field) is None else _word(told, field) for field in ("token", "lease"))
     name = "".join(c for c in _word({"name": "somebody"} | told, "name") if c.isprintable()).strip()
     return Hello(token=token, name=name or "somebody", wants=wants, lease=lease)
@@ -133,10 +133,10 @@ def _consent(told: dict[str, Any]) -> ControlConsent:
 def _sticks(told: dict[str, Any]) -> StickMessage:
     axes = told.get("axes")
     if not isinstance(axes, list) or len(axes) != len(CONTROL_AXES):
-        raise _Wrong(f"axes must be {len(CONTROL_AXES)} numbers")
+        raise _InvalidError(f"axes must be {len(CONTROL_AXES)} numbers")
     t_ms = _number(told.get("t"), "t")
     if not abs(t_ms) <= _LARGEST:  # what is no number, too
-        raise _Wrong("t must be a time in ms")
+        raise _InvalidError("t must be a time in ms")
     values = [_number(value, "axes") for value in axes]
     return StickMessage(seq=_whole(told, "seq"), t_ms=t_ms, axes=apply_dead_zone(values), lease=_word(told, "lease"))
 
@@ -144,17 +144,17 @@ def _sticks(told: dict[str, Any]) -> StickMessage:
 def _press(told: dict[str, Any]) -> ButtonPress:
     what = told.get("what")
     if what not in ACTIONS:
-        raise _Wrong(f"what {_shown(what)}, allowed {', '.join(ACTIONS)}")
+        raise _InvalidError(f"what {_shown(what)}, allowed {', '.join(ACTIONS)}")
     return ButtonPress(what=what, lease=_word(told, "lease"))
 
 
 def _desk(told: dict[str, Any]) -> SettingsChange:
     changes = told.get("set")
     if not isinstance(changes, dict) or not 0 < len(changes) <= _FIELDS:
-        raise _Wrong("set must be an object of fields and values")
+        raise _InvalidError("set must be an object of fields and values")
     for name, value in changes.items():
         if not isinstance(value, str | int | float) or (isinstance(value, str) and len(value) > _WORD):
-            raise _Wrong(f"set.{_shown(name)} must be a number, a word or true or false")
+            raise _InvalidError(f"set.{_shown(name)} must be a number, a word or true or false")
         if not isinstance(value, str | bool):
             changes[name] = _number(value, "set")
     return SettingsChange(changes=changes, lease=_word(told, "lease"))
@@ -177,7 +177,7 @@ _READERS: dict[str, Callable[[dict[str, Any]], Message]] = {
 
 def _number(value: Any, field: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _Wrong(f"{field} must be a number, not {_shown(value)}")
+        raise _InvalidError(f"{field} must be a number, not {_shown(value)}")
     try:
         return float(value)
     except OverflowError:  # a whole number of more than 308 digits
@@ -187,21 +187,21 @@ def _number(value: Any, field: str) -> float:
 def _whole(told: dict[str, Any], field: str) -> int:
     value = told.get(field)
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _LARGEST:
-        raise _Wrong(f"{field} must be a whole number from 0, not {_shown(value)}")
+        raise _InvalidError(f"{field} must be a whole number from 0, not {_shown(value)}")
     return value
 
 
 def _word(told: dict[str, Any], field: str) -> str:
     value = told.get(field)
     if not isinstance(value, str) or len(value) > _WORD:
-        raise _Wrong(f"{field} must be a text of at most {_WORD} characters, not {_shown(value)}")
+        raise _InvalidError(f"{field} must be a text of at most {_WORD} characters, not {_shown(value)}")
     return value
 
 
 def _flag(told: dict[str, Any], field: str) -> bool:
     value = told.get(field)
     if not isinstance(value, bool):
-        raise _Wrong(f"{field} must be true or false, not {_shown(value)}")
+        raise _InvalidError(f"{field} must be true or false, not {_shown(value)}")
     return value
 
 

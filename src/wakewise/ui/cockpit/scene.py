@@ -49,11 +49,7 @@ def open_scene(vehicle: Vehicle, points_W_m: Array) -> ViserScene | None:
 class ViserScene:
     """A scene that is kept up to date; all of it in world NED.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    points_W_m : ndarray, shape (n, 3)
-        Places on the target.
+    `points_W_m`, shape (n, 3): places on the target.
     """
 
     def __init__(self, vehicle: Vehicle, points_W_m: Array) -> None:
@@ -142,18 +138,16 @@ class ViserScene:
                 )
 
 
+def _no_tunnel(*_: object, **__: object) -> None:
+    """Do nothing, in place of the methods of Viser's server that open and close a tunnel."""
+
+
 def _closed_server() -> Any:
-    """Viser's server on this computer's own address, which opens no tunnel whoever asks."""
+    """Viser's server on this computer's own address, which opens no tunnel whoever asks.
+
+    Its handlers look both methods up when a request comes, so the replacements are what is called.
+    """
     import viser
 
-    class ClosedServer(viser.ViserServer):  # type: ignore[misc]
-        """Its handlers look both methods up when a request comes, so these are what is called."""
-
-        def request_share_url(self, verbose: bool = True) -> str | None:  # noqa: ARG002
-            """Do nothing: no tunnel."""
-            return None
-
-        def disconnect_share_url(self) -> None:
-            """Do nothing: there is no tunnel."""
-
-    return ClosedServer(host="127.0.0.1", port=0, verbose=False)
+    closed = {"request_share_url": _no_tunnel, "disconnect_share_url": _no_tunnel}
+    return type("ClosedServer", (viser.ViserServer,), closed)(host="127.0.0.1", port=0, verbose=False)

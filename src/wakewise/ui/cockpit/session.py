@@ -54,7 +54,6 @@ class CockpitSession:
 
     Parameters
     ----------
-    scenario : Scenario or Parts
     folder : Path or None
         Of the first flight; later ones get a number. None keeps nothing.
     paced : bool

@@ -142,13 +142,7 @@ def scenario_description(parts: Parts) -> dict[str, Any]:
 
 
 class StateEncoder:
-    """Makes a state of a moment; one for each flight. `predicted_m_s` is the wash at the gauges' points, as last read.
-
-    Parameters
-    ----------
-    gauges : WakeReadout
-    lookout : SnapshotRecorder
-    """
+    """Encodes the snapshots of one flight. `predicted_m_s` is the wash at the gauges' points as last read."""
 
     def __init__(self, gauges: WakeReadout, lookout: SnapshotRecorder) -> None:
         self._gauges, self._lookout = gauges, lookout

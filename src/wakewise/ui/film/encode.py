@@ -44,9 +44,7 @@ class FrameSink(Protocol):
 def check_film_name(path: Path) -> None:
     """Refuse a name whose ending says nothing that can be written.
 
-    Raises
-    ------
-    InputError
+    Raises InputError.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"--out {path}: ends in '{path.suffix}', allowed are {', '.join(SUFFIXES)}")
@@ -63,12 +61,8 @@ def has_h264() -> bool:
 def film_writer(path: Path, fps: float, size_px: tuple[int, int]) -> Iterator[FrameSink]:
     """Give what takes RGB frames of `size_px` (width, height); the film appears under its name only when it is whole.
 
-    Raises
-    ------
-    InputError
-        If the name's ending is none of `SUFFIXES`, or a side of the picture is odd or too small.
-    StageError
-        If the encoder refuses.
+    Raises InputError if the name's ending is none of `SUFFIXES`, or a side of the picture is odd or too small;
+    StageError if the encoder refuses.
     """
     check_film_name(path)
     if any(side < 16 or side % 2 for side in size_px):

@@ -53,6 +53,8 @@ def write_film(
 
     Frames are kept in a hidden folder beside the film until it is whole: the same call again goes on where it stopped.
 
+    Raises InputError if the folder is no finished trial, or an option is out of range; StageError if no encoder works.
+
     Parameters
     ----------
     folder : Path
@@ -65,13 +67,6 @@ def write_film(
         Frames per second.
     view : str
         ``both``, ``outside`` or ``camera``.
-
-    Raises
-    ------
-    InputError
-        If the folder is no finished trial, or an option is out of range.
-    StageError
-        If no encoder works.
     """
     if view not in VIEWS:
         raise InputError(f"--view: '{view}', allowed are {', '.join(VIEWS)}")

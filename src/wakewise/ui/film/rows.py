@@ -49,10 +49,7 @@ class ComparisonTile:
 def compared_trials(folder: Path) -> dict[str, Path]:
     """Folders of the trials that `wakewise compare` left, by method, in its order.
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    Raises InputError if there is none.
     """
     if not folder.is_dir():
         raise InputError(f"--rows {folder}: no such folder, one that wakewise compare wrote is needed")
@@ -71,19 +68,10 @@ def write_rows(
 ) -> Path:
     """Write the picture of a comparison, and give its path.
 
-    Parameters
-    ----------
-    folder : Path
-        What `wakewise compare` left: a trial folder for each method.
-    out : Path
-        Ends in .png, .jpg or .webp.
-    times_s : sequence of float
-        Counted from each trial's first photograph.
+    `folder`: what `wakewise compare` left: a trial folder for each method. `out`: ends in .png, .jpg or .webp.
+    `times_s`: counted from each trial's first photograph.
 
-    Raises
-    ------
-    InputError
-        If the folder holds no finished trials, or a time lies after a flight's end.
+    Raises InputError if the folder holds no finished trials, or a time lies after a flight's end.
     """
     if out.suffix.lower() not in (".png", ".jpg", ".jpeg", ".webp"):
         raise InputError(f"--out {out}: ends in '{out.suffix}', allowed for rows are .png, .jpg, .webp")

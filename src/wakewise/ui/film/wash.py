@@ -59,10 +59,7 @@ class RecordedMotion:
     def of(cls, steps: pl.DataFrame) -> RecordedMotion:
         """Take the motion from steps.parquet.
 
-        Raises
-        ------
-        InputError
-            If the true motion was not recorded.
+        Raises InputError if the true motion was not recorded.
         """
         thrusts = [name for name in steps.columns if name.startswith("thrust_") and name.endswith("_N")]
         place = [f"true_{a}_m" for a in "xyz"]
@@ -91,10 +88,7 @@ def wash_of(
 ) -> list[Tracers]:
     """Tracers at rising times, shape (k,); the answer is kept in the file `kept` and taken from there next time.
 
-    Raises
-    ------
-    InputError
-        If the record lacks the true motion.
+    Raises InputError if the record lacks the true motion.
     """
     digest = hashlib.sha256(steps_path.read_bytes())
     digest.update(repr((_VERSION, STEP_S, LIFE_S, TRACERS_PER_S, TRAIL, TRAIL_EVERY)).encode())

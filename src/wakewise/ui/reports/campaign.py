@@ -13,12 +13,11 @@ from wakewise.experiments.campaigns.summary import (
     ComparisonMetric,
     MethodSummary,
     Place,
-    comparable,
     measures,
     method_contrasts,
     paired_groups,
 )
-from wakewise.experiments.campaigns.table import Results, failures, group_table
+from wakewise.experiments.campaigns.table import Results, failures, group_table, varying_factors
 from wakewise.experiments.trials import UNITS
 from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, winner_text, worst_panels
 from wakewise.ui.reports.page import collapsible_section, framed_page, missing, parts, plot, section, template
@@ -35,10 +34,7 @@ def write_campaign(found: Results, folder: Path, out: Path | None = None, compar
     `folder` is the campaign's folder with the pictures. `out` is the file, or a folder for campaign.html; `folder` if
     not given. `compare` is the factor that is compared; if empty the first in which trials differ, methods first.
 
-    Raises
-    ------
-    InputError
-        If `compare` is no factor.
+    Raises InputError if `compare` is no factor.
     """
     page = campaign_page(found, folder, compare)
     path = folder / PAGE if out is None else out if out.suffix == ".html" else out / PAGE
@@ -49,7 +45,7 @@ def write_campaign(found: Results, folder: Path, out: Path | None = None, compar
 def campaign_page(found: Results, folder: Path, compare: str = "") -> str:
     """HTML of the page."""
     ended = paired_groups(found, compare)
-    compared = compare or comparable(found)[0]
+    compared = compare or varying_factors(found.plan)[0]
     judged = method_contrasts(ended)
     links = [("glance", "At a glance"), ("plots", "Trial by trial"), ("worst", "Worst trials")]
     links += [("groups", "Groups"), ("flown", "What was flown")]

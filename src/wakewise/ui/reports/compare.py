@@ -62,10 +62,7 @@ def write_comparison(trials: Mapping[str, Path], out: Path) -> Path:
 
     Ratios are relative to the first trial. `out` is the file, or a folder for comparison.html.
 
-    Raises
-    ------
-    InputError
-        If there are no trials or one of the folders holds none.
+    Raises InputError if there are no trials or one of the folders holds none.
     """
     if not trials:
         raise InputError("comparison: no trials, needs at least one")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import cast
 
 import cv2
 import numpy as np
@@ -206,7 +207,7 @@ def name_legs(axes: Axes, trial: Trial) -> None:
         return
     whole = max(spans[-1][2] - spans[0][1], 1e-9)
     for name, start, stop in spans:
-        if (stop - start) / whole > 0.11 / axes.figure.get_figwidth() * len(name):  # type: ignore[union-attr]
+        if (stop - start) / whole > 0.11 / cast("Figure", axes.figure).get_figwidth() * len(name):
             axes.annotate(
                 name, (0.5 * (start + stop), 1.0), xycoords=("data", "axes fraction"), ha="center", va="bottom",
                 color=MUTED, fontsize=9, xytext=(0, 3), textcoords="offset points",

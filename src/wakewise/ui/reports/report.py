@@ -77,10 +77,7 @@ def write_report(trial: Path, draft: PageParts | None = None) -> Path:
 
     The page is one file that opens with no network. A part of the folder that is missing leaves a gap that says why.
 
-    Raises
-    ------
-    InputError
-        If `trial` is not a folder or holds nothing of a trial.
+    Raises InputError if `trial` is not a folder or holds nothing of a trial.
     """
     read = read_trial(trial)
     path = trial / "report.html"

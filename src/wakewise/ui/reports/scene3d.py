@@ -10,6 +10,7 @@ import contextlib
 import io
 from collections.abc import AsyncIterator, Iterator
 from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -86,12 +87,13 @@ def without_server() -> Iterator[None]:
     async def closed(*_: object, **__: object) -> AsyncIterator[SimpleNamespace]:
         yield SimpleNamespace(server=SimpleNamespace(sockets=()))
 
-    served = websockets.asyncio.server.serve
-    websockets.asyncio.server.serve = closed  # type: ignore[assignment,misc]
+    library: Any = websockets.asyncio.server
+    served = library.serve
+    library.serve = closed
     try:
         yield
     finally:
-        websockets.asyncio.server.serve = served  # type: ignore[misc]
+        library.serve = served
 
 
 def _aim(server: viser.ViserServer, trial: Trial) -> None:

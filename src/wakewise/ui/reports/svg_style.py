@@ -11,6 +11,7 @@ import io
 import re
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -55,7 +56,7 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return Figure(figsize=(width_in, height_in), facecolor="none", layout="constrained")
 
 
-def style_axes(axes: Axes, *, x: str = "", y: str = "", grid: str = "y") -> None:
+def style_axes(axes: Axes, *, x: str = "", y: str = "", grid: Literal["x", "y", "both", ""] = "y") -> None:
     """Give axes the quiet look of the report: two spines, a light grid, labels with units."""
     axes.set_facecolor("none")
     for side, spine in axes.spines.items():
@@ -63,7 +64,7 @@ def style_axes(axes: Axes, *, x: str = "", y: str = "", grid: str = "y") -> None
         spine.set_color(LINE)
     axes.tick_params(colors=MUTED, labelsize=9, length=3, width=0.8)
     if grid:
-        axes.grid(axis=grid, color=LINE, linewidth=0.7)  # type: ignore[arg-type]
+        axes.grid(axis=grid, color=LINE, linewidth=0.7)
     axes.set_axisbelow(True)
     if x:
         axes.set_xlabel(x, color=MUTED, fontsize=9.5)

@@ -41,10 +41,7 @@ _OVER_BED_M = 1e-4
 def write_target(path: Path, target: Target, delicacy: Fragility, region: Region) -> None:
     """Write a target's delicate features as a page (.html), a picture (.svg) or a coloured mesh (.ply).
 
-    Raises
-    ------
-    InputError
-        If the suffix is none of these.
+    Raises InputError if the suffix is none of these.
     """
     suffix = path.suffix.lower()
     if suffix == ".html":

@@ -141,10 +141,7 @@ def read_trial(folder: Path) -> Trial:
 
     A part that is absent or unreadable is left out and named in `missing`; the report then says so.
 
-    Raises
-    ------
-    InputError
-        If the folder does not exist or holds none of the parts of a trial.
+    Raises InputError if the folder does not exist or holds none of the parts of a trial.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder, a trial folder is needed")

@@ -105,10 +105,7 @@ def equal_secrets(one: str, other: str) -> bool:
 def origin_of(text: str) -> str:
     """An address as a browser writes it into Origin: scheme, host and port.
 
-    Raises
-    ------
-    InputError
-        If it is none of http or https.
+    Raises InputError if it is none of http or https.
     """
     try:
         parts = urlsplit(text)
@@ -225,10 +222,7 @@ PER_ADDRESS, IN_ALL = 128, 384
 class PendingConnections:
     """Connections without a name, oldest first; safe to use from any thread.
 
-    Parameters
-    ----------
-    per_address, in_all : int
-        How many are kept.
+    `per_address`, `in_all`: how many are kept.
     """
 
     def __init__(self, per_address: int = PER_ADDRESS, in_all: int = IN_ALL) -> None:

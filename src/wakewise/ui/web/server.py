@@ -88,10 +88,7 @@ class HttpError(Exception):
 def parse_request(head: bytes) -> HttpRequest:
     """Request of the bytes up to the empty line (RFC 9112).
 
-    Raises
-    ------
-    HttpError
-        400, 414, 431 or 505.
+    Raises HttpError with status 400, 414, 431 or 505.
     """
     first, *lines = head.decode("latin-1").splitlines()
     words = first.split(" ")
@@ -179,10 +176,7 @@ class WebServer:
     def bind(self) -> None:
         """Reserve the port; requests are answered after `start`.
 
-        Raises
-        ------
-        InputError
-            If the port is in use, or the address is not one of this computer.
+        Raises InputError if the port is in use, or the address is not one of this computer.
         """
         if self._listener is not None:
             return

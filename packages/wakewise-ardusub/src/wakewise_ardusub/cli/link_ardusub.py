@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -29,6 +29,7 @@ from wakewise_ardusub.cli.link_ardusub_check import (
 
 if TYPE_CHECKING:
     from wakewise_ardusub.link.connection import Endpoint
+    from wakewise_ardusub.link.transports import Transport
     from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession
 
 DEFAULT_VEHICLE = "bluerov2-heavy"
@@ -215,7 +216,9 @@ def _uninterrupted() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _carried(stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None) -> tuple[Any, Any]:
+def _carried(
+    stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None
+) -> tuple[Transport, Callable[[VehicleSession], None]]:
     """What carries the bytes, and what is to be done once the session is there."""
     from wakewise.core.errors import InputError
     from wakewise_ardusub.link.mavlink_relay import MavlinkRelay
@@ -224,7 +227,7 @@ def _carried(stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None)
     if ground_at is None:
         transport = open_transport(vehicle_at)
         stack.callback(transport.close)
-        return transport, lambda session: None  # noqa: ARG005
+        return transport, lambda _: None
     for option, end in (("--connection", vehicle_at), ("--relay", ground_at)):
         if end.way not in ("udpin", "udpout"):
             raise InputError(f"{option} {end.words}: the relay forwards udpin:HOST:PORT and udpout:HOST:PORT only")

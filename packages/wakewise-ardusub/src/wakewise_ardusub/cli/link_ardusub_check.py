@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, escaped, print_json, print_table
+from wakewise.ui.cli.console import ProgressBars, print_json, print_table
 
 if TYPE_CHECKING:
     from wakewise_ardusub.link.checks import Answer, CheckInputs, CheckResult, MotorResults
@@ -188,14 +188,11 @@ def _motor_numbers(motors: str | None) -> list[int] | None:
 
 
 def _show(rows: tuple[CheckResult, ...], said: str, facts: CheckInputs) -> None:
-    from rich.table import Table
+    from rich.text import Text
 
-    table = Table(title=f"{facts.vehicle.title}: may it be driven motor by motor?", title_justify="left")
-    for column in ("", "what", "asked for", "found", "what to do"):
-        table.add_column(column, overflow="fold")
-    for row in rows:
-        table.add_row(_MARKS[row.verdict], *(escaped(words) for words in (row.what, row.asked, row.found, row.do)))
-    print_table(table)
+    cells = [(Text.from_markup(_MARKS[row.verdict]), row.what, row.asked, row.found, row.do) for row in rows]
+    columns = ("", "what", "asked for", "found", "what to do")
+    print_table("t", columns, cells, f"{facts.vehicle.title}: may it be driven motor by motor?")
     wrong = sum(row.verdict == "no-go" for row in rows)
     open_rows = sum(row.verdict == "unknown" and row.needed for row in rows)
     rest = "" if facts.heard is not None else ", as far as parameters say: what is heard needs a connection"

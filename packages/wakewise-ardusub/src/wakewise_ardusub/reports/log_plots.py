@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import cast
 
 import numpy as np
 import polars as pl
@@ -191,7 +192,7 @@ def _name_modes(axes: Axes, rows: pl.DataFrame, time_s: Array) -> None:
         if start and rows["mode"][start - 1] is not None:
             axes.axvline(time_s[start], color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
         share = (time_s[stop] - time_s[start]) / whole
-        if share * axes.figure.get_figwidth() > 0.11 * len(str(mode)):  # type: ignore[union-attr]
+        if share * cast("Figure", axes.figure).get_figwidth() > 0.11 * len(str(mode)):
             axes.annotate(
                 str(mode), (0.5 * (time_s[start] + time_s[stop]), 1.0), xycoords=("data", "axes fraction"),
                 ha="center", va="bottom", color=MUTED, fontsize=9, xytext=(0, 3), textcoords="offset points",

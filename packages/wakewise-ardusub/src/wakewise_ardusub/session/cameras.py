@@ -67,7 +67,7 @@ def parse_camera(words: str) -> MakeCamera:
         If it is none of the ways, or the program is not there.
     """
     if words in ("mavlink", "digicam"):
-        return lambda gate, folder, journal: MavlinkCamera(gate, digicam=words == "digicam")  # noqa: ARG005
+        return lambda gate, _folder, _journal: MavlinkCamera(gate, digicam=words == "digicam")
     way, _, line = words.partition(":")
     if way != "run":
         raise InputError(f"--camera {words!r}: right is {RIGHT}")
@@ -79,7 +79,7 @@ def parse_camera(words: str) -> MakeCamera:
         raise InputError(f"--camera {words!r}: nothing to run; right is {RIGHT}")
     if shutil.which(program[0]) is None:
         raise InputError(f"--camera {words!r}: there is no program {program[0]}")
-    return lambda gate, folder, journal: ProgramCamera(program, folder / PHOTOGRAPHS, journal)  # noqa: ARG005
+    return lambda _gate, folder, journal: ProgramCamera(program, folder / PHOTOGRAPHS, journal)
 
 
 @dataclass(eq=False)

@@ -174,7 +174,7 @@ class GroundStationInput:
     gate: OutputGate
     stale_s: float = 0.3
 
-    def read(self, time_s: float) -> Controls | None:  # noqa: ARG002  (as they are now)
+    def read(self, _time_s: float) -> Controls | None:
         """The sticks as last heard; None where nobody was heard for a while."""
         sticks, pressed = self.gate.known.sticks, self.gate.pressed()
         if sticks is None or self.gate.clock() - sticks.came_s > self.stale_s:
@@ -298,7 +298,7 @@ class WashFigures:
     _covered_pct: float | None = None
     _coverage: Coverage | None = None
 
-    def __call__(self, step: Step, witness: TruthProvider | None = None) -> None:  # noqa: ARG002  (as flights call it)
+    def __call__(self, step: Step, _witness: TruthProvider | None = None) -> None:
         """Reckon them anew, if it is time."""
         if step.time_s < self._due_s:
             return
@@ -451,7 +451,7 @@ class _WaitingWorld:
 class _MovingInput:
     """Sticks that are moved a little, for a rehearsal."""
 
-    def read(self, time_s: float) -> Controls:  # noqa: ARG002
+    def read(self, _time_s: float) -> Controls:
         return Controls(axes=np.array([0.0, 0.1, 0.1, 0.1, 0.0]))
 
 

@@ -94,8 +94,8 @@ class CompanionHarness:
         """The companion's clock, which began at another time than the autopilot's."""
         return _OFFSET_S + self.flight.now_s
 
-    def receive(self, timeout_s: float) -> bytes:  # noqa: ARG002  (nothing is waited for)
-        """What came since."""
+    def receive(self, _timeout_s: float) -> bytes:
+        """What came since; nothing is waited for."""
         data = b"".join(self._waiting)
         self._waiting.clear()
         return data

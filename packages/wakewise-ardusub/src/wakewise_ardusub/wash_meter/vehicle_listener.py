@@ -52,7 +52,7 @@ class LatestSamples:
 class _AsStamped:
     """The clock of who hears messages as they come: its own stamps are the time."""
 
-    def at(self, stamp_s: float, boot_s: float | None = None) -> float:  # noqa: ARG002  (as `Stamped` has it)
+    def at(self, stamp_s: float, _boot_s: float | None = None) -> float:
         return stamp_s
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import typer
 
-from wakewise.ui.cli.console import format_value, print_table
-from wakewise_paper.cli.bench_wash import reduction
+from wakewise.ui.cli.console import format_value, interval, print_table
+from wakewise_paper.cli.bench_wash import reduction, scaled, show_failures
 
 _BARS = (
     ("velocity_deviation_pct", "velocity_deviation_interval_pct", "velocity deviation, %", "< 15"),
@@ -24,31 +24,20 @@ _COLUMNS = ("flights", "deviation", "floor", "planned %", "mm/s", "direct", "les
 
 def show_operator(result: Mapping[str, Any]) -> None:
     """The claim first, with pilots, courses and rivals beside it; then each world by w_track; then the paper's."""
-    from rich.table import Table
-
     claim = result["claim"]
     beside: dict[str, Mapping[str, Any]] = {**claim["pilots"], **claim["courses"], **claim["rivals"]}
-    words = f"claim: w_track 5, {claim['flights']} flights, of {claim['trouble_flights']} direct leaves over 10 mm/s"
-    table = Table(title=words, title_justify="left")
-    for title in ("", "wake-aware", "95 %", *beside, "bar"):
-        table.add_column(title, justify="left" if not title else "right")
-    for key, ends, name, bar in _BARS:
-        told = claim[ends]
-        interval = "" if told is None else f"{format_value(told[0])} to {format_value(told[1])}"
-        table.add_row(
-            name, format_value(claim[key]), interval, *(format_value(one[key]) for one in beside.values()), bar
-        )
-    print_table(table)
-    table = Table(title="worlds; less wash and D than direct allocation on the same seeds", title_justify="left")
-    table.add_column("world")
-    table.add_column("w_track")
-    for title in _COLUMNS:
-        table.add_column(title, justify="right")
+    title = f"claim: w_track 5, {claim['flights']} flights, of {claim['trouble_flights']} direct leaves over 10 mm/s"
+    rows: list[tuple[Any, ...]] = [
+        (name, claim[key], interval(*(claim[ends] or (None, None))), *(one[key] for one in beside.values()), bar)
+        for key, ends, name, bar in _BARS
+    ]
+    print_table("tn", ("", "wake-aware", "95 %", *beside, "bar"), rows, title)
+    rows = []
     for name, world in result["worlds"].items():
-        for w_track, row in world["w_track"].items():
-            table.add_row(name, w_track, *_cells(row))
-        table.add_row(name, "no-forward-jets", *_cells(world["no-forward-jets"]))
-    print_table(table)
+        rows += [(name, w_track, *_cells(row)) for w_track, row in world["w_track"].items()]
+        rows.append((name, "no-forward-jets", *_cells(world["no-forward-jets"])))
+    title = "worlds; less wash and D than direct allocation on the same seeds"
+    print_table("ttn", ("world", "w_track", *_COLUMNS), rows, title)
     for key, where in (("w_track", "in front"), ("w_track_over", "above")):
         for w_track, row in result["paper"][key].items():
             typer.echo(
@@ -58,12 +47,9 @@ def show_operator(result: Mapping[str, Any]) -> None:
                 f"wash by {reduction(row['target_speed_reduction_pct'])}"
             )
     _show_cockpit(result)
-    typer.echo(
-        f"{result['flown']} flights flown, {result['flights'] - result['flown'] - result['failed']} known, "
-        f"{result['failed']} failed"
-    )
-    for failure in result["failures"]:
-        typer.echo(f"failed: {failure['flow']}, {failure['name']}, seed {failure['seed']}: {failure['reason']}")
+    known = result["flights"] - result["flown"] - result["failed"]
+    typer.echo(f"{result['flown']} flights flown, {known} known, {result['failed']} failed")
+    show_failures(result)
 
 
 def _show_cockpit(result: Mapping[str, Any]) -> None:
@@ -83,19 +69,15 @@ def _show_cockpit(result: Mapping[str, Any]) -> None:
             typer.echo(f"{key}: not measured: {result['why'][key]}")
 
 
-def _cells(row: Mapping[str, Any]) -> list[str]:
-    def mm_s(key: str) -> str:
-        return format_value(None if row[key] is None else 1e3 * row[key])
-
+def _cells(row: Mapping[str, Any]) -> list[Any]:
     return [
-        str(row["flights"]),
-        format_value(row["velocity_deviation_pct"]),
-        format_value(row["velocity_deviation_floor_pct"]),
-        format_value(row["velocity_deviation_planned_pct"]),
-        mm_s("target_speed_mean_m_s"),
-        mm_s("direct_target_speed_mean_m_s"),
+        row["flights"],
+        row["velocity_deviation_pct"],
+        row["velocity_deviation_floor_pct"],
+        row["velocity_deviation_planned_pct"],
+        *scaled(row, [(key, "", 1e3) for key in ("target_speed_mean_m_s", "direct_target_speed_mean_m_s")]),
         reduction(row["target_speed_reduction_all_pct"], row["target_speed_reduction_all_interval_pct"]),
         reduction(row["target_speed_reduction_pct"]),
         reduction(row["disturbance_reduction_pct"]),
-        format_value(row["energy_ratio"]),
+        row["energy_ratio"],
     ]

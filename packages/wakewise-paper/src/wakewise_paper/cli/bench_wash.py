@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import typer
 
-from wakewise.ui.cli.console import format_value, print_table
+from wakewise.ui.cli.console import format_value, interval, print_table
 
 _COLUMNS = (
     ("target_speed_mean_m_s", "mm/s", 1e3),
@@ -43,23 +44,15 @@ _CALM = (
 
 def show_gentle(result: dict[str, Any]) -> None:
     """The headline first, then a table per scenario with a row per method, then mechanisms and the paper's world."""
-    from rich.table import Table
-
     _show_headline(result["headline"])
     for name, scenario in result["scenarios"].items():
         seeds = max((row["flights"] for row in scenario["methods"].values()), default=0)
-        table = Table(title=f"{name}: {scenario['title']}; {seeds} seeds", title_justify="left")
-        table.add_column("method", no_wrap=True)
-        for _, title, _ in _COLUMNS:
-            table.add_column(title, justify="right")
-        for title in ("less than dp", "worst"):
-            table.add_column(title, justify="right")
+        rows = []
         for method, row in scenario["methods"].items():
-            cells = [format_value(None if row[key] is None else scale * row[key]) for key, _, scale in _COLUMNS]
-            worst = row.get("worst_seed_vs_dp_pct")
             less = reduction(row.get("reduction_vs_dp_pct"), row.get("reduction_vs_dp_interval_pct"))
-            table.add_row(method, *cells, less, reduction(worst))
-        print_table(table)
+            rows.append((method, *scaled(row, _COLUMNS), less, reduction(row.get("worst_seed_vs_dp_pct"))))
+        columns = ("method", *(title for _, title, _ in _COLUMNS), "less than dp", "worst")
+        print_table("Tn", columns, rows, f"{name}: {scenario['title']}; {seeds} seeds")
     mechanisms = sorted(
         {mechanism for scenario in result["scenarios"].values() for mechanism in scenario["mechanisms"]}
     )
@@ -73,31 +66,35 @@ def show_gentle(result: dict[str, Any]) -> None:
             for rival in ("dp", "mpc")
         )
         typer.echo(f"{flow} (circular: the planner's own model is the water): wake-aware moves less by {less}")
-    typer.echo(
-        f"{result['flown']} flights flown, {result['flights'] - result['flown'] - result['failed']} known, "
-        f"{result['failed']} failed"
-    )
+    known = result["flights"] - result["flown"] - result["failed"]
+    typer.echo(f"{result['flown']} flights flown, {known} known, {result['failed']} failed")
+    show_failures(result)
+
+
+def show_failures(result: Mapping[str, Any]) -> None:
+    """A line for each flight that failed."""
     for failure in result["failures"]:
         typer.echo(f"failed: {failure['flow']}, {failure['name']}, seed {failure['seed']}: {failure['reason']}")
 
 
+def scaled(row: Mapping[str, Any], columns: Sequence[tuple[str, str, float]]) -> list[float | None]:
+    """Values of a row in the units of the columns (key, title, factor)."""
+    return [None if row[key] is None else scale * row[key] for key, _, scale in columns]
+
+
 def _show_headline(headline: dict[str, Any]) -> None:
     """What was chosen beforehand, and its bars."""
-    from rich.table import Table
-
     beside = headline["beside"]
-    table = Table(title="headline: flights in which dp leaves more than 10 mm/s, less than 5", title_justify="left")
-    for title in ("", "figure", "wake-aware", "95 %", *beside, "bar"):
-        table.add_column(title, justify="left" if title in ("", "figure") else "right")
+    rows = []
     for part, bars in (("trouble", _BARS), ("calm", _CALM)):
         own = headline[part]
         for place, (key, words, bar) in enumerate(bars):
             ends = own.get(key.removesuffix("_pct") + ("_interval_pct" if key.endswith("_pct") else "_interval"))
-            interval = "" if ends is None else f"{format_value(ends[0])} to {format_value(ends[1])}"
-            others = [format_value(beside[name][part].get(key)) for name in beside]
             label = f"{part}, {own['flights']} flights" if place == 0 else ""
-            table.add_row(label, words, format_value(own.get(key)), interval, *others, bar)
-    print_table(table)
+            others = [one[part].get(key) for one in beside.values()]
+            rows.append((label, words, own.get(key), interval(*(ends or (None, None))), *others, bar))
+    columns = ("", "figure", "wake-aware", "95 %", *beside, "bar")
+    print_table("ttn", columns, rows, "headline: flights in which dp leaves more than 10 mm/s, less than 5")
     most = headline["everywhere"]
     for name, words in (("wash", "wash"), ("silt_rays", "silt on the rays"), ("sway", "sway")):
         if most[f"{name}_most_ratio"] is not None:
@@ -109,28 +106,18 @@ def _show_headline(headline: dict[str, Any]) -> None:
 
 def _show_mechanisms(scenarios: dict[str, Any], mechanisms: list[str]) -> None:
     """What each mechanism is worth, scenario by scenario: left out, alone."""
-    from rich.table import Table
-
-    table = Table(title="mechanisms: slower by, all others on / alone", title_justify="left")
-    table.add_column("scenario")
-    for mechanism in mechanisms:
-        table.add_column(mechanism, justify="right", no_wrap=True)
+    rows = []
     for name, scenario in scenarios.items():
         cells = [scenario["mechanisms"].get(mechanism, {}) for mechanism in mechanisms]
-        table.add_row(name, *(f"{reduction(c.get('left_out_pct'))} / {reduction(c.get('alone_pct'))}" for c in cells))
-    print_table(table)
+        rows.append((name, *(f"{reduction(c.get('left_out_pct'))} / {reduction(c.get('alone_pct'))}" for c in cells)))
+    print_table("tn", ("scenario", *mechanisms), rows, "mechanisms: slower by, all others on / alone")
 
 
 def _show_bound(bound: dict[str, Any]) -> None:
     """The most that sharing thrusts out could gain: less wash than `dp` as flown, energy over the least thrusts'."""
-    from rich.table import Table
-
     from wakewise_paper.wash_reduction.energy_optimum import ENERGIES
 
-    table = Table(title="the most that sharing thrusts out could gain: less than dp as flown", title_justify="left")
-    table.add_column("flight", no_wrap=True)
-    for title in ("dp mm/s", *(f"{name} x energy" for name in ENERGIES), "rule", "belief", "belief, any"):
-        table.add_column(title, justify="right")
+    cells = []
     rows = {**bound["flights"], **({} if bound["trouble"] is None else {"all in trouble": bound["trouble"]})}
     for flight, row in rows.items():
         speed = row.get("dp_m_s")
@@ -142,8 +129,9 @@ def _show_bound(bound: dict[str, Any]) -> None:
             f"{reduction(row[f'{name}_less_pct'])}, {format_value(row[f'{name}_energy'])}"
             for name in ("rule", "belief", "belief_any")
         ]
-        table.add_row(flight, format_value(None if speed is None else 1e3 * speed), *most, *named)
-    print_table(table)
+        cells.append((flight, None if speed is None else 1e3 * speed, *most, *named))
+    columns = ("flight", "dp mm/s", *(f"{name} x energy" for name in ENERGIES), "rule", "belief", "belief, any")
+    print_table("Tn", columns, cells, "the most that sharing thrusts out could gain: less than dp as flown")
 
 
 def reduction(value: float | None, interval: tuple[float, float] | None = None) -> str:

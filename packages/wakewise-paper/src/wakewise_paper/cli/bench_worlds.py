@@ -7,6 +7,7 @@ from typing import Any
 import typer
 
 from wakewise.ui.cli.console import format_value, print_table
+from wakewise_paper.cli.bench_wash import reduction, scaled, show_failures
 
 _COLUMNS = (
     ("target_speed_mean_m_s", "target mm/s", 1e3),
@@ -26,37 +27,26 @@ _COLUMNS = (
 
 def show_worlds(result: dict[str, Any]) -> None:
     """One table per world, a row per method; last, how much less each moves the target's water than the first."""
-    from rich.table import Table
-
     for name, world in result["worlds"].items():
         default = ", of the presets" if name == result["default_world"] else ""
         flights = max((row["flights"] for row in world["methods"].values()), default=0)
-        table = Table(title=f"{name}{default}: {world['title']}; {flights} seeds", title_justify="left")
-        table.add_column("method")
-        for _, title, _ in _COLUMNS:
-            table.add_column(title, justify="right")
         first = next(iter(world["methods"]))
-        table.add_column(f"less than {first}", justify="right")
-        for method, row in world["methods"].items():
-            cells = [format_value(None if row[key] is None else scale * row[key]) for key, _, scale in _COLUMNS]
-            table.add_row(method, *cells, _less(row["against"].get(first)))
-        print_table(table)
+        rows = [
+            (method, *scaled(row, _COLUMNS), _less(row["against"].get(first)))
+            for method, row in world["methods"].items()
+        ]
+        columns = ("method", *(title for _, title, _ in _COLUMNS), f"less than {first}")
+        print_table("tn", columns, rows, f"{name}{default}: {world['title']}; {flights} seeds")
     if result["judge"]:
         _show_judge(result["judge"])
     typer.echo(f"{result['flights']} flights, {result['models']} models, {result['failed']} failed")
-    for failure in result["failures"]:
-        typer.echo(f"failed: {failure['flow']}, {failure['name']}, seed {failure['seed']}: {failure['reason']}")
+    show_failures(result)
     typer.echo(f"emergent: {result['emergent']}\ntyped in: {result['typed_in']}")
 
 
 def _show_judge(judge: dict[str, Any]) -> None:
     """The same flights in the tank and in the lattice."""
-    from rich.table import Table
-
-    title = "the second judge: hovers in tank and lattice, target held still; mm/s, and less than dp"
-    table = Table(title=title, title_justify="left")
-    for name in ("world", "method", "tank: on the target", "8 cm off", "lattice: on the target", "8 cm off"):
-        table.add_column(name, justify="left" if name in ("world", "method") else "right")
+    rows = []
     for world, methods in judge.items():
         for method, row in methods.items():
             cells = []
@@ -64,13 +54,13 @@ def _show_judge(judge: dict[str, Any]) -> None:
                 speed, less = row[f"{place}m_s"], row[f"{place}less_pct"]
                 part = "" if less is None or method == "dp" else f" ({less:.0f} %)"
                 cells.append(format_value(None if speed is None else 1e3 * speed) + part)
-            table.add_row(world, method, *cells)
-    print_table(table)
+            rows.append((world, method, *cells))
+    columns = ("world", "method", "tank: on the target", "8 cm off", "lattice: on the target", "8 cm off")
+    title = "the second judge: hovers in tank and lattice, target held still; mm/s, and less than dp"
+    print_table("ttn", columns, rows, title)
 
 
 def _less(ratios: dict[str, Any] | None) -> str:
-    if ratios is None or ratios["target_speed_less_pct"] is None:
-        return "—"
-    interval = ratios["target_speed_less_interval_pct"]
-    ends = "" if interval is None else f" ({interval[0]:.0f} to {interval[1]:.0f})"
-    return f"{ratios['target_speed_less_pct']:.0f} %{ends}"
+    if ratios is None:
+        return reduction(None)
+    return reduction(ratios["target_speed_less_pct"], ratios["target_speed_less_interval_pct"])

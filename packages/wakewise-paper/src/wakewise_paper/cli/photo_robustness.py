@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table, write_page
+from wakewise.ui.cli.console import ProgressBars, answer, print_table, write_page
 from wakewise.ui.cli.options import Json, Preset, Sets, TargetName
 
 Levels = Annotated[
@@ -48,21 +48,11 @@ def degrade(
         factor = FACTORS[name]
         some = [row for row in rows if row["factor"] == name]
         write_page(f"{name}.png", partial(plot_degradation, some, factor.title, factor.unit, out / f"{name}.png"))
-    if json:
-        print_json({"rows": rows})
-        return
-    from rich.table import Table
-
-    table = Table(title=f"{scenario.target.kind} coral, {preset} preset")
     keys = ("level", "rmse_mm", "completeness_pct", "completeness_visible_pct", "registered_images", "inlier_matches")
-    for key in ("factor", *keys, "failure"):
-        table.add_column(key)
-    for row in rows:
-        table.add_row(
-            f"{row['factor']}, {row['unit']}", *(format_value(row[key]) for key in keys), row["failure"] or ""
-        )
-    print_table(table)
-    typer.echo(f"table and plots: {out}")
+    cells = [(f"{row['factor']}, {row['unit']}", *(row[key] for key in keys), row["failure"] or "") for row in rows]
+    title = f"{scenario.target.kind} coral, {preset} preset"
+    table = partial(print_table, "t", ("factor", *keys, "failure"), cells, title)
+    answer(json, {"rows": rows}, table, f"table and plots: {out}")
 
 
 def _levels(word: str) -> tuple[str, tuple[float, ...]]:

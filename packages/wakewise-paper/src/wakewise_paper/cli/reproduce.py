@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, escaped, format_value, print_json, print_table, write_page
+from wakewise.ui.cli.console import ProgressBars, interval, print_json, print_table, write_page
 from wakewise.ui.cli.options import Json
 
 _UNITS = {"s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
@@ -123,38 +123,24 @@ def seconds(option: str, text: str) -> float:
 
 def show_table(table: dict[str, Any]) -> None:
     """Rows as people read them: paper, ours, interval, met or not."""
-    from rich.table import Table
-
     counted = f"{table['made']} trials, {table['failed']} failed" if table["made"] else "not made"
-    drawn = Table(title=f"{table['table']}: {table['title']} ({counted})", title_justify="left")
-    for title, side in (
-        ("world", "left"),
-        ("method", "left"),
-        ("target", "left"),
-        ("figure", "left"),
-        ("paper", "right"),
-        ("ours", "right"),
-        ("95 %", "right"),
-        ("n", "right"),
-        ("unit", "left"),
-        ("met", "left"),
-    ):
-        drawn.add_column(title, justify="left" if side == "left" else "right")
-    for row in table["rows"]:
-        ends = "" if row["low"] is None else f"{format_value(row['low'])} to {format_value(row['high'])}"
-        drawn.add_row(
+    columns = ("world", "method", "target", "figure", "paper", "ours", "95 %", "n", "unit", "met")
+    rows = [
+        (
             row["world"],
-            escaped(row["method"]),
+            row["method"],
             row["target"] or "all",
-            escaped(row["figure"]),
-            format_value(row["paper"]),
-            format_value(row["ours"]),
-            ends,
-            str(row["n"]),
+            row["figure"],
+            row["paper"],
+            row["ours"],
+            interval(row["low"], row["high"]),
+            row["n"],
             row["unit"],
             _verdict(row),
         )
-    print_table(drawn)
+        for row in table["rows"]
+    ]
+    print_table("ttttnnnntt", columns, rows, f"{table['table']}: {table['title']} ({counted})")
     for failure in table["failures"]:
         typer.echo(f"failed: {failure['trial']}: {failure['reason']}")
     if table["left_undone"]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import ProgressBars, format_value, print_json, print_table, write_page
+from wakewise.ui.cli.console import ProgressBars, answer, format_value, print_json, print_table, write_page
 from wakewise.ui.cli.options import Json, seed_option
 
 Seed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of the split and of the resamples.")]
@@ -50,26 +51,14 @@ def validate(
 
         write_json(out / "wake.json", values)
         write_page("report", lambda: write_wake_report(result, values, out))
-    if json:
-        print_json(values)
-        return
-    _show_validation(values)
-    if out is not None:
-        typer.echo(f"report: {out / 'wake.html'}")
+    answer(json, values, partial(_show_validation, values), None if out is None else f"report: {out / 'wake.html'}")
 
 
 def _show_validation(values: dict[str, Any]) -> None:
-    from rich.table import Table
-
     for key, words in values["definitions"].items():
-        table = Table(title=f"{key}: {words}", title_justify="left")
         flows = list(next(iter(values["models"].values())))
-        table.add_column("model")
-        for flow in flows:
-            table.add_column(flow, justify="right")
-        for model, by_flow in values["models"].items():
-            table.add_row(model, *(format_value(by_flow[flow][key]) for flow in flows))
-        print_table(table)
+        rows = [(model, *(by_flow[flow][key] for flow in flows)) for model, by_flow in values["models"].items()]
+        print_table("tn", ("model", *flows), rows, f"{key}: {words}")
     paper = values["paper"]
     typer.echo(f"the paper claims {paper['r2_core']} and {paper['r2_wake']} for its proxy")
     convergence = values["grid_convergence_pct"]
@@ -100,28 +89,18 @@ def learn(
         else:
             network, _ = make(TrainingRecipe(draws=draws, steps=steps, seed=seed), out, progress)
         result = evaluation.judge(network, evaluation.held_out(held_out, progress=progress))
-    if json:
-        print_json(result | {"out": None if out is None else str(out)})
-        return
-    _show_rivals(result)
-    if out is not None:
-        typer.echo(f"written: {out}")
+    written = None if out is None else f"written: {out}"
+    answer(json, result | {"out": out and str(out)}, partial(_show_rivals, result), written)
 
 
 def _show_rivals(result: dict[str, Any]) -> None:
-    from rich.table import Table
-
     for key, words in (
         ("error_share", "root mean square error of the velocity over that of the velocity itself"),
         ("factor_of_2_pct", "share of the points with more than 1 cm/s (at 1 N) right within a factor of two, %"),
     ):
-        table = Table(title=f"{key}: {words}", title_justify="left")
-        table.add_column("model")
-        for truth in result["scores"]:
-            table.add_column(truth, justify="right")
-        for model in next(iter(result["scores"].values())):
-            table.add_row(model, *(format_value(by_model[model][key]) for by_model in result["scores"].values()))
-        print_table(table)
+        scores = result["scores"].values()
+        rows = [(model, *(by_model[model][key] for by_model in scores)) for model in next(iter(scores))]
+        print_table("tn", ("model", *result["scores"]), rows, f"{key}: {words}")
     typer.echo(f"learned: {result['weights']} weights, {result['circular']}")
 
 
@@ -148,28 +127,12 @@ def calibrate_flight(
     if json:
         print_json(result)
         return
-    from rich.table import Table
-
-    table = Table(title=f"half width slope, drawn {result['true_half_width_growth']:.3f}")
-    for name in ("minutes", "flakes", "slope", "+-", "strength", "+-", "off by, %", "error of the water, share"):
-        table.add_column(name, justify="right")
-    table.add_row(
-        "0",
-        "0",
-        *map(format_value, (result["believed"]["slope"], None, 1.0, None)),
-        "",
-        format_value(result["believed"]["error_share"]),
-    )
-    for row in result["curve"]:
-        numbers = (row["half_width_slope"], row["slope_standard_error"], row["gain"], row["gain_standard_error"])
-        table.add_row(
-            format_value(row["minutes"]),
-            str(row["flakes"]),
-            *map(format_value, numbers),
-            format_value(row["slope_error_pct"]),
-            format_value(row["error_share"]),
-        )
-    print_table(table)
+    believed = result["believed"]
+    rows = [(0, 0, believed["slope"], None, 1.0, None, "", believed["error_share"])]
+    keys = ("minutes", "flakes", "half_width_slope", "slope_standard_error", "gain", "gain_standard_error")
+    rows += [tuple(row[key] for key in (*keys, "slope_error_pct", "error_share")) for row in result["curve"]]
+    columns = ("minutes", "flakes", "slope", "+-", "strength", "+-", "off by, %", "error of the water, share")
+    print_table("n", columns, rows, f"half width slope, drawn {result['true_half_width_growth']:.3f}")
     if result["curve"]:
         law = format_value(result["curve"][-1]["gain"] ** 2)
         typer.echo(f"momentum flux over thrust: {law} at the end, strength squared; the law says 1")

@@ -22,7 +22,7 @@ import numpy as np
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import BodyState, Command, FlakeCloud, Goal, Truth, TruthProvider
+from wakewise.core.interfaces import BodyState, Command, FlakeCloud, Goal, Truth
 from wakewise.operation.loop import Step
 from wakewise.robot.vehicles import Vehicle
 from wakewise.simulation.tank.flakes import Flakes
@@ -154,7 +154,7 @@ class FlakeObserver:
     _clock: list[float] = field(default_factory=list)
     _next_s: float = 0.0
 
-    def watch(self, step: Step, witness: TruthProvider | None) -> None:
+    def watch(self, step: Step, witness: object) -> None:
         """Take a frame if it is time for one."""
         thrusts = step.command.thrusts_N
         self._pushes.append(np.concatenate([np.maximum(thrusts, 0.0), np.maximum(-thrusts, 0.0)]))
@@ -309,7 +309,7 @@ def held_sightings(
         if k % round(CARRIED_S / STEP_S) == 0:
             held.drifting.move(now, water)
         if now - turn * PUSH_S >= ARRIVED_S:
-            watcher.watch(_step(now, state, asked), held)  # type: ignore[arg-type]
+            watcher.watch(_step(now, state, asked), held)
         pushed = STEP_S * asked * true_share
         water.step(
             STEP_S, origins, origins, axes, np.stack([np.maximum(pushed, 0.0), np.maximum(-pushed, 0.0)], axis=1)

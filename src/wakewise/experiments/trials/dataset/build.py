@@ -153,10 +153,8 @@ def build_dataset(
 
     `folder` is of a campaign, of trials, or of one trial; `out` does not exist yet, or is empty.
 
-    Raises
-    ------
-    InputError
-        If there is no trial that can be taken, `out` holds something, or another process makes the same data set.
+    Raises InputError if there is no trial that can be taken, `out` holds something, or another process makes the same
+    data set.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(f"--out {out}: is there already and not empty; give a folder that does not exist yet")

@@ -43,10 +43,7 @@ def sums_text(sums: Mapping[str, str]) -> str:
 def read_sums(path: Path) -> dict[str, str]:
     """Check sums by path.
 
-    Raises
-    ------
-    InputError
-        If a line is none, a path leads out of the folder, or stands there twice.
+    Raises InputError if a line is none, a path leads out of the folder, or stands there twice.
     """
     found: dict[str, str] = {}
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):

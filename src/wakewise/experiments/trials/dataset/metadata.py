@@ -39,10 +39,7 @@ _FACTS = {
 def columns_of(parts: Sequence[TrialPart]) -> dict[str, dict[str, str]]:
     """Names and types of every table's columns over all trials.
 
-    Raises
-    ------
-    InputError
-        If a column has two types.
+    Raises InputError if a column has two types.
     """
     found: dict[str, dict[str, str]] = {}
     for part in parts:
@@ -141,10 +138,7 @@ class ChecksumReport:
 def check_dataset(folder: Path, progress: Callable[..., None] = no_progress) -> ChecksumReport:
     """Hold every file against its check sum, and the list of these against croissant.json.
 
-    Raises
-    ------
-    InputError
-        If the folder is no data set, or its metadata cannot be read.
+    Raises InputError if the folder is no data set, or its metadata cannot be read.
     """
     path = folder / METADATA
     if not path.is_file() or not (folder / SUMS).is_file():

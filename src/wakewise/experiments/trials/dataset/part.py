@@ -137,10 +137,7 @@ def trials_of(folder: Path) -> tuple[dict[str, TrialSource], list[str]]:
     A trial's own folder is one trial; a campaign's holds them below trials/; else every folder in it that is a trial,
     and those one further down, whose names are then joined.
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    Raises InputError if there is none.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; give that of a campaign, of trials, or of one trial")
@@ -202,10 +199,7 @@ class TrialSettings:
 def settings_of(source: TrialSource) -> TrialSettings:
     """Settings of a trial.
 
-    Raises
-    ------
-    InputError
-        If their file is there and cannot be read.
+    Raises InputError if their file is there and cannot be read.
     """
     path = source.settings
     if not path.is_file():
@@ -234,10 +228,7 @@ def settings_of(source: TrialSource) -> TrialSettings:
 def figures_of(source: TrialSource) -> dict[str, float]:
     """What was measured of a trial, as far as it is numbers.
 
-    Raises
-    ------
-    InputError
-        If their file is there and cannot be read.
+    Raises InputError if their file is there and cannot be read.
     """
     if not source.figures.is_file():
         return {}
@@ -293,10 +284,7 @@ class TrialPart:
 def part_of(name: str, source: TrialSource, folder: Path) -> tuple[TrialPart, bool]:
     """A trial's share in `folder`, made if it is not there or the trial has changed since; and whether it was made.
 
-    Raises
-    ------
-    InputError
-        If the trial's own files contradict each other.
+    Raises InputError if the trial's own files contradict each other.
     """
     done = read_part(folder)
     marks = _marks(source)

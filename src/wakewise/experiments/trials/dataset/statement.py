@@ -64,10 +64,7 @@ def read_words(
     until that is known); `published` is an ISO date, today's if not given; `version` is MAJOR.MINOR.PATCH; `answers` is
     a YAML file with answers to some of `QUESTIONS`.
 
-    Raises
-    ------
-    InputError
-        If a word is missing or is none.
+    Raises InputError if a word is missing or is none.
     """
     if not licence:
         raise InputError(f"--license: missing; nobody may use data without one: {', '.join(LICENCES)}, or an address")

@@ -80,10 +80,7 @@ class ControlLogWriter:
 class ControlLog:
     """A `ControlSource` that reads off a record; after its end nobody is there.
 
-    Raises
-    ------
-    InputError
-        If the table lacks a column, times do not increase, or a row is nonsense; the row is named.
+    Raises InputError if the table lacks a column, times do not increase, or a row is nonsense; the row is named.
     """
 
     def __init__(self, frame: pl.DataFrame, what: str = "trace") -> None:
@@ -118,10 +115,7 @@ class ControlLog:
 def read_trace(path: Path) -> ControlLog:
     """Trace from a Parquet or CSV file.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or see `ControlLog`.
+    Raises InputError if it cannot be read, or see `ControlLog`.
     """
     try:
         frame = pl.read_csv(path) if path.suffix == ".csv" else pl.read_parquet(path)

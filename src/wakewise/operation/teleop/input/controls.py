@@ -27,10 +27,7 @@ on or off; the gain a step up or down."""
 class Controls:
     """Axes as shares of full stick, -1 to 1, in the order of `CONTROL_AXES`, shape (5,), and what was pressed since.
 
-    Raises
-    ------
-    InputError
-        If an axis is not a number within -1 to 1, or nobody knows what was pressed.
+    Raises InputError if an axis is not a number within -1 to 1, or nobody knows what was pressed.
     """
 
     axes: Array

@@ -42,15 +42,9 @@ class Gamepad:
     once, so that a stick which is held over, or lies on something, does not fly. Buttons that are down by then ask for
     nothing until they are pressed anew.
 
-    Parameters
-    ----------
-    mapping : PadMapping, optional
-        A pad that it is not for is left alone, and that is said.
+    `mapping`: a pad that it is not for is left alone, and that is said.
 
-    Raises
-    ------
-    MissingExtra
-        Without the extra `gamepad`.
+    Raises MissingExtra without the extra `gamepad`.
     """
 
     def __init__(self, mapping: PadMapping | None = None) -> None:
@@ -89,10 +83,7 @@ class Gamepad:
     def check(self) -> None:
         """Refuse to begin with a pad that the mapping is not for, where that is all there is.
 
-        Raises
-        ------
-        InputError
-            Naming pad and mapping.
+        Raises InputError, naming pad and mapping.
         """
         if self._pad is None and self._refused:
             raise InputError(next(iter(self._refused.values())))

@@ -32,14 +32,8 @@ estimate: a tap of 0.1 s is a third of full stick, and a key let go is centred i
 def key_axes(down: Collection[str], axes: Array, dt_s: float) -> Array:
     """Axes, shape (5,), a moment after `axes`, with these keys down; opposite keys cancel.
 
-    Parameters
-    ----------
-    down : collection of str
-        Keys of `KEYS`; others do nothing.
-    axes : ndarray, shape (5,)
-        As they were.
-    dt_s : float
-        How long ago that was, 0 or more.
+    `down`: keys of `KEYS`; others do nothing. `axes`, shape (5,): as they were. `dt_s`: how long ago that was, 0 or
+    more.
 
     Returns
     -------

@@ -104,10 +104,7 @@ class PadMapping:
     def check(self, state: PadState) -> None:
         """Refuse a pad that this mapping is not for.
 
-        Raises
-        ------
-        InputError
-            If the pad has another name, or lacks what the mapping asks of it.
+        Raises InputError if the pad has another name, or lacks what the mapping asks of it.
         """
         if self.pad and self.pad.lower() not in state.name.lower():
             raise InputError(f"gamepad '{state.name}': {self.source} is for '{self.pad}'")
@@ -130,10 +127,7 @@ class PadMapping:
 def load_mapping(path: Path) -> PadMapping:
     """Mapping from a YAML file (see the top); what it leaves out is as by default.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or see `mapping_of`.
+    Raises InputError if it cannot be read, or see `mapping_of`.
     """
     return mapping_of(yaml_file(path), str(path))
 
@@ -141,10 +135,7 @@ def load_mapping(path: Path) -> PadMapping:
 def mapping_of(tree: Any, what: str = "mapping") -> PadMapping:
     """Mapping of what a file holds; `what` names it in messages.
 
-    Raises
-    ------
-    InputError
-        Naming what was found and what is allowed.
+    Raises InputError, naming what was found and what is allowed.
     """
     tree = _mapping(tree, what, ("pad", "dead_zone", "axes", "buttons"))
     pad, usual = tree.get("pad", ""), PadMapping()

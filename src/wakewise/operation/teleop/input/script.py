@@ -40,10 +40,7 @@ class ScriptEntry:
 class ScriptedInput:
     """A `ControlSource` that reads off moments in order; before the first the sticks are centred.
 
-    Raises
-    ------
-    InputError
-        If the times do not increase.
+    Raises InputError if the times do not increase.
     """
 
     moments: tuple[ScriptEntry, ...]
@@ -71,10 +68,7 @@ class ScriptedInput:
 def script_of(entries: Any, what: str = "script") -> ScriptedInput:
     """Script of entries as in the file (see the top); `what` names them in messages.
 
-    Raises
-    ------
-    InputError
-        Naming the entry, what was found and what is allowed.
+    Raises InputError, naming the entry, what was found and what is allowed.
     """
     if not isinstance(entries, list | tuple) or not entries:
         raise InputError(f"{what}: must be a list of entries, such as - {{at_s: 2, right: 0.6}}")
@@ -86,10 +80,7 @@ def script_of(entries: Any, what: str = "script") -> ScriptedInput:
 def load_script(path: Path) -> ScriptedInput:
     """Script from a YAML file.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or see `script_of`.
+    Raises InputError if it cannot be read, or see `script_of`.
     """
     return script_of(yaml_file(path), str(path))
 
@@ -140,10 +131,7 @@ READERS: dict[str, Callable[[Path], ControlSource]] = {
 def read_input(path: Path) -> ControlSource:
     """Hands that a file tells of.
 
-    Raises
-    ------
-    InputError
-        If its ending is none of `READERS`, or it cannot be read.
+    Raises InputError if its ending is none of `READERS`, or it cannot be read.
     """
     if path.suffix not in READERS:
         raise InputError(f"{path}: hands are read from {', '.join(READERS)}")

@@ -288,10 +288,7 @@ _LONG = 12
 def write_model_report(model: Path, photos: Path) -> Path:
     """Write report.html into the folder of a model that `wakewise reconstruct` made; it opens with no network.
 
-    Raises
-    ------
-    InputError
-        If the folder holds no such model.
+    Raises InputError if the folder holds no such model.
     """
     try:
         figures = json.loads((model / "reconstruction.json").read_text(encoding="utf-8"))

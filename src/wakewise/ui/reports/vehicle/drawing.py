@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -211,6 +211,23 @@ def text(
     )
 
 
+def svg_page(width: float, height: float, title: str, parts: Sequence[str]) -> str:
+    """Parts on a white page as one self-contained SVG."""
+    head = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" role="img" '
+        f'font-family="system-ui, -apple-system, Segoe UI, Roboto, sans-serif" font-size="12" fill="{INK}">',
+        f"<title>{escape(title)}</title>",
+        f'<rect width="{width:.0f}" height="{height:.0f}" fill="#ffffff"/>',
+    ]
+    return "\n".join([*head, *parts, "</svg>"]) + "\n"
+
+
+def round_step(least: float) -> float:
+    """The least of 1, 2 and 5 times the powers of ten that is not below a number."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least)
+
+
 def hull_half_m(draft: VehicleDraft) -> Array:
     """Half the box of the vehicle, shape (3,): as stated, else what holds its thrusters."""
     if draft.size_m is not None:
@@ -238,10 +255,7 @@ def drawing_svg(vehicle: AnyVehicle, *, titled: bool = True) -> str:
     a ring is a jet toward the reader and a cross one away from the reader. What a draft does not state is left out or
     dashed. `titled` puts the name and a line of figures on top.
 
-    Raises
-    ------
-    InputError
-        If the vehicle has no thruster places, that is, only a matrix.
+    Raises InputError if the vehicle has no thruster places, that is, only a matrix.
     """
     draft = as_draft(vehicle)
     if not draft.thrusters:
@@ -250,18 +264,13 @@ def drawing_svg(vehicle: AnyVehicle, *, titled: bool = True) -> str:
     heading = _heading(draft) if titled else []
     top = MARGIN + 18.0 * len(heading) + (14.0 if heading else 0.0)
     views, height, cell = _views(draft, sizes, top)
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {height:.0f}" role="img" '
-        f'font-family="system-ui, -apple-system, Segoe UI, Roboto, sans-serif" font-size="12" fill="{INK}">',
-        f"<title>{escape(draft.title)}, seen from above, from starboard and from ahead</title>",
-        f'<rect width="{WIDTH:.0f}" height="{height:.0f}" fill="#ffffff"/>',
-    ]
+    parts: list[str] = []
     for line, (words, size, weight, colour) in enumerate(heading):
         parts.append(text(MARGIN, MARGIN + 14.0 + 18.0 * line, words, size=size, weight=weight, colour=colour))
     for number, view in enumerate(views):
         parts += _panel(draft, view, sizes, number)
-    parts += [*_legend(draft, sizes, cell, views[0].px_per_m), "</svg>"]
-    return "\n".join(parts) + "\n"
+    parts += _legend(draft, sizes, cell, views[0].px_per_m)
+    return svg_page(WIDTH, height, f"{draft.title}, seen from above, from starboard and from ahead", parts)
 
 
 def _heading(draft: VehicleDraft) -> list[tuple[str, int, int, str]]:
@@ -421,9 +430,8 @@ def _legend(draft: VehicleDraft, sizes: Sizes, box: tuple[float, float, float, f
         rows.append((lambda y: gravity_mark(x, y), "centre of gravity"))
     if draft.p_BB_m is not None:
         rows.append((lambda y: buoyancy_mark(x, y), "centre of buoyancy"))
-    dashed = [
-        word for word, stated in (("size", draft.size_m is not None), ("propellers", sizes.disk_stated)) if not stated
-    ]
+    stated = {"size": draft.size_m is not None, "propellers": sizes.disk_stated}
+    dashed = [word for word, known in stated.items() if not known]
     if dashed:
         line = f'<path d="M{x - 12:.1f} {{y:.1f}}h26" stroke="{INK}" stroke-width="1.5" stroke-dasharray="4 3"/>'
         rows.append((lambda y: line.format(y=y), f"{' and '.join(dashed)} not stated, drawn to show"))
@@ -437,9 +445,7 @@ def _legend(draft: VehicleDraft, sizes: Sizes, box: tuple[float, float, float, f
 
 def _scale_bar(x: float, y: float, px_per_m: float) -> list[str]:
     """A bar of 1, 2 or 5 times a power of ten, 60 to 150 pixels long."""
-    wanted_m = 60.0 / px_per_m
-    power = 10.0 ** math.floor(math.log10(wanted_m))
-    length_m = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= wanted_m)
+    length_m = round_step(60.0 / px_per_m)
     length = length_m * px_per_m
     said = f"{1000.0 * length_m:.0f} mm" if length_m < 1.0 else f"{length_m:g} m"
     return [

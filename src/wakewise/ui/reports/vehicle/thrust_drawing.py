@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.robot.thrusters.thrust_curve import ThrustCurve
+from wakewise.ui.reports.vehicle.drawing import FRAME, MUTED, round_step, svg_page, text
 
-INK, MUTED, FRAME, PAPER, CHOSEN, BAND, OTHER = (
-    "#1d2b36",
-    "#64748b",
-    "#cbd5e1",
-    "#ffffff",
-    "#0f7bbd",
-    "#eef3f7",
-    "#a9b8c6",
-)
+CHOSEN, BAND, OTHER = "#0f7bbd", "#eef3f7", "#a9b8c6"
 WIDTH, HEIGHT = 980.0, 500.0
 TOP, BOTTOM = 112.0, 416.0
 SAMPLES = 161
@@ -56,22 +48,16 @@ class Panel:
 def curve_svg(curve: ThrustCurve, supply_V: float) -> str:
     """Draw a thrust curve as one self-contained SVG; the chosen voltage is blue, those of the table are grey.
 
-    Raises
-    ------
-    InputError
-        If the voltage lies outside the table.
+    Raises InputError if the voltage lies outside the table.
     """
     at = curve.voltage(supply_V)
     low, high = curve.limits_N(at)
     silent = curve.deadband_us(at)
     has_power = curve.forward.power_W is not None and curve.reverse.power_W is not None
+    title = f"Thrust curve {curve.name} at {at:g} V"
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {HEIGHT:.0f}" role="img" '
-        f'font-family="system-ui, -apple-system, Segoe UI, Roboto, sans-serif" font-size="12" fill="{INK}">',
-        f"<title>Thrust curve {escape(curve.name)} at {at:g} V</title>",
-        f'<rect width="{WIDTH:.0f}" height="{HEIGHT:.0f}" fill="{PAPER}"/>',
-        _text(24, 32, f"Thrust curve {curve.name} at {at:g} V", size=18, weight=600),
-        _text(
+        text(24, 32, title, size=18, weight=600),
+        text(
             24,
             52,
             f"{low:.1f} to {high:+.1f} N; no thrust from {silent[0]:g} to {silent[1]:g} us; "
@@ -79,11 +65,10 @@ def curve_svg(curve: ThrustCurve, supply_V: float) -> str:
             colour=MUTED,
         ),
         *_thrust_panel(curve, at),
-        *(_power_panel(curve, at) if has_power else [_text(540, TOP + 14, "The table has no power.", colour=MUTED)]),
-        _text(24, HEIGHT - 16, _short(curve.source, 165), colour=MUTED, size=11),
-        "</svg>",
+        *(_power_panel(curve, at) if has_power else [text(540, TOP + 14, "The table has no power.", colour=MUTED)]),
+        text(24, HEIGHT - 16, _short(curve.source, 165), colour=MUTED, size=11),
     ]
-    return "\n".join(parts) + "\n"
+    return svg_page(WIDTH, HEIGHT, title, parts)
 
 
 def _thrust_panel(curve: ThrustCurve, at: float) -> list[str]:
@@ -93,7 +78,7 @@ def _thrust_panel(curve: ThrustCurve, at: float) -> list[str]:
     panel = Panel(left=74.0, right=476.0, x_range=pulses, y_range=_widened(bottom, top))
     silent = curve.deadband_us(at)
     parts = [
-        _text(panel.left, TOP - 18, "Thrust (N) over pulse (us)", weight=600),
+        text(panel.left, TOP - 18, "Thrust (N) over pulse (us)", weight=600),
         f'<rect x="{panel.x(silent[0]):.1f}" y="{TOP:.1f}" width="{panel.x(silent[1]) - panel.x(silent[0]):.1f}" '
         f'height="{BOTTOM - TOP:.1f}" fill="{BAND}"/>',
         *_axes(panel),
@@ -114,7 +99,7 @@ def _power_panel(curve: ThrustCurve, at: float) -> list[str]:
     low, high = -float(curve.reverse.thrust_N.max()), float(curve.forward.thrust_N.max())
     most = max(float(np.max(side.power_W)) for side in (curve.forward, curve.reverse) if side.power_W is not None)
     panel = Panel(left=560.0, right=930.0, x_range=(low, high), y_range=_widened(0.0, most))
-    parts = [_text(panel.left, TOP - 18, "Electrical power (W) over thrust (N)", weight=600), *_axes(panel)]
+    parts = [text(panel.left, TOP - 18, "Electrical power (W) over thrust (N)", weight=600), *_axes(panel)]
     for voltage, colour, width in _voltages(curve, at):
         ends = curve.limits_N(voltage)
         grid = np.linspace(*ends, SAMPLES)
@@ -123,7 +108,7 @@ def _power_panel(curve: ThrustCurve, at: float) -> list[str]:
         if voltage == at:
             x, y = panel.x(ends[1]), panel.y(float(power[-1]))
             parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{colour}"/>')
-            parts.append(_text(x - 9, y - 7, f"{power[-1]:.0f} W", colour=colour, weight=600, anchor="end"))
+            parts.append(text(x - 9, y - 7, f"{power[-1]:.0f} W", colour=colour, weight=600, anchor="end"))
     return parts
 
 
@@ -135,10 +120,10 @@ def _voltages(curve: ThrustCurve, at: float) -> list[tuple[float, str, float]]:
 def _labels(labels: list[tuple[float, float, str, str, float]]) -> list[str]:
     """Names at the ends of curves, pushed apart where they would touch."""
     parts, above = [], -math.inf
-    for x, y, text, colour, width in sorted(labels, key=lambda label: label[1]):
+    for x, y, words, colour, width in sorted(labels, key=lambda label: label[1]):
         place = max(y, above + 13.0)
         bold = 600 if colour == CHOSEN else 400
-        parts.append(_text(x, place, text, colour=colour if width > 2.0 else MUTED, size=11, weight=bold))
+        parts.append(text(x, place, words, colour=colour if width > 2.0 else MUTED, size=11, weight=bold))
         above = place
     return parts
 
@@ -148,12 +133,12 @@ def _axes(panel: Panel) -> list[str]:
     for value in _ticks(*panel.x_range, 7):
         x = panel.x(value)
         parts.append(f'<path d="M{x:.1f} {TOP:.1f}V{BOTTOM:.1f}" stroke="{FRAME}" stroke-width="0.7"/>')
-        parts.append(_text(x, BOTTOM + 17, f"{value:g}", colour=MUTED, size=11, anchor="middle"))
+        parts.append(text(x, BOTTOM + 17, f"{value:g}", colour=MUTED, size=11, anchor="middle"))
     for value in _ticks(*panel.y_range, 7):
         y = panel.y(value)
         stroke = MUTED if value == 0.0 else FRAME
         parts.append(f'<path d="M{panel.left:.1f} {y:.1f}H{panel.right:.1f}" stroke="{stroke}" stroke-width="0.7"/>')
-        parts.append(_text(panel.left - 8, y + 4, f"{value:g}", colour=MUTED, size=11, anchor="end"))
+        parts.append(text(panel.left - 8, y + 4, f"{value:g}", colour=MUTED, size=11, anchor="end"))
     return parts
 
 
@@ -165,20 +150,9 @@ def _widened(low: float, high: float) -> tuple[float, float]:
 
 def _ticks(low: float, high: float, wished: int) -> list[float]:
     """Round numbers, multiples of 1, 2 or 5 times a power of ten, in a range."""
-    raw = (high - low) / wished
-    power = 10.0 ** math.floor(math.log10(raw))
-    step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw)
+    step = round_step((high - low) / wished)
     return [round(k * step, 10) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 
-def _short(text: str, most: int) -> str:
-    return text if len(text) <= most else text[: most - 3].rsplit(" ", 1)[0] + " ..."
-
-
-def _text(
-    x: float, y: float, text: str, *, colour: str = INK, size: int = 12, weight: int = 400, anchor: str = "start"
-) -> str:
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" fill="{colour}" font-size="{size}" font-weight="{weight}" '
-        f'text-anchor="{anchor}">{escape(text)}</text>'
-    )
+def _short(words: str, most: int) -> str:
+    return words if len(words) <= most else words[: most - 3].rsplit(" ", 1)[0] + " ..."

@@ -136,7 +136,7 @@ def pair_depth(
     keep = slice(pad_left, width - pad_right)
     c_one -= [pad_left, 0.0]
     depth = np.ascontiguousarray(depth[:, keep])
-    wanted = _inside(depth, focal, c_one, R @ (focus - one.p_WC_m), region)
+    wanted = depth > 0 if region is None else _in_ball(depth, float(focal), c_one, centre, float(region.radius_m))
     return DepthMap(
         first=i,
         second=j,
@@ -149,15 +149,6 @@ def pair_depth(
         wanted=wanted,
         colours=np.ascontiguousarray(a[:, keep]),
     )
-
-
-def _inside(
-    depth_m: DepthImage, focal: float, centre_px: Array, middle_C_m: Array, region: RegionOfInterest | None
-) -> BoolArray:
-    """Which pixels have a depth, and where a region is given, one inside its ball about `middle_C_m`."""
-    if region is None:
-        return np.asarray(depth_m > 0)
-    return _in_ball(depth_m, float(focal), centre_px, middle_C_m, float(region.radius_m))
 
 
 @njit(nogil=True)

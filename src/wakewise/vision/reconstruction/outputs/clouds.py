@@ -72,8 +72,11 @@ def read_cloud(path: Path) -> OrientedPointCloud:
     points = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64).reshape(-1, 3)
     if len(points) == 0 or not np.all(np.isfinite(points)):
         raise InputError(f"{path}: holds {len(points)} points, needs at least one and all finite")
+    normals, colours = (_raw(loaded, names, len(points)) for names in (("nx", "ny", "nz"), ("red", "green", "blue")))
     return OrientedPointCloud(
-        points_m=points, normals=_normals(loaded, len(points)), colours=_colours(loaded, len(points))
+        points_m=points,
+        normals=np.zeros((len(points), 3)) if normals is None or not np.isfinite(normals).all() else normals,
+        colours=np.full((len(points), 3), 0.5) if colours is None else colours / 255.0,
     )
 
 
@@ -86,16 +89,6 @@ def _raw(loaded: object, names: tuple[str, ...], count: int) -> Array | None:
     if not set(names) <= set(table.dtype.names) or len(table) != count:
         return None
     return np.stack([np.asarray(table[name], dtype=np.float64).reshape(-1) for name in names], axis=1)
-
-
-def _normals(loaded: object, count: int) -> Array:
-    found = _raw(loaded, ("nx", "ny", "nz"), count)
-    return found if found is not None and np.all(np.isfinite(found)) else np.zeros((count, 3))
-
-
-def _colours(loaded: object, count: int) -> Array:
-    found = _raw(loaded, ("red", "green", "blue"), count)
-    return found / 255.0 if found is not None else np.full((count, 3), 0.5)
 
 
 def read_surface(path: Path) -> tuple[Array, IntArray]:

@@ -107,7 +107,9 @@ def calibrate(folder: Path, board: CalibrationBoard, model: str = "radial") -> C
         if count < MIN_CORNERS:
             left_out[photo] = count
             continue
-        found[photo] = _paired(detector, corners, ids)
+        # Places on the board in m, shape (n, 3), and in the photograph in px, shape (n, 2).
+        places = np.asarray(detector.getBoard().getChessboardCorners(), dtype=np.float32)
+        found[photo] = places[np.ravel(ids)], np.asarray(corners, dtype=np.float32).reshape(-1, 2)
     if len(found) < MIN_PHOTOS:
         raise StageError(
             f"calibration: the board of {board.columns} x {board.rows} squares is found in {len(found)} of "
@@ -229,12 +231,6 @@ def board_detector(photos: list[NDArray[np.uint8]], board: CalibrationBoard) -> 
     if best[2] is None:
         raise StageError(f"calibration: no marker of {', '.join((*ARUCO, *APRILTAG))} is found in the first photos")
     return best[1], best[2]
-
-
-def _paired(detector: Any, corners: Points, ids: NDArray[np.int32]) -> tuple[Points, Points]:
-    """Places on the board in m, shape (n, 3), and in the photograph in px, shape (n, 2)."""
-    places = np.asarray(detector.getBoard().getChessboardCorners(), dtype=np.float32)
-    return places[np.ravel(ids)], np.asarray(corners, dtype=np.float32).reshape(-1, 2)
 
 
 def _fit(found: dict[str, tuple[Points, Points]], size: tuple[int, int], flags: int, before: Fit | None) -> Fit:

@@ -19,7 +19,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.csv_separators import other_separator
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import matrix_from_quat
-from wakewise.vision.reconstruction.photos.lenses import COUNTS, LAYOUTS, Lens, lens_from
+from wakewise.vision.reconstruction.photos.lenses import COUNTS, LAYOUTS, Lens, read_model
 from wakewise.vision.reconstruction.photos.photo_folder import Photo
 
 _MODELS = (
@@ -31,8 +31,8 @@ Pose = tuple[Array, Array]
 """R_WC, shape (3, 3), and p_WC, shape (3,)."""
 
 
-def read_colmap(folder: Path) -> tuple[dict[str, Pose], dict[str, Lens]]:
-    """Poses and lenses by photo name from images and cameras (.bin before .txt).
+def _read_colmap(folder: Path) -> KnownCameras:
+    """Poses and lenses from COLMAP's images and cameras (.bin before .txt).
 
     Raises InputError if a file is missing or damaged, or a camera is of a model that is not known here.
     """
@@ -47,7 +47,11 @@ def read_colmap(folder: Path) -> tuple[dict[str, Pose], dict[str, Lens]]:
         lenses = {number: _lens(cameras_file, *camera) for number, camera in cameras.items()}
         images = list(_images_bin(images_file) if binary else _images_txt(images_file))
         poses = {name: _pose(numbers) for name, numbers, _ in images}
-        return poses, {name: lenses[camera] for name, _, camera in images}
+        return KnownCameras(
+            rotations={name: pose[0] for name, pose in poses.items()},
+            positions={name: pose[1] for name, pose in poses.items()},
+            lenses={name: lenses[camera] for name, _, camera in images},
+        )
     except (OSError, UnicodeDecodeError, ValueError, IndexError, KeyError, struct.error):
         raise InputError(f"{folder}: cameras{suffix} and images{suffix} are not as COLMAP writes them") from None
 
@@ -55,9 +59,7 @@ def read_colmap(folder: Path) -> tuple[dict[str, Pose], dict[str, Lens]]:
 def _lens(file: Path, model: str, width: int, height: int, params: Array) -> Lens:
     if model not in LAYOUTS:
         raise InputError(f"{file}: camera model {model} is not known here, allowed are {', '.join(LAYOUTS)}")
-    if len(params) != COUNTS[model] or not np.isfinite(params).all():
-        raise InputError(f"{file}: {len(params)} parameters, {model} has {COUNTS[model]}, all finite")
-    return lens_from(model, width, height, params)
+    return read_model(file, model, width, height, params)
 
 
 def _pose(numbers: Array) -> Pose:
@@ -151,11 +153,7 @@ def read_known_cameras(path: Path) -> KnownCameras:
     if path.is_dir():
         for folder in (path, path / "sparse" / "0", path / "sparse"):
             if any((folder / f"images{suffix}").is_file() for suffix in (".bin", ".txt")):
-                poses, lenses = read_colmap(folder)
-                rotations = {name: pose[0] for name, pose in poses.items()}
-                return KnownCameras(
-                    rotations=rotations, positions={name: pose[1] for name, pose in poses.items()}, lenses=lenses
-                )
+                return _read_colmap(folder)
         if (path / "transforms.json").is_file():
             return _read_nerfstudio(path / "transforms.json")
         files = sorted(path.glob("*.camera"))
@@ -263,12 +261,7 @@ def _nerfstudio_lens(values: Mapping[str, Any]) -> Lens | None:
         fx = 0.5 * width / (half if fisheye else float(np.tan(half)))
     else:
         return None
-    params = [
-        fx,
-        float(values.get("fl_y", fx)),
-        float(values.get("cx", width / 2)),
-        float(values.get("cy", height / 2)),
-    ]
+    params = [fx, *(float(values.get(*entry)) for entry in (("fl_y", fx), ("cx", width / 2), ("cy", height / 2)))]
     bend, others = (_FISHEYE_BEND, ("p1", "p2")) if fisheye else (_BEND, ("k3", "k4"))
     params += [float(values.get(key, 0.0)) for key in bend]
     for key in others:

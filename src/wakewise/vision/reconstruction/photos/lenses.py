@@ -108,9 +108,7 @@ def read_lens(path: Path) -> Lens:
         width, height, params = int(row[2]), int(row[3]), np.array([float(word) for word in row[4:]])
     except ValueError:
         raise InputError(f"{file}: holds something that is no number where the camera's numbers must be") from None
-    if len(params) != COUNTS[row[1]] or not np.isfinite(params).all():
-        raise InputError(f"{file}: {len(params)} parameters, {row[1]} has {COUNTS[row[1]]}, all finite")
-    return lens_from(row[1], width, height, params)
+    return read_model(file, row[1], width, height, params)
 
 
 def _from_calibration(file: Path, text: str) -> Lens:
@@ -131,9 +129,17 @@ def _from_calibration(file: Path, text: str) -> Lens:
         raise InputError(
             f"{file}: colmap must hold model (one of {', '.join(LAYOUTS)}), width, height and params, a list of numbers"
         )
-    if len(params) != COUNTS[model] or not np.isfinite(np.array(params, dtype=np.float64)).all():
+    return read_model(file, str(model), size[0], size[1], np.array(params, dtype=np.float64))
+
+
+def read_model(file: Path, model: str, width: int, height: int, params: Array) -> Lens:
+    """Lens of one of COLMAP's models in `LAYOUTS` as a file states it.
+
+    Raises InputError if the number of parameters is not the model's, or one is not finite.
+    """
+    if len(params) != COUNTS[model] or not np.isfinite(params).all():
         raise InputError(f"{file}: {len(params)} parameters, {model} has {COUNTS[model]}, all finite")
-    return lens_from(model, size[0], size[1], np.array(params, dtype=np.float64))
+    return lens_from(model, width, height, params)
 
 
 def lens_from(model: str, width: int, height: int, params: Array) -> Lens:

@@ -50,7 +50,9 @@ def read_masks(photos: Path, found: tuple[Photo, ...], folder: Path | None) -> M
     else:
         if not folder.is_dir():
             raise InputError(f"{folder}: is no folder; masks are images in a folder, named like the photos")
-        files = {photo.name: path for photo in found if (path := _beside(folder, photo.name)) is not None}
+        beside = {photo.name: [folder / _name(pattern, photo.name) for pattern in NAMES] for photo in found}
+        there = {name: [path for path in paths if path.is_file()] for name, paths in beside.items()}
+        files = {name: paths[0] for name, paths in there.items() if paths}
         if not files:
             raise InputError(
                 f"{folder}: holds no mask of any of the {len(found)} photos; that of {found[0].name} would be "
@@ -88,10 +90,6 @@ def write_for_colmap(masks: Masks, names: list[str], folder: Path) -> None:
             path = folder / f"{name}.png"
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(cv2.imencode(".png", np.where(mask, 255, 0).astype(np.uint8))[1].tobytes())
-
-
-def _beside(folder: Path, name: str) -> Path | None:
-    return next((path for pattern in NAMES if (path := folder / _name(pattern, name)).is_file()), None)
 
 
 def _name(pattern: str, name: str) -> str:

@@ -144,8 +144,7 @@ def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2)
         raise InputError(f"{folder}: {found}; a folder of photos ({allowed}) is needed")
     images = photo_files(folder)
     if not images:
-        files = _files(folder)
-        inside = sorted(p.name for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+        files, inside = _files(folder), [path.name for path in _folders(folder)]
         found = "is empty"
         if files:
             found = f"holds no photos ({files[0].name} is none)"
@@ -160,22 +159,18 @@ def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2)
 
 def photo_files(folder: Path) -> list[Path]:
     """Files of a folder that are taken for photographs by their names: its own, or else those of the folders in it."""
-    return [path for path in _files(folder) if path.suffix.lower() in SUFFIXES] or _below(folder)
+    below = (path for inside in _folders(folder) for path in _files(inside))
+    return [path for path in _files(folder) if path.suffix.lower() in SUFFIXES] or [
+        path for path in below if path.suffix.lower() in SUFFIXES
+    ]
 
 
 def _files(folder: Path) -> list[Path]:
     return sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
 
 
-def _below(folder: Path) -> list[Path]:
-    """Photographs of the folders in a folder."""
-    inside = sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
-    return [
-        p
-        for one in inside
-        for p in sorted(one.iterdir())
-        if p.is_file() and not p.name.startswith(".") and p.suffix.lower() in SUFFIXES
-    ]
+def _folders(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
 
 
 def unsupported_files(folder: Path) -> dict[str, int]:
@@ -183,11 +178,9 @@ def unsupported_files(folder: Path) -> dict[str, int]:
 
     In the folder itself, and in those in it where the photographs lie in them.
     """
-    folders = [folder]
-    if not any(p.is_file() and p.suffix.lower() in SUFFIXES for p in folder.iterdir()):
-        folders += [p for p in folder.iterdir() if p.is_dir() and not p.name.startswith(".")]
-    files = [p for one in folders for p in one.iterdir() if p.is_file() and not p.name.startswith(".")]
-    suffixes = [p.suffix.lower() for p in files]
+    photographs = any(path.suffix.lower() in SUFFIXES for path in _files(folder))
+    folders = [folder] if photographs else [folder, *_folders(folder)]
+    suffixes = [path.suffix.lower() for one in folders for path in _files(one)]
     counts = {kind: sum(suffix in wanted for suffix in suffixes) for kind, wanted in _OTHERS.items()}
     return {kind: count for kind, count in counts.items() if count}
 

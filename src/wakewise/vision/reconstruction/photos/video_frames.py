@@ -86,10 +86,8 @@ def take_frames(film: Path, out: Path, progress: Progress = no_progress) -> tupl
     """
     make_folder(out)
     folder = out / "frames"
-    digest = hashlib.blake2b(digest_size=16)
     with film.open("rb") as file:
-        while block := file.read(1 << 22):
-            digest.update(block)
+        digest = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16))
     key = fingerprint(VERSION, digest.hexdigest(), STEP_SHARE, MOST_FRAMES)
     with exclusive_run(out):
         done = run_stage(out, "frames", key, (folder,), lambda: {"film": asdict(_take(film, folder, progress))})

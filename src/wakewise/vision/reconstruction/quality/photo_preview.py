@@ -6,7 +6,7 @@ Small copies are matched fast (SIFT, fundamental matrix by RANSAC).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -270,7 +270,7 @@ def _with_faults(photo: PhotoQuality) -> PhotoQuality:
         faults.append(f"one partner: overlaps {photo.partners[0][0]} only")
     elif photo.covered_pct < LEAST_COVERED_PCT:
         faults.append(f"little shared: two other photos show {photo.covered_pct:.0f} % of it")
-    return PhotoQuality(**{**{k: getattr(photo, k) for k in photo.__dataclass_fields__}, "faults": tuple(faults)})
+    return replace(photo, faults=tuple(faults))
 
 
 def _advice(photos: Sequence[PhotoQuality], groups: tuple[int, ...]) -> tuple[str, ...]:
@@ -300,5 +300,5 @@ def _advice(photos: Sequence[PhotoQuality], groups: tuple[int, ...]) -> tuple[st
     return tuple(out)
 
 
-def _some(names: list[str], most: int = 6) -> str:
-    return ", ".join(names) if len(names) <= most else f"{', '.join(names[:most])} and {len(names) - most} more"
+def _some(names: list[str]) -> str:
+    return ", ".join(names) if len(names) <= 6 else f"{', '.join(names[:6])} and {len(names) - 6} more"

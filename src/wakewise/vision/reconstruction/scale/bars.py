@@ -145,6 +145,7 @@ def read_bars(path: Path) -> ScaleBars:
     except ValidationError as fault:
         faults = describe_faults(fault, _BarsFile, "bars")
         raise InputError(f"{path}: {faults}; a bar has ends: [3, 7], length_m, sigma_m") from None
+    board = entries.board
     try:
         return ScaleBars(
             bars=tuple(
@@ -157,15 +158,8 @@ def read_bars(path: Path) -> ScaleBars:
             ),
             family=entries.targets,
             tag_m=entries.tag_m,
-            board=None
-            if entries.board is None
-            else CalibrationBoard(
-                columns=entries.board.columns,
-                rows=entries.board.rows,
-                square_m=entries.board.square_m,
-                marker_m=entries.board.marker_m,
-            ),
-            board_sigma=SIGMA_SHARE if entries.board is None else entries.board.sigma,
+            board=None if board is None else CalibrationBoard(**board.model_dump(exclude={"sigma"})),
+            board_sigma=SIGMA_SHARE if board is None else board.sigma,
         )
     except InputError as fault:
         raise InputError(f"{path}: {fault}") from None

@@ -25,7 +25,6 @@ from wakewise.core.interfaces import Progress
 from wakewise.core.run_lock import temporary_prefix
 from wakewise.core.threads import in_order
 from wakewise.vision.reconstruction.photos.lens_groups import LensGroup, group_photos
-from wakewise.vision.reconstruction.photos.lenses import Lens
 from wakewise.vision.reconstruction.photos.masks import write_for_colmap
 from wakewise.vision.reconstruction.photos.photo_folder import Image, Photo, PhotoStore
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
@@ -138,7 +137,6 @@ def match_photos(
     pairs: Pairs,
     progress: Progress,
     store: PhotoStore | None = None,
-    lens: Lens | None = None,
     poses: Poses | None = None,
     groups: tuple[LensGroup, ...] | None = None,
     may_be_none: bool = False,
@@ -147,8 +145,8 @@ def match_photos(
     """Find SIFT features, match and verify; write COLMAP's database whole.
 
     `focal_px`: focal length to start from, in pixels of these photos; else from EXIF or 1.2 times the longer side, of a
-    fisheye .4 times. `pairs`: what to match. `store`: photos that are decoded already. `lens`: the camera that took
-    them all, instead of a focal length. `groups`: which photos share a lens; found from the photos if not given.
+    fisheye 0.4 times. `pairs`: what to match. `store`: photos that are decoded already. `groups`: which photos share a
+    lens; found from the photos if not given.
     `poses`: rough R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name: pairs are matched along epipolar lines
     first, and only those that do not verify among all features. `may_be_none`: whether it is no failure that nothing
     matches, as where the cameras are known. `retrieved`: with how many others each is matched besides, because they
@@ -157,16 +155,23 @@ def match_photos(
     StageError if no pair of photos could be verified.
     """
     names = [photo.name for photo in photos]
-    _check_pairs(names, pairs)
+    known = set(names)
+    unknown = next((name for pair in pairs for name in pair if name not in known), None)
+    if unknown is not None:
+        raise InputError(f"pairs: {unknown} is not among the photos ({names[0]} ... {names[-1]})")
     pycolmap.set_random_seed(RANDOM_SEED)
     size = database_bytes(len(photos), len(pairs) + retrieved * len(photos), settings)
     with whole_file(database) as whole, database_folder(database, size) as room:
         work = room / "database.db"
         work.touch()
-        lenses = group_photos(photos, lenses=lens) if groups is None else groups
+        lenses = group_photos(photos) if groups is None else groups
         store = store or PhotoStore(folder)
         _extract(store, lenses, work, settings, focal_px, progress, room)
-        _check_all_there(work, folder, names)
+        with open_database(work) as link:
+            read = {image.name for image in link.read_all_images()}
+        unread = next((name for name in names if name not in read), None)
+        if unread is not None:
+            raise StageError(f"features: COLMAP cannot read {folder / unread}; save it anew as PNG or remove it")
         if retrieved:
             pairs = sorted({*pairs, *retrieve_pairs(read_descriptors(work), retrieved)})
         left = pairs if poses is None else match_by_poses(work, pairs, poses, settings.threads, progress)
@@ -193,22 +198,6 @@ def database_bytes(photos: int, pairs: int, settings: ReconstructionSettings) ->
     return 2.0 * settings.max_features * (152 * photos + 2 * pairs)
 
 
-def _check_all_there(database: Path, folder: Path, names: list[str]) -> None:
-    with open_database(database) as link:
-        known = {image.name for image in link.read_all_images()}
-    for name in names:
-        if name not in known:
-            raise StageError(f"features: COLMAP cannot read {folder / name}; save it anew as PNG or remove it")
-
-
-def _check_pairs(names: list[str], pairs: Pairs) -> None:
-    known = set(names)
-    for pair in pairs:
-        for name in pair:
-            if name not in known:
-                raise InputError(f"pairs: {name} is not among the photos ({names[0]} ... {names[-1]})")
-
-
 def _extract(
     store: PhotoStore,
     groups: tuple[LensGroup, ...],
@@ -222,6 +211,10 @@ def _extract(
     if focal_px is not None and len({(group.width, group.height) for group in groups}) > 1:
         raise InputError("photos: have different sizes, so one focal length in pixels cannot hold for all of them")
     done, total = 0, sum(len(group.photos) for group in groups)
+
+    def report(more: int) -> None:
+        progress(done + more, total, "features")
+
     for group in groups:
         reader = pycolmap.ImageReaderOptions()
         fisheye = settings.lens == "fisheye"
@@ -236,7 +229,7 @@ def _extract(
             reader.camera_model, reader.camera_params = group.lens.for_colmap()
         work = _by_opencv if settings.detector == "opencv" else _by_colmap
         here = settings.model_copy(update={"threads": threads_for(settings, group.width, group.height)})
-        work(store, list(group.photos), database, here, reader, partial(_report, progress, done, total))
+        work(store, list(group.photos), database, here, reader, report)
         done += len(group.photos)
     progress(done, total, "features")
 
@@ -245,10 +238,6 @@ def threads_for(settings: ReconstructionSettings, width: int, height: int) -> in
     """Threads of feature extraction for photos of this size, within `ROOM_BYTES` of memory."""
     doubled = 4 if settings.first_octave == -1 else 1
     return max(1, min(settings.threads, int(ROOM_BYTES / (BYTES_PER_PX * doubled * width * height))))
-
-
-def _report(progress: Progress, before: int, total: int, done: int) -> None:
-    progress(before + done, total, "features")
 
 
 def _by_opencv(
@@ -314,9 +303,8 @@ def _by_colmap(
         )
         done += len(batch)
         if reader.existing_camera_id < 0 or done == len(batch):
-            link = pycolmap.Database.open(database)
-            read = [image.camera_id for image in link.read_all_images() if image.name in batch]
-            link.close()
+            with open_database(database) as link:
+                read = [image.camera_id for image in link.read_all_images() if image.name in batch]
             if read:
                 reader.existing_camera_id = read[0]
 

@@ -140,14 +140,8 @@ def map_photos(
         wrong += lens_warnings(model, own, shift_pct)
     else:
         wrong = known_pose_warnings(found, error_px=uncut_px, kept_pct=given.kept_pct)
-    figures: dict[str, Any] = {
-        "cameras_rmse_mm": None,
-        "cameras_max_mm": None,
-        "reference_inliers": None,
-        "scale": None,
-        "surface_distance_m": None,
-        "suspicion": None,
-    }
+    in_metres = ("cameras_rmse_mm", "cameras_max_mm", "reference_inliers", "scale", "surface_distance_m", "suspicion")
+    figures: dict[str, Any] = dict.fromkeys(in_metres)
     if given is not None:
         figures |= {"scale": 1.0} | _plausibility(model)
     elif references is not None:
