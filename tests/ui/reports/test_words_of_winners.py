@@ -39,7 +39,7 @@ def test_best_is_who_is_surely_better():
         (judged(low=-2.69, high=3.0, less=0.258), "undecided, the interval holds zero"),
         (judged(low=0.0), "undecided, the interval holds zero"),
         (judged(low=-1.0, trials=3), "3 pairs are too few to be sure"),
-        (judged(trials=1, low=None), "one trial each: nobody knows"),
+        (judged(trials=1, low=None), "one trial each: no interval"),
     ],
 )
 def test_no_difference_is_shown_where_it_may_be_chance(one, why):

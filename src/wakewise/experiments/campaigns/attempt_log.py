@@ -30,7 +30,7 @@ class Attempts:
 
     begun: int = 0
     failed: int = 0
-    """Attempts that ended in one of `RETRIED`, since the trial was last told to be tried anew."""
+    """Attempts that ended in one of `RETRIED`, since a retry of the trial was last asked for."""
     how: How | None = None
     """How the last one ended; None if none has, or if it is tried anew."""
     reason: str | None = None

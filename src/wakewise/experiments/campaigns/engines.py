@@ -36,11 +36,11 @@ MOST_WORKERS = 1024
 
 @dataclass(frozen=True, kw_only=True)
 class WorkerPool:
-    """Those who work.
+    """Where attempts are made.
 
     `executor` makes calls of `worker_process.attempt`; `threads` are those of each attempt's libraries; `size` says how
     many attempts are made at once now, so that what waits can still be stopped or taken by others; `check` raises if
-    nobody is left.
+    no worker is left.
     """
 
     executor: Executor
@@ -54,7 +54,7 @@ class TrialExecutor(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the engine, as the command line knows it."""
+        """Of the engine, on the command line."""
         ...
 
     def crew(self, driver: Path) -> AbstractContextManager[WorkerPool]:
@@ -77,7 +77,7 @@ class ProcessExecutor:
 
     @contextmanager
     def crew(self, driver: Path) -> Iterator[WorkerPool]:
-        """Threads that each mind one process."""
+        """Threads that each supervise one process."""
         workers = self.workers or cores()
         executor = ThreadPoolExecutor(workers, thread_name_prefix="campaign")
         try:

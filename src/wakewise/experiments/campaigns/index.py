@@ -63,7 +63,7 @@ def listing(store: CampaignStore) -> dict[str, IndexEntry]:
             figures, took_s = read_figures(place) or (None, 0.0)
             found[key], fresh = IndexEntry(key, figures, took_s, read_attempts(place)), True
     if fresh:
-        # A full disk, which polars tells in either way, or a folder of others: the cache only costs time.
+        # A full disk, for which polars raises either, or a folder of other users: the cache only saves time.
         with suppress(OSError, pl.exceptions.ComputeError):
             _write(store.folder / INDEX, [(stamps[key], listed) for key, listed in found.items()])
     return found

@@ -2,7 +2,7 @@
 
 FOLDER/store.json              format of what lies here
 FOLDER/trials/KEY/trial.json   what is made: work, settings, versions
-FOLDER/trials/KEY/attempts.jsonl, log.txt, claim.json while somebody is at it
+FOLDER/trials/KEY/attempts.jsonl, log.txt, claim.json while a process works on it
 FOLDER/trials/KEY/work         what the work leaves
 FOLDER/trials/KEY/figures.json the trial is finished
 """
@@ -134,7 +134,7 @@ def write_figures(place: Path, figures: Mapping[str, Any], took_s: float) -> Non
 
 
 def plain_figures(figures: Mapping[str, Any]) -> dict[str, Figure]:
-    """Figures as JSON knows them: numbers, words, None; what is not finite is None."""
+    """Figures as JSON can hold them: numbers, words, None; what is not finite is None."""
     plain: dict[str, Figure] = {}
     for key, value in figures.items():
         if value is None or isinstance(value, str):

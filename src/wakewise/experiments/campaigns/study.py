@@ -25,14 +25,14 @@ from wakewise.experiments.trials.timing import BenchOptions
 
 K = TypeVar("K", bound=Hashable)
 Key = tuple[str, str, int]
-"""World or scenario, method or other name, seed: what a study knows its trials by unless it needs more."""
+"""World or scenario, method or other name, seed: what identifies a trial of a study unless it needs more."""
 Row = Mapping[str, float | None]
 WATER_EVERY_S = 0.25
 """How often the water is measured in the flights of studies."""
 
 
 def store_folder(study: str) -> Path:
-    """Where a study's trials are kept unless told otherwise: the user's cache folder (XDG base directories)."""
+    """Where a study's trials are kept by default: the user's cache folder (XDG base directories)."""
     base = os.environ.get("XDG_CACHE_HOME", "")
     return (Path(base) if base else Path.home() / ".cache") / "wakewise" / "campaigns" / study
 
@@ -156,7 +156,7 @@ def numbers(figures: Figures) -> dict[str, float | None]:
 
 
 def selected(what: str, wished: Sequence[str] | None, allowed: Sequence[str]) -> tuple[str, ...]:
-    """The wished names in the order of `allowed`; all if None.
+    """The chosen names in the order of `allowed`; all if None.
 
     Raises InputError if one is not allowed.
     """

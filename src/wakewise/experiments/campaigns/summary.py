@@ -72,7 +72,7 @@ class MethodSummary:
         if self.rival is None:
             return "there was no other method"
         if self.trials < 2:
-            return "one trial each: nobody knows"
+            return "one trial each: no interval"
         if self.trials < FEWEST:
             return f"{self.trials} pairs are too few to be sure"
         if not self.is_sure:

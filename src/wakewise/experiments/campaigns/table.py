@@ -34,7 +34,7 @@ HEADLINES = (
     "position_rmse_mm",
     "energy_kJ",
 )
-"""What a table shows if not told otherwise, as far as it is there."""
+"""What a table shows by default, as far as it is there."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +120,7 @@ def failures(found: Results) -> list[dict[str, Any]]:
 
 
 def varying_factors(plan: CampaignPlan) -> tuple[str, ...]:
-    """Factors that differ in a campaign, seeds aside: what its table is grouped by if not told otherwise."""
+    """Factors that differ in a campaign, seeds aside: what its table is grouped by by default."""
     return tuple(
         factor
         for factor in FACTORS

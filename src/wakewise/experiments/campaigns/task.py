@@ -83,7 +83,7 @@ class Task:
     """One trial to make.
 
     `work` is ``package.module:function``, a function `(settings, folder, progress) -> figures`; `settings` are plain
-    values, all that the function is told, its seed with it; `sources` are the parts whose source can change the
+    values, all that the function is given, its seed with it; `sources` are the parts whose source can change the
     figures.
 
     Raises InputError if the settings are no plain values.

@@ -48,7 +48,7 @@ def this_process() -> LockHolder:
 
 
 def holder_of(folder: Path) -> LockHolder | None:
-    """Who has claimed a trial's folder; None if nobody has, or if the claim cannot be read."""
+    """Claim on a trial's folder; None if there is none, or if it cannot be read."""
     try:
         return LockHolder(**json.loads((folder / CLAIM).read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
@@ -112,7 +112,7 @@ def _is_left(folder: Path, abandoned_beat: int | None) -> bool:
     if not (folder / CLAIM).exists():
         return True
     holder = holder_of(folder)
-    if holder is None or holder.is_gone:  # nobody writes half a claim: an unreadable one is a damaged file
+    if holder is None or holder.is_gone:  # claims are written whole: an unreadable one is a damaged file
         return True
     return not holder.is_here and abandoned_beat is not None and heartbeat_of(folder) == abandoned_beat
 
@@ -121,34 +121,22 @@ def _is_left(folder: Path, abandoned_beat: int | None) -> bool:
 def _one_at_a_time(folder: Path) -> Iterator[None]:
     """Hold others off while a claim is taken over: between the look at it and its replacement no other may do so."""
     path = folder / _TAKING_OVER
-    handle = _locked(path)
-    while not _is_still(handle, path):  # its holder removed it between the opening and the locking
-        os.close(handle)
-        handle = _locked(path)
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        with suppress(ImportError, OSError):  # systems, and file systems, without locks
+            import fcntl
+
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        with suppress(FileNotFoundError):
+            if os.fstat(handle).st_ino == path.stat().st_ino:
+                break
+        os.close(handle)  # its holder removed it between the opening and the locking
     try:
         yield
     finally:
         with suppress(OSError):  # Windows removes no open file
             path.unlink(missing_ok=True)
         os.close(handle)
-
-
-def _locked(path: Path) -> int:
-    """An open file that no other process has locked."""
-    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-    with suppress(ImportError, OSError):  # systems, and file systems, without locks
-        import fcntl
-
-        fcntl.flock(handle, fcntl.LOCK_EX)
-    return handle
-
-
-def _is_still(handle: int, path: Path) -> bool:
-    """Whether an open file is the one that has the name."""
-    try:
-        return os.fstat(handle).st_ino == path.stat().st_ino
-    except FileNotFoundError:
-        return False
 
 
 @cache

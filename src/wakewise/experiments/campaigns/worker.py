@@ -1,7 +1,7 @@
 """A process that makes trials: tickets come as lines of JSON, a line goes back for each.
 
-It claims the trial's folder, notes the attempt, works, and writes the figures last. It ends when nobody minds it any
-more: whatever took the driver down, no process stays behind. What the work prints goes into the trial's log.
+It claims the trial's folder, notes the attempt, works, and writes the figures last. It ends with its driver,
+however that ended, so no process stays behind. What the work prints goes into the trial's log.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from wakewise.experiments.campaigns.store import FIGURES, LOG, TRIAL, WORK, writ
 from wakewise.experiments.campaigns.task import Work, WorkProgress, function_named, source_version
 
 _GRACE_S = 10.0
-"""After its time a process ends itself, if nobody has ended it for so long."""
+"""Grace after its time, after which a process that was not ended ends itself."""
 _PACKAGES = ("wakewise", "numpy", "scipy", "numba", "pycolmap", "embreex", "small-gicp")
 
 
@@ -70,14 +70,16 @@ def run_attempt(
             return {"how": "held", "reason": None, "took_s": 0.0}
         if (place / FIGURES).exists():  # another driver was faster
             return {"how": "known", "reason": None, "took_s": 0.0}
-        _tidy(place)
+        for left in place.glob(".*"):  # half-written by a killed holder; who holds the claim is alone here
+            with suppress(OSError):
+                left.unlink()
         if not (place / TRIAL).exists():
             write_json(place / TRIAL, ticket.trial | {"versions": _versions()}, lasting=True)
         attempt_log.begin(place, **asdict(trial_lock.this_process()))
         begun()
         told = _tried(ticket, place, send, quiet)
         told["took_s"] = time.monotonic() - began
-        with suppress(OSError):  # a full disk: the driver is told
+        with suppress(OSError):  # a full disk: the driver reports it
             attempt_log.end(place, told["how"], told["reason"], told["took_s"])
         return told
     except OSError as fault:
@@ -120,15 +122,8 @@ def _check_version(ticket: AttemptRequest) -> None:
 
 
 def _in_a_line(failure: Exception) -> str:
-    """A failure of the computer in a line; a full disk, however it was told, in the same words."""
+    """A failure of the computer in a line; a full disk, whichever error reports it, in the same words."""
     return FULL if is_full(failure) else " ".join(str(failure).split()) or type(failure).__name__
-
-
-def _tidy(place: Path) -> None:
-    """Remove what a killed holder left half-written; who holds the claim is alone here."""
-    for left in place.glob(".*"):
-        with suppress(OSError):
-            left.unlink()
 
 
 @contextmanager
@@ -168,7 +163,7 @@ def _versions() -> dict[str, str]:
 
 
 def _main() -> None:
-    """Answer tickets until nobody sends any."""
+    """Answer tickets until the pipe closes."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     tickets: queue.SimpleQueue[str] = queue.SimpleQueue()
 

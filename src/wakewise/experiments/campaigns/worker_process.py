@@ -1,9 +1,9 @@
-"""A place where one trial at a time is made: a process, and who minds it.
+"""A slot that makes one trial at a time: a process and the thread that supervises it.
 
 The process is ended when it takes too long, takes too much memory, or is not wanted any more; the next attempt gets a
 new one. Engines differ only in where slots are: in threads of the driver, or in Dask's workers.
 
-How much memory a process and those that it started have, as the system tells it.
+How much memory a process and those that it started have, as the system reports it.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def memory_MB(pid: int) -> float:
 
 _LOOK_S = 0.1
 _ASK_S, _BEAT_S = 0.5, 10.0
-"""How often a slot looks at its process, asks whether its driver still wants it, and shows that it is alive."""
+"""How often a slot looks at its process, checks whether its driver still runs, and shows that it is alive."""
 _START_S = 300.0
 """How long a process may take to start and to claim its trial, which is no time of the trial."""
 _THREADS = (
@@ -123,7 +123,7 @@ class TrialProcess:
                 trial_lock.renew_lock(place)
 
     def close(self) -> None:
-        """End the process; an attempt that is under way is told of as stopped."""
+        """End the process; an attempt that is under way is reported as stopped."""
         self._closed = True
         if self._process is not None:
             end_process(self._process, group=True)

@@ -3,7 +3,7 @@
 The controller (auv_controllers, https://github.com/Robotic-Decision-Making-Lab/auv_controllers, formerly Evan-Palmer's)
 takes `thrusters`, `reference_controllers` and the matrix by rows, `tam.{x, y, z, rx, ry, rz}`
 (thruster_allocation_matrix_controller/src/thruster_allocation_matrix_controller_parameters.yaml), and multiplies a
-geometry_msgs/Wrench by its pseudo-inverse; it knows neither limits nor frames: the matrix must be in the axes of the
+geometry_msgs/Wrench by its pseudo-inverse; it handles neither limits nor frames: the matrix must be in the axes of the
 wrench that it is sent. That is FLU for a wrench as ROS has it (REP 103). The project's own velocity controllers work in
 `base_link_fsd` (forward-starboard-down, our FRD), and the matrix of its demo is of that frame
 (auv_control_demos/chained_controllers/config/chained_controllers.yaml).

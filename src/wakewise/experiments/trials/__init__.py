@@ -3,7 +3,7 @@
 Each stage reads files and leaves files, is skipped when done, and goes on where it was cut off.
 
 - `trial.py`: the stages of a trial; several methods side by side.
-- `stages.py`: who is told of progress, what a stage cost. `surface.py`: mesh and colours in a process of their own.
+- `stages.py`: reports of progress, what a stage cost. `surface.py`: mesh and colours in a process of their own.
 - `metrics.py`: every figure with unit, definition and better side; reference values. `coverage.py`: the coverage guide
   against the model.
 - `export.py`: a trial as files of other tools. `dataset/`: a data set of many trials.

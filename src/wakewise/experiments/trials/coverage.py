@@ -97,7 +97,7 @@ def agreement_with(coverage: Coverage, parts: Parts, cloud_W_m: Array) -> Covera
     patches, target = coverage.patches, parts.target
     truth = sample_surface(target.mesh, Crop(bed_z_m=target.bed_z_m), np.random.default_rng(0))
     there = np.asarray(KDTree(cloud_W_m).query(truth.points_m)[0]) < REACH_M
-    # The believed surface laid on the true one, so that what is compared is the same piece of it.
+    # The estimated surface laid on the true one, so that what is compared is the same piece of it.
     shift = parts.surveyed_target.centre_W_m - target.centre_W_m
     facing = NORMAL_SHARE * target.radius_m
     own = np.concatenate([patches.points_W_m - shift, facing * patches.normals], axis=1)
@@ -142,17 +142,23 @@ def measure_coverage(folder: Path) -> dict[str, Any]:
     crop = Crop(bed_z_m=parts.target.bed_z_m)
     compared = compare_surface(read_cloud(folder / "dense.ply").points_m, parts.target.mesh, crop=crop)
     both = agreement_with(coverage, parts, compared.points_W_m)
-    later_ms = spent_ms[1:] or spent_ms
     return {
         "coverage_predicted_pct": both.predicted_pct,
         "coverage_sure_pct": 100.0 * coverage.sure,
         "completeness_pct": both.completeness_pct,
         "coverage_agreement_pct": both.agreement_pct,
         "coverage_trivial_pct": both.trivial_pct,
-        "coverage_ms_per_photo": float(np.median(later_ms)),
-        "coverage_ms_per_photo_max": float(np.max(later_ms)),
+        **_costs(spent_ms),
         "photos": coverage.photos,
         "blurred": coverage.blurred,
+    }
+
+
+def _costs(spent_ms: list[float]) -> dict[str, float]:
+    later_ms = spent_ms[1:] or spent_ms
+    return {
+        "coverage_ms_per_photo": float(np.median(later_ms)),
+        "coverage_ms_per_photo_max": float(np.max(later_ms)),
     }
 
 
@@ -165,11 +171,6 @@ def measure_cost(parts: Parts) -> dict[str, float]:
     spent_ms: list[float] = []
     shots: list[Shot] = [(X_WC, None) for X_WC in parts.route.X_WC_planned]
     coverage = coverage_of(parts.surveyed_target, parts.camera, shots, spent_ms)
-    later_ms = spent_ms[1:] or spent_ms
-    if not later_ms:
+    if not spent_ms:
         raise InputError("mission: plans no photograph, the guide needs at least one")
-    return {
-        "coverage_predicted_pct": 100.0 * coverage.share,
-        "coverage_ms_per_photo": float(np.median(later_ms)),
-        "coverage_ms_per_photo_max": float(np.max(later_ms)),
-    }
+    return {"coverage_predicted_pct": 100.0 * coverage.share, **_costs(spent_ms)}

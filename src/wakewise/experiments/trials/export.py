@@ -70,7 +70,7 @@ def export_trial(
 
     `out` is a folder (qgc-plan: a file), `export/` in the trial's folder if not given; one that holds something is
     refused. `poses`, of nerfstudio and colmap, are "true" ones with the true camera or "estimated" ones with the camera
-    as the crew knows it; the others hold both, as far as they are there. `origin`, of qgc-plan, is where the world's
+    as estimated on board; the others hold both, as far as they are there. `origin`, of qgc-plan, is where the world's
     origin lies. Of nerfstudio and colmap, one photograph in `held_out` (8) is held out from training, drawn by `seed`
     (0); 0 holds none out.
 
@@ -173,7 +173,7 @@ def _training_data(folder: Path, path: Path, to: str, poses: str, one_in: int, s
 
 
 def _known_water(folder: Path) -> WaterAttenuation:
-    """Optics of the clear water that the trial was rendered with; silt is told of by photograph."""
+    """Optics of the clear water that the trial was rendered with; silt is given by photograph."""
     from wakewise.operation import read_scenario
 
     try:

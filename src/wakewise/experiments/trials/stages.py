@@ -1,6 +1,6 @@
 """Stages of a trial: who watches them, what they cost, and what is already done.
 
-A report beside a result: should it fail, the result is there all the same, and what failed is told in one line.
+A report beside a result: should it fail, the result is there all the same, and what failed is reported in one line.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class StageCosts:
         try:
             yield
         except BaseException:
-            with suppress(OSError):  # a full disk has been told of already
+            with suppress(OSError):  # a full disk has been reported already
                 self._add(name, wall, cpu)
             raise
         self._add(name, wall, cpu)
@@ -93,7 +93,7 @@ def cpu_s() -> float:
 
 
 def of_the_computer(failure: str | None) -> bool:
-    """Whether a failure kept by versions up to 0.1.0 tells of the disk or a file, not of the photographs."""
+    """Whether a failure kept by versions up to 0.1.0 concerns the disk or a file, not the photographs."""
     return failure is not None and any(words in failure for words in _NOT_MEASURED)
 
 
@@ -123,6 +123,6 @@ def _in_a_line(fault: Exception) -> str:
     said = " ".join(str(fault).split())
     if isinstance(fault, (WakewiseError, OSError)):
         return said
-    # A fault of the program: whoever mends it wants to know where.
+    # A fault of the program: its place helps to mend it.
     last = traceback.extract_tb(fault.__traceback__)[-1]
     return f"{type(fault).__name__}: {said} ({Path(last.filename).name}:{last.lineno})"

@@ -3,7 +3,7 @@
 How far the size of a model is from the truth's, and what is left of its error once that is taken out.
 
 A model's scale comes from the vehicle's own estimates of where it was. Where these are off by millimetres for seconds,
-the model is too large or too small, and no alignment that is honest may mend it; the figures say how much it costs.
+the model is too large or too small, and no alignment may mend it; the figures say how much it costs.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def run_trial(
 ) -> Figures:
     """Run what is left of a trial and return its figures, which are the content of metrics.json.
 
-    `told` is called with the figures as soon as they are known and written, before the mesh and its colours are made.
+    `told` is called with the figures as soon as they are there and written, before the mesh and its colours are made.
     With `meanwhile` another process makes them: it is called with "mesh" and with "colours" while that is at work, not
     where they are there already or there is no such process.
 

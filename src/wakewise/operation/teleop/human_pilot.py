@@ -43,10 +43,10 @@ STICKS = StickDeflection(
 
 
 @dataclass(kw_only=True, eq=False)
-class HumanPilot:
-    """A `Pilot` that flies a reference by eye; its state is reset at time zero.
+class _OperatorByEye:
+    """A simulated operator who flies a reference by eye; its state is reset at time zero.
 
-    `X_BC` is the camera mount, `target_W_m` (3,) the point to be kept in the picture, `dt_s` the time between two goals
+    `X_BC` is the camera mount, `target_W_m` (3,) the point to be kept in the picture, `dt_s` the time between two calls
     and `seed` selects the operator.
     """
 
@@ -57,31 +57,41 @@ class HumanPilot:
     seed: int
     operator: OperatorModel = field(init=False)
     _state: OperatorModelState = field(init=False)
-    _place_W_m: Array = field(init=False)
-    _velocity_m_s: Array = field(init=False)
-    _change_m_s2: Array = field(init=False)
-    _heading_rad: float = 0.0
-    _turn_rad_s: float = 0.0
 
     def __post_init__(self) -> None:
         self.operator = sample_operator(self.seed, STICKS)
-        self._begin(np.zeros(3), 0.0)
+        self._state = begin(self.operator)
 
-    def _begin(self, place_W_m: Array, heading_rad: float) -> None:
-        self._state, self._place_W_m, self._heading_rad = begin(self.operator), place_W_m, heading_rad
-        self._velocity_m_s, self._change_m_s2, self._turn_rad_s = np.zeros(3), np.zeros(3), 0.0
+    def _steer(self, time_s: float, estimate: BodyState) -> tuple[Goal, Array]:
+        """The reference goal, and the velocities that the operator asks for: forward, right, down, turn, shape (4,)."""
+        if time_s <= 0.0:
+            self._state = begin(self.operator)
+        reference = self.reference.goal(time_s, estimate)
+        view = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
+        wanted = CameraMotion.of(reference.X_WB, reference.nu_B, self.X_BC)
+        seen = viewed_point(reference, self.X_BC, self.target_W_m)
+        self._state, asked = steer(self.operator, self._state, self.dt_s, view, wanted, seen)
+        return reference, asked
+
+
+@dataclass(kw_only=True, eq=False)
+class HumanPilot(_OperatorByEye):
+    """A `Pilot` whose goal is the integrated command of the operator's sticks."""
+
+    _place_W_m: Array = field(default_factory=lambda: np.zeros(3))
+    _velocity_m_s: Array = field(default_factory=lambda: np.zeros(3))
+    _change_m_s2: Array = field(default_factory=lambda: np.zeros(3))
+    _heading_rad: float = 0.0
+    _turn_rad_s: float = 0.0
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
         """Integrated position and velocity of the sticks' commands, with roll and pitch of the reference."""
-        reference = self.reference.goal(time_s, estimate)
-        roll_rad, pitch_rad, _ = euler_from_quat(reference.X_WB.q)
         if time_s <= 0.0:
-            self._begin(np.array(estimate.X_WB.p_m), float(euler_from_quat(estimate.X_WB.q)[2]))
-        view = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
-        wanted = CameraMotion.of(reference.X_WB, reference.nu_B, self.X_BC)
-        self._state, asked = steer(
-            self.operator, self._state, self.dt_s, view, wanted, viewed_point(reference, self.X_BC, self.target_W_m)
-        )
+            self._place_W_m = np.array(estimate.X_WB.p_m)
+            self._heading_rad = float(euler_from_quat(estimate.X_WB.q)[2])
+            self._velocity_m_s, self._change_m_s2, self._turn_rad_s = np.zeros(3), np.zeros(3), 0.0
+        reference, asked = self._steer(time_s, estimate)
+        roll_rad, pitch_rad, _ = euler_from_quat(reference.X_WB.q)
         before_m_s, before_rad_s = self._velocity_m_s, self._turn_rad_s
         self._velocity_m_s, self._change_m_s2 = filtered_velocity(before_m_s, self._change_m_s2, asked[:3], self.dt_s)
         self._turn_rad_s = limit_slew(before_rad_s, float(asked[3]), self.dt_s, TURN_RAD_S2)
@@ -108,35 +118,15 @@ def viewed_point(reference: Goal, X_BC: Pose, target_W_m: Array) -> Array:
 
 
 @dataclass(kw_only=True, eq=False)
-class SimulatedOperatorInput:
-    """A `ControlSource`: stick deflections of a simulated operator who flies a reference by eye.
+class SimulatedOperatorInput(_OperatorByEye):
+    """A `ControlSource`: stick deflections of the operator. `pressed` are the actions at time zero."""
 
-    Fields as of `HumanPilot`; `pressed` are the actions at time zero.
-    """
-
-    reference: Pilot
-    X_BC: Pose
-    target_W_m: Array
-    dt_s: float
-    seed: int
     pressed: tuple[str, ...] = ("operator",)
-    operator: OperatorModel = field(init=False)
-    _state: OperatorModelState = field(init=False)
     _controls: Controls = CENTRED
-
-    def __post_init__(self) -> None:
-        self.operator = sample_operator(self.seed, STICKS)
-        self._state = begin(self.operator)
 
     def look(self, time_s: float, estimate: BodyState, share: float) -> None:
         """Compute the deflections from the estimate; full stick means this `share` of the largest speeds."""
-        if time_s <= 0.0:
-            self._state = begin(self.operator)
-        reference = self.reference.goal(time_s, estimate)
-        view = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
-        wanted = CameraMotion.of(reference.X_WB, reference.nu_B, self.X_BC)
-        seen = viewed_point(reference, self.X_BC, self.target_W_m)
-        self._state, asked = steer(self.operator, self._state, self.dt_s, view, wanted, seen)
+        _, asked = self._steer(time_s, estimate)
         full = share * np.array([FULL_M_S, FULL_M_S, FULL_M_S, FULL_RAD_S])
         pushed = np.clip(asked / full, -1.0, 1.0)
         first = time_s <= 0.0

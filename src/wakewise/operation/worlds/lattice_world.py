@@ -16,22 +16,18 @@ sheds eddies then).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError
-from wakewise.core.interfaces import BodyState, Measurement, Plant, ScalarGrid, Truth, TruthProvider, WaterTruth
-from wakewise.robot.thrusters import electrical_power_W
+from wakewise.core.interfaces import BodyState, WaterTruth
+from wakewise.operation.worlds.vehicle_in_water import VehicleInWater
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
 from wakewise.simulation.lattice.forced_lattice import ForcedLattice, disk_points
-from wakewise.simulation.tank import Sensors, TankSettings, VehiclePlant
+from wakewise.simulation.tank import TankSettings
 from wakewise.simulation.tank.sediment import SiltProperties
-from wakewise.simulation.tank.sensors import CameraJoint
-from wakewise.simulation.tank.settings import PLANT_STEP_S
 from wakewise.simulation.tank.water_truth import TargetProbes
 from wakewise.simulation.water import AmbientSum, SteadyCurrent
 
@@ -64,8 +60,8 @@ class _Water:
         return self.velocity(points_W_m) - self.ambient_velocity(points_W_m)
 
 
-class LatticeWater:
-    """A `Plant` and its own `TruthProvider`: vehicle and sensors of the tank in the lattice's water.
+class LatticeWater(VehicleInWater):
+    """Vehicle and sensors of the tank in the lattice's water.
 
     Raises InputError if the settings ask for water that this is not, or the vehicle starts outside the box.
 
@@ -96,17 +92,9 @@ class LatticeWater:
     ) -> None:
         _check(settings)
         sensor_rng, probe_rng, self._load_rng = rng.spawn(3)
-        self.settings, self.target = settings, target
         density, current = settings.density_kg_m3, np.array(settings.current.velocity_m_s)
         ambient = AmbientSum(parts=(SteadyCurrent(velocity_W_m_s=current),) if current.any() else ())
-        self._plant = VehiclePlant(
-            vehicle,
-            start,
-            density_kg_m3=density,
-            ambient=ambient,
-            size_m=settings.size_m,
-            target_W_m=target.mesh.vertices_m,
-        )
+        super().__init__(vehicle, target, settings, start, sensor_rng, ambient, tilt_rad)
         depth = settings.size_m[2]
         across = 2 * math.ceil(half_size_m / cell_m)
         cells = (across, across, round(depth / cell_m))
@@ -127,13 +115,10 @@ class LatticeWater:
         self._disks_m = np.stack([disk_points(_DISK_POINTS, math.sqrt(2.0) * d) for d in _diameters(vehicle)])
         self._loads = self._load_rng.standard_normal((len(vehicle.thrusters), _DISK_POINTS, 3))
         self._hull_B_m = _hull_points(vehicle)
-        self._sensors = Sensors(settings.sensors, sensor_rng)
-        self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, sensor_rng.spawn(1)[0])
         self._probes = TargetProbes(target, probe_rng)
         self._laws = SiltProperties.of(
             settings.silt.grain_m, settings.silt.grain_density_kg_m3, density, settings.silt.erosion_kg_m2_s
         )
-        self._time = 0.0
         speed = float(np.linalg.norm(current))
         nothing = np.zeros((0, 3))
         spin_up_s = min(SPIN_UP_M / speed, SPIN_UP_S) if speed > 0.0 else 0.0
@@ -144,38 +129,16 @@ class LatticeWater:
         self._water = _Water(self._box, self._alone)
 
     @property
-    def state(self) -> BodyState:
-        """True pose and twist."""
-        return self._plant.state
-
-    @property
     def box(self) -> ForcedLattice:
         """The water."""
         return self._box
 
-    def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
-        """Hold commanded thrusts, shape (n,), for dt_s; return what the sensors handed over."""
-        end = self._time + dt_s
-        while end - self._time > _TOLERANCE_S:
-            stop = min(self._time + PLANT_STEP_S, end, self._sensors.next_due_s())
-            self._plant.step(thrusts_N, max(stop - self._time, 0.0))
-            self._time = max(stop, self._time)
-            if self._sensors.next_due_s() - self._time < _TOLERANCE_S:
-                self._sensors.sample(self._time, self._plant.vector, self._plant.force_B_m_s2)
+    def _advance_water(self) -> None:
         nothing = np.zeros((0, 3))
         while self._box.time_s - self._began_s < self._time - 0.5 * self._box.step_s:
             self._box.advance(*self._pushes())
             if self._alone is not None:
                 self._alone.advance(nothing, nothing)
-        return self._sensors.collect(self._time) + self._joint.turn(self._time, dt_s)
-
-    def push(self, wrench_B: Array) -> None:
-        """A wrench from outside the water that acts until the next call; see `wakewise.core.interfaces.Plant`."""
-        self._plant.push_B = np.array(wrench_B, dtype=np.float64)
-
-    def aim(self, tilt_rad: float) -> None:
-        """Wish an angle of the camera's joint; a fixed camera does not mind."""
-        self._joint.aim(tilt_rad)
 
     def _pushes(self) -> tuple[Array, Array]:
         """Where the vehicle pushes the water now, and with what, both shape (k, 3)."""
@@ -199,20 +162,6 @@ class LatticeWater:
         given = np.broadcast_to(plant.drag()[1] / len(hull), hull.shape)
         return np.concatenate([points.reshape(-1, 3), hull]), np.concatenate([forces.reshape(-1, 3), given])
 
-    def observe(self) -> Truth:
-        """Vehicle, thrusters and collisions now."""
-        plant, thrusts = self._plant, self._plant.thrusts_N
-        power = electrical_power_W(
-            thrusts, plant.vehicle.disk_areas_m2, water_density_kg_m3=self.settings.density_kg_m3
-        )
-        return Truth(
-            state=plant.state,
-            thrusts_N=thrusts,
-            power_W=float(power.sum()),
-            collision=bool(plant.contact),
-            tilt_rad=self._joint.tilt_rad,
-        )
-
     def water(self) -> WaterTruth:
         """Water at the target now."""
         camera = (self._plant.state.X_WB @ self._plant.vehicle.X_BC_at(self._joint.tilt_rad)).p_m
@@ -221,42 +170,6 @@ class LatticeWater:
     def excess_velocity(self, points_W_m: Array) -> Array:
         """Velocity less that of the same water without a vehicle, both shape (n, 3), now."""
         return self._water.excess_velocity(points_W_m)
-
-    def silt(self) -> ScalarGrid:
-        """None: the water is clear."""
-        return ScalarGrid(origin_W_m=np.zeros(3), spacing_m=1.0, values=np.zeros((1, 1, 1)))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LatticeWorld:
-    """`LatticeWater` that begins alike each time; implements `wakewise.core.interfaces.World`.
-
-    Parameters as of `LatticeWater`; `draw` gives a fresh generator of the same seed at each call.
-    """
-
-    vehicle: Vehicle
-    target: Target
-    settings: TankSettings
-    start: BodyState
-    half_size_m: float
-    draw: Callable[[], np.random.Generator]
-    cell_m: float = CELL_M
-    tilt_rad: float = 0.0
-    name: str = "lattice"
-
-    def begin(self) -> tuple[Plant, TruthProvider | None]:
-        """Fresh water at its start, which is plant and witness in one."""
-        water = LatticeWater(
-            self.vehicle,
-            self.target,
-            self.settings,
-            self.start,
-            self.draw(),
-            self.half_size_m,
-            self.cell_m,
-            self.tilt_rad,
-        )
-        return water, water
 
 
 def box_half_size_m(places_W_m: Array, centre_W_m: Array, vehicle: Vehicle) -> float:

@@ -12,14 +12,15 @@ from wakewise.core.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.core.interfaces import BodyState, World
 from wakewise.core.plugins import find
 from wakewise.operation.parts import Parts
-from wakewise.operation.worlds.lattice_world import LatticeWorld, box_half_size_m
+from wakewise.operation.worlds.lattice_world import LatticeWater, box_half_size_m
 from wakewise.operation.worlds.quasi_steady_world import (
     Jets,
-    QuasiSteadyWorld,
+    QuasiSteadyWater,
     free_jet_field,
     lattice_jets,
     paper_jets,
 )
+from wakewise.operation.worlds.vehicle_in_water import RepeatableWorld
 from wakewise.robot.vehicles import Vehicle, perturbed, with_drag
 from wakewise.simulation.tank import TankWorld
 
@@ -75,35 +76,31 @@ def _check_rigid(parts: Parts, name: str) -> None:
         )
 
 
-def _quasi_steady(name: str, jets: Callable[[float], Jets], parts: Parts) -> QuasiSteadyWorld:
-    seed = parts.scenario.seed
+def _quasi_steady(name: str, jets: Callable[[float], Jets], parts: Parts) -> RepeatableWorld:
+    seed, settings = parts.scenario.seed, parts.scenario.tank
     _check_rigid(parts, name)
-    return QuasiSteadyWorld(
+    flow, around = jets(settings.density_kg_m3), (parts.target, settings, true_start(parts))
+    return RepeatableWorld(
         name=name,
-        jets=jets(parts.scenario.tank.density_kg_m3),
         vehicle=true_vehicle(parts),
-        target=parts.target,
-        settings=parts.scenario.tank,
-        start=true_start(parts),
+        make=lambda vehicle, rng: QuasiSteadyWater(flow, vehicle, *around, rng, parts.start_tilt_rad),
         draw=lambda: np.random.default_rng([seed, 11]),
-        tilt_rad=parts.start_tilt_rad,
     )
 
 
-def lattice_world(parts: Parts) -> LatticeWorld:
+def lattice_world(parts: Parts) -> RepeatableWorld:
     """`lattice`: a large-eddy simulation around the target, stepped with the vehicle."""
     _check_rigid(parts, "lattice")
     route = parts.route
     times_s = np.linspace(0.0, route.duration_s, 200)
     places = np.array([route.body(float(t), parts.aim).X_WB.p_m for t in times_s])
-    return LatticeWorld(
+    half_size_m = box_half_size_m(places, parts.target.centre_W_m, parts.vehicle)
+    around = (parts.target, parts.scenario.tank, true_start(parts))
+    return RepeatableWorld(
+        name="lattice",
         vehicle=true_vehicle(parts),
-        target=parts.target,
-        settings=parts.scenario.tank,
-        start=true_start(parts),
-        half_size_m=box_half_size_m(places, parts.target.centre_W_m, parts.vehicle),
+        make=lambda vehicle, rng: LatticeWater(vehicle, *around, rng, half_size_m, tilt_rad=parts.start_tilt_rad),
         draw=parts.seeds.tank,
-        tilt_rad=parts.start_tilt_rad,
     )
 
 

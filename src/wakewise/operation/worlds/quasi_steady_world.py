@@ -16,7 +16,6 @@ are those of the tank.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -24,21 +23,14 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import (
     BodyState,
-    Measurement,
-    Plant,
-    ScalarGrid,
-    Truth,
-    TruthProvider,
     WakeModel,
     WaterTruth,
 )
-from wakewise.robot.thrusters import electrical_power_W
+from wakewise.operation.worlds.vehicle_in_water import VehicleInWater
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
 from wakewise.simulation.lattice import LatticeFlow, MeanField, load_mean_field
-from wakewise.simulation.tank import Sensors, TankSettings, VehiclePlant, build_ambient
-from wakewise.simulation.tank.sensors import CameraJoint
-from wakewise.simulation.tank.settings import PLANT_STEP_S
+from wakewise.simulation.tank import TankSettings, build_ambient
 from wakewise.simulation.tank.water_truth import surface_points
 from wakewise.wake import wake_model
 
@@ -80,8 +72,8 @@ def lattice_jets(table: MeanField, density_kg_m3: float) -> Jets:
     return velocity
 
 
-class QuasiSteadyWater:
-    """A `Plant` and its own `TruthProvider`: plant and sensors of the tank, water without memory.
+class QuasiSteadyWater(VehicleInWater):
+    """Plant and sensors of the tank, water without memory.
 
     `vehicle`: true parameters. `settings`: of which water and silt are not used. `rng`: its children serve sensors,
     probes and ambient water. `tilt_rad`: where the joint of the camera, if it has one, stands at the start.
@@ -98,44 +90,9 @@ class QuasiSteadyWater:
         tilt_rad: float = 0.0,
     ) -> None:
         sensor_rng, probe_rng, current_rng = rng.spawn(3)
-        self.settings = settings
-        self._plant = VehiclePlant(
-            vehicle,
-            start,
-            density_kg_m3=settings.density_kg_m3,
-            ambient=build_ambient(settings, current_rng),
-            size_m=settings.size_m,
-            target_W_m=target.mesh.vertices_m,
-        )
-        self._sensors = Sensors(settings.sensors, sensor_rng)
-        self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, sensor_rng.spawn(1)[0])
+        super().__init__(vehicle, target, settings, start, sensor_rng, build_ambient(settings, current_rng), tilt_rad)
         self._jets = jets
         self._surface_W_m = surface_points(target, _PROBES, probe_rng)
-        self._time = 0.0
-
-    @property
-    def state(self) -> BodyState:
-        """True pose and twist."""
-        return self._plant.state
-
-    def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
-        """Hold commanded thrusts, shape (n,), for dt_s; return what the sensors handed over."""
-        end = self._time + dt_s
-        while end - self._time > _TOLERANCE_S:
-            stop = min(self._time + PLANT_STEP_S, end, self._sensors.next_due_s())
-            self._plant.step(thrusts_N, max(stop - self._time, 0.0))
-            self._time = max(stop, self._time)
-            if self._sensors.next_due_s() - self._time < _TOLERANCE_S:
-                self._sensors.sample(self._time, self._plant.vector, self._plant.force_B_m_s2)
-        return self._sensors.collect(self._time) + self._joint.turn(self._time, dt_s)
-
-    def push(self, wrench_B: Array) -> None:
-        """A wrench from outside the water that acts until the next call; see `wakewise.core.interfaces.Plant`."""
-        self._plant.push_B = np.array(wrench_B, dtype=np.float64)
-
-    def aim(self, tilt_rad: float) -> None:
-        """Wish an angle of the camera's joint; a fixed camera does not mind."""
-        self._joint.aim(tilt_rad)
 
     def speeds_m_s(self, points_W_m: Array) -> Array:
         """Speed of the jets' water, shape (n,), at points, shape (n, 3)."""
@@ -146,20 +103,6 @@ class QuasiSteadyWater:
         origins, axes = self._plant.disks()
         return self._jets(points_W_m, origins, axes, self._plant.thrusts_N, self._plant.vehicle.disk_areas_m2)
 
-    def observe(self) -> Truth:
-        """Vehicle, thrusters and collisions now."""
-        plant, thrusts = self._plant, self._plant.thrusts_N
-        power = electrical_power_W(
-            thrusts, plant.vehicle.disk_areas_m2, water_density_kg_m3=self.settings.density_kg_m3
-        )
-        return Truth(
-            state=plant.state,
-            thrusts_N=thrusts,
-            power_W=float(power.sum()),
-            collision=bool(plant.contact),
-            tilt_rad=self._joint.tilt_rad,
-        )
-
     def water(self) -> WaterTruth:
         """Water at the target's surface now."""
         speed = self.speeds_m_s(self._surface_W_m)
@@ -169,34 +112,6 @@ class QuasiSteadyWater:
             bed_speed_p95_m_s=float("nan"),
             turbidity_per_m=0.0,
         )
-
-    def silt(self) -> ScalarGrid:
-        """None: the water is clear."""
-        return ScalarGrid(origin_W_m=np.zeros(3), spacing_m=1.0, values=np.zeros((1, 1, 1)))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class QuasiSteadyWorld:
-    """`QuasiSteadyWater` that begins alike each time; implements `wakewise.core.interfaces.World`.
-
-    Parameters as of `wakewise.simulation.tank.TankWorld`, and `jets`.
-    """
-
-    name: str
-    jets: Jets
-    vehicle: Vehicle
-    target: Target
-    settings: TankSettings
-    start: BodyState
-    draw: Callable[[], np.random.Generator]
-    tilt_rad: float = 0.0
-
-    def begin(self) -> tuple[Plant, TruthProvider | None]:
-        """A fresh world at its start, which is plant and witness in one."""
-        water = QuasiSteadyWater(
-            self.jets, self.vehicle, self.target, self.settings, self.start, self.draw(), self.tilt_rad
-        )
-        return water, water
 
 
 def paper_jets() -> Jets:

@@ -1,4 +1,4 @@
-"""Angles of other projects' files: radians where the format says so, and no guess that a vehicle would fly with."""
+"""Angles of other projects' files: radians where the format says so, and no guess that ends up in a vehicle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from wakewise.core.arrays import Array
 from wakewise.robot.importers.xml import PlacedError, SourceLocation
 
 TURN = 2.0 * math.pi + 0.01
-"""Angles beyond this are no angles in radians that anybody writes, unless they are a few eighths of a turn."""
+"""Angles beyond this are not taken as radians, unless they are a few eighths of a turn."""
 _FEW_TURNS = 8.0 * math.pi
 _EIGHTH = math.pi / 4.0
 _WHOLE = 1e-9
@@ -36,7 +36,7 @@ def read_angles(rows: list[tuple[Array, SourceLocation]], what: str, key: str) -
     """Angles in radians of a file whose format states no unit, and a note on how they were read ("" if none).
 
     All rows are of one unit, which the key may say (`..._deg`, `..._rad`). Else angles beyond a turn are degrees if all
-    are whole or half degrees; whole numbers of radians are nobody's angles, so they are refused.
+    are whole or half degrees; whole numbers of radians are implausible, so they are refused.
 
     `rows`, shape (3,): roll, pitch and yaw of each thruster. `what`, `key`: for messages, and the key that the angles
     stand under. Raises InputError if the unit cannot be told.

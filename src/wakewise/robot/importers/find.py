@@ -98,7 +98,7 @@ def find_vehicle(
 ) -> VehicleDraft:
     """Read a vehicle of the library, a vehicle file, or any file of another project that can be imported.
 
-    The options are those of `importers.import_vehicle`; they speak of files of other projects only.
+    The options are those of `importers.import_vehicle`; they concern files of other projects only.
 
     Raises InputError if there is no such vehicle or file, it cannot be read as a vehicle, or an option does not apply
     to it.

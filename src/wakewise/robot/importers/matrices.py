@@ -175,7 +175,7 @@ def read_matrix_only(root: YamlNode, found: ParsedVehicle, rows: WrenchOrder | N
 _ALONE = 0.9
 _LIFT_M = 1e-3
 _NEAR_LINES = 40
-"""How far from the thrusters or the matrix a comment may stand that speaks of their frame."""
+"""How far from the thrusters or the matrix a comment on their frame may stand."""
 
 
 def _holds_figures(item: YamlNode) -> bool:
@@ -206,7 +206,7 @@ def _frame(root: YamlNode, entries: Entries, found: ParsedVehicle, *, geometry: 
     votes = compare_names(names, *placed) if names and len(names) == len(placed[0]) else None
     if votes is not None and votes.frame:
         if spoken and votes.frame not in spoken:
-            found.notes.append(f"{QUESTION}a comment speaks of {next(iter(spoken))}, the names of the thrusters do not")
+            found.notes.append(f"{QUESTION}a comment names {next(iter(spoken))}, the names of the thrusters do not")
         return ("FLU" if votes.frame == "FLU" else "FRD"), f"inferred: {votes.words}"
     if found.p_G_m is not None and found.p_buoyancy_m is not None:
         lift_m = float(found.p_buoyancy_m[2] - found.p_G_m[2])
@@ -237,7 +237,7 @@ def _named_frame(entries: Entries, found: ParsedVehicle) -> tuple[Frame, str] | 
     """
     ranked: list[tuple[int, Frame, str, YamlNode]] = []
     for path, item in entries:
-        # Only names of frames tell; a topic may mention either.
+        # Only names of frames count; a topic may mention either.
         if not isinstance(item.value, str) or not re.search(r"frame|tf", " ".join(path), re.IGNORECASE):
             continue
         down, up = _DOWN_WORDS.search(item.value), _UP_WORDS.search(item.value)

@@ -46,7 +46,7 @@ class PackagePaths:
         self._found: dict[str, Path | None] = {}
 
     def package(self, name: str) -> Path | None:
-        """Folder of a package: told, or named so (by folder or package.xml) near the file; None if there is none."""
+        """Folder of a package: given, or named so (by folder or package.xml) near the file; None if there is none."""
         if name in self.told:
             return self.told[name]
         if name not in self._found:
@@ -57,7 +57,7 @@ class PackagePaths:
         return self._found[name]
 
     def whence(self, path: Path) -> str:
-        """Which package a file is of, if it was found by its name alone: a namesake may be meant; "" if told or own."""
+        """Which package a file is of, if it was found by name alone: a namesake may be meant; "" if given or own."""
         for name, folder in self._found.items():
             if folder is not None and folder != self.root and path.resolve().is_relative_to(folder.resolve()):
                 return f"; package {name} was found by its name in {folder}, --package {name}=DIR names another"

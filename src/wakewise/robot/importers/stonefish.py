@@ -167,7 +167,7 @@ def _lag(actuator: Element, thruster: ParsedThruster) -> bool:
 
 
 def _thrusts(model: Element, top: float, diameter: float | None, density: float | None) -> tuple[float, float] | None:
-    """Thrusts in newton, both positive, of the rotor turning at +top and at -top; None where the file tells neither."""
+    """Thrusts in newton, both positive, of the rotor turning at +top and at -top; None where neither is stated."""
 
     def value(tag: str, key: str) -> float | None:
         return model.child(tag).number_attribute(key, f"{tag} {key}")

@@ -36,6 +36,7 @@ _SHORT = re.compile(r"[hvt]?(?P<end>[fbram])(?P<side>[lr])[hvtb]?")
 """Short forms: FL, FRH, VBL, rr; the first of two letters is the end, the second the side."""
 _SIDE_FIRST = re.compile(r"(?:[hv](?P<second>[lr])|(?P<side>[lr])(?P<rest>[fbvh])?)")
 """Short forms that begin with the side: L, RV, LF; and VL, VR, HR."""
+_VERTICAL = re.compile(r"vertical|heave|dive", re.IGNORECASE)
 _NEAR_M = 1e-3
 _UPRIGHT = 0.7
 
@@ -50,7 +51,7 @@ class AxisVotes:
 
     @property
     def frame(self) -> str:
-        """FLU or FRD if all names that speak of a side or of up and down agree; else ""."""
+        """FLU or FRD if all names that state a side or up and down agree; else ""."""
         for_, against = (*self.port[0], *self.up[0]), (*self.port[1], *self.up[1])
         if bool(for_) == bool(against):
             return ""
@@ -68,13 +69,15 @@ class AxisVotes:
 def compare_names(names: Sequence[str], places: Array, axes: Array) -> AxisVotes:
     """Hold names against places, shape (n, 3), and axes of positive thrust, shape (n, 3), of one frame.
 
-    Left and port, right and starboard speak of y; front and bow, back and stern of x; top and bottom of z, compared
+    Left and port, right and starboard concern y; front and bow, back and stern x; top and bottom z, compared
     with one another; up and down of the force of a vertical thruster.
     """
     votes = AxisVotes()
-    letters = {letter for name in names for letter in _letters(name)}
+    # First letters of short forms: where L stands beside R, R is the right side and not the rear.
+    sides = [side for name in names for token in _tokens(name) if (side := _SIDE_FIRST.fullmatch(token)) is not None]
+    letters = {side["side"] or side["second"] for side in sides}
     meanings = [_meaning(name, letters) for name in names]
-    # Bow and stern speak of one another: bodies with their origin at the nose are about.
+    # Bow and stern are compared with each other: bodies with their origin at the nose are about.
     middle = np.array([float(places[:, 0].mean()), 0.0, 0.0])
     for name, meaning, place in zip(names, meanings, places - middle, strict=True):
         for pair, axis, for_, against in (("port", 1, "left", "right"), ("ahead", 0, "front", "back")):
@@ -85,7 +88,7 @@ def compare_names(names: Sequence[str], places: Array, axes: Array) -> AxisVotes
     if top and bottom and abs(np.mean(top) - np.mean(bottom)) > _NEAR_M:
         votes.up[0 if np.mean(top) > np.mean(bottom) else 1].append("top and bottom")
     pushing = [(n, m, a) for n, m, a in zip(names, meanings, axes, strict=True) if ("up" in m) != ("down" in m)]
-    # Where a horizontal thruster is called up or down, the words speak of places.
+    # Where a horizontal thruster is called up or down, the words mean places.
     if all(abs(a[2]) > _UPRIGHT for _, _, a in pushing):
         for name, meaning, axis in pushing:
             votes.up[0 if (axis[2] > 0.0) == ("up" in meaning) else 1].append(name)
@@ -107,12 +110,8 @@ def contradictions(names: Sequence[str], places: Array, axes: Array) -> list[str
 
 def mislabelled_vertical(names: Sequence[str], axes: Array) -> list[str]:
     """Where thrusters that are called vertical push along the horizon, axes of shape (n, 3)."""
-    wrong = [n for n, a in zip(names, axes, strict=True) if _says_vertical(n) and abs(a[2]) < 0.5]
+    wrong = [n for n, a in zip(names, axes, strict=True) if _VERTICAL.search(n) and abs(a[2]) < 0.5]
     return [f"by the names {_some(wrong)} push up or down, by their axes they do not"] if wrong else []
-
-
-def _says_vertical(name: str) -> bool:
-    return bool(re.search(r"vertical|heave|dive", name, re.IGNORECASE))
 
 
 def _some(names: list[str]) -> str:
@@ -124,11 +123,6 @@ def _tokens(name: str) -> list[str]:
     # A left-handed propeller is on no side.
     following = [*tokens, ""][1:]
     return [t for t, after in zip(tokens, following, strict=True) if not after.startswith("hand") and t != "upright"]
-
-
-def _letters(name: str) -> set[str]:
-    """First letters of short forms: where L stands beside R, R is the right side and not the rear."""
-    return {(m["side"] or m["second"]) for t in _tokens(name) if (m := _SIDE_FIRST.fullmatch(t)) is not None}
 
 
 def _meaning(name: str, letters: set[str]) -> set[str]:
@@ -151,7 +145,7 @@ UNIT_SLACK = 0.02
 
 _ROUNDING = 0.02
 MAX_ARM_M = 10.0
-"""Longest arm of a thruster about the body's origin that is believed."""
+"""Longest plausible arm of a thruster about the body's origin."""
 _COUNT = re.compile(r"^((num|number|n|no|count)_?(of_)?thrusters?|thrusters?_(count|num|number))$", re.IGNORECASE)
 _LIST = re.compile(
     r"^thrusters?(_(names?|ids?|joints?|links?|frames?|topics?|pins?|channels?|labels?|list))?$", re.IGNORECASE
@@ -301,7 +295,7 @@ def question_rank(found: ParsedVehicle, matrix: Array, name: str) -> list[str]:
 def question_names(found: ParsedVehicle, draft: VehicleDraft, *, told: bool) -> list[str]:
     """Hold places and axes against the thrusters' own names, and a guess of axes against what any vehicle can do.
 
-    `draft`: in FRD. `told`: whether the user said along which axis thrusters push. Returns notes that question the
+    `draft`: in FRD. `told`: whether the user gave the axis along which thrusters push. Returns notes that question the
     places. Raises InputError if nothing but a guess says which way thrusters push, and the vehicle it makes is none.
     """
     if not draft.thrusters:

@@ -176,7 +176,7 @@ def _turn(located: list[_Placed], found: ParsedVehicle) -> None:
     for key in dict.fromkeys(p.key for p in located if p.angles is not None):
         group = [p for p in located if p.key == key and p.angles is not None]
         for p in group:
-            # The angles (1, 0, 0) are nobody's; as a direction they are.
+            # (1, 0, 0) is implausible as angles, and common as a direction.
             unit = p.angles is not None and abs(float(np.linalg.norm(p.angles)) - 1.0) < _SLACK
             if unit and _MAYBE_DIRECTION.search(key) and unit_of(key) == "":
                 raise PlacedError(

@@ -235,7 +235,7 @@ class TextSubstitution:
             case "dirname" | "cwd":
                 return str(place.file.parent)
             case "env":
-                # The environment is nobody's vehicle: the text stays as it is, and opens no file.
+                # The environment is no part of a vehicle: the text stays as it is, and opens no file.
                 return f"$(env {rest})"
             case "optenv":
                 return rest.partition(" ")[2].strip()

@@ -272,7 +272,7 @@ def read_parameters(entries: Entries, found: ParsedVehicle) -> bool:
 
 
 def _of_the_vehicle(entries: Entries, found: ParsedVehicle) -> Entries:
-    """Entries that speak of the vehicle, outermost first, not of an arm or another part of it.
+    """Entries that concern the vehicle, outermost first, not of an arm or another part of it.
 
     Raises InputError if two masses stand at one depth that may both be the vehicle's.
     """

@@ -1,6 +1,6 @@
 """From a maker's table of pulses and thrusts to a thrust curve: read, check, make monotone, say what was done.
 
-Thrust curves by name or by file: those that come with the package, and anybody's table.
+Thrust curves by name or by file: those that come with the package, and tables of users.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ SILENT_SHARE = 1e-3
 """A thrust below this share of the largest at its voltage is the load cell's zero."""
 
 RESOLVED_US = 10.0
-"""If silence and the first running pulse are further apart than this, the table does not tell where running starts."""
+"""If silence and the first running pulse are further apart than this, the table does not show where running starts."""
 
 NOISE_N, NOISE_SHARE = 0.3, 0.03
 """How far a reading may lie from the nearest monotone curve: newton, or share of the largest thrust if that is more."""

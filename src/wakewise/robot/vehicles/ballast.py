@@ -26,7 +26,7 @@ Coordinate = Annotated[float, Field(ge=-5.0, le=5.0)]
 
 
 class BallastBlock(Settings):
-    """One block of ballast on the vehicle, which everybody knows of."""
+    """One block of ballast on the vehicle; the controller's model has it, too."""
 
     float_N: float = Field(ge=-5000.0, le=5000.0, description="what it lifts in water, a negative one is lead")
     at_B_m: tuple[Coordinate, Coordinate, Coordinate] | None = Field(

@@ -173,9 +173,9 @@ def completed(draft: VehicleDraft, like: VehicleDraft) -> VehicleDraft:
             given[attribute] = value
 
     give("size_m", s * _array(like.size_m))
-    give("mass_kg", s**3 * _number(like.mass_kg))
+    give("mass_kg", s**3 * float(_array(like.mass_kg)))
     give("inertia_kg_m2", s**5 * _array(like.inertia_kg_m2))
-    give("displaced_volume_m3", s**3 * _number(like.displaced_volume_m3))
+    give("displaced_volume_m3", s**3 * float(_array(like.displaced_volume_m3)))
     give("p_BG_m", s * _array(like.p_BG_m))
     centre = _array(given.get("p_BG_m", draft.p_BG_m))
     give("p_BB_m", centre + s * (_array(like.p_BB_m) - _array(like.p_BG_m)))
@@ -199,10 +199,6 @@ def completed(draft: VehicleDraft, like: VehicleDraft) -> VehicleDraft:
     )
 
 
-def _number(value: float | None) -> float:
-    return float(_array(value))
-
-
 def _array(value: Any) -> Array:
     if value is None:
         raise InputError("vehicle: is not whole")
@@ -220,12 +216,11 @@ def _thrusters(draft: VehicleDraft, like: VehicleDraft, s: float) -> tuple[Thrus
         if draft.shipped_matrix is not None:
             return ()
         return tuple(replace(t, p_BT_m=s * t.p_BT_m) for t in like.thrusters)
-    usual = {field: float(np.median([_number(getattr(t, field)) for t in like.thrusters])) for field in THRUSTER_FIELDS}
-    return tuple(_filled(t, usual) for t in draft.thrusters)
-
-
-def _filled(thruster: ThrusterDraft, usual: dict[str, Any]) -> ThrusterDraft:
-    return replace(thruster, **{field: value for field, value in usual.items() if getattr(thruster, field) is None})
+    usual: dict[str, Any] = {
+        field: float(np.median([_array(getattr(t, field)) for t in like.thrusters])) for field in THRUSTER_FIELDS
+    }
+    lacking = [{field: usual[field] for field in usual if getattr(t, field) is None} for t in draft.thrusters]
+    return tuple(replace(t, **values) for t, values in zip(draft.thrusters, lacking, strict=True))
 
 
 def _provenance(draft: VehicleDraft, asked: list[str], words: str) -> tuple[Provenance, ...]:

@@ -11,7 +11,7 @@ from wakewise.core.checks import instance_of
 from wakewise.core.errors import InputError
 
 NOMINAL, RANDOM = "nominal", "random"
-"""What a true vehicle's drag is called besides its cases by name: the believed set, and one of all, drawn."""
+"""What a true vehicle's drag is called besides its cases by name: the controller's set, and one of all, drawn."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

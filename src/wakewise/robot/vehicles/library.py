@@ -107,7 +107,7 @@ def parse_vehicle(text: str, where: str, name: str) -> VehicleDraft:
 
 
 def _lacks(tree: dict[str, Any], told: str) -> str:
-    """What a flight needs beside what was told, of a file that cannot be read as it is."""
+    """What a flight needs beside what was given, of a file that cannot be read as it is."""
     layout = tree.get("thruster_layout")
     mounts = layout.get("mounts") if isinstance(layout, dict) else None
     own = {key for mount in mounts if isinstance(mount, dict) for key in mount} if isinstance(mounts, list) else set()
@@ -142,7 +142,7 @@ def _on_its_base(value: dict[str, Any], where: str) -> dict[str, Any]:
 def draft_yaml(draft: VehicleDraft, blanks: Mapping[str, Sequence[str]] | None = None) -> str:
     """Write a draft as the text of a vehicle file that `load_draft` reads back as the same draft.
 
-    What the draft does not know is left out. A group's source is the draft's own where no provenance names the group.
+    What the draft lacks is left out. A group's source is the draft's own where no provenance names the group.
 
     `blanks`: comments to write in each group, or in place of one that is not there (see
     `wakewise.robot.vehicles.completion`).
@@ -172,7 +172,7 @@ def _text(value: dict[str, Any]) -> str:
 
 
 def groups_of(draft: VehicleDraft) -> dict[str, dict[str, Any]]:
-    """Fields of a vehicle file by group, as plain values in its units; None of what the draft does not know."""
+    """Fields of a vehicle file by group, as plain values in its units; None for what the draft lacks."""
     matrix, linear, quadratic = draft.added_mass, draft.linear_damping, draft.quadratic_damping
     inertia, shipped, curve, camera = draft.inertia_kg_m2, draft.shipped_matrix, draft.curve, draft.X_BC
     least, joint = draft.least_thrust, draft.tilt

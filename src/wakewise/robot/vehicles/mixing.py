@@ -1,4 +1,4 @@
-"""Matrices and mixers that somebody stated, held against the allocation matrix that the geometry gives."""
+"""Stated matrices and mixers, compared with the allocation matrix that the geometry gives."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ ROUNDING = 1e-3
 """Entries that differ by less than this, relative to the largest of their row, agree."""
 
 _PARASITIC = 1e-3
-"""Share of a command from which a side effect is told."""
+"""Share of a command from which a side effect is reported."""
 
 FLU = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """Signs that turn the rows of a matrix between x forward, y left, z up and x forward, y right, z down."""

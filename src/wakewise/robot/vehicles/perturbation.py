@@ -1,6 +1,6 @@
-"""A plant's own parameters: near those that the controller believes, but not the same.
+"""A plant's own parameters: near those of the controller's model, but not the same.
 
-Drag as one source has it: a vehicle believes one set of damping, its true drag may be another.
+Drag as one source has it: the controller's model has one set of damping, the true drag may be another.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def with_drag(vehicle: Vehicle, case: str, rng: np.random.Generator | None = Non
 
 
 def with_each_drag(vehicle: Vehicle) -> tuple[Vehicle, ...]:
-    """The vehicle with each set of drag that it may have, the believed one first."""
+    """The vehicle with each set of drag that it may have, that of the controller's model first."""
     return tuple(with_drag(vehicle, case) for case in possible_drags(vehicle, RANDOM))
 
 

@@ -50,11 +50,11 @@ class TiltJoint:
             freeze(self, p_BJ_m=(3,))
 
     def within(self, tilt_rad: float) -> float:
-        """The angle nearest to a wished one between the stops."""
+        """The angle nearest to a commanded one between the stops."""
         return min(max(tilt_rad, self.low_rad), self.high_rad)
 
     def towards(self, tilt_rad: float, wished_rad: float, dt_s: float) -> float:
-        """The angle after a time at the joint's rate towards a wished angle or its stop."""
+        """The angle after a time at the joint's rate towards a commanded angle or its stop."""
         way = self.within(wished_rad) - tilt_rad
         return tilt_rad + math.copysign(min(abs(way), self.rate_rad_s * dt_s), way)
 

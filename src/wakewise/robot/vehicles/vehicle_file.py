@@ -44,7 +44,7 @@ class ParameterGroup(Settings):
     """Any group of numbers: where they come from, and whether they are an estimate."""
 
     source: Text = Field(description="where the numbers come from")
-    estimate: bool = Field(default=False, description="true if nobody published or measured these numbers")
+    estimate: bool = Field(default=False, description="true if these numbers were neither published nor measured")
 
 
 class BodyGroup(ParameterGroup):

@@ -89,15 +89,15 @@ class CockpitSession:
         self.flights = 0
         self.fault: BaseException | None = None
         self._camera = LiveCamera(self._parts.scenario, self._parts.given.get("target")) if pictures else None
-        self._live: LiveFlight | None = None
+        self.live: LiveFlight | None = None
         self._pilot: AssistedPilot | None = None
         self._gauges: WakeReadout | None = None
-        self._lookout: SnapshotRecorder | None = None
+        self.lookout: SnapshotRecorder | None = None
         self._instruments: StateEncoder | None = None
         self._guide: LiveCoverage | None = None
         self._described: dict[str, Any] = {}
-        self._preparing: str | None = "making the parts of the flight"
-        self._edition = 0
+        self.preparing: str | None = "making the parts of the flight"
+        self.edition = 0
         self._notes: deque[StatusMessage] = deque(maxlen=_MOST_NOTES)
         self._photos, self._pictures = 0, 0
         self._silt_shown: object = None
@@ -125,11 +125,6 @@ class CockpitSession:
             self._scene = None
 
     @property
-    def preparing(self) -> str | None:
-        """What is being prepared; None while a flight is on."""
-        return self._preparing
-
-    @property
     def running(self) -> bool:
         """Whether the session goes on, with a flight or between two."""
         return self._thread.is_alive()
@@ -137,22 +132,7 @@ class CockpitSession:
     @property
     def flying(self) -> bool:
         """Whether the vehicle flies."""
-        return self._preparing is None
-
-    @property
-    def live(self) -> LiveFlight | None:
-        """The flight that is on, or the last one."""
-        return self._live
-
-    @property
-    def lookout(self) -> SnapshotRecorder | None:
-        """What that flight's thread takes down."""
-        return self._lookout
-
-    @property
-    def edition(self) -> int:
-        """Grows when `welcome` has something new to say."""
-        return self._edition
+        return self.preparing is None
 
     def welcome(self) -> dict[str, Any]:
         """What a client needs once; vehicle and target are empty while they are being made."""
@@ -164,11 +144,11 @@ class CockpitSession:
         ranges = {name: list(ends) for name, ends in RANGES.items()} | {"mode": list(MODES), "method": list(WAYS)}
         told = nothing | self._described
         url = None if self._scene is None else self._scene.url
-        return told | {"desk": self._desk() | {"ranges": ranges}, "scene_url": url, "preparing": self._preparing}
+        return told | {"desk": self._desk() | {"ranges": ranges}, "scene_url": url, "preparing": self.preparing}
 
     def state(self) -> dict[str, Any] | None:
         """How the flight stands; None before the first step."""
-        lookout, instruments, live, pilot = self._lookout, self._instruments, self._live, self._pilot
+        lookout, instruments, live, pilot = self.lookout, self._instruments, self.live, self._pilot
         if lookout is None or instruments is None or live is None or pilot is None or not self.flying:
             return None
         lookout.look()
@@ -203,7 +183,7 @@ class CockpitSession:
 
     def picture(self) -> CameraPicture | None:
         """What the camera sees now."""
-        now = self._lookout.now if self._lookout is not None else None
+        now = self.lookout.now if self.lookout is not None else None
         if now is None or self._camera is None:
             return None
         silt = now.silt if now.silt is not self._silt_shown else None
@@ -274,7 +254,7 @@ class CockpitSession:
             self._say_preparing("looking for views of the target")
             self._guide = LiveCoverage(parts)
         live = LiveFlight(flown, folder=self._free_folder(), paced=self._paced, watch=lookout)
-        self._pilot, self._lookout, self._live = pilot, lookout, live
+        self._pilot, self.lookout, self.live = pilot, lookout, live
         self._instruments = StateEncoder(self._gauges, lookout)
         return live
 
@@ -300,11 +280,11 @@ class CockpitSession:
         if self._scene_wanted and self._scene is None and self._gauges is not None:
             self._scene = open_scene(live.parts.vehicle, self._gauges.points_W_m)
             self._scene_wanted = self._scene is not None
-            self._edition += 1
+            self.edition += 1
 
     def _show_scene(self) -> None:
         """Bring the scene up to date now and then, while somebody looks at the page."""
-        lookout, instruments, now_s = self._lookout, self._instruments, time.monotonic()
+        lookout, instruments, now_s = self.lookout, self._instruments, time.monotonic()
         if self._scene is None or lookout is None or instruments is None or lookout.now is None:
             return
         if now_s < self._shown_s + SCENE_EVERY_S or not lookout.looked_at:
@@ -353,13 +333,13 @@ class CockpitSession:
         self._over.set()
 
     def _say(self, text: str, level: str = "info", time_s: float | None = None) -> None:
-        at_s = self._live.time_s if time_s is None and self._live is not None else time_s
+        at_s = self.live.time_s if time_s is None and self.live is not None else time_s
         self._notes.append(StatusMessage(text=text, level=level, time_s=at_s or 0.0))
 
     def _say_preparing(self, what: str | None) -> None:
-        if what != self._preparing:
-            self._preparing = what
-            self._edition += 1
+        if what != self.preparing:
+            self.preparing = what
+            self.edition += 1
 
     def _desk(self) -> dict[str, Any]:
         state = self.desk.state

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import cv2
 from markupsafe import Markup, escape
 
 from wakewise.core.errors import InputError
@@ -14,7 +13,7 @@ from wakewise.core.files import write_text
 from wakewise.experiments.trials.metrics import BETTER
 from wakewise.ui.reports import figures
 from wakewise.ui.reports.errors import ModelErrors, model_errors
-from wakewise.ui.reports.media import coloured_model, embed
+from wakewise.ui.reports.media import coloured_model, embed, jpeg_uri
 from wakewise.ui.reports.page import (
     collapsible_section,
     error_scale,
@@ -29,7 +28,7 @@ from wakewise.ui.reports.page import (
     template,
 )
 from wakewise.ui.reports.references import limits_section
-from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, data_uri, error_colours
+from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, error_colours
 from wakewise.ui.reports.text import grouped, number, shown, unit, verdict
 from wakewise.ui.reports.trial import Trial, read_trial
 from wakewise.ui.reports.views import SIDES, ViewBounds, coverage_colours, draw_cloud, draw_surface
@@ -225,18 +224,15 @@ def _water(trials: Mapping[str, Trial]) -> str:
 
 
 def _rows(picture: Path | None) -> str:
-    if picture is None:
-        return ""
-    image = read_picture(picture)
+    image = None if picture is None else read_picture(picture)
     if image is None:
         return ""
-    jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 86])[1]
     caption = "each method at three times, by the camera and from outside"
     return section(
         "rows",
         "At the same times",
         "Each method at the same times after its first photograph: what its camera saw, and the vehicle and its wash.",
-        parts().photo(data_uri(jpeg.tobytes(), "image/jpeg"), caption, caption),
+        parts().photo(jpeg_uri(image, 86), caption, caption),
     )
 
 

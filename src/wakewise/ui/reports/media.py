@@ -110,16 +110,29 @@ def _pair(shot: Photograph, before: NDArray[np.uint8], after: NDArray[np.uint8])
     figures = []
     for picture, kind in ((before, "as taken"), (after, "water undone")):
         caption = f"{shot.name}, {shot.time_s:.1f} s, {kind}"
-        figures.append(parts().captioned(parts().photo(_embedded(picture), caption, caption), caption))
+        source = jpeg_uri(np.ascontiguousarray(shrunk(picture, WIDTH)[..., ::-1]), 84)
+        figures.append(parts().captioned(parts().photo(source, caption, caption), caption))
     return str(parts().columns(figures, True))
 
 
-def _embedded(picture: NDArray[np.uint8]) -> str:
-    if picture.shape[1] > WIDTH:
-        height = max(1, round(WIDTH * picture.shape[0] / picture.shape[1]))
-        picture = np.asarray(cv2.resize(picture, (WIDTH, height), interpolation=cv2.INTER_AREA), np.uint8)
-    jpeg = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, 84])[1]
-    return data_uri(jpeg.tobytes(), "image/jpeg")
+def shrunk(image: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:
+    """The image, at most `width` pixels wide."""
+    if image.shape[1] <= width:
+        return image
+    height = max(1, round(width * image.shape[0] / image.shape[1]))
+    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def jpeg_uri(image: NDArray[np.uint8], quality: int) -> str:
+    """JPEG data URI of a BGR image."""
+    options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_OPTIMIZE, 1]
+    return data_uri(cv2.imencode(".jpg", image, options)[1].tobytes(), "image/jpeg")
+
+
+def thumbnail(path: Path, width: int = 128) -> NDArray[np.uint8] | None:
+    """A small RGB picture of a photograph as it lies in the file; None if that is no image."""
+    image = read_picture(path, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    return None if image is None else np.ascontiguousarray(shrunk(image, width)[..., ::-1])
 
 
 def _read(path: Path) -> NDArray[np.uint8] | None:
@@ -153,24 +166,14 @@ def extremes(photographs: tuple[Photograph, ...]) -> Extremes:
 
 def embed(shot: Photograph, width: int) -> str | None:
     """JPEG data URI of a photograph, at most `width` pixels wide; None if the file is missing or no image."""
-    if not shot.path.is_file():
-        return None
-    image = read_picture(shot.path)
-    if image is None:
-        return None
-    if image.shape[1] > width:
-        height = max(1, round(width * image.shape[0] / image.shape[1]))
-        image = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-    jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY, cv2.IMWRITE_JPEG_OPTIMIZE, 1])[1]
-    return data_uri(jpeg.tobytes(), "image/jpeg")
+    image = read_picture(shot.path) if shot.path.is_file() else None
+    return None if image is None else jpeg_uri(shrunk(image, width), QUALITY)
 
 
 def embedded_width(count: int) -> int:
     """Width at which this many photographs fit the page."""
-    for width in WIDTHS:
-        if count * width * width * 0.75 * BYTES_PER_PIXEL <= BUDGET_BYTES:
-            return width
-    return WIDTHS[-1]
+    fitting = (width for width in WIDTHS if count * width * width * 0.75 * BYTES_PER_PIXEL <= BUDGET_BYTES)
+    return next(fitting, WIDTHS[-1])
 
 
 def contact_sheet(trial: Trial, leg_of: dict[int, str]) -> str:

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
-import cv2
 import numpy as np
 import trimesh
 import viser
@@ -24,12 +23,11 @@ from wakewise.core.geometry import Pose, quat_multiply
 from wakewise.robot.importers import any_vehicle
 from wakewise.robot.vehicles import Vehicle
 from wakewise.ui.reports.errors import ModelErrors
-from wakewise.ui.reports.media import coloured_model
+from wakewise.ui.reports.media import coloured_model, thumbnail
 from wakewise.ui.reports.svg_style import error_colours
-from wakewise.ui.reports.trial import Photograph, Trial, TrialMesh
+from wakewise.ui.reports.trial import Trial, TrialMesh
 from wakewise.ui.reports.vehicle.hull import hull_of
 from wakewise.ui.reports.views import OUTLOOK
-from wakewise.vision.image_decoding import read_picture
 
 # NED to ENU: swap x and y, turn z round; a half turn about the line between x and y.
 R_UW = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -59,24 +57,72 @@ def scene_html(trial: Trial, errors: ModelErrors | None) -> str | None:
     path = path if np.isfinite(path).any() else trial.positions("est")
     if len(path) == 0 and not trial.photographs and trial.truth is None:
         return None
-    # viser greets on standard output, which belongs to the command line's own answer.
+    with scene_server((0.0, 0.0, 1.0)) as server:
+        _aim(server, trial)
+        _bed(server, trial)
+        _target(server, trial, errors)
+        _cameras(server, trial)
+        return _fly(server, trial, path)
+
+
+@contextlib.contextmanager
+def scene_server(up: Sequence[float]) -> Iterator[viser.ViserServer]:
+    """A viser server without a port, with light and the direction that is up; silent, and stopped after the block."""
+    # viser prints to standard output, which belongs to the output of the command.
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
         with without_server():
             server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
-            scene = server.scene
-            scene.set_up_direction("+z")
-            # Environment maps would be fetched from the network.
-            scene.configure_environment_map(None)
-            scene.add_light_ambient("/light", intensity=1.3)
-            _aim(server, trial)
-            _bed(server, trial)
-            _target(server, trial, errors)
-            _cameras(server, trial)
-            html = _fly(server, trial, path)
+            server.scene.set_up_direction((up[0], up[1], up[2]))
+            server.scene.configure_environment_map(None)  # it would be fetched from the network
+            server.scene.add_light_ambient("/light", intensity=1.3)
+            yield server
         finally:
             server.stop()
-    return html
+
+
+def aim_camera(server: viser.ViserServer, centre: Array, position: Array, up: Sequence[float], near: float) -> None:
+    """Set the view with which the scene opens: the point looked at, the camera's place, and what is nearest."""
+    camera = server.initial_camera
+    camera.look_at, camera.position, camera.up = tuple(centre.tolist()), tuple(position.tolist()), tuple(up)
+    camera.fov, camera.near = FOV_RAD, near
+
+
+def matt_mesh(
+    vertices: Array, faces: IntArray, rgba: Array, roughness: float = 0.9, normals: Array | None = None
+) -> trimesh.Trimesh:
+    """A mesh with a colour per vertex, uint8, shape (n, 4).
+
+    Without a material of its own, glTF takes a mesh for bare metal, which is black without an environment map.
+    """
+    mesh = trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False)
+    material = trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=roughness)
+    mesh.visual = trimesh.visual.TextureVisuals(material=material)
+    mesh.visual.vertex_attributes["color"] = rgba
+    return mesh
+
+
+def add_points(
+    server: viser.ViserServer,
+    name: str,
+    points: Array,
+    colours: Array | tuple[int, int, int],
+    size: float,
+    visible: bool,
+    shape: Literal["circle", "diamond", "square"] = "circle",
+    most: int = MAX_POINTS,
+) -> None:
+    """Add at most `most` of the points, shape (n, 3), in colours from 0 to 1, shape (n, 3), or in one RGB."""
+    step = max(1, -(-len(points) // most))
+    server.scene.add_point_cloud(
+        name,
+        points=points[::step].astype(np.float32),
+        colors=colours if isinstance(colours, tuple) else as_bytes(colours[::step]),
+        point_size=size,
+        point_shape=shape,
+        precision="float32",
+        visible=visible,
+    )
 
 
 @contextlib.contextmanager
@@ -107,11 +153,7 @@ def _aim(server: viser.ViserServer, trial: Trial) -> None:
     low, high = np.quantile(points, (0.002, 0.998), axis=0) if len(points) else (np.zeros(3), np.ones(3))
     centre, reach = 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 0.02)
     distance = FILL * reach / np.sin(0.5 * FOV_RAD)
-    server.initial_camera.look_at = tuple(centre)
-    server.initial_camera.position = tuple(centre + distance * (R_UW @ OUTLOOK.axes[2]))
-    server.initial_camera.up = (0.0, 0.0, 1.0)
-    server.initial_camera.fov = FOV_RAD
-    server.initial_camera.near = 0.005
+    aim_camera(server, centre, centre + distance * (R_UW @ OUTLOOK.axes[2]), (0.0, 0.0, 1.0), near=0.005)
 
 
 def _bed(server: viser.ViserServer, trial: Trial) -> None:
@@ -130,39 +172,20 @@ def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None)
     found = coloured_model(trial)
     if errors is not None and errors.model is not None and errors.model_accuracy_m is not None:
         model, chosen = decimated(errors.model)
-        mesh = trimesh.Trimesh(upright(model.vertices_m, trial.bed_z_m), model.faces, process=False)
-        # Without a material of its own, glTF takes a mesh for bare metal, which is black without an environment map.
-        matt = trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)
-        mesh.visual = trimesh.visual.TextureVisuals(material=matt)
-        mesh.visual.vertex_attributes["color"] = _linear(error_colours(errors.model_accuracy_m[chosen]))
+        rgba = _linear(error_colours(errors.model_accuracy_m[chosen]))
+        mesh = matt_mesh(upright(model.vertices_m, trial.bed_z_m), model.faces, rgba)
         scene.add_mesh_trimesh("/model by error", mesh, visible=found is None)
     if found is not None:
         whole, colours = found
         model, chosen = decimated(whole)
-        mesh = trimesh.Trimesh(upright(model.vertices_m, trial.bed_z_m), model.faces, process=False)
-        mesh.visual = trimesh.visual.TextureVisuals(
-            material=trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)
-        )
-        mesh.visual.vertex_attributes["color"] = _linear(colours[chosen])
+        mesh = matt_mesh(upright(model.vertices_m, trial.bed_z_m), model.faces, _linear(colours[chosen]))
         scene.add_mesh_trimesh("/model in colour", mesh)
     if errors is not None:
-        step = max(1, -(-len(errors.points_m) // MAX_POINTS))
-        scene.add_point_cloud(
-            "/model points by error",
-            points=upright(errors.points_m[::step], trial.bed_z_m).astype(np.float32),
-            colors=_bytes(error_colours(errors.accuracy_m[::step])),
-            point_size=0.0011,
-            point_shape="circle",
-            precision="float32",
-            visible=errors.model is None and found is None,
-        )
+        points, shown = upright(errors.points_m, trial.bed_z_m), errors.model is None and found is None
+        add_points(server, "/model points by error", points, error_colours(errors.accuracy_m), 0.0011, shown)
     elif trial.cloud_m is not None:
-        step = max(1, -(-len(trial.cloud_m) // MAX_POINTS))
-        points = upright(trial.cloud_m[::step], trial.bed_z_m).astype(np.float32)
-        scene.add_point_cloud(
-            "/model points", points=points, colors=TRUTH_RGB, point_size=0.0015, precision="float32",
-            visible=found is None,
-        )  # fmt: skip
+        points = upright(trial.cloud_m, trial.bed_z_m)
+        add_points(server, "/model points", points, TRUTH_RGB, 0.0015, found is None, "square")
     if trial.truth is not None:
         truth, _ = decimated(trial.truth)
         scene.add_mesh_simple(
@@ -208,19 +231,12 @@ def _cameras(server: viser.ViserServer, trial: Trial) -> None:
             continue
         scene.add_camera_frustum(
             f"/photographs/{i + 1:03d}", fov=fov_rad, aspect=aspect, scale=FRUSTUM_M, thickness=0.0016,
-            color=CAMERA_RGB, image=_thumbnail(shot), format="jpeg", jpeg_quality=70, cast_shadow=False,
+            color=CAMERA_RGB, image=thumbnail(shot.path), format="jpeg", jpeg_quality=70, cast_shadow=False,
             receive_shadow=False, wxyz=quat_multiply(Q_UW, pose.q), position=upright(pose.p_m, trial.bed_z_m),
         )  # fmt: skip
     if trial.planned:
-        scene.add_point_cloud(
-            "/planned viewpoints",
-            points=upright(np.array([pose.p_m for pose in trial.planned]), trial.bed_z_m).astype(np.float32),
-            colors=PLANNED_RGB,
-            point_size=0.008,
-            point_shape="diamond",
-            precision="float32",
-            visible=False,
-        )
+        points = upright(np.array([pose.p_m for pose in trial.planned]), trial.bed_z_m)
+        add_points(server, "/planned viewpoints", points, PLANNED_RGB, 0.008, False, "diamond")
 
 
 def _lens(trial: Trial) -> tuple[float, float]:
@@ -230,15 +246,6 @@ def _lens(trial: Trial) -> tuple[float, float]:
     imaging = trial.settings.imaging
     aspect = imaging.width / imaging.height
     return aspect, float(2 * np.arctan(np.tan(np.radians(imaging.fov_deg) / 2) / aspect))
-
-
-def _thumbnail(shot: Photograph, width: int = 128) -> Array | None:
-    image = read_picture(shot.path)
-    if image is None:
-        return None
-    height = max(1, round(width * image.shape[0] / image.shape[1]))
-    small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-    return np.ascontiguousarray(small[..., ::-1])
 
 
 def _fly(server: viser.ViserServer, trial: Trial, path: Array) -> str:
@@ -293,25 +300,23 @@ def _hull(server: viser.ViserServer, vehicle: Vehicle | None) -> None:
         return
     hull = hull_of(vehicle)
     # Each face has corners of its own, so that edges stay edges and colours do not run.
-    mesh = trimesh.Trimesh(
-        hull.vertices_B_m[hull.faces].reshape(-1, 3),
-        np.arange(3 * len(hull.faces)).reshape(-1, 3),
-        vertex_normals=hull.normals.reshape(-1, 3),
-        process=False,
-    )
-    mesh.visual = trimesh.visual.TextureVisuals(
-        material=trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.7)
-    )
-    colours = np.concatenate([np.repeat(hull.colours, 3, axis=0), np.ones((len(mesh.vertices), 1))], axis=1)
-    mesh.visual.vertex_attributes["color"] = _bytes(colours)
-    server.scene.add_mesh_trimesh("/vehicle/hull", mesh)
+    corners = hull.vertices_B_m[hull.faces].reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    rgba = opaque(np.repeat(hull.colours, 3, axis=0))
+    server.scene.add_mesh_trimesh("/vehicle/hull", matt_mesh(corners, faces, rgba, 0.7, hull.normals.reshape(-1, 3)))
 
 
 def _linear(colours: Array) -> Array:
     """Opaque glTF vertex colours, uint8, shape (n, 4): linear light, while colours on screen follow IEC 61966-2-1."""
     linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
-    return _bytes(np.concatenate([linear, np.ones((len(linear), 1))], axis=1))
+    return opaque(linear)
 
 
-def _bytes(colours: Array) -> Array:
+def opaque(colours: Array) -> Array:
+    """Opaque RGBA, uint8, shape (n, 4), of colours from 0 to 1, shape (n, 3)."""
+    return as_bytes(np.concatenate([colours, np.ones((len(colours), 1))], axis=1))
+
+
+def as_bytes(colours: Array) -> Array:
+    """Colours from 0 to 1 as uint8."""
     return np.round(255 * colours).astype(np.uint8)

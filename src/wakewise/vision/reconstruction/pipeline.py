@@ -289,7 +289,7 @@ class Model:
             why |= {
                 key: "the cameras are as they were given" for key in why if key.startswith(("cameras_", "reference_"))
             }
-            why |= {key: "the cameras that were given were not doubted" for key in why if key == "second_opinion_pct"}
+            why |= {key: "given cameras are not questioned" for key in why if key == "second_opinion_pct"}
         return figures | {"why": why}
 
 
@@ -446,7 +446,7 @@ def _run_stages(job: _Inputs, out: Path, progress: Progress) -> dict[str, StageR
 def _poses(
     settings: ReconstructionSettings, positions: dict[str, Array] | None, rotations: dict[str, Array] | None
 ) -> Poses | None:
-    """Poses to match and map from: of the photos whose place and turn are both known; None if they are not wanted."""
+    """Poses to match and map from: of the photos whose place and turn are both known; None if not to be used."""
     if settings.mapper != "poses" or settings.position_priors:
         return None
     if positions is None or rotations is None:

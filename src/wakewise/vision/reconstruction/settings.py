@@ -53,8 +53,8 @@ class ReconstructionSettings(Settings):
     )
     check_shared_intrinsics: bool = Field(
         default=True,
-        description="map once more with a lens for each photo, which tells photos of several lenses that nobody told "
-        "of, and parts them; not of a flight's photographs, which one camera took",
+        description="map once more with a lens for each photo, which finds photos of several lenses that were not "
+        "declared, and parts them; not of a flight's photographs, which one camera took",
     )
     position_priors: bool = Field(
         default=False, description="let known camera positions pull at the model, instead of only placing it"

@@ -34,7 +34,8 @@ from wakewise.experiments.campaigns.flights import FlightProbe
 from wakewise.experiments.campaigns.study import Key, Row, flight_trial
 from wakewise.operation import Parts
 from wakewise.operation.loop import Step
-from wakewise.operation.worlds.quasi_steady_world import QuasiSteadyWorld, paper_jets
+from wakewise.operation.worlds.quasi_steady_world import QuasiSteadyWater, paper_jets
+from wakewise.operation.worlds.vehicle_in_water import RepeatableWorld
 from wakewise.robot.vehicles import load_vehicle, perturbed
 from wakewise.scene.missions import open_route
 from wakewise.wake import InfluenceModel, WakeSettings, disturbance, wake_model
@@ -192,13 +193,10 @@ def paper_course(parts: Parts, course: str) -> Parts:
         start=start,
         pilot=ScriptedOperator(asked, watch, here, 1.0 / control.rate_hz),
         controller=ControllerProbe(method),
-        world=QuasiSteadyWorld(
+        world=RepeatableWorld(
             name="paper",
-            jets=paper_jets(),
             vehicle=true,
-            target=target,
-            settings=tank,
-            start=start,
+            make=lambda vehicle, rng: QuasiSteadyWater(paper_jets(), vehicle, target, tank, start, rng),
             draw=lambda: np.random.default_rng([seed, 13]).spawn(2)[1],
         ),
     )

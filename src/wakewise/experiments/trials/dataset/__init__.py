@@ -1,4 +1,4 @@
-"""Data sets of trials: what a crew could know and what is true, apart, with metadata, check sums and a data sheet.
+"""Data sets of trials: what is known in the field and what is true, apart, with metadata, check sums and a data sheet.
 
 - `build.py`: a folder of trials becomes a data set, and goes on where it was cut off; the data sheet from `sheet.md`.
 - `part.py`: which folders are trials, one trial's share of a data set, which columns are known and what each means.

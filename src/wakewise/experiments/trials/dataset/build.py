@@ -169,7 +169,9 @@ def build_dataset(
             name, why = next(iter(left_out.items()))
             raise InputError(f"{folder}: none of {len(left_out)} trials can be taken; {name}: {why}")
         columns_of(parts)  # refuses before anything is moved
-        _forget_others(growing, {part.trial for part in parts})
+        for path in (growing / _PARTS).iterdir():
+            if path.name not in {part.trial for part in parts}:  # an attempt before took it
+                shutil.rmtree(path)
         sizes = _finish(growing, parts, left_out, words)
     if out.exists():
         out.rmdir()
@@ -203,17 +205,10 @@ def _gather(
     return parts, left_out, made
 
 
-def _forget_others(growing: Path, names: set[str]) -> None:
-    """Remove parts of trials that an attempt before took and this one does not."""
-    for path in (growing / _PARTS).iterdir():
-        if path.name not in names:
-            shutil.rmtree(path)
-
-
 def _finish(
     growing: Path, parts: Sequence[TrialPart], left_out: dict[str, str], words: DatasetStatement
 ) -> dict[str, int]:
-    """Lay everything out anew from the parts, and write what tells of all of them; returns sizes by path."""
+    """Lay everything out anew from the parts, and write what describes all of them; returns sizes by path."""
     for path in growing.iterdir():
         if path.name in (_PARTS, LOCK):
             continue

@@ -3,7 +3,7 @@
 `croissant.json` beside this module is the template: context, files, sets of files and tables. Filled in are what the
 statement says, sizes and check sums, and the columns that the tables have; what a data set does not hold is left out.
 Terms are those of https://docs.mlcommons.org/croissant/docs/croissant-spec.html. Parquet has the media type that
-readers of Croissant 1.0 know.
+readers of Croissant 1.0 accept.
 """
 
 from __future__ import annotations

@@ -181,7 +181,7 @@ def _name(text: str) -> str:
 class TrialSettings:
     """A scenario as a tree and as text; nothing where a trial has none.
 
-    Names of folders are taken out of the text: they tell of somebody's computer and lead nowhere else.
+    Names of folders are taken out of the text: they are private and exist on one computer only.
     """
 
     tree: Mapping[str, Any] = field(default_factory=dict)
@@ -268,7 +268,7 @@ class TrialPart:
     """What was taken of a trial.
 
     `sums` are check sums by path in the data set, `sizes` their bytes; `columns` the names and types of each table's
-    columns; `facts` what the sheet tells, `figures` what the trial measured; `lacks` what it did not have.
+    columns; `facts` what the sheet states, `figures` what the trial measured; `lacks` what it did not have.
     """
 
     trial: str

@@ -67,7 +67,7 @@ def read_words(
     Raises InputError if a word is missing or is none.
     """
     if not licence:
-        raise InputError(f"--license: missing; nobody may use data without one: {', '.join(LICENCES)}, or an address")
+        raise InputError(f"--license: missing; data without one may not be used: {', '.join(LICENCES)}, or an address")
     known = {word.lower().replace(" ", "-"): word for word in LICENCES}
     spdx = known.get(licence.strip().lower().replace(" ", "-"))
     if spdx is None and not _ADDRESS.match(licence):

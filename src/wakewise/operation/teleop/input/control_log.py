@@ -21,7 +21,7 @@ import polars as pl
 
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.operation.teleop.input.controls import CONTROL_AXES, Controls
+from wakewise.operation.teleop.input.controls import CONTROL_AXES, Controls, TimedControls
 
 TRACE_FILE = "controls.parquet"
 """What a flight by hand leaves in its folder."""
@@ -77,15 +77,15 @@ class ControlLogWriter:
                 self.frame().write_parquet(temporary)
 
 
-class ControlLog:
+class ControlLog(TimedControls):
     """A `ControlSource` that reads off a record; after its end nobody is there.
 
     Raises InputError if the table lacks a column, times do not increase, or a row is nonsense; the row is named.
     """
 
     def __init__(self, frame: pl.DataFrame, what: str = "trace") -> None:
-        self._times_s, self._rows, self._desks = _checked(frame, what)
-        self._next, self._until_s = 0, -1.0
+        times_s, rows, self._desks = _checked(frame, what)
+        super().__init__(times_s, rows, before=None)
 
     @property
     def end_s(self) -> float:
@@ -93,18 +93,9 @@ class ControlLog:
         return float(self._times_s[-1])
 
     def read(self, time_s: float) -> Controls | None:
-        """What the hands did at `time_s`; a time before the last one begins afresh."""
-        if time_s < self._until_s:
-            self._next = 0
-        self._until_s, pressed = time_s, list[str]()
-        while self._next < len(self._rows) and self._times_s[self._next] <= time_s + 1e-9:
-            held = self._rows[self._next]
-            pressed += () if held is None else held.pressed
-            self._next += 1
-        if self._next == 0 or time_s > self.end_s + 1e-9:
-            return None
-        held = self._rows[self._next - 1]
-        return None if held is None else Controls(axes=held.axes, pressed=tuple(pressed))
+        """The entry at `time_s`; None before the first and after the end."""
+        held = super().read(time_s)
+        return None if time_s > self.end_s + 1e-9 else held
 
     def desk_at(self, time_s: float) -> Mapping[str, Any] | None:
         """What was set at `time_s`; None where the record does not say."""

@@ -8,7 +8,7 @@ comes of it that of `wakewise.operation`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -62,6 +62,31 @@ class ControlSource(Protocol):
     def read(self, time_s: float) -> Controls | None:
         """Read them at `time_s` of the flight, at most once a control step; None: nobody is there, so stop and hold."""
         ...
+
+
+class TimedControls:
+    """A `ControlSource` of entries in the order of time; each holds until the next, `before` until the first.
+
+    `times_s` increases. A button is pressed once. A time before that of the last call starts again.
+    """
+
+    def __init__(
+        self, times_s: Sequence[float] | Array, entries: Sequence[Controls | None], before: Controls | None
+    ) -> None:
+        self._times_s, self._entries, self._before = times_s, entries, before
+        self._next, self._until_s = 0, -1.0
+
+    def read(self, time_s: float) -> Controls | None:
+        """The entry at `time_s`, with the buttons pressed since the last call."""
+        if time_s < self._until_s:
+            self._next = 0
+        self._until_s, pressed = time_s, list[str]()
+        while self._next < len(self._entries) and self._times_s[self._next] <= time_s + 1e-9:
+            entry = self._entries[self._next]
+            pressed += () if entry is None else entry.pressed
+            self._next += 1
+        held = self._before if self._next == 0 else self._entries[self._next - 1]
+        return None if held is None else Controls(axes=held.axes, pressed=tuple(pressed))
 
 
 def apply_dead_zone(raw: Iterable[float], dead_zone: float = 0.05) -> Array:

@@ -13,7 +13,8 @@ Hands from a file, by its ending: a script in YAML, or the record of a flight as
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import yaml_file
-from wakewise.operation.teleop.input.controls import CENTRED, CONTROL_AXES, Controls, ControlSource
+from wakewise.operation.teleop.input.controls import CENTRED, CONTROL_AXES, Controls, ControlSource, TimedControls
 
 LONGEST = 100_000
 """Most entries of a script."""
@@ -36,33 +37,18 @@ class ScriptEntry:
     controls: Controls | None
 
 
-@dataclass(eq=False)
-class ScriptedInput:
-    """A `ControlSource` that reads off moments in order; before the first the sticks are centred.
+class ScriptedInput(TimedControls):
+    """A `ControlSource` that reads the entries of a script; before the first the sticks are centred.
 
     Raises InputError if the times do not increase.
     """
 
-    moments: tuple[ScriptEntry, ...]
-    _read: int = field(default=0, init=False)
-    _until_s: float = field(default=-1.0, init=False)
-
-    def __post_init__(self) -> None:
-        for number, (one, other) in enumerate(zip(self.moments, self.moments[1:], strict=False), 2):
+    def __init__(self, moments: tuple[ScriptEntry, ...]) -> None:
+        for number, (one, other) in enumerate(pairwise(moments), 2):
             if not one.at_s < other.at_s:
                 raise InputError(f"script: entry {number} at {other.at_s:g} s, must be later than {one.at_s:g} s")
-
-    def read(self, time_s: float) -> Controls | None:
-        """What the hands do at `time_s`; a time before the last one begins afresh."""
-        if time_s < self._until_s:
-            self._read = 0
-        self._until_s, pressed = time_s, list[str]()
-        while self._read < len(self.moments) and self.moments[self._read].at_s <= time_s + 1e-9:
-            controls = self.moments[self._read].controls
-            pressed += () if controls is None else controls.pressed
-            self._read += 1
-        held = CENTRED if self._read == 0 else self.moments[self._read - 1].controls
-        return None if held is None else Controls(axes=held.axes, pressed=tuple(pressed))
+        self.moments = moments
+        super().__init__([one.at_s for one in moments], [one.controls for one in moments], before=CENTRED)
 
 
 def script_of(entries: Any, what: str = "script") -> ScriptedInput:

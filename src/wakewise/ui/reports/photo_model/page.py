@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
-import trimesh
 import viser
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
@@ -20,6 +16,7 @@ from wakewise.core.arrays import Array, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
 from wakewise.core.geometry import quat_from_matrix
+from wakewise.ui.reports.media import thumbnail
 from wakewise.ui.reports.page import (
     collapsible_section,
     framed_page,
@@ -32,19 +29,23 @@ from wakewise.ui.reports.page import (
     template,
     tile,
 )
-from wakewise.ui.reports.scene3d import CAMERA_RGB, MAX_POINTS, decimated, without_server
+from wakewise.ui.reports.scene3d import (
+    CAMERA_RGB,
+    FOV_RAD,
+    MAX_POINTS,
+    add_points,
+    aim_camera,
+    decimated,
+    matt_mesh,
+    opaque,
+    scene_server,
+)
 from wakewise.ui.reports.svg_style import TEAL, new_figure, style_axes
 from wakewise.ui.reports.text import NONE, fixed, number, shown
 from wakewise.ui.reports.trial import TrialMesh
-from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import read_cloud
 from wakewise.vision.reconstruction.quality.photo_statistics import ModelStatistics, PhotoStatistics, model_facts
 from wakewise.vision.texturing.textured import read_textured
-
-
-def facts_list(rows: Sequence[tuple[str, str]]) -> str:
-    """Names and values, one below the other."""
-    return str(parts().facts(rows))
 
 
 def scale_tile(figures: dict[str, Any]) -> str:
@@ -75,10 +76,10 @@ def scale_section(figures: dict[str, Any]) -> str:
     if bars is not None:
         lead, content = _by_bars(bars)
     elif figures.get("scale") is not None:
-        lead, content = "From the places of the cameras that were given.", facts_list(_references(figures))
+        lead, content = "From the places of the cameras that were given.", str(parts().facts(_references(figures)))
     elif fixes is not None and fixes["used"]:
         lead, content = f"From where {shown(fixes['photos'])} photos were taken, by their fixes.", ""
-    return section("scale", "Scale", lead, content + ("" if fixes is None else facts_list(_by_fixes(fixes))))
+    return section("scale", "Scale", lead, content + ("" if fixes is None else str(parts().facts(_by_fixes(fixes)))))
 
 
 def _by_fixes(fixes: dict[str, Any]) -> list[tuple[str, str]]:
@@ -156,10 +157,9 @@ def _references(figures: dict[str, Any]) -> list[tuple[str, str]]:
     ]  # fmt: skip
 
 
-FOV_RAD = float(np.radians(40.0))
 FRUSTUM_SHARE = 0.12
 """Size of a camera's pyramid over the median distance from camera to subject."""
-_THUMB_PX, _MOST_PICTURES = 128, 120
+_MOST_PICTURES = 120
 
 
 def model_up(facts: ModelStatistics) -> Array:
@@ -180,61 +180,39 @@ def model_scene(model: Path, photos: Path, facts: ModelStatistics) -> str | None
         return None
     eyes = np.array([photo.p_WC for photo in placed])
     middle = np.median(facts.points, axis=0)
-    # viser greets on standard output, which belongs to the command line's own answer.
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        with without_server():
-            server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        try:
-            up = model_up(facts)
-            server.scene.set_up_direction(tuple(float(v) for v in up))
-            server.scene.configure_environment_map(None)  # it would be fetched from the network
-            server.scene.add_light_ambient("/light", intensity=1.3)
-            seen = _subject(server, model, facts)
-            distance = float(np.median(np.linalg.norm(eyes - middle, axis=1)))
-            _cameras(server, photos, placed, FRUSTUM_SHARE * distance)
-            _aim(server, seen, eyes, up)
-            return str(server.get_scene_serializer().as_html())
-        finally:
-            server.stop()
+    up = model_up(facts)
+    with scene_server(up.tolist()) as server:
+        seen = _subject(server, model, facts)
+        distance = float(np.median(np.linalg.norm(eyes - middle, axis=1)))
+        _cameras(server, photos, placed, FRUSTUM_SHARE * distance)
+        _aim(server, seen, eyes, up)
+        return str(server.get_scene_serializer().as_html())
 
 
 def _subject(server: viser.ViserServer, model: Path, facts: ModelStatistics) -> Array:
     """Add surface, dense and sparse points; what is in sight at first, as points."""
-    scene, seen = server.scene, facts.points
+    seen = facts.points
     surface = (model / "mesh.glb").is_file()
     if surface:
         vertices, faces, colours = read_textured(model / "mesh.glb")
         light, chosen = decimated(TrialMesh(vertices_m=vertices, faces=faces))
-        mesh = trimesh.Trimesh(light.vertices_m, light.faces, process=False)
-        mesh.visual = trimesh.visual.TextureVisuals(
-            material=trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)
-        )
-        rgba = np.concatenate([colours[chosen], np.ones((len(chosen), 1))], axis=1)
-        mesh.visual.vertex_attributes["color"] = np.round(255 * rgba).astype(np.uint8)
-        scene.add_mesh_trimesh("/surface", mesh)
+        server.scene.add_mesh_trimesh("/surface", matt_mesh(light.vertices_m, light.faces, opaque(colours[chosen])))
         seen = light.vertices_m
     dense = (model / "dense.ply").is_file()
     if dense:
         cloud = read_cloud(model / "dense.ply")
-        step = max(1, -(-len(cloud.points_m) // MAX_POINTS))
         if not surface:
             seen = cloud.points_m
-        _points(server, "/dense points", cloud.points_m[::step], cloud.colours[::step], not surface)
-    _points(server, "/sparse points", facts.points, facts.colours, not surface and not dense)
+        _points(server, "/dense points", cloud.points_m, cloud.colours, not surface)
+    _points(server, "/sparse points", facts.points, facts.colours, not surface and not dense, most=len(facts.points))
     return np.asarray(seen, dtype=np.float64)
 
 
-def _points(server: viser.ViserServer, name: str, points: Array, colours: Array, visible: bool) -> None:
+def _points(
+    server: viser.ViserServer, name: str, points: Array, colours: Array, visible: bool, most: int = MAX_POINTS
+) -> None:
     extent = float(np.linalg.norm(np.subtract(*np.quantile(points, (0.95, 0.05), axis=0))))
-    server.scene.add_point_cloud(
-        name,
-        points=points.astype(np.float32),
-        colors=np.round(255 * colours).astype(np.uint8),
-        point_size=0.004 * extent,
-        point_shape="circle",
-        precision="float32",
-        visible=visible,
-    )
+    add_points(server, name, points, colours, 0.004 * extent, visible, most=most)
 
 
 def _cameras(server: viser.ViserServer, photos: Path, placed: list[PhotoStatistics], size: float) -> None:
@@ -244,18 +222,10 @@ def _cameras(server: viser.ViserServer, photos: Path, placed: list[PhotoStatisti
             continue
         server.scene.add_camera_frustum(
             f"/photographs/{photo.name}", fov=float(np.radians(photo.fov_deg)), aspect=photo.aspect, scale=size,
-            thickness=0.02 * size, color=CAMERA_RGB, image=_thumb(photos / photo.name) if k % every == 0 else None,
+            thickness=0.02 * size, color=CAMERA_RGB, image=thumbnail(photos / photo.name) if k % every == 0 else None,
             format="jpeg", jpeg_quality=70, cast_shadow=False, receive_shadow=False,
             wxyz=quat_from_matrix(photo.R_WC), position=photo.p_WC,
         )  # fmt: skip
-
-
-def _thumb(path: Path) -> Array | None:
-    image = read_picture(path, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-    if image is None:
-        return None
-    height = max(1, round(_THUMB_PX * image.shape[0] / image.shape[1]))
-    return np.ascontiguousarray(cv2.resize(image, (_THUMB_PX, height), interpolation=cv2.INTER_AREA)[..., ::-1])
 
 
 def _aim(server: viser.ViserServer, seen: Array, eyes: Array, up: Array) -> None:
@@ -267,11 +237,7 @@ def _aim(server: viser.ViserServer, seen: Array, eyes: Array, up: Array) -> None
     way = way / max(float(np.linalg.norm(way)), 1e-9) + 0.35 * side / max(float(np.linalg.norm(side)), 1e-9)
     way = way / max(float(np.linalg.norm(way)), 1e-9)
     distance = 1.15 * reach / np.sin(0.5 * FOV_RAD)
-    server.initial_camera.look_at = tuple(float(v) for v in centre)
-    server.initial_camera.position = tuple(float(v) for v in centre + distance * way)
-    server.initial_camera.up = tuple(float(v) for v in up)
-    server.initial_camera.fov = FOV_RAD
-    server.initial_camera.near = 0.005 * distance
+    aim_camera(server, centre, centre + distance * way, up.tolist(), near=0.005 * distance)
 
 
 LINKS = (
@@ -429,7 +395,7 @@ def _cut(figures: dict[str, Any]) -> str:
         ("files not read", ", ".join(others) or "none"),
     ]
     return section(
-        "cut", "What was cut", "What the model rests on no longer, and why it may be missed.", facts_list(rows)
+        "cut", "What was cut", "What the model rests on no longer, and why it may be missed.", str(parts().facts(rows))
     )
 
 

@@ -252,7 +252,7 @@ def fit_scale(bars: list[BarMeasurement], keep: bool = False) -> ScaleFit:
         if len(bars) == 2:
             what = f"bars {bars[0].name} and {bars[1].name} differ by {abs(off or 0.0):.1f} %"
         raise InputError(
-            f"bars: {what} ({MOST_OFF_PCT:g} % would be believed); measure again, or look whether the numbers of its "
+            f"bars: {what} ({MOST_OFF_PCT:g} % is accepted); measure again, or look whether the numbers of its "
             "ends are right and its targets stayed where they were"
         )
     applied = 1.0 if keep else mean

@@ -35,7 +35,7 @@ def find_targets(
 ) -> tuple[str, Sightings]:
     """The targets' family and where each target of it is seen.
 
-    Raises InputError if none of the wanted targets is seen.
+    Raises InputError if none of the given targets is seen.
     """
     if family is None:
         family = _told(store, names, wanted, threads, progress)
@@ -49,7 +49,7 @@ def find_targets(
 
 
 def _told(store: PhotoStore, names: list[str], wanted: tuple[int, ...], threads: int, progress: Progress) -> str:
-    """The family with most of the wanted targets, over photographs spread over the set."""
+    """The family with most of the given targets, over photographs spread over the set."""
     some = names[:: max(1, -(-len(names) // TRIED))]
     count = dict.fromkeys(FAMILIES, 0)
     for done, found in enumerate(in_order(lambda name: _found(_small(store.image(name)), FAMILIES), some, threads)):

@@ -236,7 +236,7 @@ def _flattened(raw: Mapping[str, _RawFix], source: str) -> PositionFixes:
         if values.size and np.ptp(values) > MOST_APART_M:
             raise InputError(
                 f"{source}: fixes lie {np.ptp(values) / 1e3:.0f} km apart ({words}), {MOST_APART_M / 1e3:.0f} km are "
-                "believed; are latitude and longitude mixed up?"
+                "accepted; are latitude and longitude mixed up?"
             )
     return PositionFixes(fixes=fixes, origin=origin)
 

@@ -149,7 +149,7 @@ def map_photos(
     colour_points(model, store or PhotoStore(folder), settings.threads)
     error_px = float(model.compute_mean_reprojection_error())
     if error_px >= settings.reprojection_px and given is None:
-        wrong.append(f"mean reprojection error {error_px:.2f} px, {settings.reprojection_px:g} px was wished for")
+        wrong.append(f"mean reprojection error {error_px:.2f} px, {settings.reprojection_px:g} px is allowed")
     figures |= {
         "mapping": way,
         "poses_refused": seeded.refusal,

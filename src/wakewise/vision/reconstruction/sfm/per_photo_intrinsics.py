@@ -68,7 +68,7 @@ def fit_per_photo_intrinsics(
             if k == 0:
                 centres[image.name] = np.asarray(image.projection_center())
             focal_px = float(model.cameras[image.camera_id].mean_focal_length())
-            if image.name not in found and focal_px > 0.0:  # photographs that tell nothing of it drive it anywhere
+            if image.name not in found and focal_px > 0.0:  # photographs that do not constrain it drive it anywhere
                 found[image.name] = PhotoIntrinsics(focal_px=focal_px, points=image.num_points3D)
     return PerPhotoIntrinsics(lenses=found, centres=centres)
 
