@@ -160,8 +160,8 @@ class Pid:
         return PidState(force_W_N=force_W, moment_B_Nm=moment_B, goal_nu=state.goal_nu), wrench, twist_B
 
 
-def make_pid(vehicle: Vehicle, settings: ControlSettings) -> Pid:
-    """PID for a nominal vehicle, its gains slowed per axis where the loop's margins ask for it.
+def make_pid(vehicle: Vehicle, settings: ControlSettings, *, slowed: bool = True) -> Pid:
+    """PID for a nominal vehicle; if `slowed`, its gains are per axis as slow as the loop's margins ask for.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def make_pid(vehicle: Vehicle, settings: ControlSettings) -> Pid:
     """
     dt_s = 1.0 / settings.rate_hz
     forces = Gains(kp=settings.kp_N_m, kd=settings.kd_N_s_m, ki=settings.ki_N_m_s)
-    scale = stable_gain_scale(vehicle, forces, dt_s, ESTIMATOR_LAG_S, GYRO_LAG_S)
+    scale = stable_gain_scale(vehicle, forces, dt_s, ESTIMATOR_LAG_S, GYRO_LAG_S) if slowed else np.ones(6)
     gains = [g.slowed(float(s)) for g, s in zip(wished_gains(vehicle_axes(vehicle), forces), scale, strict=True)]
     reach = np.minimum(-vehicle.thrust_lower_N, vehicle.thrust_upper_N)
     limit = INTEGRAL_SHARE * (np.abs(vehicle.allocation_matrix) @ reach)
