@@ -230,11 +230,19 @@ class ErrorStateFilter:
                 work.commands_N,
                 work.time_s,
                 until_s,
-                self._noise,
+                self._noise_in_current(work.mean),
                 work.noise_scale,
                 self._lasting,
                 self._time_constants_s,
             )
+
+    def _noise_in_current(self, mean: Array) -> Array:
+        """Process noise, shape (6,), with the walk of the load that a turbulent current makes."""
+        noise = self._noise.copy()
+        walk_N = self.priors.turbulence_rate * math.hypot(mean[13], mean[14])
+        noise[2] += walk_N
+        noise[3] += self.priors.turbulence_arm_m * walk_N
+        return noise
 
     def _correct(self, work: _WorkingState, measured: Measurement) -> None:
         s, slow = self.settings, self._slow

@@ -74,9 +74,17 @@ class Priors:
     # force_std_N, moment_std_N_m: unmodelled force and moment at the start.
     force_std_N: float = 1.0
     moment_std_N_m: float = 0.1
-    # force_walk_N, moment_walk_N_m: their random walk (N/sqrt(s), N m/sqrt(s)).
-    force_walk_N: float = 0.004
+    # force_walk_N, moment_walk_N_m: their random walk at rest in still water (N/sqrt(s), N m/sqrt(s)).
+    force_walk_N: float = 0.01
     moment_walk_N_m: float = 0.001
+    # turbulence_rate, turbulence_arm_m: what a current adds to the walk, as a share of the horizontal load per sqrt(s),
+    # and the arm of its moment. Drag goes with the square of the speed, so eddies of intensity I shake it by 2 I; they
+    # last T, and a walk of 2 I sqrt(2 / T) has the same variance over that time. I is 0.1 (I. Nezu and H. Nakagawa,
+    # Turbulence in Open-Channel Flows, 1993); T is 8 s, of eddies as long as 1.5 m of water is deep, at 0.2 m/s. The
+    # arm is a tenth of a small vehicle's height (an estimate). Before, nothing of the current was in the walk: in the
+    # stream of 0.3 m/s dp stood 16 mm off and now 8 (docs/research-log/0083).
+    turbulence_rate: float = 0.1
+    turbulence_arm_m: float = 0.03
     # start_std_m, start_std_rad, start_std_m_s, start_std_rad_s: error of the first position, attitude, velocity and
     # body rate.
     start_std_m: float = 0.03
