@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 from wakewise.core.arrays import Array
 from wakewise.experiments.campaigns.pictures import MODEL, photographs_of
 from wakewise.experiments.campaigns.statistics import performance_profile, stratified_bootstrap
-from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place, worst_trials
+from wakewise.experiments.campaigns.summary import MethodSummary, Place, worst_trials
+from wakewise.experiments.campaigns.table import ComparisonMetric
 from wakewise.ui.reports.figures import NARROW_IN, WIDTH_IN
 from wakewise.ui.reports.page import error_scale, panel, parts, pictures, template
 from wakewise.ui.reports.svg_style import (
