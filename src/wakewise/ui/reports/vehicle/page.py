@@ -54,13 +54,11 @@ def _macros() -> Any:
 
 def _card(title: str, hint: str, content: str, key: tuple[str, str, str] | None = None) -> str:
     """A card; `key` is the colour scale of the cells: CSS class, left and right end."""
-    made: str = _macros().card(title, hint, content, key)
-    return made
+    return str(_macros().card(title, hint, content, key))
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
-    made: str = _macros().table(heads, rows)
-    return made
+    return str(_macros().table(heads, rows))
 
 
 def _header(draft: VehicleDraft, facts: dict[str, Any]) -> str:
@@ -75,8 +73,7 @@ def _header(draft: VehicleDraft, facts: dict[str, Any]) -> str:
     notes = [_sentence(note) for note in draft.notes]
     actuation = _sentence(facts["actuation"])
     texts = (draft.source, draft.does_not_claim, draft.missing, notes)
-    made: str = _macros().header(draft.title, actuation, chips, *texts)
-    return made
+    return str(_macros().header(draft.title, actuation, chips, *texts))
 
 
 def _wrench(facts: dict[str, Any]) -> str:
@@ -99,8 +96,7 @@ def _wrench(facts: dict[str, Any]) -> str:
         }
         for axis, w in wrench.items()
     ]
-    made: str = _macros().wrench(rows)
-    return made
+    return str(_macros().wrench(rows))
 
 
 def _null_space(facts: dict[str, Any]) -> str:
@@ -114,8 +110,7 @@ def _null_space(facts: dict[str, Any]) -> str:
         }
         for vector in facts["null_space"]
     ]
-    made: str = _macros().null_space(vectors)
-    return made
+    return str(_macros().null_space(vectors))
 
 
 def _share(number: int, thrust: float | None) -> tuple[str, str]:
