@@ -171,12 +171,9 @@ class PictureRenderer:
     def __init__(self, scenario: Scenario, target: Target | None, width_px: int) -> None:
         import numpy as np
 
-        from wakewise.vision.imaging import SiltOptics
-
         parts = scenario.parts() if target is None else scenario.parts().replace(target=target)
         self._given, self._width_px, self._scene = parts.scenario.imaging, width_px, parts.scene
-        silt = parts.scenario.tank.silt
-        self._grains = SiltOptics(diameter_m=silt.grain_m, density_kg_m3=silt.grain_density_kg_m3)
+        self._grains = parts.grains
         self._silt: ScalarGrid | None = None
         self._seen: deque[float] = deque(maxlen=_METERED)
         self._rng = np.random.default_rng(parts.scenario.seed)

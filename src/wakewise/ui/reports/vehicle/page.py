@@ -54,11 +54,13 @@ def _macros() -> Any:
 
 def _card(title: str, hint: str, content: str, key: tuple[str, str, str] | None = None) -> str:
     """A card; `key` is the colour scale of the cells: CSS class, left and right end."""
-    return str(_macros().card(title, hint, content, key))
+    made: str = _macros().card(title, hint, content, key)
+    return made
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
-    return str(_macros().table(heads, rows))
+    made: str = _macros().table(heads, rows)
+    return made
 
 
 def _header(draft: VehicleDraft, facts: dict[str, Any]) -> str:
@@ -73,7 +75,8 @@ def _header(draft: VehicleDraft, facts: dict[str, Any]) -> str:
     notes = [_sentence(note) for note in draft.notes]
     actuation = _sentence(facts["actuation"])
     texts = (draft.source, draft.does_not_claim, draft.missing, notes)
-    return str(_macros().header(draft.title, actuation, chips, *texts))
+    made: str = _macros().header(draft.title, actuation, chips, *texts)
+    return made
 
 
 def _wrench(facts: dict[str, Any]) -> str:
@@ -96,7 +99,8 @@ def _wrench(facts: dict[str, Any]) -> str:
         }
         for axis, w in wrench.items()
     ]
-    return str(_macros().wrench(rows))
+    made: str = _macros().wrench(rows)
+    return made
 
 
 def _null_space(facts: dict[str, Any]) -> str:
@@ -110,7 +114,8 @@ def _null_space(facts: dict[str, Any]) -> str:
         }
         for vector in facts["null_space"]
     ]
-    return str(_macros().null_space(vectors))
+    made: str = _macros().null_space(vectors)
+    return made
 
 
 def _share(number: int, thrust: float | None) -> tuple[str, str]:
