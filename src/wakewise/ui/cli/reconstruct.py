@@ -1,7 +1,4 @@
-"""`wakewise reconstruct`: photographs to a model.
-
-The log file of `wakewise reconstruct`: what was asked, when each stage began, what was said, how it ended.
-"""
+"""`wakewise reconstruct`: photographs to a model, with a log file of options, stages, messages and result."""
 
 from __future__ import annotations
 
@@ -75,7 +72,7 @@ class RunLog:
 
 @contextmanager
 def logged(out: Path) -> Iterator[RunLog]:
-    """A log that also tells of a failure, which goes on its way."""
+    """A log that also records a failure, which is raised again."""
     log = RunLog(out)
     try:
         yield log

@@ -1,7 +1,4 @@
-"""What may be asked of `wakewise reconstruct` besides photographs and cameras.
-
-What `wakewise reconstruct --write` leaves besides the model: textures, orthophoto, LAS, extent by halves.
-"""
+"""Options of `wakewise reconstruct` besides photographs and cameras, and the outputs of `--write`."""
 
 from __future__ import annotations
 

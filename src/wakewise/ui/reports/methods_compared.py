@@ -1,6 +1,6 @@
-"""Methods side by side, whoever's trials they are: in words and as plots.
+"""Methods side by side: in words, as plots, and pictures of each method's worst trial.
 
-Pictures of each method's worst trial: photographs 0, 5 and 10 s after the first, and the model with its errors.
+The pictures are photographs 0, 5 and 10 s after the first, and the model with its errors.
 """
 
 from __future__ import annotations

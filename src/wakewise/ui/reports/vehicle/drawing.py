@@ -1,7 +1,4 @@
-"""A drawing of a vehicle from above, from starboard and from ahead: thrusters, jets of positive thrust, camera view.
-
-Marks of the vehicle drawing: projections, thrusters with the jets of positive thrust, camera, centres, text.
-"""
+"""A drawing of a vehicle from above, from starboard and from ahead: thrusters, jets of positive thrust, camera view."""
 
 from __future__ import annotations
 
