@@ -69,7 +69,7 @@ class AssistedPilot:
     begin : DeskState, optional
         Settings at time zero, for reproducible flights; None: they stay as they are.
     keep_off : KeepOff, optional
-        What the sticks do not run into.
+        Obstacles that the motion commanded by the sticks must not reach.
 
     Attributes
     ----------
@@ -202,22 +202,22 @@ class AssistedPilot:
             look = getattr(self.source, "look", None)
             if look is not None:
                 look(time_s, estimate, self.desk.state.share)
-            self.controls, why = self.source.read(time_s), "nobody at the sticks"
+            self.controls, why = self.source.read(time_s), "no input from the sticks"
         except Exception as fault:  # a device that goes away must not end the flight
             self.controls, why = None, f"sticks cannot be read ({type(fault).__name__}: {fault})"
         there = self.controls is not None
         if there != self._there:
             if there:
-                self._say("info", "hands at the sticks again", time_s)
+                self._say("info", "input from the sticks is back", time_s)
             else:
-                self._say("warn", f"{why}: stopping, then holding the place", time_s)
+                self._say("warn", f"{why}: stopping, then holding the position", time_s)
             self._there = there
         return self.controls
 
     def _enter(self, mode: str, time_s: float, first: bool) -> None:
-        """Change of who steers; what was there goes on from where it is."""
+        """Change of the mode of control; the motion goes on from its present state."""
         if mode == "scan" and not self.mission.flies:
-            self._say("warn", "no mission to fly: holding the place", time_s)
+            self._say("warn", "no mission to fly: holding the position", time_s)
             mode = self.desk.press("hold").mode
         if mode == self._mode:
             return
@@ -227,7 +227,7 @@ class AssistedPilot:
                 self._scan, self.motion = self.mission.begun()
         elif self._mode == "scan":
             self._sphere = StickFrame()
-        words = {"operator": "operator flies", "hold": "holding the place", "scan": "the mission flies"}
+        words = {"operator": "operator flies", "hold": "holding the position", "scan": "the mission flies"}
         self._say("info", words[mode], time_s)
         self._mode = mode
 
