@@ -43,7 +43,7 @@ def test_the_library_does_not_grow() -> None:
     """At most 400 modules. The goal is 80,000 lines; the bound is what is reached, and is only ever lowered."""
     library = [path for path in MODULES if path.is_relative_to(ROOT / "src")]
     assert len([path for path in library if path.name != "__init__.py"]) <= 400
-    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in library) <= 87_500
+    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in library) <= 85_800
 
 
 def test_few_lines_are_excused_from_ruff_and_mypy() -> None:

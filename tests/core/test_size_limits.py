@@ -119,8 +119,7 @@ def test_pictures_are_decoded_in_one_place():
         "vision/image_decoding.py",
         "vision/reconstruction/photos/photo_folder.py",
         "ui/film/encode.py",
-        "ui/reports/target.py",
-        "ui/reports/methods_compared.py",
+        "ui/reports/views.py",
     }
     header_only = {"vision/reconstruction/scale/position_fixes.py"}  # no pixel of it is unpacked
     found = {

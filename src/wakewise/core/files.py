@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import errno
+import io
 import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -126,6 +128,13 @@ def write_text(path: Path, text: str, lasting: bool = False) -> None:
 def write_json(path: Path, value: Any, lasting: bool = False) -> None:
     """Write JSON whole or not at all; NaN and infinity are refused, since JSON has none. `lasting` as above."""
     write_text(path, json.dumps(value, indent=2, allow_nan=False) + "\n", lasting)
+
+
+def write_csv(path: Path, rows: Iterable[Iterable[object]]) -> None:
+    """Write rows as CSV, whole or not at all."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    write_text(path, text.getvalue())
 
 
 def name_fault(name: str) -> str | None:

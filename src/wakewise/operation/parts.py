@@ -40,7 +40,7 @@ from wakewise.wake import wake_model
 
 if TYPE_CHECKING:  # imported at first use: rendering and flight checks are not needed to fly
     from wakewise.operation.preflight import PreflightResult
-    from wakewise.vision.imaging import LensCamera, PinholeCamera, Scene
+    from wakewise.vision.imaging import LensCamera, PinholeCamera, Scene, SiltOptics
 
 T = TypeVar("T")
 
@@ -319,6 +319,14 @@ class Parts:
     def camera(self) -> PinholeCamera | LensCamera:
         """The camera of the scenario."""
         return self.scenario.imaging.camera()
+
+    @property
+    def grains(self) -> SiltOptics:
+        """Optics of the silt's grains."""
+        from wakewise.vision.imaging import SiltOptics
+
+        silt = self.scenario.tank.silt
+        return SiltOptics(diameter_m=silt.grain_m, density_kg_m3=silt.grain_density_kg_m3)
 
     @cached_property
     def scene(self) -> Scene:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import json
 import math
 from collections.abc import Callable
@@ -16,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array
-from wakewise.core.files import whole_file, write_text
+from wakewise.core.files import whole_file, write_csv, write_text
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import no_progress
 from wakewise.operation.flight_log import ExposureRecord, read_exposures
@@ -24,7 +22,7 @@ from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.scenario.calibration_error import calibration_with_error
 from wakewise.scene.targets import turned_normals
-from wakewise.vision.imaging import Scene, SiltOptics, calibrate, photograph
+from wakewise.vision.imaging import Scene, calibrate, photograph
 
 SMEAR_PX = 0.5
 """Way of the fastest tip across the picture from one scene of an exposure to the next."""
@@ -60,17 +58,14 @@ def photograph_flight(parts: Parts, folder: Path, progress: Callable[..., None] 
             [
                 name,
                 f"{exposure.time_s:.6f}",
-                *_numbers(exposure.X_WC_est @ calibration.X_CM),
-                *_numbers(middle @ calibration.X_CM),
+                *pose_cells(exposure.X_WC_est @ calibration.X_CM),
+                *pose_cells(middle @ calibration.X_CM),
                 "" if seen["sharpness"] is None else f"{seen['sharpness']:.6g}",
                 f"{seen['turbidity_per_m']:.6g}",
             ]
         )
     progress(len(exposures), len(exposures))
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([IMAGE_COLUMNS, *rows])
-    write_text(folder / "images.csv", text.getvalue())
+    write_csv(folder / "images.csv", [IMAGE_COLUMNS, *rows])
     for note in (folder / "images").glob(".*.json"):
         note.unlink()
 
@@ -91,7 +86,6 @@ def take_photograph(parts: Parts, folder: Path, number: int, exposure: ExposureR
         if noted["exposure"] == mark:
             return noted
     rng = parts.seeds.imaging().spawn(number + 1)[number]
-    grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
     silt = exposure.silt if exposure.silt.largest > 0.0 else None
     photo = photograph(
         scenes_of(parts, exposure),
@@ -100,7 +94,7 @@ def take_photograph(parts: Parts, folder: Path, number: int, exposure: ExposureR
         silt,
         scenario.imaging,
         rng,
-        grains,
+        parts.grains,
         exposure.X_WC_before,
         exposure.flakes,
     )
@@ -185,5 +179,6 @@ def write_image(path: Path, image: NDArray[np.uint8], jpeg_quality: int = 92) ->
         temporary.write_bytes(cv2.imencode(path.suffix, image[..., ::-1], options)[1].tobytes())
 
 
-def _numbers(X_WC: Pose) -> list[str]:
+def pose_cells(X_WC: Pose) -> list[str]:
+    """Position and quaternion of a pose as cells of a table."""
     return [f"{value:.9f}" for value in (*X_WC.p_m, *X_WC.q)]

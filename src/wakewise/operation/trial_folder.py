@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import platform
 from collections.abc import Iterable
 from importlib.metadata import version
@@ -11,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.core.errors import EnvironmentFailure, InputError
-from wakewise.core.files import write_text
+from wakewise.core.files import write_csv
 from wakewise.core.geometry import Pose
 from wakewise.operation.parts import Parts, build
-from wakewise.operation.photography import photo_name
+from wakewise.operation.photography import photo_name, pose_cells
 from wakewise.operation.plugin_adapter import is_builtin
 from wakewise.operation.scenario import Scenario, differences, read_scenario, write_scenario
 from wakewise.scene.targets import write_mesh
@@ -81,14 +79,8 @@ def write_plan(parts: Parts, folder: Path) -> None:
 
 def write_views(parts: Parts, folder: Path, views: Iterable[tuple[str, float, Pose]]) -> None:
     """Write planned.csv: names, times and reference poses of photographs."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("name", "time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"))
-    for name, time_s, X_WC in views:
-        writer.writerow(
-            (photo_name(name, parts.scenario), f"{time_s:.6f}", *(f"{value:.9f}" for value in (*X_WC.p_m, *X_WC.q)))
-        )
-    write_text(folder / "planned.csv", text.getvalue())
+    rows = [(photo_name(name, parts.scenario), f"{time_s:.6f}", *pose_cells(X_WC)) for name, time_s, X_WC in views]
+    write_csv(folder / "planned.csv", [("name", "time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"), *rows])
 
 
 def write_truth(parts: Parts, folder: Path) -> None:

@@ -1,8 +1,10 @@
-"""Decoding of pictures by OpenCV; the size in the header is checked first."""
+"""Pictures by OpenCV: decoded, the size in the header checked first; grey and smaller copies."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -65,3 +67,28 @@ def read_picture(path: Path, flags: int = COLOUR) -> NDArray[Any] | None:
     except OSError:
         return None
     return decode_picture(data, str(path), flags)
+
+
+def grey_of(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Grey values, shape (h, w), of a picture in blue, green, red."""
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+
+def shrunk(image: NDArray[np.uint8], longest_px: int) -> NDArray[np.uint8]:
+    """The picture, its longer side at most so long."""
+    shrink = longest_px / max(image.shape[:2])
+    if shrink >= 1.0:
+        return image
+    size = [max(1, round(shrink * side)) for side in image.shape[1::-1]]
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+@contextmanager
+def one_opencv_thread() -> Iterator[None]:
+    """Context in which OpenCV's calls use one thread each, for callers that work on several pictures at once."""
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)

@@ -2,7 +2,8 @@
 
 import pytest
 
-from wakewise.experiments.campaigns.summary import ComparisonMetric, summarize, worst_trials
+from wakewise.experiments.campaigns.summary import summarize, worst_trials
+from wakewise.experiments.campaigns.table import ComparisonMetric
 
 RMSE = ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True)
 

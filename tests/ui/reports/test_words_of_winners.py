@@ -7,7 +7,8 @@ from importlib import resources
 import pytest
 from test_campaign_page import campaign
 
-from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, summarize
+from wakewise.experiments.campaigns.summary import MethodSummary, summarize
+from wakewise.experiments.campaigns.table import ComparisonMetric
 from wakewise.ui.reports.campaign import campaign_page
 from wakewise.ui.reports.methods_compared import cost_text, winner_text
 from wakewise.ui.reports.page import legend_entry, missing, prose, scene_box

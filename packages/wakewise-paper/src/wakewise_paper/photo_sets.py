@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import io
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +19,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError, StageError
-from wakewise.core.files import write_text
+from wakewise.core.files import write_csv
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_rotvec, quat_multiply
 from wakewise.core.interfaces import Progress, ScalarGrid, no_progress
 from wakewise.experiments.trials.trial import REGION_SHARE
@@ -137,13 +136,12 @@ def write_photos(
         elif renders is not None:
             clean = renders[k]
         write_image(path, photograph_of(clean, camera, view.X_WC, silt, imaging, rng).image)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("name", "x_m", "y_m", "z_m", "true_x_m", "true_y_m", "true_z_m", "qw", "qx", "qy", "qz"))
+    rows = []
     for view in views:
         numbers = (*view.X_WC_est.p_m, *view.X_WC[1].p_m, *view.X_WC_est.q)
-        writer.writerow((view.name, *(f"{value:.9f}" for value in numbers)))
-    write_text(folder / "poses.csv", text.getvalue())
+        rows.append((view.name, *(f"{value:.9f}" for value in numbers)))
+    heads = ("name", "x_m", "y_m", "z_m", "true_x_m", "true_y_m", "true_z_m", "qw", "qx", "qy", "qz")
+    write_csv(folder / "poses.csv", [heads, *rows])
     return read_photo_set(folder, camera.focal_px)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from wakewise.experiments.campaigns.statistics import (
     compare_pairs,
     probability_of_improvement,
 )
-from wakewise.experiments.campaigns.table import Results, varying_factors
+from wakewise.experiments.campaigns.table import MEASURES, ComparisonMetric, Results, varying_factors
 
 Place = Mapping[str, Any]
 """A trial: world, method, target, seed, folder below the store, figures, and reason if it failed."""
@@ -26,15 +26,6 @@ Place = Mapping[str, Any]
 
 FEWEST = 6
 """Pairs from which on a difference can be sure: five all agree by chance alone once in sixteen times."""
-
-
-class ComparisonMetric(NamedTuple):
-    """A figure that methods are judged by, its unit in words, the factor to that, and whether less is better."""
-
-    figure: str
-    words: str
-    scale: float
-    less: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,17 +158,8 @@ def by_target(values: Mapping[tuple[str, int], float], which: Iterable[tuple[str
     return found
 
 
-MEASURES = (
-    ComparisonMetric("success", "% of models good", 100.0, False),
-    ComparisonMetric("rmse_mm", "mm RMSE of the model", 1.0, True),
-    ComparisonMetric("completeness_pct", "% of the surface", 1.0, False),
-    ComparisonMetric("target_speed_mean_m_s", "mm/s of water at the target", 1e3, True),
-    ComparisonMetric("exposure_speed_mean_m_s", "mm/s while the shutter is open", 1e3, True),
-    ComparisonMetric("position_rmse_mm", "mm off the wished place", 1.0, True),
-    ComparisonMetric("energy_kJ", "kJ of the thrusters", 1.0, True),
-)
-"""What a page judges by, as far as trials have it; the first of RMSE and the water's speed that is there leads."""
 _LEADING = ("rmse_mm", "target_speed_mean_m_s")
+"""The first of these that trials have leads."""
 
 
 def paired_groups(found: Results, compare: str = "") -> list[Place]:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -25,16 +25,27 @@ from wakewise.experiments.campaigns.task import Figure
 State = Literal["done", "failed", "running", "waiting"]
 SHARES = ("success",)
 """Figures that are yes or no; their interval is exact. A trial that failed is no success."""
-HEADLINES = (
-    "success",
-    "rmse_mm",
-    "completeness_pct",
-    "target_speed_mean_m_s",
-    "exposure_speed_mean_m_s",
-    "position_rmse_mm",
-    "energy_kJ",
+
+
+class ComparisonMetric(NamedTuple):
+    """A figure that methods are judged by, its unit in words, the factor to that, and whether less is better."""
+
+    figure: str
+    words: str
+    scale: float
+    less: bool
+
+
+MEASURES = (
+    ComparisonMetric("success", "% of models good", 100.0, False),
+    ComparisonMetric("rmse_mm", "mm RMSE of the model", 1.0, True),
+    ComparisonMetric("completeness_pct", "% of the surface", 1.0, False),
+    ComparisonMetric("target_speed_mean_m_s", "mm/s of water at the target", 1e3, True),
+    ComparisonMetric("exposure_speed_mean_m_s", "mm/s while the shutter is open", 1e3, True),
+    ComparisonMetric("position_rmse_mm", "mm off the wished place", 1.0, True),
+    ComparisonMetric("energy_kJ", "kJ of the thrusters", 1.0, True),
 )
-"""What a table shows by default, as far as it is there."""
+"""What a table shows by default and a page judges by, as far as trials have it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +155,7 @@ def group_table(found: Results, by: Sequence[str] = (), figures: Sequence[str] =
     for name in figures:
         if known and name not in known:
             raise InputError(f"--figures: '{name}' is in no trial, allowed: {', '.join(known)}")
-    wished = tuple(figures) or tuple(name for name in HEADLINES if name in known)
+    wished = tuple(figures) or tuple(measure.figure for measure in MEASURES if measure.figure in known)
     groups: dict[tuple[str | int, ...], list[TrialRecord]] = {}
     for one in found.made:
         groups.setdefault(tuple(one.entry.factors.get(name, "") for name in by), []).append(one)

@@ -1,9 +1,8 @@
-"""By hand: what an operator asks for becomes goals, and a flight goes on until somebody ends it.
+"""Teleoperation: an operator's inputs become goals, with assists, in flights without a fixed end.
 
-`operator_state.py` is what an operator has set, `assisted.py` the pilot between hands and goals; `motion.py` is the one
-smooth goal that all share, `arbitration.py` moves it by sticks and `arbitration.py`, `arbitration.py` off what
-is solid, `resumable_mission.py` along a mission that waits. `human_pilot.py` is a person at these sticks,
-`human_pilot.py` one whose sticks ask any method for velocities. `live.py` flies without an end, by the clock of
-`live.py`, and photographs when `live.py` is asked; `live.py` makes a trial's folder of what
-was, and `replay.py` flies its hands again.
+- `input/`: sources of the inputs. `operator_state.py`: the operator's settings.
+- `assisted.py`: the pilot from inputs to goals. `motion.py`: its motion reference. `arbitration.py`: the reference by
+  sticks, with camera on the target and collision limits. `resumable_mission.py`: a mission that can be interrupted.
+- `human_pilot.py`: simulated operators.
+- `live.py`: real-time flights, their photographs and folders. `replay.py`: flights from recorded inputs.
 """

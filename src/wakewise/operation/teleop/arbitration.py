@@ -1,15 +1,10 @@
-"""How sticks, desk and assists move a piloted goal: one pure step for the attitude, one for the place.
+"""Motion reference by sticks, settings and assists: one pure step for the attitude, one for the position.
 
-Released sticks brake: the commanded velocity falls to rest, and where it comes to rest, ahead, is what is held. A
-velocity is kept in the frame of the sticks, which turns with the vehicle or along the sphere, so that a stick that is
-held goes on along a circle.
+Released sticks brake: the commanded velocity falls to zero, and the position where it becomes zero is held. The
+velocity is kept in the frame of the sticks, which turns with the vehicle or along the sphere about the target.
 
-What assists wish of a body: the camera on the target, and the ways of sticks in the level frame or on a sphere.
-
-A commanded velocity that never runs into anything: it falls so that the hull can stop in front of it.
-
-Towards each plane and sphere of the surroundings the velocity of approach is at most that from which the way left, less
-the clearance, suffices to stop: v = sqrt(2 a (h - h0)). Along it the hull slides; away from it all is allowed.
+Collision limits: towards each plane and sphere of the surroundings the velocity of approach is at most v = sqrt(2 a d),
+from which the hull stops within d, the distance less the clearance. Tangential velocity is not limited.
 """
 
 from __future__ import annotations
@@ -134,9 +129,9 @@ class CollisionLimiter:
         freeze(self, half_m=(3,))
 
     def allowed(self, X_WB: Pose, velocity_W_m_s: Array, omega_B_rad_s: Array) -> tuple[Array, str | None]:
-        """The velocity nearly as wished, shape (3,), and what is in its way, None if nothing.
+        """The velocity with collision limits, shape (3,), and the name of the obstacle, None if there is none.
 
-        A hull that turns, `omega_B_rad_s` of shape (3,), makes way for its corners.
+        The rotation of the hull, `omega_B_rad_s` of shape (3,), is included.
         """
         velocity, R, slope, blocks = np.array(velocity_W_m_s), X_WB.R, np.empty(6), None
         planes, spheres = self.around.planes, self.around.spheres
@@ -179,15 +174,15 @@ SLOW_M_S = 0.01
 HARDEST_M_S2 = 0.6
 """Largest change of a commanded velocity, whatever bends its way: 0.4 m/s on a circle of a quarter of a metre."""
 TILT_RAD_S = math.radians(40.0)
-"""What the tilt stick asks for at gain 1."""
+"""Tilt rate of the full stick at gain 1."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StickFrame:
     """The frame of the sticks, shape (3, 3), as it was a step ago, and the orbit's radius where one is kept.
 
-    `frame` is None where nobody steered before, and `orbits` tells whether it is that of an orbit. `change_m_s2`, shape
-    (3,), is how fast the velocity changes in that frame. `blocked_by` is what is in the way, None if nothing.
+    `frame` is None before the first step; `orbits`: it is the frame of an orbit. `change_m_s2`, shape (3,), is the
+    acceleration in that frame. `blocked_by` is the name of an obstacle, None if there is none.
     """
 
     frame: Array | None = None
@@ -257,8 +252,8 @@ def steer_position(
         free = velocity
         velocity, _ = keep_off.allowed(motion.X_WB, velocity, motion.omega_B_rad_s)
         if not np.array_equal(velocity, free):
-            change = np.zeros(3)  # what stops it now is not the sticks' doing, and is not to go on after it
-        if wish.any():  # what is asked for, not what is left of it by now, is what something is in the way of
+            change = np.zeros(3)  # the collision limit is no acceleration of the sticks, so it does not continue
+        if wish.any():  # the obstacle of the command, not of the velocity that is already reduced
             _, blocked_by = keep_off.allowed(motion.X_WB, frame @ wish - swing, motion.omega_B_rad_s)
     # Near the zenith the frame turns faster than a velocity may.
     velocity = limit_acceleration(motion.velocity_W_m_s, velocity, dt_s, HARDEST_M_S2)
@@ -270,9 +265,9 @@ def steer_position(
 
 
 def filtered_velocity(now_m_s: Array, change_m_s2: Array, wish_m_s: Array, dt_s: float) -> tuple[Array, Array]:
-    """What sticks lead a commanded velocity to, and how fast that changes, a step on; shape (3,) each, in their frame.
+    """Commanded velocity and acceleration after one step, with limited jerk; shape (3,) each, in the sticks' frame.
 
-    A change that comes as fast as a hand moves no vehicle can make, and what it misses it makes up for with thrust.
+    No vehicle follows a step of the command; without the limit it would compensate the lag with thrust.
     """
     slower = np.linalg.norm(wish_m_s) < np.linalg.norm(now_m_s)
     return limit_jerk(
@@ -281,7 +276,7 @@ def filtered_velocity(now_m_s: Array, change_m_s2: Array, wish_m_s: Array, dt_s:
 
 
 def _at_range(wish: float, now: float, kept_m: float | None, range_m: float) -> tuple[float, float | None]:
-    """Wished speed towards the centre and the radius that is kept: the stick's, and none, while it is held."""
+    """Commanded speed towards the centre, and the radius that is held; None while the stick is deflected."""
     if wish != 0.0 or (kept_m is None and abs(now) > SLOW_M_S):
         return wish, None
     kept_m = range_m if kept_m is None else kept_m

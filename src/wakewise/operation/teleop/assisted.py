@@ -1,9 +1,9 @@
-"""Assisted flight by hand: hands and desk become goals, which any method flies; and a controller that heeds the desk.
+"""Assisted teleoperation: inputs and settings become goals for any method; the controller follows the settings.
 
-The pilot holds one smooth `MotionReference`. Sticks ask for a velocity in the body's level frame, or along the sphere
-about the target; released, the motion brakes, and the place that is held lies ahead, where the vehicle can stop. The
-mission may take over and be left at any moment (see `scanning.py`). Whoever steers goes on from where the motion is, so
-goals never jump.
+The pilot holds one smooth `MotionReference`. Sticks command a velocity in the body's level frame, or along the sphere
+about the target. When they are released, the motion brakes to a position ahead, where the vehicle can stop. The mission
+can take over and be interrupted at any time (see `resumable_mission.py`). Each mode continues from the current
+reference, so goals are continuous.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ MEAN_S, LEAST_M_S = 2.0, 0.01
 SAID_EVERY_S = 3.0
 """What is in the way is said no more often."""
 KEPT = 200
-"""Most actions and notes that are kept for somebody to take."""
+"""Largest number of actions and of notes in a queue."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +58,7 @@ class OperatorMessage:
 
 @dataclass(kw_only=True, eq=False)
 class AssistedPilot:
-    """A `Pilot` whose goals come from hands, a desk and a mission; begins afresh at time zero.
+    """A `Pilot` whose goals follow from inputs, settings and a mission; it is reset at time zero.
 
     Parameters
     ----------
@@ -67,20 +67,20 @@ class AssistedPilot:
     dt_s : float
         Time between two goals.
     begin : DeskState, optional
-        What the desk is set to at time zero, for flights that are to be flown again; None: it stays as it is.
+        Settings at time zero, for reproducible flights; None: they stay as they are.
     keep_off : KeepOff, optional
-        What the sticks do not run into.
+        Obstacles that the motion commanded by the sticks must not reach.
 
     Attributes
     ----------
     controls : Controls or None
         As last read.
     velocity_W_m_s : ndarray, shape (3,)
-        Asked for, as shaped.
+        Commanded velocity after filtering.
     deviation_pct : float or None
-        Of the estimated velocity from the one asked for, rms over the last seconds; None while none is asked for.
+        Of the estimated from the commanded velocity, rms over the last seconds; None while the command is zero.
     trace : ControlLogWriter
-        Hands and desk of the whole flight, to be written beside its record.
+        Inputs and settings of the whole flight, to be written beside its record.
     state : OperatorSettings
         What was set at the last step: the controller goes by it, so that a change from another thread in the middle of
         a step counts for the next one, and the record of a flight gives the same flight.
@@ -119,7 +119,7 @@ class AssistedPilot:
 
     @property
     def velocity_W_m_s(self) -> Array:
-        """Asked for, as shaped, shape (3,)."""
+        """Commanded velocity after filtering, shape (3,)."""
         return self.motion.velocity_W_m_s
 
     @property
@@ -138,7 +138,7 @@ class AssistedPilot:
         return self._scan.phase if self._mode == "scan" else None
 
     def taken(self) -> tuple[str, ...]:
-        """Photographs ("capture") and the end ("stop") asked for since the last call, in order."""
+        """Requests since the last call, in order: "capture" for a photograph, "stop" for the end."""
         return _emptied(self._actions)
 
     def notes(self) -> tuple[OperatorMessage, ...]:
@@ -146,7 +146,7 @@ class AssistedPilot:
         return _emptied(self._notes)
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
-        """Where hands, desk and mission lead, a step on."""
+        """The goal after one step of inputs, settings and mission."""
         first = time_s <= 0.0
         if first:
             self._begin(estimate)
@@ -179,7 +179,7 @@ class AssistedPilot:
         return self.mission.route.leg_name(self._scan.mission_s) if flying else "back to the mission"
 
     def _set(self, time_s: float) -> OperatorSettings:
-        """What is set on the desk; where hands are played back, as it was set then."""
+        """The settings; in a replay those of the record."""
         recorded = getattr(self.source, "desk_at", None)
         played = None if recorded is None else recorded(time_s)
         return self.desk.state if played is None else self.desk.set(**played)
@@ -197,27 +197,27 @@ class AssistedPilot:
         self._notes.clear()
 
     def _read(self, time_s: float, estimate: BodyState) -> Controls | None:
-        """The hands; a source that fails counts as nobody there, and both are said."""
+        """The inputs; None if the source fails. Loss and return of the inputs are reported."""
         try:
             look = getattr(self.source, "look", None)
             if look is not None:
                 look(time_s, estimate, self.desk.state.share)
-            self.controls, why = self.source.read(time_s), "nobody at the sticks"
+            self.controls, why = self.source.read(time_s), "no input from the sticks"
         except Exception as fault:  # a device that goes away must not end the flight
             self.controls, why = None, f"sticks cannot be read ({type(fault).__name__}: {fault})"
         there = self.controls is not None
         if there != self._there:
             if there:
-                self._say("info", "hands at the sticks again", time_s)
+                self._say("info", "input from the sticks is back", time_s)
             else:
-                self._say("warn", f"{why}: stopping, then holding the place", time_s)
+                self._say("warn", f"{why}: stopping, then holding the position", time_s)
             self._there = there
         return self.controls
 
     def _enter(self, mode: str, time_s: float, first: bool) -> None:
-        """Change of who steers; what was there goes on from where it is."""
+        """Change of the mode of control; the motion goes on from its present state."""
         if mode == "scan" and not self.mission.flies:
-            self._say("warn", "no mission to fly: holding the place", time_s)
+            self._say("warn", "no mission to fly: holding the position", time_s)
             mode = self.desk.press("hold").mode
         if mode == self._mode:
             return
@@ -227,7 +227,7 @@ class AssistedPilot:
                 self._scan, self.motion = self.mission.begun()
         elif self._mode == "scan":
             self._sphere = StickFrame()
-        words = {"operator": "operator flies", "hold": "holding the place", "scan": "the mission flies"}
+        words = {"operator": "operator flies", "hold": "holding the position", "scan": "the mission flies"}
         self._say("info", words[mode], time_s)
         self._mode = mode
 
@@ -266,10 +266,10 @@ class AssistedPilot:
 
 
 def assisted(parts: Parts, source: ControlSource, desk: OperatorState, begin: OperatorSettings | None = None) -> Parts:
-    """Parts that hands and a desk fly: the pilot is the assisted one, the controller heeds the desk at each step.
+    """Parts of an assisted flight: the pilot is the assisted one, the controller follows the settings at each step.
 
-    `parts`: their route is the mission that the mode `scan` flies. `begin`: what the desk is set to at time zero of
-    each flight; None: it stays as it is.
+    The route of `parts` is the mission of the mode `scan`. `begin` are the settings at time zero of each flight; None:
+    they stay as they are.
 
     Returns
     -------

@@ -63,7 +63,7 @@ class _OperatorByEye:
         self._state = begin(self.operator)
 
     def _steer(self, time_s: float, estimate: BodyState) -> tuple[Goal, Array]:
-        """The reference goal, and the velocities that the operator asks for: forward, right, down, turn, shape (4,)."""
+        """The reference goal, and the velocities that the operator commands: forward, right, down, turn, shape (4,)."""
         if time_s <= 0.0:
             self._state = begin(self.operator)
         reference = self.reference.goal(time_s, estimate)

@@ -1,13 +1,7 @@
-"""A flight without an end, on the clock, in a thread of its own: what a person flies.
+"""A flight in real time without a fixed end, in its own thread.
 
-The loop, the parts and the record are those of every flight; what differs is who says when a photograph is taken and
-when it is over. What it leaves is a trial folder like any other.
-
-From the parts that a flight by hand left to the folder of a trial: at its end, or after it was cut off.
-
-When photographs are taken in a flight by hand: when somebody asks.
-
-The clock of a flight that a person is in: steps wait for their time, and how late they come is known.
+Loop, parts and record are those of every flight. Photographs are taken and the flight ends on request. The result is a
+trial folder, also after an interruption.
 """
 
 from __future__ import annotations
@@ -59,8 +53,8 @@ _SEEN = ("time_s", *(f"goal_{axis}_m" for axis in "xyz"), *(f"goal_q{axis}" for 
 def collect_flight(parts: Parts, folder: Path) -> bool:
     """Make of a flight's parts what a trial's flight leaves; False where there are none, or the flight is whole.
 
-    Of planned.csv: a flight by hand has no plan, so it says where the camera was wished to be at each photograph. Rows
-    and photographs are as many as both were kept of, so a flight that was cut off ends a moment early.
+    planned.csv holds the commanded camera pose at each photograph. Rows without their photograph, or photographs
+    without their row, are dropped, so an interrupted flight ends slightly earlier.
     """
     if (folder / "steps.parquet").exists() or not has_parts(folder):
         drop_parts(folder)
@@ -83,7 +77,7 @@ def collect_flight(parts: Parts, folder: Path) -> bool:
 
 
 def _view(parts: Parts, seen: pl.DataFrame, k: int) -> tuple[float, Pose]:
-    """When photograph k was taken and the camera's wished pose then."""
+    """Time of photograph k, and the commanded pose of the camera."""
     time_s, *place, tilt_deg = (float(value) for value in seen.row(k))
     joint, X_BC = parts.vehicle.tilt, parts.vehicle.X_BC
     mount = X_BC if joint is None else joint.mount(X_BC, math.radians(tilt_deg))
@@ -91,17 +85,17 @@ def _view(parts: Parts, seen: pl.DataFrame, k: int) -> tuple[float, Pose]:
 
 
 BETWEEN_S = 0.2
-"""Time between two photographs at least; who asks more often is served then."""
+"""Least time between two photographs; an earlier request is served then."""
 BY_HAND = "by hand"
-"""What a stretch of flight is called where the pilot has no name for it."""
+"""Name of a leg if the pilot gives none."""
 
 
 class PhotoTrigger:
-    """A `Timetable` that opens when asked, from any thread or by the pilot's own hands.
+    """A `PhotoSchedule` on request, from any thread or by the pilot.
 
-    A pilot may have a method `taken()`, which gives and clears what hands asked for since: "capture" is a photograph in
-    the same step, "stop" the end of the flight. So both belong to the flight's time, and a flight that is flown again
-    from its record has them where they were. It may also say in `leg` what it does now.
+    A pilot may have a method `taken()`, which returns and clears the requests since the last call: "capture" for a
+    photograph in the same step, "stop" for the end of the flight. So a replay has both at the same times. Its attribute
+    `leg` names the current leg.
     """
 
     def __init__(self, parts: Parts) -> None:
@@ -112,22 +106,22 @@ class PhotoTrigger:
         self.over = False
 
     def ask(self) -> None:
-        """Have a photograph taken at the next step."""
+        """Request a photograph at the next step."""
         self._asked.set()
 
     def leg_name(self, _time_s: float) -> str:
-        """What the pilot says that it does."""
+        """The leg that the pilot names."""
         return str(getattr(self._parts.pilot, "leg", BY_HAND))
 
     def heed(self) -> None:
-        """Take in what hands asked for since."""
+        """Read the pilot's requests."""
         for what in getattr(self._parts.pilot, "taken", tuple)():
             if what == "capture":
                 self._asked.set()
             self.over |= what == "stop"
 
     def shutter_s(self, _number: int, time_s: float, _dt_s: float) -> float | None:
-        """Now, if a photograph was asked for and the last one is long enough ago."""
+        """Now, if a photograph was requested and the last one is long enough ago."""
         self.time_s = time_s
         self.heed()
         if not self._asked.is_set() or time_s < self._last_s + BETWEEN_S - 1e-9:
@@ -138,8 +132,8 @@ class PhotoTrigger:
 
 
 MOST_CATCHING_UP_S = 0.25
-"""How much lost time is flown again in a hurry. A world that runs fast under a person's hands is worse than one that
-lost a moment, so what is more than this is let go."""
+"""Largest delay that is caught up by faster steps; a larger one is dropped, because fast motion disturbs an operator
+more than a gap."""
 KEPT = 3000
 """Steps that percentiles are taken over: the last minute at 50 Hz."""
 
@@ -225,7 +219,7 @@ _NO_WATER = ScalarGrid(origin_W_m=np.zeros(3), spacing_m=1.0, values=np.zeros((0
 
 
 class LiveFlight:
-    """Flies parts until it is told to stop; one thread flies, any other may ask and tell.
+    """Flies parts until `stop`; one thread flies, the methods can be called from any thread.
 
     Raises InputError if the folder holds another trial, or a flight already.
 
@@ -240,7 +234,7 @@ class LiveFlight:
     water_every_s : float
         How often the water at the target is measured.
     shutter : Shutter, optional
-        Says when photographs are taken and when the flight is over; by default when it is asked.
+        Times of the photographs and of the end; by default on request.
     checked : bool
         Hold the parts against their scenario's tank first (see `Parts.preflight`); who flies elsewhere has done so.
     """
@@ -324,7 +318,7 @@ class LiveFlight:
                 if self.folder is not None:
                     stack.enter_context(exclusive_run(self.folder))
                 self._fly()
-        except BaseException as fault:  # the thread's end is told of by `fault`, whatever it is
+        except BaseException as fault:  # the reason of the end is in `fault`
             self.fault = fault
 
     def _fly(self) -> None:
@@ -367,7 +361,7 @@ class LiveFlight:
                 collect_flight(parts, folder)
 
     def _keep_hands(self, part: int) -> None:
-        """Put away what the hands did until now, of a pilot who has any."""
+        """Write the inputs until now, if the pilot has a record of them."""
         pilot: Any = self.parts.pilot
         if not isinstance(getattr(pilot, "trace", None), ControlLogWriter):
             return
@@ -376,7 +370,7 @@ class LiveFlight:
         pilot.trace = ControlLogWriter()
 
     def _is_over(self) -> bool:
-        """Whether somebody said stop, or the program has ended round its flight."""
+        """Whether the end was requested, or the main thread has ended."""
         return self._told_to_stop.is_set() or self._shutter.over or not threading.main_thread().is_alive()
 
     def _prepare(self, _done: float, _total: float, note: str = "") -> None:

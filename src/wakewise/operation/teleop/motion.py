@@ -1,7 +1,7 @@
-"""Where a piloted goal is and how it moves: one smooth reference, whoever steers it.
+"""Motion reference of teleoperation, which all modes share.
 
-Roll, pitch and yaw with their rates, a place with its velocity, and the camera's tilt. Whoever takes over goes on from
-here, so that a goal never jumps: what a mode wishes is approached within the bounds of this page.
+Roll, pitch and yaw with their rates, a position with its velocity, and the camera's tilt. Each mode continues from it,
+so goals are continuous; commands are approached within the limits of this module.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class MotionReference:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AttitudeReference:
-    """Wished roll, pitch and yaw, shape (3,), and tilt of the camera, and how fast they change."""
+    """Commanded roll, pitch and yaw, shape (3,), tilt of the camera, and their rates."""
 
     angles_rad: Array
     rates_rad_s: Array

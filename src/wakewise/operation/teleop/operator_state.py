@@ -1,7 +1,7 @@
-"""The desk: what an operator has set, which may change at any moment of a flight.
+"""Settings of an operator, which can change at any time of a flight.
 
-One holder, read by the control loop at each step and written from any thread (a page, a gamepad, a script). What is set
-is checked when it is set, so that the loop never meets nonsense.
+One record, read by the control loop at each step and written from any thread (a page, a gamepad, a script). Values are
+checked when they are set.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ TRANSIT, DELICATE = 10.0, 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class OperatorSettings:
-    """What is set.
+    """The settings.
 
     Raises InputError if a value is none of these, naming field, value and range.
 
     Parameters
     ----------
     mode : "operator", "hold" or "scan"
-        Who says where to go: the sticks, nobody, or the mission.
+        Source of the motion: the sticks, none, or the mission.
     method : "wake-aware" or "direct"
         How thrusts are chosen; direct is `dp`, the least thrusts.
     w_track : float
-        How closely the command is obeyed, on the paper's scale (see `wakewise.control.velocity_reference`), 0.5 to 50.
+        Tracking weight, on the paper's scale (see `wakewise.control.velocity_reference`), 0.5 to 50.
     gain : float
-        Share of the fastest speed that full stick asks for, 0.1 to 1.
+        Share of the largest speed at full stick, 0.1 to 1.
     precise : bool
         Slower by `PRECISE_SHARE`.
     watch_target : bool
@@ -78,16 +78,16 @@ class OperatorSettings:
 
     @property
     def share(self) -> float:
-        """Share of the fastest speeds that full stick asks for."""
+        """Share of the largest speeds at full stick."""
         return self.gain * (PRECISE_SHARE if self.precise else 1.0)
 
 
 FIELDS: tuple[str, ...] = tuple(field.name for field in fields(OperatorSettings))
-"""What can be set."""
+"""Names of the settings."""
 
 
 class OperatorState:
-    """Holds what is set; safe to read and to write from any thread."""
+    """Holds the settings; can be read and written from any thread."""
 
     def __init__(self, state: OperatorSettings | None = None) -> None:
         self._lock = threading.Lock()
@@ -95,11 +95,11 @@ class OperatorState:
 
     @property
     def state(self) -> OperatorSettings:
-        """What is set now."""
+        """The settings now."""
         return self._state
 
     def set(self, **changes: Any) -> OperatorSettings:
-        """Change some fields; returns what is set then.
+        """Change some fields; returns the new settings.
 
         Raises InputError, naming field, value and range; nothing is changed then.
         """
@@ -111,14 +111,14 @@ class OperatorState:
             return self._state
 
     def press(self, action: str) -> OperatorSettings:
-        """What a button does to what is set; one that does nothing to it changes nothing."""
+        """The settings after a button; buttons without effect on them are ignored."""
         with self._lock:
             self._state = apply_button(self._state, action)
             return self._state
 
 
 def apply_button(state: OperatorSettings, action: str) -> OperatorSettings:
-    """What is set after a button (see `wakewise.operation.teleop.input.ACTIONS`)."""
+    """The settings after a button (see `wakewise.operation.teleop.input.ACTIONS`)."""
     if action in MODES:
         return replace(state, mode=action)
     if action == "precise":
@@ -131,7 +131,7 @@ def apply_button(state: OperatorSettings, action: str) -> OperatorSettings:
 
 
 def tracking_regime(w_track: float) -> str:
-    """What a `w_track` is for, in the paper's words: transit above 10, delicate below 2, work between."""
+    """The regime of a `w_track` by the paper: transit above 10, delicate below 2, work between."""
     return "transit" if w_track > TRANSIT else "delicate" if w_track < DELICATE else "work"
 
 
@@ -139,7 +139,7 @@ def tracking_regime(w_track: float) -> str:
 class TrackingWeightMeaning:
     """What a `w_track` means: its regime, and in percent how far the vehicle deviates and how much wash it saves.
 
-    The percentages are None where nobody has measured them.
+    The percentages are None if they were not measured.
     """
 
     regime: str

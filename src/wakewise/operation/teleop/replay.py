@@ -1,4 +1,4 @@
-"""A flight by hand flown again, from the record of its hands: in the same world the same flight, to the byte."""
+"""Replay of a teleoperated flight from its recorded inputs: in the same world the same flight, to the byte."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ AFTER_S = 3.0
 
 
 class ReplayedPhotoTrigger(PhotoTrigger):
-    """Opens when it did in a flight before, whatever hands ask for, and ends with it.
+    """Photographs and end at the times of an earlier flight; requests are ignored.
 
     `steps`: the columns `time_s` and `exposing` of the flight's steps.parquet.
     """
@@ -41,20 +41,20 @@ class ReplayedPhotoTrigger(PhotoTrigger):
 
 
 class TimedPhotoTrigger(PhotoTrigger):
-    """One that ends a flight at `end_s`, if hands did not before."""
+    """Photographs on request; the flight ends at `end_s`, or earlier on request."""
 
     def __init__(self, parts: Parts, end_s: float) -> None:
         super().__init__(parts)
         self._end_s = end_s
 
     def heed(self) -> None:
-        """Take in what hands asked for since, and look at the clock."""
+        """Read the pilot's requests, and check the time."""
         super().heed()
         self.over |= self.time_s >= self._end_s - 1e-9
 
 
 def replay_input(parts: Parts, folder: Path) -> None:
-    """Fly the hands that a scenario of the pilot `operator` names, as fast as it goes, into the folder of a trial.
+    """Fly the inputs that a scenario of the pilot `operator` names, faster than real time, into a trial's folder.
 
     A record ends with its flight, a script `AFTER_S` after its last entry, unless "stop" is pressed before.
 
@@ -72,11 +72,11 @@ def replay_input(parts: Parts, folder: Path) -> None:
 
 
 def replay_of(folder: Path, out: Path | None, parts: Parts | Scenario | None = None) -> LiveFlight:
-    """A flight that flies again what a folder's hands did, as fast as it goes; begin it with `start`.
+    """A replay of a folder's inputs, faster than real time; begin it with `start`.
 
     `folder`: of a flight by hand. `out`: what the flight leaves goes there. `parts`: where it is flown; by default
-    where it was, which gives the same flight. Hands see nothing: elsewhere, or with another method, they do the same
-    and the vehicle is somewhere else.
+    where it was, which gives the same flight. The inputs do not react: elsewhere, or with another method, the vehicle
+    takes another path.
 
     Raises InputError if the folder holds no flight by hand, or `out` holds another trial.
     """

@@ -1,9 +1,9 @@
 """A mission that can be left and taken up again at any moment: its own time, and the way back to where it stands.
 
-The route knows where to be by a clock. Here that clock is the mission's: it stands while somebody else flies. Taken up
-again, the vehicle comes to rest, flies at the mission's pace round the target (straight in azimuth, elevation and
-range, so never through it) to where the mission was left, and there the clock begins to run again, faster and faster
-until it keeps up with the world's.
+A route is a function of time. Here it is the time of the mission, which stops while another mode flies. When the
+mission is resumed, the vehicle comes to rest, flies at the mission's pace round the target (straight in azimuth,
+elevation and range, so never through it) to where the mission was left, and there the clock begins to run again, faster
+and faster until it keeps up with the world's.
 """
 
 from __future__ import annotations

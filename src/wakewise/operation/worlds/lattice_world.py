@@ -1,11 +1,10 @@
-"""The second judge: a flight in the lattice's water, which shares no law with the tank.
+"""World `lattice`: a flight in a lattice Boltzmann large-eddy simulation, which shares no law with the tank.
 
-Thruster disks push moving cells, the hull takes from the water what the vehicle's drag gives it (spread over its box,
-so that a vehicle that hovers leaves no momentum), target and bed are solid, and the current comes in by the sides: each
-flight is a large-eddy simulation with the loop closed. Vehicle, sensors and the places at which water is judged are
-those of the tank.
+Thruster disks force the cells that they move through. The reaction of the vehicle's drag is spread over its box, so
+that a hovering vehicle leaves no momentum. Target and bed are solid, and the current enters by the sides. Vehicle,
+sensors and probes are those of the tank.
 
-What it has not: silt, waves, a pump, turbulence of the water's own; the hull lets jets through. Cells of 2.5 cm are
+Not modelled: silt, waves, a pump, ambient turbulence, and the hull as an obstacle of jets. Cells of 2.5 cm are
 three to a thruster's diameter: a jet's speed times distance is then 20 % low at 0.4 m and 20 % high at 0.9 m (cells of
 2 cm come nearer, at 2.4 times the work), and sheets on the bed and the thin water at the target's surface are coarser
 still. The target's excess speed is what the tank's is: this water less the same water without a vehicle, which goes on
@@ -33,9 +32,9 @@ from wakewise.simulation.water import AmbientSum, SteadyCurrent
 
 CELL_M = 0.025
 STRONGEST_N = 5.0
-"""Thrust of the fastest jet that the time step is made for; stronger ones of short duration still run."""
+"""Thrust of the fastest jet for which the time step is chosen; stronger ones of short duration are stable."""
 SPIN_UP_M, SPIN_UP_S = 1.0, 10.0
-"""Way that the current goes past the target before the thrusters start, or for how long if that is less."""
+"""Distance that the current flows before the thrusters start, or the time if that is shorter."""
 _DISK_POINTS, _HULL_SPACING = 32, 0.04
 _UNSTEADINESS = 0.15  # rms of a disk's load over its mean, as in the cases (see `lattice.cases.Case`)
 _LOAD_LIFE = 0.5  # exit diameters over exit speed
@@ -44,7 +43,7 @@ _MARGIN_M = 0.25  # the side takes the water's motion out over 0.2 m
 
 
 class _Water:
-    """The box as `TargetProbes` looks at it: what is more than in the same box without a vehicle, None if at rest."""
+    """The water of `TargetProbes`; its ambient flow is that of the same box without a vehicle, zero without current."""
 
     def __init__(self, water: ForcedLattice, alone: ForcedLattice | None) -> None:
         self._water, self._alone = water, alone
@@ -141,7 +140,7 @@ class LatticeWater(VehicleInWater):
                 self._alone.advance(nothing, nothing)
 
     def _pushes(self) -> tuple[Array, Array]:
-        """Where the vehicle pushes the water now, and with what, both shape (k, 3)."""
+        """Points of the vehicle's forces on the water now, and the forces in N, both shape (k, 3)."""
         plant, vehicle = self._plant, self._plant.vehicle
         origins, axes = plant.disks()
         if not self._box.holds(origins):
@@ -173,7 +172,7 @@ class LatticeWater(VehicleInWater):
 
 
 def box_half_size_m(places_W_m: Array, centre_W_m: Array, vehicle: Vehicle) -> float:
-    """How far a box about a target must reach so that the vehicle stays in it at all places, shape (n, 3)."""
+    """Half size of a box about a target that holds the vehicle at all places, shape (n, 3)."""
     away = np.abs(places_W_m[:, :2] - centre_W_m[:2]).max()
     return float(away) + 0.5 * float(np.linalg.norm(vehicle.size_m)) + _MARGIN_M
 
@@ -221,7 +220,7 @@ def _across(axes: Array) -> Array:
 
 
 def _check(settings: TankSettings) -> None:
-    """Refuse what this water does not have; silt and turbulence are left out, which the trial's figures show."""
+    """Refuse settings that this water does not model; silt and turbulence are ignored."""
     for wrong, words in (
         (settings.waves.amplitude_m > 0.0, "tank.waves.amplitude_m: the lattice has no waves"),
         (settings.pump.speed_m_s > 0.0, "tank.pump.speed_m_s: the lattice has no pump"),

@@ -1,8 +1,8 @@
-"""Worlds by name: what the water, the bed, the target and the vehicle's secrets are like where users have the trouble.
+"""Worlds by name: water, bed, target and vehicle mismatch of typical missions.
 
-Each is a YAML file: why it is flown, and fields of a scenario, each with a value, or a range from which the seed draws,
-and the source of the number; `_every.yaml` holds what all of them draw. A world lies over a preset and under what the
-user says.
+Each is a YAML file: its purpose, and fields of a scenario, each with a value or a distribution, and the source of the
+number. `_every.yaml` holds the distributions that all worlds share. A world is merged over a preset and below the
+user's settings.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from wakewise.operation.scenario.randomization import FieldDistribution
 
 
 class WorldField(Settings):
-    """One field of a world: its value or from where it is drawn, and the source of the number."""
+    """One field of a world: its value or distribution, and the source of the number."""
 
     value: Any = Field(None, description="what the field is")
     randomize: FieldDistribution | None = Field(None, description="from where the seed draws it")
@@ -81,7 +81,7 @@ def world_names() -> tuple[str, ...]:
 
 
 def own_file(name: str) -> str:
-    """A hint for whoever gives a file for a world; empty for any other name."""
+    """A hint if a file is given in place of a world's name; empty for any other name."""
     if not name.lower().endswith((".yaml", ".yml")):
         return ""
     return f"a world of your own is given as the scenario, `wakewise scan {name}` (docs/worlds.md), by name "
@@ -102,7 +102,7 @@ def load_world(name: str) -> NamedWorld:
 
 @functools.cache
 def every_world() -> dict[str, WorldField]:
-    """Fields that every world has, unless it says otherwise, by their dotted names."""
+    """Fields of all worlds, which a world may override, by their dotted names."""
     return parse_world("_every", _text("_every")).file.fields
 
 

@@ -1,10 +1,9 @@
-"""Worlds whose water answers thrust at once, everywhere: the paper's own, and the lattice's steady jets.
+"""Worlds with quasi-steady water: the paper's wake model, and steady jets of the lattice.
 
-Water without memory: at each instant the velocity follows from the true thrusts at the true pose. Vehicle and sensors
-are those of the tank.
+The velocity follows at each instant from the true thrusts at the true pose. Vehicle and sensors are those of the tank.
 
-- `paper`: v = sum of v_i by the paper's wake model. A planner that weighs the same model is judged by its own belief,
-  so figures from here are *circular*. They tell what a method does with its freedom, not what water does. The gain is
+- `paper`: v = sum of v_i by the paper's wake model. A planner with the same model is evaluated by its own
+  model, so these figures are *circular*: they show the method, not the water. The gain is
   that of `paper-calibrated`: 0.036 of the printed one, which at 1 N is 85 cm/s at 0.1 m and 3.4 cm/s at 0.5 m on the
   axis, the published 60 and 5 cm/s in the geometric mean (the law falls by a factor of 25 over that range, the
   published speeds by 12).
@@ -42,7 +41,7 @@ Jets = Callable[[Array, Array, Array, Array, Array], Array]
 
 
 def jets_of(wake: WakeModel) -> Jets:
-    """Water that is what a wake model says: the sum of its jets."""
+    """Water by a wake model: the sum of its jets."""
 
     def velocity(points_W_m: Array, origins_W_m: Array, axes_W: Array, thrusts_N: Array, areas_m2: Array) -> Array:
         jets = -np.sign(thrusts_N)[:, None] * axes_W

@@ -7,7 +7,6 @@ Read a measured step of a thruster.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from wakewise.core.arrays import Array, frozen
-from wakewise.core.csv_separators import other_separator
+from wakewise.core.csv_separators import csv_rows
 from wakewise.core.errors import InputError
 from wakewise.robot.thrusters.rotor_lag import FirstOrderLag, LagModel, RotorLag, SecondOrderLag, SplitLag
 
@@ -424,25 +423,14 @@ def read_step(path: Path | str) -> tuple[Array, Array, Array]:
     if path.stat().st_size > LARGEST_FILE_BYTES:
         raise InputError(f"step {path}: {path.stat().st_size} bytes, at most {LARGEST_FILE_BYTES}")
     rows = []
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
-            if missing:
-                how = other_separator(reader.fieldnames)
-                raise InputError(f"step {path}: no column {', '.join(missing)}, needs {', '.join(COLUMNS)}{how}")
-            for row in reader:
-                try:
-                    values = [float(row[name]) for name in COLUMNS]
-                except (TypeError, ValueError):
-                    values = [math.nan]
-                if not all(map(math.isfinite, values)):
-                    raise InputError(
-                        f"step {path}: line {reader.line_num}: {', '.join(COLUMNS)} must be finite numbers"
-                    )
-                rows.append(values)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"step {path}: not readable as CSV ({error})") from error
+    for where, row in csv_rows(path, COLUMNS, f"a step with the columns {', '.join(COLUMNS)}"):
+        try:
+            values = [float(row[name] or "") for name in COLUMNS]
+        except ValueError:
+            values = [math.nan]
+        if not all(map(math.isfinite, values)):
+            raise InputError(f"step {where}: {', '.join(COLUMNS)} must be finite numbers")
+        rows.append(values)
     if not rows:
         raise InputError(f"step {path}: no rows")
     time_s, command, thrust_N = np.array(rows).T

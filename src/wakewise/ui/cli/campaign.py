@@ -16,9 +16,7 @@ if TYPE_CHECKING:
     from wakewise.experiments.campaigns.table import Results
 
 app = typer.Typer(
-    help="Campaigns: methods x targets x worlds x seeds from one file, resumable, on one computer or a cluster.",
-    no_args_is_help=False,
-    rich_markup_mode=None,
+    help="Campaigns: methods x targets x worlds x seeds from one file, resumable, on one computer or a cluster."
 )
 
 Folder = Annotated[Path, typer.Argument(help="Folder of a campaign, or its file where --out was not given.")]

@@ -11,21 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wakewise.ui.cli import options
 from wakewise.ui.cli.console import print_json
-from wakewise.ui.cli.options import (
-    Json,
-    Out,
-    Preset,
-    ScenarioFile,
-    Seed,
-    Sets,
-    TargetName,
-    TargetSize,
-    Vehicle,
-    World,
-    default_folder,
-    overrides,
-)
 
 if TYPE_CHECKING:
     from wakewise.operation.teleop.input import ControlSource
@@ -37,15 +24,15 @@ _LOOK_S = 0.1
 
 
 def cockpit(
-    scenario: ScenarioFile = None,
-    preset: Preset = "quick",
-    out: Out = None,
-    target: TargetName = None,
-    target_size: TargetSize = None,
-    vehicle: Vehicle = None,
-    world: World = None,
-    seed: Seed = None,
-    sets: Sets = None,
+    scenario: options.ScenarioFile = None,
+    preset: options.Preset = "quick",
+    out: options.Out = None,
+    target: options.TargetName = None,
+    target_size: options.TargetSize = None,
+    vehicle: options.Vehicle = None,
+    world: options.World = None,
+    seed: options.Seed = None,
+    sets: options.Sets = None,
     port: Annotated[int, typer.Option(help="Port of the page; 0 takes any that is free.", min=0, max=65535)] = 8765,
     host: Annotated[
         str,
@@ -64,7 +51,7 @@ def cockpit(
         Path | None, typer.Option(metavar="FILE", help="YAML file that says what the gamepad's parts do.")
     ] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the page in a browser.")] = False,
-    json: Json = False,
+    json: options.Json = False,
 ) -> None:
     """Fly by hand: a page in the browser with the camera's picture, the helm, and what the thrusters do to the target.
 
@@ -80,9 +67,9 @@ def cockpit(
     from wakewise.ui.web.origin_check import is_loopback, origin_of
 
     origins = tuple(origin_of(text) for text in origin or ())
-    changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)
+    changes = options.overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)
     resolved = load_scenario(preset, scenario, changes)
-    folder = out or default_folder(resolved, "cockpit")
+    folder = out or options.default_folder(resolved, "cockpit")
     with ExitStack() as stack:
         device = stack.enter_context(_gamepad(mapping)) if gamepad or mapping is not None else None
         session = CockpitSession(resolved, folder, device=device, scene=is_loopback(host))

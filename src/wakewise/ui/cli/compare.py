@@ -7,22 +7,8 @@ from typing import Annotated
 import typer
 
 from wakewise.core.errors import InputError
+from wakewise.ui.cli import options
 from wakewise.ui.cli.console import ProgressBars, no_report, print_json, print_table, unit_suffix
-from wakewise.ui.cli.options import (
-    Json,
-    Out,
-    Preset,
-    ScenarioFile,
-    Seed,
-    Sets,
-    TargetName,
-    TargetSize,
-    Vehicle,
-    World,
-    default_folder,
-    listed,
-    overrides,
-)
 
 _ROWS = (
     "success",
@@ -43,17 +29,17 @@ _ROWS = (
 
 
 def compare(
-    scenario: ScenarioFile = None,
+    scenario: options.ScenarioFile = None,
     methods: Annotated[str, typer.Option(help="Comma-separated; ratios are to the first.")] = "dp,wake-aware",
-    preset: Preset = "quick",
-    out: Out = None,
-    target: TargetName = None,
-    target_size: TargetSize = None,
-    vehicle: Vehicle = None,
-    world: World = None,
-    seed: Seed = None,
-    sets: Sets = None,
-    json: Json = False,
+    preset: options.Preset = "quick",
+    out: options.Out = None,
+    target: options.TargetName = None,
+    target_size: options.TargetSize = None,
+    vehicle: options.Vehicle = None,
+    world: options.World = None,
+    seed: options.Seed = None,
+    sets: options.Sets = None,
+    json: options.Json = False,
 ) -> None:
     """Fly the same mission with each method in the same water, and set the outcomes side by side."""
     from wakewise.core.optional_dependencies import need
@@ -63,13 +49,13 @@ def compare(
     from wakewise.experiments.trials import UNITS
     from wakewise.operation import load_scenario
 
-    names = listed(methods)
+    names = options.listed(methods)
     if len(names) != len(set(names)) or len(names) < 2:
         hint = f"; one alone is `wakewise scan --method {names[0]}`" if len(names) == 1 else ""
         raise InputError(f"--methods: '{methods}', must be two or more different names such as dp,wake-aware{hint}")
-    changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)
+    changes = options.overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)
     scenarios = {name: load_scenario(preset, scenario, changes | {"method": name}) for name in names}
-    folder = out or default_folder(scenarios[names[0]], "compare")
+    folder = out or options.default_folder(scenarios[names[0]], "compare")
     result = api.compare(scenarios, folder, ProgressBars())
     figures = result.figures
     if json:

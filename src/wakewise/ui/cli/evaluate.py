@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from wakewise.core.errors import InputError, StageError
-from wakewise.ui.cli.console import print_json, print_table
+from wakewise.ui.cli.console import answer, print_table
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
@@ -142,32 +143,29 @@ def evaluate(
     if reference is None:
         figures, definitions = _against_depths(points, depth_maps, cameras)
     else:
-        figures, definitions = _against_reference(
-            cloud, points, reference, cameras, bed_z, unit_m, thresholds, not no_icp, colours
-        )
+        try:
+            figures, definitions, aligned, error_mm = _against_reference(
+                cloud, points, reference, cameras, bed_z, unit_m, thresholds, not no_icp
+            )
+        except StageError as fault:
+            hint = "; if the model holds the bed that the object stands on, say where: --bed-z" if bed_z is None else ""
+            raise StageError(f"{fault}{hint}") from None
+        if colours is not None:
+            _write_errors(colours, aligned, error_mm)
     _remark(figures)
     if about:
         from wakewise.vision.evaluation import SPLAT_DEFINITIONS
 
         figures, definitions = figures | about, definitions | SPLAT_DEFINITIONS
-    if json:
-        why = {key: "camera positions were not given (--cameras)" for key, value in figures.items() if value is None}
-        why |= {key: "ICP was not wished for" for key in why if key.startswith("icp_")}
-        why |= {key: "the model is no mesh" for key in why if key == "model_faults"}
-        units = {key: unit for key, (unit, _) in definitions.items()}
-        print_json(
-            figures | {"why": why, "units": units, "definitions": {k: text for k, (_, text) in definitions.items()}}
-        )
-        return
-    shown = {
-        key: value for key, value in figures.items() if not isinstance(value, (list, dict)) and key != "model_faults"
-    }
-    _print_figures(f"{cloud} against {reference or depth_maps}", shown, {key: definitions[key][1] for key in shown})
-    for share in figures.get("shares", ()):
-        typer.echo(
-            f"within {share['threshold_mm']:.3g} mm: {share['accuracy_pct']:.1f} % of the model, "
-            f"{share['completeness_pct']:.1f} % of the truth, F {share['f_score']:.1f}"
-        )
+    why = {key: "camera positions were not given (--cameras)" for key, value in figures.items() if value is None}
+    why |= {key: "ICP was not wished for" for key in why if key.startswith("icp_")}
+    why |= {key: "the model is no mesh" for key in why if key == "model_faults"}
+    shares = (
+        f"within {share['threshold_mm']:.3g} mm: {share['accuracy_pct']:.1f} % of the model, "
+        f"{share['completeness_pct']:.1f} % of the truth, F {share['f_score']:.1f}"
+        for share in figures.get("shares", ())
+    )
+    _print_figures(json, f"{cloud} against {reference or depth_maps}", figures, why, definitions, {}, *shares)
 
 
 def _points(
@@ -215,15 +213,9 @@ def _print_views(views: Path, photos: Path, split: Path | None, json: bool) -> N
     from wakewise.vision.evaluation import VIEW_DEFINITIONS, read_split, score_views
 
     scores = score_views(views, photos, None if split is None else read_split(split))
-    figures = scores.figures()
-    if json:
-        units = {key: unit for key, (unit, _) in VIEW_DEFINITIONS.items()}
-        definitions = {key: text for key, (_, text) in VIEW_DEFINITIONS.items()}
-        print_json(figures | {"why": scores.why, "units": units, "definitions": definitions})
-        return
-    shown = {key: value for key, value in figures.items() if key != "per_view"}
-    meanings = {key: scores.why.get(key, VIEW_DEFINITIONS[key][1]) for key in shown}
-    _print_figures(f"{views} against {photos}", shown, meanings)
+    _print_figures(
+        json, f"{views} against {photos}", scores.figures(), scores.why, VIEW_DEFINITIONS, instead=scores.why
+    )
 
 
 def _remark(figures: dict[str, Any]) -> None:
@@ -242,6 +234,16 @@ def _remark(figures: dict[str, Any]) -> None:
         )
 
 
+def _write_errors(path: Path, points: Array, error_mm: Array) -> None:
+    import numpy as np
+
+    from wakewise.vision.evaluation import error_colours
+    from wakewise.vision.reconstruction import OrientedPointCloud, write_cloud
+
+    none = np.zeros_like(points)
+    write_cloud(path, OrientedPointCloud(points_m=points, normals=none, colours=error_colours(error_mm)))
+
+
 def _against_reference(
     cloud: Path,
     points: Array,
@@ -251,43 +253,11 @@ def _against_reference(
     unit_m: float,
     thresholds: str | None,
     icp: bool,
-    colours: Path | None,
-) -> Figures:
-    """Against a mesh, or against a cloud where the file has no faces."""
+) -> tuple[dict[str, Any], dict[str, tuple[str, str]], Array, Array]:
+    """Figures, definitions, the aligned model and its errors in mm; the reference is a cloud if it has no faces."""
     from wakewise.core.optional_dependencies import need
 
     need("wakewise evaluate", "photos", only=("embreex", "small_gicp"))
-    import numpy as np
-
-    from wakewise.vision.evaluation import error_colours
-    from wakewise.vision.reconstruction import OrientedPointCloud as Points
-    from wakewise.vision.reconstruction import write_cloud
-
-    try:
-        figures, definitions, aligned, error_mm = _measured(
-            cloud, points, reference, cameras, bed_z, unit_m, thresholds, icp
-        )
-    except StageError as fault:
-        if bed_z is not None:
-            raise
-        raise StageError(f"{fault}; if the model holds the bed that the object stands on, say where: --bed-z") from None
-    if colours is not None:
-        none = np.zeros_like(aligned)
-        write_cloud(colours, Points(points_m=aligned, normals=none, colours=error_colours(error_mm)))
-    return figures, definitions
-
-
-def _measured(
-    cloud: Path,
-    points: Array,
-    reference: Path,
-    cameras: Path | None,
-    bed_z: float | None,
-    unit_m: float,
-    thresholds: str | None,
-    icp: bool,
-) -> tuple[dict[str, Any], dict[str, tuple[str, str]], Array, Array]:
-    """Figures, definitions, the aligned model and its errors in mm."""
     import numpy as np
 
     from wakewise.scene.targets import read_mesh
@@ -359,7 +329,25 @@ def _against_depths(points: Array, depth_maps: Path | None, cameras: Path | None
     return dataclasses.asdict(compare_depths(points, read_depth_views(depth_maps, cameras))), DEPTH_DEFINITIONS
 
 
-def _print_figures(title: str, figures: Mapping[str, Any], meanings: Mapping[str, str]) -> None:
-    """A table of figures with what each is."""
-    rows = [(key, value, meanings[key]) for key, value in figures.items()]
-    print_table("tnt", ("figure", "value", "what it is"), rows, title)
+def _print_figures(
+    json: bool,
+    title: str,
+    figures: dict[str, Any],
+    why: Mapping[str, str],
+    definitions: Mapping[str, tuple[str, str]],
+    instead: Mapping[str, str],
+    *lines: str,
+) -> None:
+    """Print the figures: with `json` with units, definitions and why some are null, else as a table and lines.
+
+    The table has the definition of each figure, or what `instead` says of it.
+    """
+    units = {key: unit for key, (unit, _) in definitions.items()}
+    texts = {key: text for key, (_, text) in definitions.items()}
+    rows = [
+        (key, value, instead.get(key) or texts[key])
+        for key, value in figures.items()
+        if not isinstance(value, (list, dict)) and key != "model_faults"
+    ]
+    table = partial(print_table, "tnt", ("figure", "value", "what it is"), rows, title)
+    answer(json, figures | {"why": why, "units": units, "definitions": texts}, table, *lines)

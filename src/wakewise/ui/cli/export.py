@@ -5,61 +5,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, print_json
+from wakewise.ui.cli.console import ProgressBars, answer, print_json
 from wakewise.ui.cli.options import Json, seed_option
 
 LISTED = 5
 """Trials that were left out are listed up to so many; DATASHEET.md lists all."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class DatasetOptions:
-    """What the options that go with --to dataset said."""
-
-    licence: str | None = None
-    creators: tuple[str, ...] = ()
-    name: str | None = None
-    url: str | None = None
-    published: str | None = None
-    version: str | None = None
-    answers: Path | None = None
-    check: bool = False
-
-    def refuse_beside(self, to: str) -> None:
-        """Refuse them where another format is made."""
-        names = {"licence": "license", "creators": "creator", "published": "date"}
-        for one in fields(self):
-            if getattr(self, one.name):
-                raise InputError(f"--{names.get(one.name, one.name)}: goes with --to dataset only, not with {to}")
-
-
-def export_dataset(folder: Path, out: Path | None, words: DatasetOptions, json: bool) -> None:
-    """Make a data set, or check one."""
-    if words.check:
-        _check(folder, words, out, json)
-        return
+def _dataset(folder: Path, out: Path | None, options: dict[str, Any], json: bool) -> None:
     from wakewise.experiments.trials.dataset import build_dataset, read_words
     from wakewise.experiments.trials.dataset.statement import QUESTIONS
 
     path = out or folder / "export" / "dataset"
-    told = read_words(
-        name=folder.resolve().name if words.name is None else words.name,
-        licence=words.licence,
-        creators=words.creators,
-        url=words.url,
-        published=words.published,
-        version=words.version or "1.0.0",
-        answers=words.answers,
+    words = read_words(
+        name=folder.resolve().name if options["name"] is None else options["name"],
+        licence=options["license"],
+        creators=tuple(options["creator"] or ()),
+        url=options["url"],
+        published=options["date"],
+        version=options["version"] or "1.0.0",
+        answers=options["answers"],
     )
     with ProgressBars().stage("trials") as progress:
-        built = build_dataset(folder, path, told, progress)
+        built = build_dataset(folder, path, words, progress)
     facts: dict[str, Any] = {
         "to": "dataset",
         "path": str(built.path),
@@ -69,39 +43,30 @@ def export_dataset(folder: Path, out: Path | None, words: DatasetOptions, json: 
         "bytes": built.bytes,
         "left_out": built.left_out,
     }
-    if json:
-        print_json(facts)
-        return
     kept = f", {built.trials - built.made} of them from before" if built.made < built.trials else ""
-    typer.echo(
+    lines = [
         f"{built.path}: {built.trials} trials{kept}, {built.photographs} photographs, {built.files} files, "
-        f"{built.bytes / 1e6:.1f} MB"
-    )
-    for name, why in list(built.left_out.items())[:LISTED]:
-        typer.echo(f"left out        {name}: {why}")
+        f"{built.bytes / 1e6:.1f} MB",
+        *(f"left out        {name}: {why}" for name, why in list(built.left_out.items())[:LISTED]),
+    ]
     if len(built.left_out) > LISTED:
-        typer.echo(f"                and {len(built.left_out) - LISTED} more, see DATASHEET.md")
-    if unsaid := [question for question in QUESTIONS if question not in told.answers]:
-        typer.echo(f"open            {', '.join(unsaid)}: DATASHEET.md asks, --answers FILE tells")
+        lines.append(f"                and {len(built.left_out) - LISTED} more, see DATASHEET.md")
+    if open_questions := [question for question in QUESTIONS if question not in words.answers]:
+        lines.append(
+            f"open            {', '.join(open_questions)}: answers are missing in DATASHEET.md (--answers FILE)"
+        )
+    answer(json, facts, *lines)
 
 
-def _check(folder: Path, words: DatasetOptions, out: Path | None, json: bool) -> None:
+def _check(folder: Path, json: bool) -> None:
     from wakewise.experiments.trials.dataset import check_dataset
 
-    if out is not None or any(getattr(words, one.name) for one in fields(words) if one.name != "check"):
-        raise InputError("--check: takes the folder of a data set and no other option")
     with ProgressBars().stage("check sums") as progress:
         checked = check_dataset(folder, progress)
     amiss = checked.differences
+    facts = {"path": str(folder), "files": checked.files, "bytes": checked.bytes}
     if json:
-        print_json(
-            {
-                "path": str(folder),
-                "files": checked.files,
-                "bytes": checked.bytes,
-                "differences": {one.path: one.what for one in amiss},
-            }
-        )
+        print_json(facts | {"differences": {one.path: one.what for one in amiss}})
     if amiss:
         more = f", and {len(amiss) - 1} more" if len(amiss) > 1 else ""
         raise InputError(f"{folder}: is not as it was made: {amiss[0].path} {amiss[0].what}{more}")
@@ -179,16 +144,16 @@ def export(
     A data set takes all trials of a folder, what a controller could know apart from the truth, with Croissant metadata,
     check sums and a data sheet; it goes on where it was cut off.
     """
-    words = DatasetOptions(
-        licence=licence,
-        creators=tuple(creator or ()),
-        name=name,
-        url=url,
-        published=date,
-        version=version,
-        answers=answers,
-        check=check,
-    )
+    options: dict[str, Any] = {
+        "license": licence,
+        "creator": creator,
+        "name": name,
+        "url": url,
+        "date": date,
+        "version": version,
+        "answers": answers,
+    }
+    given = [option for option, value in options.items() if value]
     if to == "dataset":
         if trial is None or vehicle is not None:
             raise InputError("export --to dataset: give the folder of a campaign, of trials or of one, and no vehicle")
@@ -196,9 +161,15 @@ def export(
             raise InputError("--held-out, --seed: go with --to nerfstudio and colmap only, not with dataset")
         if origin is not None or poses != "true" or frame != "fsd":
             raise InputError("export --to dataset: no --origin, --poses or --frame; it keeps all poses as they are")
-        export_dataset(trial, out, words, json)
+        if check and (out is not None or given):
+            raise InputError("--check: takes the folder of a data set and no other option")
+        if check:
+            _check(trial, json)
+        else:
+            _dataset(trial, out, options, json)
         return
-    words.refuse_beside(to or "FORMAT")
+    if given or check:
+        raise InputError(f"--{[*given, 'check'][0]}: goes with --to dataset only, not with {to or 'FORMAT'}")
     water = None
     if to == "auv_controllers":
         if vehicle is None or trial is not None:
@@ -219,16 +190,14 @@ def export(
         place = None if origin is None else GeodeticOrigin(*_two(origin))
         done = export_trial(trial, to, out=out, poses=poses, origin=place, held_out=held_out, seed=seed)
         path, holds, water = done.path, done.holds, done.water
-    if json:
-        print_json({"to": to, "path": str(path), **holds} | ({} if water is None else {"water": water.figures()}))
-        return
-    told = ", ".join(f"{count} {what.replace('_', ' ')}" for what, count in holds.items())
-    typer.echo(f"{path}: {told}")
+    contents = ", ".join(f"{count} {what.replace('_', ' ')}" for what, count in holds.items())
+    lines = [f"{path}: {contents}"]
     if water is not None and water.attenuation_per_m is not None:
         red, green, blue = water.attenuation_per_m
-        typer.echo(f"water ({water.source}): attenuation {red:.3g}, {green:.3g}, {blue:.3g} /m in red, green, blue")
+        lines.append(f"water ({water.source}): attenuation {red:.3g}, {green:.3g}, {blue:.3g} /m in red, green, blue")
     elif water is not None:
-        typer.echo(f"water: attenuation is not known ({water.why})")
+        lines.append(f"water: attenuation is not known ({water.why})")
+    answer(json, {"to": to, "path": str(path), **holds} | ({} if water is None else {"water": water.figures()}), *lines)
 
 
 def _allocation(vehicle: str, out: Path | None, frame: str) -> tuple[Path, dict[str, int]]:

@@ -1,7 +1,4 @@
-"""`wakewise reconstruct`: photographs to a model.
-
-The log file of `wakewise reconstruct`: what was asked, when each stage began, what was said, how it ended.
-"""
+"""`wakewise reconstruct`: photographs to a model, with a log file of options, stages, messages and result."""
 
 from __future__ import annotations
 
@@ -75,7 +72,7 @@ class RunLog:
 
 @contextmanager
 def logged(out: Path) -> Iterator[RunLog]:
-    """A log that also tells of a failure, which goes on its way."""
+    """A log that also records a failure, which is raised again."""
     log = RunLog(out)
     try:
         yield log
@@ -183,14 +180,11 @@ def reconstruct_photos(
         return
     for line in output_folder(photos):
         typer.echo(f"wakewise: {line}", err=True)
+    made = partial(reconstruct, settings=settings, focal_px=focal_px, lens=lenses, lens_patterns=patterns)
     with logged(out) as log, ProgressBars().stage("reconstruct") as progress:
-        model = reconstruct(
+        model = made(
             photos,
             out,
-            settings,
-            focal_px=focal_px,
-            lens=lenses,
-            lens_patterns=patterns,
             reference_positions=references,
             known=known,
             region=(np.array(region[:3]), region[3]) if region else None,
@@ -211,17 +205,8 @@ def reconstruct_photos(
     write_report_of(out, photos)
 
     def remake(half: Path, folder: Path, places: Any, tell: Any) -> Model:
-        return reconstruct(
-            half,
-            folder,
-            settings,
-            focal_px=focal_px,
-            lens=lenses,
-            lens_patterns=patterns,
-            reference_positions=places,
-            request=ReconstructionRequest(masks=masks, crop=request.crop),
-            progress=tell,
-        )
+        kept = ReconstructionRequest(masks=masks, crop=request.crop)
+        return made(half, folder, reference_positions=places, request=kept, progress=tell)
 
     for line in write_outputs(write, out, photos, model, remake):
         log.say(line)

@@ -1,7 +1,4 @@
-"""What may be asked of `wakewise reconstruct` besides photographs and cameras.
-
-What `wakewise reconstruct --write` leaves besides the model: textures, orthophoto, LAS, extent by halves.
-"""
+"""Options of `wakewise reconstruct` besides photographs and cameras, and the outputs of `--write`."""
 
 from __future__ import annotations
 
@@ -12,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars
+from wakewise.ui.cli.console import ProgressBars, answer, write_page
 
 if TYPE_CHECKING:
     from wakewise.core.arrays import Array
@@ -89,12 +86,11 @@ def request_of(
 
 def frames_of(photos: Path, out: Path) -> Path:
     """The folder of photographs: what was given, or frames of the film that was given, which are counted."""
-    from wakewise.ui.cli.console import ProgressBars as Progress
     from wakewise.vision.reconstruction.photos.video_frames import is_film, take_frames
 
     if not is_film(photos):
         return photos
-    with Progress().stage("frames") as progress:
+    with ProgressBars().stage("frames") as progress:
         folder, said = take_frames(photos, out, progress)
     for line in said.lines():
         typer.echo(f"wakewise: {line}", err=True)
@@ -105,33 +101,25 @@ def look_first(photos: Path, out: Path, threads: int, json: bool) -> None:
     """Leave `out/look.html` and `look.json`, and say what to shoot again."""
     from wakewise.core.files import write_json
     from wakewise.core.optional_dependencies import need
-    from wakewise.ui.cli.console import ProgressBars as Progress
-    from wakewise.ui.cli.console import print_json, write_page
     from wakewise.ui.reports.photo_preview import write_look
     from wakewise.vision.reconstruction.quality.photo_preview import preview_photos
 
     need("wakewise reconstruct --look", "reports")
     if out.resolve() == photos.resolve():
         raise InputError(f"{out}: is the folder of the photos, the look must go elsewhere")
-    with Progress().stage("look") as progress:
+    with ProgressBars().stage("look") as progress:
         look, thumbs = preview_photos(photos, threads, progress)
     write_json(out / "look.json", look.summary())
     page = write_page("page", lambda: write_look(look, thumbs, out / "look.html", photos.resolve().name))
-    if json:
-        print_json(look.summary())
-        return
     again = sum(bool(photo.faults) for photo in look.photos)
-    typer.echo(f"{len(look.photos)} photos, {look.groups[0]} hang together, {again} to look at again")
-    for line in look.advice:
-        typer.echo(f"  {line}")
-    if page:
-        typer.echo(f"page: {out / 'look.html'}")
+    counts = f"{len(look.photos)} photos, {look.groups[0]} hang together, {again} to look at again"
+    written = f"page: {out / 'look.html'}" if page else None
+    answer(json, look.summary(), counts, *(f"  {line}" for line in look.advice), written)
 
 
 def write_report_of(out: Path, photos: Path) -> None:
     """Leave `out/report.html`; without the packages that it needs, say so."""
     from wakewise.core.optional_dependencies import has, how_to_install
-    from wakewise.ui.cli.console import write_page
 
     if not has("reports"):
         typer.echo(f"wakewise: no report, as it needs {how_to_install('reports')}", err=True)

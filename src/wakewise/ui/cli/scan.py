@@ -8,21 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wakewise.ui.cli import options
 from wakewise.ui.cli.console import ProgressBars, no_report, print_json, print_table, unique_reasons, unit_suffix
-from wakewise.ui.cli.options import (
-    Json,
-    Out,
-    Preset,
-    ScenarioFile,
-    Seed,
-    Sets,
-    TargetName,
-    TargetSize,
-    Vehicle,
-    World,
-    default_folder,
-    overrides,
-)
 
 if TYPE_CHECKING:
     from wakewise.operation import Scenario
@@ -48,9 +35,9 @@ _HEADLINES = (
 
 
 def scan(
-    scenario: ScenarioFile = None,
-    preset: Preset = "quick",
-    out: Out = None,
+    scenario: options.ScenarioFile = None,
+    preset: options.Preset = "quick",
+    out: options.Out = None,
     method: Annotated[
         str | None,
         typer.Option(
@@ -59,12 +46,12 @@ def scan(
             "wake-aware, a plug-in, or package.module:make."
         ),
     ] = None,
-    target: TargetName = None,
-    target_size: TargetSize = None,
-    vehicle: Vehicle = None,
-    world: World = None,
-    seed: Seed = None,
-    sets: Sets = None,
+    target: options.TargetName = None,
+    target_size: options.TargetSize = None,
+    vehicle: options.Vehicle = None,
+    world: options.World = None,
+    seed: options.Seed = None,
+    sets: options.Sets = None,
     resume: Annotated[
         Path | None,
         typer.Option(
@@ -72,7 +59,7 @@ def scan(
             help="Go on with what a folder holds, as its scenario.yaml says: a trial cut short, a flight by hand.",
         ),
     ] = None,
-    json: Json = False,
+    json: options.Json = False,
 ) -> None:
     """Fly layered orbits round a target, photograph it, reconstruct it, measure the model, write a report.
 
@@ -86,12 +73,12 @@ def scan(
     from wakewise.core.errors import InputError
     from wakewise.operation import load_scenario, read_scenario
 
-    changes = overrides(
+    changes = options.overrides(
         sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, method=method, world=world
     )
     if resume is None:
         resolved = load_scenario(preset, scenario, changes)
-        folder = out or default_folder(resolved, resolved.method)
+        folder = out or options.default_folder(resolved, resolved.method)
     else:
         if scenario is not None or out is not None or changes:
             raise InputError("--resume: goes on as the folder says, so give nothing beside it but --json")

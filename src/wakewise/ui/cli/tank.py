@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from wakewise.core.arrays import Array
     from wakewise.scene.targets import Target
 
-app = typer.Typer(
-    help="The simulated water: its flow at any points.",
-    no_args_is_help=False,
-    rich_markup_mode=None,
-)
+app = typer.Typer(help="The simulated water: its flow at any points.")
 
 
 @app.callback()

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 STREAMS_M_S = (0.004, 0.036, 0.06, 0.18)
 """Streams in which a soft target is shown: what a gentle method leaves, the tank's current, and the paper's washes."""
 
-app = typer.Typer(help="What Wakewise makes of a target.", no_args_is_help=False, rich_markup_mode=None)
+app = typer.Typer(help="What Wakewise makes of a target.")
 
 
 @app.callback()

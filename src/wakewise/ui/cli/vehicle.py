@@ -20,9 +20,7 @@ from wakewise.ui.cli.options import (
 )
 from wakewise.ui.cli.vehicle_import import foreign_vehicle
 
-app = typer.Typer(
-    help="Vehicles: list, show, check, import; their thrusters.", no_args_is_help=False, rich_markup_mode=None
-)
+app = typer.Typer(help="Vehicles: list, show, check, import; their thrusters.")
 app.command("import")(vehicle_import.import_file)
 app.command("thruster")(vehicle_thruster.thruster)
 app.command("lag")(vehicle_thruster.lag)

@@ -12,11 +12,7 @@ import typer
 from wakewise.ui.cli.console import answer, interval, print_table
 from wakewise.ui.cli.options import Json, seed_option
 
-app = typer.Typer(
-    help="What a jet does to the water: calibrate a model, see how good each is.",
-    no_args_is_help=False,
-    rich_markup_mode=None,
-)
+app = typer.Typer(help="What a jet does to the water: calibrate a model, see how good each is.")
 
 
 @app.command("fit")

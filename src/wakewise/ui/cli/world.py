@@ -10,7 +10,7 @@ import typer
 from wakewise.ui.cli.console import answer, print_json, print_table
 from wakewise.ui.cli.options import Json, seed_option
 
-app = typer.Typer(help="Worlds: list, show what each is made of and why.", no_args_is_help=False, rich_markup_mode=None)
+app = typer.Typer(help="Worlds: list, show what each is made of and why.")
 
 _WIDTH = 100
 

@@ -1,6 +1,6 @@
-"""One page that is connected: what waits to be sent to it, and what it may still say.
+"""One connected page: its outbox and its message rate, and the pictures of all pages.
 
-When pictures are drawn and to whom they go: one is under way per client, and the next one is drawn meanwhile.
+One picture is in transit per client; the next one is rendered meanwhile.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from websockets.asyncio.server import ServerConnection
 from wakewise.ui.cockpit.view_model import CameraPicture, ViewModel
 
 _MOST_WAITING = 64
-"""Notes that wait for a client at most; of more the oldest are lost to it."""
+"""Largest number of notes in an outbox; of more the oldest are dropped."""
 SEEN_WITHIN_S = 0.3
-"""A page that shows pictures says so within this time; one that is hidden leaves them unseen."""
+"""A visible page acknowledges a picture within this time."""
 RATE_HZ, BURST = 120.0, 240.0
 """Messages that a client may send: sticks come at 25 Hz, pictures are acknowledged at some 15 Hz."""
 
 
 @dataclass(kw_only=True, eq=False)
 class Client:
-    """A connection and its outbox. Of states and pictures only the newest waits; nobody waits for the client."""
+    """A connection and its outbox. It holds the newest state and picture only; nothing waits for the client."""
 
     connection: ServerConnection
     id: str
@@ -47,11 +47,11 @@ class Client:
 
     @property
     def looks(self) -> bool:
-        """Whether a picture would be sent on at once."""
+        """Whether a picture would be sent at once."""
         return self.greeted and self.unseen is None and self._picture is None
 
     def will_look(self, now_s: float) -> bool:
-        """Whether it can take a picture, or has had one so lately that its word for it may be under way."""
+        """Whether it can take a picture, or its acknowledgement of the last one may be in transit."""
         return self.looks or (self.greeted and now_s - self.pictured_s < SEEN_WITHIN_S)
 
     def send(self, text: str) -> None:
@@ -108,11 +108,11 @@ class Client:
 
 PICTURE_EVERY_S = 1.0 / 15.0
 OLD_S = 0.3
-"""A picture that nobody could take for so long is drawn anew."""
+"""A picture that no client could take for this time is rendered again."""
 
 
 async def show_pictures(show: ViewModel, clients: Callable[[], Iterable[Client]], seen: asyncio.Event) -> None:
-    """Draw pictures for as long as somebody looks, until cancelled.
+    """Render pictures while a page can show them, until cancelled.
 
     `show`: its `picture` is called in a thread. `clients`: who may look now. `seen`: set when a client has shown a
     picture.

@@ -1,24 +1,18 @@
-"""Where the flight meets the helm: a `ControlSource` that several threads may touch.
+"""Controls of a flight: a lease with one holder, and the holder's sticks as the flight reads them.
 
-The page's messages come in the server's thread, the flight reads in its own; between them stands the state machine of
-`wakewise.ui.cockpit.control_mailbox` behind a lock that nobody holds for longer than a move of it takes.
+The page's messages come in the server's thread, the flight reads in its own. `ControlMailbox` is a `ControlSource` that
+protects the state machine `ControlLease` by a lock.
 
-Who has the helm: one lease, renewed by the sticks of its holder, and what of those sticks may be flown.
+Each transition of `ControlLease` takes a time of a monotonic clock and gives the next state. Its rules
+(docs/research-log/0044):
 
-`ControlLease` is a pure state machine: each move takes a time of one clock that never goes back and gives the next
-state. Its rules are those that others learnt with sticks in browsers (docs/research-log/0044):
-
-- One holder. The helm is taken where it is free or has lapsed (`LEASE_TIMEOUT_S` without sticks), else the holder is
-asked and
-  may hand it over; nothing forces it out of a hand that flies.
-- A lapsed lease is anybody's. Its holder's next sticks take it up again while nobody has, for `FORGET_S`; after that it
-  is void, so that a page left open for a day holds nothing.
-- Sticks count by their number: a replay or an older one is dropped. Sticks older than `INPUT_TIMEOUT_S` when they would
-be
-  flown are zero. Their age counts from when they were sent, as far as two clocks can tell: by how much longer than the
-  fastest of this lease they were under way.
-- After a pause of `INPUT_TIMEOUT_S` sticks count again once they were seen centred: what was held meanwhile was not
-meant.
+- One holder. The controls are given if they are free or the lease has lapsed (`LEASE_TIMEOUT_S` without sticks). Else
+  the holder is asked and may hand them over. They are never taken from an active holder.
+- A lapsed lease is free for any client. The holder's next sticks renew it until another client has it, for `FORGET_S`.
+- Sticks count by their number: a repeated or older one is dropped. Sticks older than `INPUT_TIMEOUT_S` are zero. Their
+  age counts from the time of sending, by the difference of two clocks: the delay beyond that of the fastest message of
+  this lease.
+- After a gap of `INPUT_TIMEOUT_S` sticks count again once they were centred.
 """
 
 from __future__ import annotations
@@ -46,11 +40,11 @@ _COMPARED = 250
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HolderInput:
-    """What the holder's sticks last said, when that came, and when by this side's clock it was sent.
+    """The holder's last sticks, their time of arrival, and their time of sending by this side's clock.
 
-    `quickest_s` is the least difference of the two clocks over the last messages, the way of the fastest of them and
-    what lies between their zeros; `before_s` that of the messages before those, and `compared` how many they are. What
-    is old is forgotten, since a clock may stand still for a while, as in a laptop that slept.
+    `quickest_s` is the least difference of the two clocks over the last `compared` messages: the delay of the fastest
+    one plus the offset of the clocks. `before_s` is that of the messages before those. Old values are dropped, because
+    a clock may stop for a while, as in a suspended laptop.
     """
 
     seq: int = -1
@@ -79,9 +73,9 @@ class HolderInput:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ControlLease:
-    """Who holds the helm, with which lease, who asks for it, and the hands of the holder.
+    """Holder, lease, the client that requests the controls, and the holder's sticks.
 
-    `armed` tells whether the sticks are flown: not after a pause, until they were let go.
+    `armed`: the sticks have effect; not so after a gap, until they were centred.
     """
 
     holder: str | None = None
@@ -93,18 +87,18 @@ class ControlLease:
     pressed: tuple[str, ...] = ()
 
     def held(self, now_s: float) -> bool:
-        """Whether somebody flies: there is a holder, and the lease has not lapsed."""
+        """Whether there is a holder and the lease has not lapsed."""
         return self.holder is not None and now_s - self.renewed_s <= LEASE_TIMEOUT_S
 
     def axes(self, now_s: float) -> Array:
-        """Sticks as they may be flown now, shape (5,): zero where they are old or nobody's."""
+        """Sticks with effect now, shape (5,): zero if they are old or without a holder."""
         fresh = self.armed and self.held(now_s) and now_s - self.hands.sent_s <= INPUT_TIMEOUT_S
         return self.hands.axes if fresh else np.zeros_like(CENTRED.axes)
 
     def ask(self, client: str, now_s: float, lease: str, force: bool = False) -> tuple[ControlLease, str]:
-        """A client asks for the helm, to be given under a new `lease`; the answer in words.
+        """A client requests the controls, to be given under a new `lease`; the answer in words.
 
-        It is given where it is free or has lapsed. Else the holder is asked; whoever would `force` it is refused.
+        They are given if they are free or the lease has lapsed. Else the holder is asked; `force` is refused.
         """
         if self.holder == client and self.held(now_s):
             return self, "the helm is yours already"
@@ -117,7 +111,7 @@ class ControlLease:
         return replace(self, asked_by=client), "asked; the holder must agree"
 
     def consent(self, client: str, to: str, yes: bool, now_s: float, lease: str) -> tuple[ControlLease, str]:
-        """The holder's answer to the client who asked."""
+        """The holder's answer to a request."""
         if client != self.holder or not self.held(now_s):
             return self, "not yours to give"
         if to != self.asked_by:
@@ -127,7 +121,7 @@ class ControlLease:
         return self._given(to, now_s, lease), "the helm was handed over"
 
     def left(self, client: str) -> ControlLease:
-        """A client gives the helm back, or is gone: its sticks are zero at once."""
+        """A client gives the controls back, or has disconnected: its sticks are zero at once."""
         if client == self.holder:
             return replace(
                 self, holder=None, lease=None, renewed_s=-math.inf, hands=HolderInput(), armed=True, pressed=()
@@ -137,7 +131,7 @@ class ControlLease:
     def moved(
         self, client: str, lease: str, seq: int, t_ms: float, axes: Array, now_s: float
     ) -> tuple[ControlLease, bool]:
-        """Sticks came in; whether they were taken."""
+        """The lease after sticks of a client, and whether they were accepted."""
         if not self.may(client, lease, now_s) or seq <= self.hands.seq or not math.isfinite(t_ms):
             return self, False
         hands = self.hands.then(seq, 1e-3 * t_ms, axes, now_s)
@@ -146,7 +140,7 @@ class ControlLease:
         return replace(self, hands=hands, armed=armed, renewed_s=now_s), True
 
     def press(self, client: str, lease: str, what: str, now_s: float) -> tuple[ControlLease, bool]:
-        """A button of the holder; whether it counts."""
+        """The lease after a button of a client, and whether it was accepted."""
         if not self.may(client, lease, now_s) or len(self.pressed) >= _MOST_PRESSED:
             return self, False
         return replace(self, pressed=(*self.pressed, what)), True
@@ -157,7 +151,7 @@ class ControlLease:
         return client == helm.holder and lease == helm.lease
 
     def tick(self, now_s: float) -> ControlLease:
-        """Time has passed: a lease that lapsed long ago is void."""
+        """The lease now; void if it lapsed longer than `FORGET_S` ago."""
         if self.holder is not None and now_s - self.renewed_s > FORGET_S:
             return replace(self.left(self.holder), asked_by=None)
         return self
@@ -167,13 +161,13 @@ class ControlLease:
 
 
 DEVICE = "gamepad"
-"""The client whose sticks are plugged into this computer."""
+"""The client of a gamepad at this computer."""
 _KEPT = 1024
 
 
 @dataclass(frozen=True, kw_only=True)
 class ControlOwnership:
-    """Who has the helm: ids of clients, the lease that only the holder is to be told, and whether its sticks count."""
+    """Ids of the holder and the requesting client, the lease (secret to others), and whether its sticks have effect."""
 
     holder: str | None
     lease: str | None
@@ -183,10 +177,10 @@ class ControlOwnership:
 
 
 class ControlMailbox:
-    """The helm of one flight, and the sticks as the flight reads them.
+    """The controls of one flight.
 
-    `clock`: seconds that never go back. `device`: sticks at this computer. They take the helm when it is free and they
-    move; pulled out, they give it back.
+    `clock`: monotonic, s. `device`: a gamepad at this computer. It takes the controls when they are free and it moves,
+    and gives them back when it is unplugged.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, device: ControlSource | None = None) -> None:
@@ -201,7 +195,7 @@ class ControlMailbox:
 
     @property
     def holding(self) -> ControlOwnership:
-        """Who has the helm now."""
+        """Holder and lease now."""
         with self._lock:
             self._helm = helm = self._helm.tick(self.clock())
             flying = helm.held(self.clock())
@@ -210,41 +204,41 @@ class ControlMailbox:
             )
 
     def ask(self, client: str, force: bool = False) -> str:
-        """A client asks for the helm; the answer in words."""
+        """Request the controls for a client; the answer in words."""
         with self._lock:
             self._helm, words = self._helm.ask(client, self.clock(), secrets.token_urlsafe(12), force)
             return words
 
     def consent(self, client: str, to: str, yes: bool) -> str:
-        """The holder answers who asked; the outcome in words."""
+        """The holder's answer to a request; the result in words."""
         with self._lock:
             self._helm, words = self._helm.consent(client, to, yes, self.clock(), secrets.token_urlsafe(12))
             return words
 
     def left(self, client: str) -> None:
-        """A client gave the helm back, or is gone."""
+        """Give the controls of a client back."""
         with self._lock:
             self._helm = self._helm.left(client)
 
     def moved(self, client: str, lease: str, seq: int, t_ms: float, axes: Array) -> bool:
-        """Sticks came in; whether they were taken."""
+        """Take in sticks of a client; whether they were accepted."""
         with self._lock:
             self._helm, taken = self._helm.moved(client, lease, seq, t_ms, axes, self.clock())
             return taken
 
     def press(self, client: str, lease: str, what: str) -> bool:
-        """A button was pressed; whether it counts."""
+        """Take in a button of a client; whether it was accepted."""
         with self._lock:
             self._helm, taken = self._helm.press(client, lease, what, self.clock())
             return taken
 
     def may(self, client: str, lease: str) -> bool:
-        """Whether this client may change what is flown."""
+        """Whether this client has the controls."""
         with self._lock:
             return self._helm.may(client, lease, self.clock())
 
     def read(self, time_s: float) -> Controls | None:
-        """The holder's hands now; None where nobody has the helm, or whoever has it has been quiet for a second."""
+        """The holder's sticks now; None without a holder, or if the lease has lapsed."""
         if self._device is not None:
             self._read_device(time_s)
         with self._lock:
@@ -261,7 +255,7 @@ class ControlMailbox:
             return Controls(axes=helm.axes(now_s), pressed=pressed)
 
     def flown(self) -> None:
-        """Thrusts were given: whatever sticks were read before that have had their effect."""
+        """Thrusts were sent, which answer the sticks read before."""
         with self._lock:
             if self._unflown_s is not None:
                 self._waits_s.append(self.clock() - self._unflown_s)
@@ -269,7 +263,7 @@ class ControlMailbox:
 
     @property
     def waits_s(self) -> tuple[float, ...]:
-        """From a message's arrival to thrusts that know of it, of the last ones flown."""
+        """Times from the arrival of sticks to the thrusts that answer them, s."""
         with self._lock:
             return tuple(self._waits_s)
 

@@ -1,7 +1,6 @@
-"""What the flight's own thread takes down at each step for whoever looks: little, and without waiting for anybody.
+"""Snapshots of a flight for the pages, taken at each step in the thread of the flight without waiting.
 
-Only there may the truth be asked, since the world moves in that thread. Everything else is computed from what is taken
-down here, in the server's.
+The truth of the world is read in this thread only. All other values are computed from the snapshots in the server's.
 """
 
 from __future__ import annotations
@@ -20,10 +19,10 @@ from wakewise.operation.loop import Step
 from wakewise.robot.vehicles import Vehicle
 
 WINDOW_S = 10.0
-"""Deviation and savings are told over the last ten seconds."""
+"""Window of deviation and savings."""
 SAMPLED_S = 0.1
 LOOKS_S = 2.0
-"""How long a look lasts."""
+"""Time for which the true water is measured after a request."""
 TRUE_EVERY_S, SILT_EVERY_S = 0.5, 1.0
 MEAN_OF = 10
 """Steps over which commanded thrusts are averaged for the gauges: small ones are sent as pulses."""
@@ -51,7 +50,7 @@ class FlightSnapshot:
 
 
 class SnapshotRecorder:
-    """Called as `(step, witness)` at each step; `now` is the newest moment, for any thread.
+    """Called as `(step, witness)` at each step; `now` is the newest snapshot, for any thread.
 
     `points_W_m`, shape (n, 3): where the true water is asked, if the witness knows. `given`: called when the step's
     thrusts are on their way. `asked`: velocity that is asked for in W, shape (3,).
@@ -79,16 +78,16 @@ class SnapshotRecorder:
         self._looked_s = -np.inf
 
     def look(self) -> None:
-        """Somebody looks: for a while the true water is asked, too."""
+        """Measure the true water, too, for `LOOKS_S` from now on."""
         self._looked_s = time.monotonic()
 
     @property
     def looked_at(self) -> bool:
-        """Whether somebody has looked of late."""
+        """Whether `look` was called within `LOOKS_S`."""
         return time.monotonic() - self._looked_s < LOOKS_S
 
     def __call__(self, step: Step, witness: TruthProvider | None) -> None:
-        """Take down a step."""
+        """Take a snapshot of a step."""
         self._given()
         now_s = step.time_s
         self._thrusts.append(step.command.thrusts_N)
@@ -118,7 +117,7 @@ class SnapshotRecorder:
         )
 
     def _ask(self, now_s: float, witness: TruthProvider) -> None:
-        """Ask for the true water, now and then."""
+        """Measure silt and true water at their intervals."""
         if now_s >= self._silt_s + SILT_EVERY_S:
             self._silt_s, self._silt = now_s, witness.silt()
         elif now_s >= self._true_s + TRUE_EVERY_S:
@@ -135,7 +134,7 @@ class SnapshotRecorder:
 
     @property
     def deviation_pct(self) -> float | None:
-        """Root mean square of velocity less what was asked, over that of what was asked; None of hands off."""
+        """Rms of velocity less command, over the rms of the command; None while the command is zero."""
         followed = list(self._followed)
         if not followed:
             return None

@@ -1,8 +1,8 @@
 """The live picture: what the camera sees now, small, by the renderer of the photographs, in a process of its own.
 
-Of a photograph's chain it has scene, light, water, silt, exposure and noise; left out are motion blur, flakes, and how
-a soft target bends. One ray a pixel. Rendering takes the interpreter's lock for longer than a control step may wait, so
-it is done in another process, which yields to the loop where both want a core.
+It includes scene, light, water, silt, exposure and noise, with one ray per pixel. Motion blur, flakes and the bending
+of a soft target are left out. Rendering holds the interpreter's lock for longer than a control step may wait, so it
+runs in another process with lower priority.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ if TYPE_CHECKING:
     from wakewise.vision.imaging import ImagingSettings
 
 WIDTHS_PX = (480, 400, 320, 256)
-"""Widths a picture may have, widest first: where the cores are busy, pictures get smaller rather than rarer."""
+"""Widths of a picture, widest first: under load pictures become smaller, and not less frequent."""
 DRAWN_WITHIN_S = 0.07
-"""What a picture may take by the clock, so that ten a second are left when it has to be sent and shown, too."""
+"""Largest rendering time, so that ten pictures a second can be sent and shown."""
 _SMOOTHED = 0.3
 QUALITY = 75
 NICER = 5
-"""How much the process yields to others (nice), once its scene is ready."""
+"""Niceness of the process after its scene is ready."""
 _METERED = 8
 
 
@@ -57,10 +57,10 @@ class CameraState:
 
 
 class PictureWidth:
-    """How wide the next picture may be, by how long the last ones took.
+    """Width of the next picture by the times of the last ones.
 
-    The time of a picture goes with its pixels, thus with the square of its width: one step narrower where the mean of
-    late is above `within_s`, one step wider only where that width would keep it with a fifth to spare.
+    The time is proportional to the number of pixels, that is, to the square of the width. The width is one step smaller
+    if the mean time is above `within_s`, and one step larger if the time there is a fifth below it.
     """
 
     def __init__(self, widths_px: tuple[int, ...] = WIDTHS_PX, within_s: float = DRAWN_WITHIN_S) -> None:
@@ -74,7 +74,7 @@ class PictureWidth:
         return self._widths_px[self._at]
 
     def took(self, took_s: float) -> None:
-        """Learn how long the last picture took by the clock."""
+        """Take in the time of the last picture."""
         before_s = self._mean_s
         mean_s = took_s if before_s is None else before_s + _SMOOTHED * (took_s - before_s)
         self._mean_s = mean_s
@@ -94,7 +94,7 @@ class PictureWidth:
 
 
 class LiveCamera:
-    """Draws views on request, one at a time.
+    """Renders views on request, one at a time.
 
     `scenario`: its target, camera, light and water. `target`: in place of the scenario's own. `widths_px`: of its
     pictures, widest first; the height follows from the scenario's.
@@ -111,11 +111,11 @@ class LiveCamera:
         self._lock = threading.Lock()
 
     def start(self) -> None:
-        """Start the process, which takes a few seconds to light its scene."""
+        """Start the process, which takes a few seconds to build its scene."""
         self._process = start_python("-m", "wakewise.ui.cockpit.live_camera", variables={"NUMBA_NUM_THREADS": "1"})
         threading.Thread(target=self._listen, args=(self._process.stdout,), name="pictures", daemon=True).start()
         self._send(pickle.dumps(self._begin))
-        self._waited_for = 1  # its word that the scene is ready
+        self._waited_for = 1  # the message that the scene is ready
 
     def draw(self, view: CameraState, timeout_s: float = 2.0) -> bytes | None:
         """Draw a view as a JPEG; None while the scene is not ready, or where a picture does not come in time.
@@ -141,7 +141,7 @@ class LiveCamera:
             end_process(process)
 
     def _caught_up(self, timeout_s: float) -> bool:
-        """Whether all that was asked for has been answered, within a time."""
+        """Whether all requests were answered within a time."""
         while self._waited_for:
             try:
                 answer = self._answers.get(timeout=timeout_s) if timeout_s else self._answers.get_nowait()
@@ -155,7 +155,7 @@ class LiveCamera:
     def _send(self, message: bytes) -> None:
         assert self._process is not None
         assert self._process.stdin is not None
-        with suppress(OSError):  # then it has ended, which the answers tell
+        with suppress(OSError):  # then it has ended, which `_listen` reports
             write_message(self._process.stdin, message)
 
     def _listen(self, pipe: IO[bytes]) -> None:
@@ -171,19 +171,16 @@ class PictureRenderer:
     def __init__(self, scenario: Scenario, target: Target | None, width_px: int) -> None:
         import numpy as np
 
-        from wakewise.vision.imaging import SiltOptics
-
         parts = scenario.parts() if target is None else scenario.parts().replace(target=target)
         self._given, self._width_px, self._scene = parts.scenario.imaging, width_px, parts.scene
-        silt = parts.scenario.tank.silt
-        self._grains = SiltOptics(diameter_m=silt.grain_m, density_kg_m3=silt.grain_density_kg_m3)
+        self._grains = parts.grains
         self._silt: ScalarGrid | None = None
         self._seen: deque[float] = deque(maxlen=_METERED)
         self._rng = np.random.default_rng(parts.scenario.seed)
         self._first = CameraState(X_WC=parts.start.X_WB @ parts.vehicle.X_BC)
 
     def warm(self) -> None:
-        """Draw a picture for nobody: the first one reads kernels, which takes as long as dozens of others."""
+        """Render a first picture, which loads the kernels."""
         self.draw(self._first)
         self._seen.clear()
 
@@ -218,7 +215,7 @@ class PictureRenderer:
 
 
 def serve(pipe: IO[bytes], answers: IO[bytes]) -> None:
-    """Draw what is asked for until nobody asks any more: the other process."""
+    """Render the requested views until the pipe ends: the other process."""
     import cv2
 
     first = read_message(pipe)

@@ -1,4 +1,4 @@
-"""The coverage guide of a live flight: what its photographs have seen, and where to go next, as it is sent."""
+"""The coverage guide of a live flight: coverage by its photographs, and the next view, as sent to pages."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from wakewise.ui.cockpit.state import number, rounded
 
 
 class LiveCoverage:
-    """Follows the photographs of one flight by where the vehicle believes that they were taken.
+    """Coverage by the photographs of one flight at their estimated poses.
 
-    One thread hands in photographs, another asks; making the guide takes about a second.
+    One thread adds photographs, another reads the coverage; the constructor takes about a second.
     """
 
     def __init__(self, parts: Parts) -> None:
@@ -26,7 +26,7 @@ class LiveCoverage:
         self._coverage.seen(parts.start.X_WB @ parts.vehicle.X_BC, self._camera).words(parts.start.X_WB)
 
     def saw(self, X_WC: Pose) -> str:
-        """Take in a photograph; what is seen well now, in words."""
+        """Add a photograph; the coverage now, in words."""
         coverage = self._coverage.seen(X_WC, self._camera)
         with self._lock:
             self._coverage = coverage

@@ -1,8 +1,8 @@
-"""What a page may say, read strictly: a message of known type and shape, or one line that says what is wrong with it.
+"""Messages of a page, validated strictly: a message of known type and shape, or one line that describes the fault.
 
-Nothing that comes over the wire raises: what cannot be used becomes `InvalidMessage`, which the server answers and
-counts. Axes of the sticks are the exception to strictness: numbers of any size, and what is no number (NaN), are made
-harmless by `wakewise.operation.teleop.input.controls.apply_dead_zone`, as for any other device.
+Reading never raises: an invalid message becomes `InvalidMessage`, which the server answers and counts. Axes of the
+sticks are the exception: numbers of any size and NaN are limited by
+`wakewise.operation.teleop.input.controls.apply_dead_zone`, as for any other device.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _FIELDS = 16
 
 @dataclass(frozen=True, kw_only=True)
 class Hello:
-    """The first message of a client; `lease`: of the helm, that it had before its connection was lost."""
+    """The first message of a client; `lease`: that of the controls before its connection was lost."""
 
     token: str | None
     name: str
@@ -32,7 +32,7 @@ class Hello:
 
 @dataclass(frozen=True, kw_only=True)
 class ControlRequest:
-    """A client asks for the helm, or gives it back."""
+    """A client requests the controls, or gives them back."""
 
     want: bool
     force: bool = False
@@ -40,7 +40,7 @@ class ControlRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class ControlConsent:
-    """The holder's answer to client `to`, who asked for the helm."""
+    """The holder's answer to client `to`, who requested the controls."""
 
     to: str
     yes: bool
@@ -48,7 +48,7 @@ class ControlConsent:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StickMessage:
-    """Axes made harmless, shape (5,), with their number and the client's own clock in ms."""
+    """Limited axes, shape (5,), with their number and the time of the client's clock in ms."""
 
     seq: int
     t_ms: float
@@ -66,7 +66,7 @@ class ButtonPress:
 
 @dataclass(frozen=True, kw_only=True)
 class SettingsChange:
-    """Settings of the desk, whose values the desk itself judges."""
+    """Changes of the operator's settings, which check the values."""
 
     changes: dict[str, str | float | bool]
     lease: str
@@ -81,7 +81,7 @@ class PictureAck:
 
 @dataclass(frozen=True, kw_only=True)
 class InvalidMessage:
-    """What is wrong with a message, in one line."""
+    """The fault of a message in one line."""
 
     why: str
 
@@ -206,7 +206,7 @@ def _flag(told: dict[str, Any], field: str) -> bool:
 
 
 def _shown(value: Any) -> str:
-    """A value as it is told back: short, on one line, and never a fault of its own."""
+    """A value as text for an answer: short and on one line."""
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > _LARGEST:
         return "a huge number"
     if isinstance(value, dict | list):

@@ -1,8 +1,7 @@
-"""The flight as viser's 3D scene, to look at only: target by its wash, vehicle with its thrusts, the way it flew.
+"""The flight as a viser scene, to view only: target by its wash, vehicle with its thrusts, path.
 
-viser serves it on this computer's own address and knows neither helm nor token, so it is given nothing that acts: no
-controls, no callbacks. Any of its clients may ask it to open a tunnel for the public; here that does nothing. World is
-NED, as everywhere, with its z axis down on the screen, too.
+viser serves it at the loopback address without access control, so it has no controls and no callbacks. Requests for a
+public tunnel have no effect. The world is NED, with its z axis down on the screen.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ def has_viser() -> bool:
 
 
 def speed_colours(speeds_m_s: Array) -> Array:
-    """Colours 0 to 255, uint8, shape (n, 3), of speeds of the wash, shape (n,); what is not known counts as still."""
+    """Colours 0 to 255, uint8, shape (n, 3), of speeds of the wash, shape (n,); NaN counts as zero."""
     known = np.maximum(np.nan_to_num(np.asarray(speeds_m_s, dtype=np.float64)), 0.0)
     shares = np.log1p(known / _GENTLE_M_S) / np.log1p(MOST_M_S / _GENTLE_M_S)
     channels = [np.interp(shares, SPEED_SHARES, SPEED_RGB[:, k]) for k in range(3)]
@@ -63,7 +62,7 @@ class ViserScene:
 
     @property
     def url(self) -> str:
-        """Where the page finds it, on this computer only."""
+        """Its URL, on this computer only."""
         return f"http://127.0.0.1:{self._server.get_port()}/"
 
     def show(self, X_WB: Pose, thrusts_N: Array | None = None, predicted_m_s: Array | None = None) -> None:
@@ -124,7 +123,7 @@ class ViserScene:
         return np.stack([starts, ends], axis=1).astype(np.float32)
 
     def _went(self, p_W_m: Array) -> None:
-        """Lengthen the drawn way, by steps that can be seen; it has an end, so that a long flight does not grow."""
+        """Extend the drawn path by visible steps; its length is limited."""
         if self._path and np.linalg.norm(p_W_m - self._path[-1]) < _PATH_STEP_M:
             return
         self._path = [*self._path[-_PATH_POINTS:], np.asarray(p_W_m)]

@@ -1,8 +1,8 @@
-"""From a scenario to flights that pages show and hands fly: one after the other, each with a folder of its own.
+"""Teleoperated flights of one scenario, one after the other, each with its own folder.
 
-A thread tends the session: it prepares the parts, lets the flight begin, follows its photographs and says what became
-of it. The flight has its own thread (`wakewise.operation.teleop.live`), pictures their own process, the server its own
-loop; none waits for another.
+A thread prepares the parts, starts the flight, follows its photographs and reports its end. The flight has its own
+thread (`wakewise.operation.teleop.live`), pictures their own process, the server its own event loop; none waits for
+another.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ _MOST_NOTES = 200
 
 
 class CockpitSession:
-    """Flights of one scenario; the `Show` of a server.
+    """Flights of one scenario; the `ViewModel` of a server.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class CockpitSession:
         return self.preparing is None
 
     def welcome(self) -> dict[str, Any]:
-        """What a client needs once; vehicle and target are empty while they are being made."""
+        """Static data for a client; vehicle and target are empty while they are being made."""
         nothing = {
             "scenario": scenario_description(self._parts),
             "vehicle": {"name": self._parts.scenario.vehicle, "thrusters": []},
@@ -147,7 +147,7 @@ class CockpitSession:
         return told | {"desk": self._desk() | {"ranges": ranges}, "scene_url": url, "preparing": self.preparing}
 
     def state(self) -> dict[str, Any] | None:
-        """How the flight stands; None before the first step."""
+        """State of the flight; None before the first step."""
         lookout, instruments, live, pilot = self.lookout, self._instruments, self.live, self._pilot
         if lookout is None or instruments is None or live is None or pilot is None or not self.flying:
             return None
@@ -171,18 +171,18 @@ class CockpitSession:
         }
 
     def notes(self) -> Sequence[StatusMessage]:
-        """What has happened since the last call."""
+        """Notes since the last call."""
         told = []
         while self._notes:
             told.append(self._notes.popleft())
         return told
 
     def change_settings(self, changes: dict[str, Any]) -> None:
-        """Change settings of the desk; raises InputError where a value is out of range."""
+        """Change the operator's settings; raises InputError if a value is out of range."""
         self.desk.set(**changes)
 
     def picture(self) -> CameraPicture | None:
-        """What the camera sees now."""
+        """The camera picture now."""
         now = self.lookout.now if self.lookout is not None else None
         if now is None or self._camera is None:
             return None
@@ -259,7 +259,7 @@ class CockpitSession:
         return live
 
     def _follow(self, live: LiveFlight) -> None:
-        """Hand on what the pilot says, and photographs to the guide."""
+        """Forward the pilot's notes, and photographs to the coverage guide."""
         assert self._pilot is not None
         for note in self._pilot.notes():
             self._notes.append(StatusMessage(text=note.text, level=note.level, time_s=note.time_s))
@@ -276,14 +276,14 @@ class CockpitSession:
             self._say(f"photograph {self._photos}{f': {said}' if said else ''}", time_s=exposure.time_s)
 
     def _open_scene(self, live: LiveFlight) -> None:
-        """Serve the 3D scene, after the first light, which it would keep waiting."""
+        """Serve the 3D scene, after the first step, which it would delay."""
         if self._scene_wanted and self._scene is None and self._gauges is not None:
             self._scene = open_scene(live.parts.vehicle, self._gauges.points_W_m)
             self._scene_wanted = self._scene is not None
             self.edition += 1
 
     def _show_scene(self) -> None:
-        """Bring the scene up to date now and then, while somebody looks at the page."""
+        """Update the scene at its interval while a page is open."""
         lookout, instruments, now_s = self.lookout, self._instruments, time.monotonic()
         if self._scene is None or lookout is None or instruments is None or lookout.now is None:
             return
@@ -293,7 +293,7 @@ class CockpitSession:
         self._scene.show(step.estimate.X_WB, lookout.now.thrusts_N, instruments.predicted_m_s)
 
     def _close(self, live: LiveFlight) -> None:
-        """Say what became of a flight."""
+        """Report the end of a flight."""
         if live.fault is not None:
             self.fault = live.fault
             self._say(f"the flight ended: {live.fault}", "error")
@@ -303,7 +303,7 @@ class CockpitSession:
         self.desk.set(mode="hold")
 
     def _await_next(self) -> None:
-        """Wait until somebody with the helm asks for another flight."""
+        """Wait until the holder of the controls starts another flight."""
         if self._over.is_set():
             return
         self._say_preparing("the flight is over; hold, scan or operator begins another")
@@ -316,7 +316,7 @@ class CockpitSession:
                 return
 
     def _free_folder(self) -> Path | None:
-        """The folder of the next flight: the one given, or with the first number that is free."""
+        """The folder of the next flight: the given one, or with the first free number."""
         if self.folder is None:
             return None
         count, folder = 1, self.folder

@@ -1,12 +1,10 @@
-"""What is sent: a flight's parts once, and ten times a second how it stands, as plain numbers for JSON.
+"""Data for pages: the parts of a flight once, and its state ten times a second, as plain numbers for JSON.
 
-Numbers are rounded to what can be seen; one that is not finite is null.
+Numbers are rounded to the visible precision; one that is not finite is null.
 
-What the thrusts of now do to the target, as the controller's own wake model sees it.
-
-The flown thrusts are held against those that direct allocation, the least thrusts, would give for the same wrench at
-the same place: what differs is what sparing the target brings. The jets are carried by the current that the estimator
-finds, as they are for the controller (see `wakewise.control.null_space_allocation`).
+The wash at the target is that of the controller's wake model. The flown thrusts are compared with the least thrusts of
+the same wrench at the same pose (direct allocation). The jets are advected by the estimated current, as for the
+controller (see `wakewise.control.null_space_allocation`).
 """
 
 from __future__ import annotations
@@ -33,16 +31,16 @@ from wakewise.wake.disturbance import advected_velocity
 from wakewise.wake.jets import AxialJet
 
 POINTS = 300
-"""Places on the target's surface that are shown."""
+"""Points on the target's surface that are shown."""
 _LEAST_N = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WakeReadout:
-    """A vehicle's thrusters, a target's region and the wake model between them.
+    """Wash at a target by the wake model.
 
-    `points_W_m`, shape (n, 3), are places on the target where it is taken to be, evenly by area; `true_points_W_m` the
-    same places where it is.
+    `points_W_m`, shape (n, 3), are points on the surveyed target, evenly by area; `true_points_W_m` the same points at
+    its true place.
     """
 
     view: InfluenceModel
@@ -56,7 +54,7 @@ class WakeReadout:
 
     @classmethod
     def of(cls, parts: Parts) -> WakeReadout:
-        """The gauges of a flight."""
+        """The readout of a flight."""
         true = surface_points(parts.target, POINTS, np.random.default_rng(parts.scenario.seed))
         off_m = parts.surveyed_target.centre_W_m - parts.target.centre_W_m
         made_of = (parts.vehicle, parts.region, parts.wake)
@@ -75,7 +73,7 @@ class WakeReadout:
         return one, other
 
     def rms_m_s(self, disturbance: float) -> float:
-        """Root mean square speed of the water at the target that a disturbance D in (m/s)^2 amounts to."""
+        """Root mean square speed of the water at the target for a disturbance D in (m/s)^2."""
         return math.sqrt(disturbance / self.view.total_weight) if disturbance >= 0.0 else math.nan
 
     def predicted_m_s(self, estimate: BodyState, thrusts_N: Array) -> Array:
@@ -99,11 +97,11 @@ class WakeReadout:
 
 
 POINTS_EVERY, GAUGES_EVERY = 5, 2
-"""States between two looks at the water of every point, and at D: with a current these cost the most."""
+"""States between two evaluations of all points, and of D: with a current these cost most of the time."""
 
 
 def static_description(parts: Parts, gauges: WakeReadout) -> dict[str, Any]:
-    """Scenario, vehicle and target, as a client is told when it comes."""
+    """Scenario, vehicle and target, for a new client."""
     scenario, vehicle, target = parts.scenario, parts.vehicle, parts.surveyed_target
     return {
         "scenario": scenario_description(parts),
@@ -130,7 +128,7 @@ def static_description(parts: Parts, gauges: WakeReadout) -> dict[str, Any]:
 
 
 def scenario_description(parts: Parts) -> dict[str, Any]:
-    """What a scenario is called, known before any of its parts is made."""
+    """Names of a scenario, known before any of its parts is made."""
     scenario = parts.scenario
     return {
         "name": scenario.name,
@@ -152,7 +150,7 @@ class StateEncoder:
         self._count = 0
 
     def read(self, now: FlightSnapshot) -> dict[str, Any]:
-        """How the flight stands, but for what desk, helm, coverage and photographs add."""
+        """State of the flight without settings, controls, coverage and photographs."""
         step, estimate = now.step, now.step.estimate
         if self._count % GAUGES_EVERY == 0:
             self._now = self._gauges.disturbances(estimate, now.thrusts_N)
@@ -191,8 +189,9 @@ class StateEncoder:
 
     @property
     def saved_pct(self) -> float | None:
-        """How much less D the flown thrusts made than direct allocation over ten seconds; None where that leaves the
-        water as good as still (`STILL_M_S`), so that there is nothing to save.
+        """Reduction of D by the flown thrusts against direct allocation over ten seconds, in percent.
+
+        None if direct allocation moves the water by less than `STILL_M_S`.
         """
         if not self._both:
             return None

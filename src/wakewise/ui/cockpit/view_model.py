@@ -1,4 +1,4 @@
-"""What a server needs of what it shows: words, numbers, pictures, and a seat for the hands."""
+"""Interface between a server and the flight that it shows: texts, numbers, pictures, and the pilot's controls."""
 
 from __future__ import annotations
 
@@ -13,61 +13,61 @@ from wakewise.ui.cockpit.control_mailbox import ControlMailbox
 
 @dataclass(frozen=True, kw_only=True)
 class CameraPicture:
-    """What the camera sees: a JPEG, its number, and the time of the flight that it shows."""
+    """A camera picture: JPEG, number, and time of the flight."""
 
     number: int
     time_s: float
     jpeg: bytes
 
     def message(self) -> bytes:
-        """As it goes over the wire: number and flight's time in ms, little-endian, then the JPEG."""
+        """Encoded: number and flight's time in ms, little-endian, then the JPEG."""
         return struct.pack("<II", self.number % 2**32, max(0, round(1e3 * self.time_s)) % 2**32) + self.jpeg
 
 
 @dataclass(frozen=True, kw_only=True)
 class StatusMessage:
-    """A line for everybody: what has just changed."""
+    """A note for all pages."""
 
     text: str
     level: str = "info"
     time_s: float = 0.0
 
     def message(self) -> str:
-        """As it goes over the wire."""
+        """Encoded as JSON."""
         return as_json({"type": "note", "level": self.level, "text": self.text, "time_s": round(self.time_s, 2)})
 
 
 class ViewModel(Protocol):
-    """What is shown, and what may be changed; called from the server's thread, and never for long."""
+    """Shown data and settings; called from the server's thread, and returns quickly."""
 
     @property
     def mailbox(self) -> ControlMailbox:
-        """The helm, and where the flight reads its sticks."""
+        """The controls, and the source of the flight's sticks."""
         ...
 
     @property
     def edition(self) -> int:
-        """Grows when `welcome` has something new to say, which all are then told."""
+        """Increases when `welcome` changes, which is then sent to all."""
         ...
 
     def welcome(self) -> dict[str, Any]:
-        """What a client needs once: vehicle, target, desk."""
+        """Static data for a client: vehicle, target, settings."""
         ...
 
     def state(self) -> dict[str, Any] | None:
-        """What is so now; None before there is anything."""
+        """The state now; None before the first."""
         ...
 
     def notes(self) -> Sequence[StatusMessage]:
-        """What has happened since the last call."""
+        """Notes since the last call."""
         ...
 
     def change_settings(self, changes: dict[str, Any]) -> None:
-        """Change settings of the desk; raises InputError where a value is out of range."""
+        """Change the operator's settings; raises InputError if a value is out of range."""
         ...
 
     def picture(self) -> CameraPicture | None:
-        """What the camera sees now; called in another thread, where it may wait for the picture for a while."""
+        """The camera picture now; called in another thread, where it may wait."""
         ...
 
 

@@ -1,9 +1,8 @@
 """A film of a trial: what the camera saw, and from outside the vehicle, its wash, the silt and the target.
 
 Start reading in `make.py` (a film from a trial's folder) and `rows.py` (trials side by side at a few instants).
-`external_view.py` draws from a place of its own (`external_view.py`), `wash.py` drives the tank's own water again with
-the recorded motion and follows tracers in it, `layout.py` and `layout.py` put a frame together, `encode.py` writes it
-without a system codec.
+`external_view.py` renders the external view. `wash.py` simulates the tank's water again with the recorded motion, and
+tracers in it. `layout.py` composes a frame, `encode.py` writes it without a system codec.
 """
 
 from typing import TYPE_CHECKING

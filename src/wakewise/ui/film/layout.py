@@ -1,7 +1,4 @@
-"""A frame of the film as a page: pictures, the figures of the moment, and the whole flight as a line of time.
-
-Words and marks on pictures: one typeface, a few sizes, the report's dark colours.
-"""
+"""A frame of the film: pictures, current figures, and a time line of the flight, in the report's dark colours."""
 
 from __future__ import annotations
 
@@ -37,7 +34,7 @@ Box = tuple[int, int, int, int]
 
 @cache
 def font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
-    """DejaVu Sans, which comes with matplotlib, so that pictures look alike on every machine."""
+    """DejaVu Sans, which matplotlib contains, so that pictures are the same on every computer."""
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name), size)
 

@@ -19,7 +19,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid, no_progress
-from wakewise.operation import Scenario, read_exposures, read_scenario
+from wakewise.operation import Parts, Scenario, read_exposures, read_scenario
 from wakewise.operation.flight_log import ExposureRecord
 from wakewise.scene.targets import stony_kinds
 from wakewise.ui.film.encode import check_film_name, film_writer
@@ -30,7 +30,7 @@ from wakewise.ui.reports import figures
 from wakewise.ui.reports.trial import Trial, read_trial
 from wakewise.ui.reports.vehicle.hull import hull_of
 from wakewise.vision.image_decoding import read_picture
-from wakewise.vision.imaging import PinholeCamera, SiltOptics
+from wakewise.vision.imaging import PinholeCamera
 
 FPS = 12.0
 SECONDS = 20.0
@@ -135,15 +135,7 @@ class _Film:
         self._exposures = read_exposures(exposures) if exposures.is_file() else []
         camera = PinholeCamera(*self.page.main_size, FOV_RAD * self.page.main_size[0] / 852.0)
         first = min((shot.time_s for shot in self.trial.photographs), default=0.0)
-        flown = self.motion.p_W_m[self.motion.row(first) :]
-        X_WC = choose_viewpoint(
-            camera, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m))
-        )
-        grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
-        scene = parts.scene
-        self._outside = ExternalView.build(
-            scene, camera, X_WC, hull_of(parts.vehicle), scenario.imaging.lights(), grains
-        )
+        self._outside = view_of_flight(parts, camera, self.motion.p_W_m[self.motion.row(first) :])
         self._tracers = wash_of(scenario, self.folder / "steps.parquet", self.times_s, wash, progress)
 
     def frame(self, k: int) -> NDArray[np.uint8]:
@@ -188,6 +180,14 @@ class _Film:
             image = read_picture(self.trial.photographs[index].path)
             self._photo = (index, None if image is None else np.ascontiguousarray(image[..., ::-1]))
         return self._photo[1]
+
+
+def view_of_flight(parts: Parts, camera: PinholeCamera, path_W_m: Array) -> ExternalView:
+    """The external view that shows the target and a path of the vehicle, shape (n, 3)."""
+    radius_m = 0.5 * float(np.linalg.norm(parts.vehicle.size_m))
+    X_WC = choose_viewpoint(camera, parts.target.centre_W_m, path_W_m, radius_m)
+    lights = parts.scenario.imaging.lights()
+    return ExternalView.build(parts.scene, camera, X_WC, hull_of(parts.vehicle), lights, parts.grains)
 
 
 def story_of(trial: Trial, scenario: Scenario, duration_s: float, pace: float) -> FilmOverview:

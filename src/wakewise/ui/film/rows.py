@@ -23,14 +23,13 @@ from wakewise.core.files import whole_file
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import no_progress
 from wakewise.operation import Scenario, read_exposures, read_scenario
-from wakewise.ui.film.external_view import FOV_RAD, ExternalView, choose_viewpoint
+from wakewise.ui.film.external_view import FOV_RAD
 from wakewise.ui.film.layout import INK, MUTED, PAPER, fill_frame, paste, write
-from wakewise.ui.film.make import silt_at
+from wakewise.ui.film.make import silt_at, view_of_flight
 from wakewise.ui.film.wash import RecordedMotion, wash_of
 from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Trial, read_trial
-from wakewise.ui.reports.vehicle.hull import hull_of
-from wakewise.vision.imaging import PinholeCamera, SiltOptics, photograph
+from wakewise.vision.imaging import PinholeCamera, photograph
 
 TIMES_S = (0.0, 5.0, 10.0)
 CELL = (480, 360)
@@ -100,9 +99,7 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[ComparisonTile]:
         left = motion.time_s[-1] - first_s
         raise InputError(f"--at: {max(times_s):g} s, {folder.name} flew for {left:.0f} s after its first photograph")
     parts = scenario.parts()
-    scene = parts.scene
     exposures = read_exposures(folder / "exposures.npz")
-    grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
     order = np.argsort(instants, kind="stable")
     kept = folder / ".rows.npz"
     tracers = wash_of(scenario, folder / "steps.parquet", instants[order], kept)
@@ -110,8 +107,7 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[ComparisonTile]:
     wash = {int(k): one for k, one in zip(order, tracers, strict=True)}
     flown = motion.p_W_m[motion.row(first_s) : motion.row(float(instants.max()) + 5.0)]
     far = PinholeCamera(*CELL, FOV_RAD)
-    X_WO = choose_viewpoint(far, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m)))
-    outside = ExternalView.build(scene, far, X_WO, hull_of(parts.vehicle), scenario.imaging.lights(), grains)
+    outside = view_of_flight(parts, far, flown)
     speed, turbidity = trial.column("target_speed_mean_m_s"), trial.column("turbidity_per_m")
     tilt_deg = trial.column("true_tilt_deg")  # none in trials that were flown before cameras had a joint
     out = []
@@ -120,7 +116,7 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[ComparisonTile]:
         X_WB, silt = Pose(motion.p_W_m[row], motion.q_WB[row]), silt_at(exposures, float(time_s))
         rng = np.random.default_rng([scenario.seed, k])
         X_WC = X_WB @ parts.vehicle.X_BC_at(0.0 if tilt_deg is None else math.radians(float(tilt_deg[row])))
-        photo = photograph(scene, scenario.imaging.camera(), [X_WC], silt, scenario.imaging, rng, grains)
+        photo = photograph(parts.scene, parts.camera, [X_WC], silt, scenario.imaging, rng, parts.grains)
         facts = [] if photo.sharpness is None else [f"sharpness {number(photo.sharpness)}"]
         facts += [] if turbidity is None else [f"silt {number(float(turbidity[row]), 2)} /m"]
         facts += [] if speed is None else [f"water {1e3 * float(speed[row]):.1f} mm/s"]

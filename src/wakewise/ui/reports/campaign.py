@@ -10,14 +10,13 @@ from typing import Any
 from wakewise.core.files import write_text
 from wakewise.experiments.campaigns.summary import (
     FEWEST,
-    ComparisonMetric,
     MethodSummary,
     Place,
     measures,
     method_contrasts,
     paired_groups,
 )
-from wakewise.experiments.campaigns.table import Results, failures, group_table, varying_factors
+from wakewise.experiments.campaigns.table import ComparisonMetric, Results, failures, group_table, varying_factors
 from wakewise.experiments.trials import UNITS
 from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, winner_text, worst_panels
 from wakewise.ui.reports.page import collapsible_section, framed_page, missing, parts, plot, section, template

@@ -1,7 +1,4 @@
-"""The part of a trial's report that shows its model: in 3D, in the photographs' colours, by its errors.
-
-The part of a trial's report that says what its photographs saw well, as the coverage guide has it before leaving.
-"""
+"""The part of a trial's report about its model: in 3D, in the photographs' colours, by its errors, and its coverage."""
 
 from __future__ import annotations
 

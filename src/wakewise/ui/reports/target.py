@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import base64
 from pathlib import Path
 
-import cv2
 import numpy as np
 import trimesh
 from markupsafe import Markup
@@ -23,7 +21,7 @@ from wakewise.scene.targets.fragility import FRAGILE_FROM, SHARP_PER_M, THIN_M
 from wakewise.ui.reports.page import framed_page, plot, section, template, tile
 from wakewise.ui.reports.svg_style import INK, LINE, MUTED, SLATE, TEAL, new_figure, style_axes
 from wakewise.ui.reports.trial import TrialMesh
-from wakewise.ui.reports.views import ViewBounds, Viewpoint, draw_surface
+from wakewise.ui.reports.views import ViewBounds, Viewpoint, draw_surface, png_pixels
 
 SUFFIXES = (".html", ".svg", ".ply")
 VIEW_PIXELS = 560
@@ -79,7 +77,7 @@ def picture(target: Target, delicacy: Fragility, page: bool = True) -> Figure:
     grid = figure.subplots(1, 3)
     span_mm = 1e3 * frame.radius_m
     for axes, source, view in zip(grid, sources, VIEWS, strict=True):
-        axes.imshow(_pixels(source), extent=(-span_mm, span_mm, -span_mm, span_mm), interpolation="antialiased")
+        axes.imshow(png_pixels(source), extent=(-span_mm, span_mm, -span_mm, span_mm), interpolation="antialiased")
         axes.set_axis_off()
         axes.annotate(view.name, (0.0, span_mm), xytext=(0, -4), textcoords="offset points", ha="center", va="top",
                       color=ink, fontsize=10.5)  # fmt: skip
@@ -201,9 +199,3 @@ def _ruler(axes: Axes, span_mm: float, colour: str) -> None:
     axes.plot([-0.5 * length, 0.5 * length], [y, y], color=colour, linewidth=1.4, solid_capstyle="butt")
     axes.annotate(f"{length:g} mm", (0.0, y), xytext=(0, 4), textcoords="offset points", ha="center", va="bottom",
                   color=colour, fontsize=9)  # fmt: skip
-
-
-def _pixels(source: str) -> Array:
-    """Pixels, shape (h, w, 4), from 0 to 1, of a PNG data URI."""
-    content = np.frombuffer(base64.b64decode(source.split(",", 1)[1]), np.uint8)
-    return np.asarray(cv2.cvtColor(cv2.imdecode(content, cv2.IMREAD_UNCHANGED), cv2.COLOR_BGRA2RGBA) / 255.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from dataclasses import dataclass
 
 import cv2
@@ -154,3 +155,9 @@ def _png(image: Array, pixels: int) -> str:
     colour = np.divide(mean[..., :3], alpha, out=np.zeros_like(mean[..., :3]), where=alpha > 0)
     bytes_ = np.round(255 * np.concatenate([colour[..., ::-1], alpha], axis=2)).astype(np.uint8)
     return data_uri(cv2.imencode(".png", bytes_, [cv2.IMWRITE_PNG_COMPRESSION, 6])[1].tobytes(), "image/png")
+
+
+def png_pixels(source: str) -> Array:
+    """RGBA pixels, shape (h, w, 4), from 0 to 1, of a PNG data URI."""
+    content = np.frombuffer(base64.b64decode(source.partition(",")[2]), np.uint8)
+    return np.asarray(cv2.cvtColor(cv2.imdecode(content, cv2.IMREAD_UNCHANGED), cv2.COLOR_BGRA2RGBA) / 255.0)

@@ -1,16 +1,12 @@
-"""Who may come in: names under which the page may be asked for, who may open its socket, and who must show a token.
+"""Access to a server: allowed hosts and origins, the token, its addresses, and limits on pending connections.
 
-A page of another site can have a browser talk to a port of this computer: by a name of its own that it points here (DNS
-rebinding; the Host header tells), or straight (the Origin header tells). Both are refused. From this computer by its
-loopback names nothing more is asked; anybody else must show the token.
+A page of another site can send requests from a browser to a port of this computer: by a host name that resolves to this
+computer (DNS rebinding, visible in the Host header), or directly (visible in the Origin header). Both are refused.
+Callers on this computer need nothing more; all others need the token.
 
-Under which addresses others reach a server: those of this computer's networks where it listens at all of them.
-
-Connections that have not said who they are yet: how many a server keeps, and which it closes for one more.
-
-Whoever connects costs a descriptor, and often a thread, before the first word. They are bounded here, by address and in
-all. One too many is never refused: it might be the pilot. The one that has been silent for longest is closed instead,
-of the same address, or of the address that has most.
+A connection takes a descriptor, and often a thread, before its first request. Pending connections are limited by
+address and in total. A new one is never refused, because it may be the pilot's. The oldest pending one is closed
+instead, of the same address, or of the address with most of them.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from wakewise_ardusub.logs.replay_allocation import ReplayedAllocation
     from wakewise_ardusub.logs.table import LogTable
 
-app = typer.Typer(help="Real vehicles and what they recorded.", rich_markup_mode=None)
+app = typer.Typer(help="Real vehicles and what they recorded.")
 app.command("wash-meter")(wash_meter)
 app.command("sensors")(sensors)
 

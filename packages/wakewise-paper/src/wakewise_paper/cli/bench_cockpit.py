@@ -44,7 +44,7 @@ def _measured(result: dict[str, Any], options: BenchOptions, keys: tuple[str, ..
 def _latency(options: BenchOptions) -> tuple[dict[str, Any], dict[str, Any]]:
     from wakewise.core.optional_dependencies import need
     from wakewise.operation import load_scenario
-    from wakewise.ui.cockpit.latency import measure
+    from wakewise_paper.cockpit_latency import measure
 
     need("the cockpit's latency", "cockpit")
     scenario = load_scenario("quick", None, {})

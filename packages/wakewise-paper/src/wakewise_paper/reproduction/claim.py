@@ -11,7 +11,8 @@ from importlib import resources
 from typing import Any, Literal
 
 from wakewise.core.safe_yaml import read_yaml
-from wakewise.experiments.campaigns.summary import ComparisonMetric, MethodSummary, Place, summarize
+from wakewise.experiments.campaigns.summary import MethodSummary, Place, summarize
+from wakewise.experiments.campaigns.table import ComparisonMetric
 
 Reading = Literal["mean", "less_pct", "share_pct", "order", "spread_pct"]
 """What is made of the trials: their mean; how much less than another method's, in percent; the share that succeeded;

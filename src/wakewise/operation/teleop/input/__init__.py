@@ -1,4 +1,4 @@
-"""Input of an operator: what hands do, whatever they hold.
+"""Inputs of an operator, from any device.
 
 `controls.py` is the record of all inputs; it comes from a script (`script.py`), a trace (`control_log.py`), keys
 (`keyboard.py`) or a gamepad (`gamepad.py`, the only module that knows SDL, and `pad_mapping.py`); `script.py` reads

@@ -1,9 +1,8 @@
-"""A record of hands: what the sticks did in a flight, to be read, plotted, and flown again.
+"""Record of an operator's inputs in a flight, for analysis and replay.
 
-A table with the columns `time_s`, the five axes, `pressed` (names, separated by commas) and `desk` (what was set, as
-JSON, whatever the desk knows). It has a row wherever something changed, which holds until the next one, and a last one
-at the end. Where nobody was at the sticks the axes are null. As a file it is Parquet or CSV; a flight by hand leaves
-`controls.parquet` in its folder.
+A table with the columns `time_s`, the five axes, `pressed` (names, separated by commas) and `desk` (the settings as
+JSON). It has a row at each change, which holds until the next one, and a last one at the end. Without inputs the axes
+are null. The file is Parquet or CSV; a teleoperated flight writes `controls.parquet` into its folder.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ from wakewise.core.files import whole_file
 from wakewise.operation.teleop.input.controls import CONTROL_AXES, Controls, TimedControls
 
 TRACE_FILE = "controls.parquet"
-"""What a flight by hand leaves in its folder."""
+"""Name of the record in the folder of a flight."""
 _NOBODY = (math.nan,) * len(CONTROL_AXES)
 
 
 @dataclass(eq=False)
 class ControlLogWriter:
-    """Collects hands and desk as they are read; what does not change takes no room."""
+    """Collects inputs and settings as they are read; only changes are kept."""
 
     _rows: array[float] = field(default_factory=lambda: array("d"), init=False)
     _pressed: dict[int, str] = field(default_factory=dict, init=False)
@@ -40,7 +39,7 @@ class ControlLogWriter:
     _last_s: float = field(default=0.0, init=False)
 
     def take(self, time_s: float, controls: Controls | None, desk: Mapping[str, Any]) -> None:
-        """Take in what the hands did at a step, and what was set then."""
+        """Take in the inputs and settings of a step."""
         axes = _NOBODY if controls is None else tuple(controls.axes.tolist())
         pressed = () if controls is None else controls.pressed
         same = self._axes is axes or (axes is not _NOBODY and self._axes == axes)
@@ -78,7 +77,7 @@ class ControlLogWriter:
 
 
 class ControlLog(TimedControls):
-    """A `ControlSource` that reads off a record; after its end nobody is there.
+    """A `ControlSource` from a record; after its end there are no inputs.
 
     Raises InputError if the table lacks a column, times do not increase, or a row is nonsense; the row is named.
     """
@@ -98,7 +97,7 @@ class ControlLog(TimedControls):
         return None if time_s > self.end_s + 1e-9 else held
 
     def desk_at(self, time_s: float) -> Mapping[str, Any] | None:
-        """What was set at `time_s`; None where the record does not say."""
+        """The settings at `time_s`; None if they are not in the record."""
         at = int(np.searchsorted(self._times_s, time_s + 1e-9, side="right")) - 1
         return self._desks[at] if at >= 0 else None
 

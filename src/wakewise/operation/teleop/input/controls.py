@@ -1,7 +1,7 @@
-"""What a pilot's hands do at one instant, whatever they hold: gamepad, keyboard, a page in the browser, a script.
+"""Inputs of an operator at one instant, from any device: gamepad, keyboard, a page in the browser, a script.
 
 Axes are shares of full stick in the vehicle's level frame: forward along its heading, right, down, turn clockwise as
-seen from above, tilt of the camera upwards. What full stick means is the desk's doing (gain, precise mode), and what
+seen from above, tilt of the camera upwards. The operator's settings (gain, precise mode) scale full stick; what
 comes of it that of `wakewise.operation`.
 """
 
@@ -19,15 +19,15 @@ from wakewise.core.errors import InputError
 
 CONTROL_AXES = ("forward", "right", "down", "turn", "tilt")
 ACTIONS = ("capture", "hold", "scan", "operator", "stop", "precise", "gain_up", "gain_down")
-"""What buttons ask for: a photograph; hold the place; let the mission fly; take over; end the flight; the finer sticks
-on or off; the gain a step up or down."""
+"""Actions of buttons: take a photograph; hold the position; fly the mission; fly by sticks; end the flight; precise
+mode on or off; the gain a step up or down."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Controls:
     """Axes as shares of full stick, -1 to 1, in the order of `CONTROL_AXES`, shape (5,), and what was pressed since.
 
-    Raises InputError if an axis is not a number within -1 to 1, or nobody knows what was pressed.
+    Raises InputError if an axis is not a number within -1 to 1, or an action is unknown.
     """
 
     axes: Array
@@ -43,24 +43,23 @@ class Controls:
 
     @property
     def centred(self) -> bool:
-        """Whether no axis asks for anything."""
+        """Whether all axes are zero."""
         return not self.axes.any()
 
 
 CENTRED = Controls(axes=np.zeros(len(CONTROL_AXES)))
-"""Hands off."""
+"""All axes zero."""
 
 
 class ControlSource(Protocol):
-    """Where a pilot's hands are read.
+    """A source of inputs.
 
-    One that sees may have a method `look(time_s, estimate, share)`, called before each read: where the vehicle is, and
-    what share of the fastest speeds full stick asks for. One that plays back may have `desk_at(time_s)`: what was set
-    on the desk then, by field.
+    A source that depends on the vehicle has a method `look(time_s, estimate, share)`, called before each read with the
+    share of the largest speeds at full stick. A replay has `desk_at(time_s)`: the settings at that time, by field.
     """
 
     def read(self, time_s: float) -> Controls | None:
-        """Read them at `time_s` of the flight, at most once a control step; None: nobody is there, so stop and hold."""
+        """Inputs at `time_s` of the flight, at most once a control step; None: no inputs, so stop and hold."""
         ...
 
 
@@ -90,7 +89,7 @@ class TimedControls:
 
 
 def apply_dead_zone(raw: Iterable[float], dead_zone: float = 0.05) -> Array:
-    """Axes as a device gives them, made harmless: shape (5,), dead zone taken out, the rest stretched to full.
+    """Axes of a device with a dead zone, shape (5,); the rest of the range is scaled to full stick.
 
     What is not a number counts as centred, what is larger than full as full.
     """

@@ -1,7 +1,7 @@
-"""A gamepad by SDL: the only file that knows SDL.
+"""A gamepad by SDL: the only module that uses SDL.
 
-SDL lives in a thread of its own, which asks the pad a hundred times a second, so that neither a driver that takes long
-nor a pad that is being plugged in holds the flight up: `read` only takes what was found last. No window is opened.
+SDL runs in its own thread, which polls the gamepad at 100 Hz. So a slow driver, or a gamepad that is plugged in, does
+not delay the flight: `read` returns the last state. No window is opened.
 """
 
 from __future__ import annotations
@@ -38,9 +38,8 @@ _SDL = {
 class Gamepad:
     """A `ControlSource` that is a gamepad, whichever is plugged in; use it in a `with` statement.
 
-    Nobody is there (None) while there is no pad, and of one that was just plugged in until its sticks were centred
-    once, so that a stick which is held over, or lies on something, does not fly. Buttons that are down by then ask for
-    nothing until they are pressed anew.
+    There are no inputs (None) without a gamepad, and after it is plugged in until its sticks were centred once, so that
+    a deflected stick has no effect. Buttons that are held then have no effect until they are pressed again.
 
     `mapping`: a pad that it is not for is left alone, and that is said.
 
@@ -113,7 +112,7 @@ class Gamepad:
                     self._poll(pygame)
                     self._first_look.set()
                     self._ended.wait(EVERY_S)
-        except Exception as fault:  # a driver's fault is nobody at the sticks, not the end of the flight
+        except Exception as fault:  # a fault of a driver means no inputs; the flight continues
             self._say("warn", f"gamepads cannot be read: {type(fault).__name__}: {fault}")
         finally:
             self._pad = None

@@ -1,13 +1,13 @@
-"""Hands by a script: a list of times with what the sticks do from then on.
+"""Inputs by a script: a list of times with the stick deflections from then on.
 
 As YAML, each entry with `at_s` and any of the axes (those not named are centred), what is `pressed` at that moment, or
-`gone: true` where nobody is at the sticks until the next entry:
+`gone: true` for no inputs until the next entry:
 
     - {at_s: 2, right: 0.6}
     - {at_s: 5, pressed: [capture]}
     - {at_s: 8, gone: true}
 
-Hands from a file, by its ending: a script in YAML, or the record of a flight as Parquet or CSV.
+Inputs from a file, by its suffix: a script in YAML, or the record of a flight as Parquet or CSV.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _KEYS = ("at_s", *CONTROL_AXES, "pressed", "gone")
 
 @dataclass(frozen=True, kw_only=True)
 class ScriptEntry:
-    """From `at_s` on the hands do this, None: nobody is there; what is pressed is pressed once."""
+    """Inputs from `at_s` on, None: no inputs; buttons are pressed once."""
 
     at_s: float
     controls: Controls | None
@@ -100,7 +100,7 @@ def _number(value: Any, what: str) -> float:
 
 
 def _record(path: Path) -> ControlSource:
-    """The record of a flight; tables are imported where one is read, since every scenario knows of this file."""
+    """The record of a flight; polars is imported at first use, because every scenario imports this module."""
     from wakewise.operation.teleop.input.control_log import read_trace
 
     return read_trace(path)
@@ -115,7 +115,7 @@ READERS: dict[str, Callable[[Path], ControlSource]] = {
 
 
 def read_input(path: Path) -> ControlSource:
-    """Hands that a file tells of.
+    """Inputs from a file.
 
     Raises InputError if its ending is none of `READERS`, or it cannot be read.
     """

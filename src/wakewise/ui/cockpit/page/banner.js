@@ -1,11 +1,11 @@
-// One line that says who flies, and what the sticks do. It is the first thing a pilot must know.
+// One line: the mode of control and the state of the sticks.
 
 const box = document.getElementById("banner");
 const what = document.getElementById("banner-what");
 const more = document.getElementById("banner-more");
 const button = document.getElementById("helm-button");
 const ask = document.getElementById("ask");
-const MODES = { operator: "sticks are live", hold: "holding the place: press Operate to fly", scan: "the mission flies: press Operate to take over" };
+const MODES = { operator: "sticks are live", hold: "holding the position: press Operate to fly", scan: "the mission flies: press Operate to take over" };
 
 /** `link`: "up", "connecting", "down", "silent", "refused" with words; then the helm, whether sticks go out, the mode. */
 export function banner({ link, said, helm, sending, mode, preparing }) {

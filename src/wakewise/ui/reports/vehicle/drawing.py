@@ -1,15 +1,11 @@
-"""A drawing of a vehicle from above, from starboard and from ahead: thrusters, jets of positive thrust, camera view.
-
-Marks of the vehicle drawing: projections, thrusters with the jets of positive thrust, camera, centres, text.
-"""
+"""A drawing of a vehicle from above, from starboard and from ahead: thrusters, jets of positive thrust, camera view."""
 
 from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 
@@ -18,8 +14,9 @@ from wakewise.core.errors import InputError
 from wakewise.robot.vehicles.check import AnyVehicle, actuation
 from wakewise.robot.vehicles.describe import as_draft
 from wakewise.robot.vehicles.draft import ThrusterDraft, VehicleDraft
+from wakewise.ui.reports.vehicle.svg import INK, MUTED, svg_page, tag, text
 
-INK, MUTED, FRAME, HULL, JET, LENS, BUOY = "#16232e", "#5b6b7a", "#d4dde5", "#f3f6f9", "#0b76b8", "#d98e04", "#0f9d8a"
+FRAME, HULL, JET, LENS, BUOY = "#d4dde5", "#f3f6f9", "#0b76b8", "#d98e04", "#0f9d8a"
 FACE_ON = 0.35
 """A thruster whose axis shows less of its length than this on paper is drawn as a ring."""
 
@@ -78,15 +75,15 @@ def thruster_marks(draft: VehicleDraft, view: ProjectionPanel, index: int, sizes
     radius = max(disk_radius_m(thruster, sizes) * view.px_per_m, 5.0)
     dx, dy = view.direction(-thruster.axis_B)
     seen = math.hypot(dx, dy)
-    dash = "" if sizes.disk_stated else ' stroke-dasharray="3 2"'
+    outline = {"stroke": INK, "stroke_width": "1.8", "stroke_dasharray": None if sizes.disk_stated else "3 2"}
     if seen < FACE_ON:
         toward = float(-thruster.axis_B @ view.toward_B) > 0.0
         r = 0.30 * radius
         cross = f"M{x - r:.1f} {y - r:.1f}l{2 * r:.1f} {2 * r:.1f}m0 {-2 * r:.1f}l{-2 * r:.1f} {2 * r:.1f}"
         return [
-            _circle(x, y, radius, fill="#ffffff", stroke=INK, width=1.8, extra=dash),
-            _circle(x, y, radius, fill=JET, extra=' fill-opacity="0.13"'),
-            _circle(x, y, r, fill=JET) if toward else f'<path d="{cross}" stroke="{JET}" stroke-width="2.2"/>',
+            circle(x, y, radius, fill="#ffffff", **outline),
+            circle(x, y, radius, fill=JET, fill_opacity="0.13"),
+            circle(x, y, r, fill=JET) if toward else tag("path", d=cross, stroke=JET, stroke_width="2.2"),
         ]
     ux, uy = dx / seen, dy / seen
     length = sizes.jet_m * view.px_per_m * seen
@@ -94,18 +91,21 @@ def thruster_marks(draft: VehicleDraft, view: ProjectionPanel, index: int, sizes
     tip_x, tip_y = x + length * ux, y + length * uy
     # A disk whose axis leans out of the page shows as an ellipse.
     flat = max(radius * math.sqrt(max(0.0, 1.0 - seen * seen)), 0.16 * radius, 2.2)
-    angle = math.degrees(math.atan2(uy, ux))
+    turn = f"rotate({math.degrees(math.atan2(uy, ux)):.1f} {x:.1f} {y:.1f})"
     end_x, end_y = x + 0.62 * length * ux, y + 0.62 * length * uy
     return [
         f'<linearGradient id="{key}" gradientUnits="userSpaceOnUse" x1="{x:.1f}" y1="{y:.1f}" x2="{tip_x:.1f}" '
         f'y2="{tip_y:.1f}"><stop offset="0" stop-color="{JET}" stop-opacity="0.42"/>'
         f'<stop offset="1" stop-color="{JET}" stop-opacity="0"/></linearGradient>',
-        f'<path d="M{x - radius * uy:.1f} {y + radius * ux:.1f}L{tip_x - wide * uy:.1f} {tip_y + wide * ux:.1f}'
-        f'L{tip_x + wide * uy:.1f} {tip_y - wide * ux:.1f}L{x + radius * uy:.1f} {y - radius * ux:.1f}Z" '
-        f'fill="url(#{key})"/>',
+        polygon(
+            (x - radius * uy, y + radius * ux),
+            (tip_x - wide * uy, tip_y + wide * ux),
+            (tip_x + wide * uy, tip_y - wide * ux),
+            (x + radius * uy, y - radius * ux),
+            fill=f"url(#{key})",
+        ),
         arrow(x, y, end_x, end_y, JET),
-        f'<ellipse cx="{x:.1f}" cy="{y:.1f}" rx="{flat:.1f}" ry="{radius:.1f}" fill="#ffffff" stroke="{INK}" '
-        f'stroke-width="1.8"{dash} transform="rotate({angle:.1f} {x:.1f} {y:.1f})"/>',
+        tag("ellipse", cx=x, cy=y, rx=flat, ry=radius, fill="#ffffff", **outline, transform=turn),
     ]
 
 
@@ -126,7 +126,7 @@ def badge(x: float, y: float, words: str) -> list[str]:
     """Thruster numbers, white on dark."""
     width = 10.0 + 6.5 * len(words)
     return [
-        f'<rect x="{x - 0.5 * width:.1f}" y="{y - 8:.1f}" width="{width:.1f}" height="16" rx="8" fill="{INK}"/>',
+        tag("rect", x=x - 0.5 * width, y=y - 8.0, width=width, height=16, rx=8, fill=INK),
         text(x, y + 4, words, colour="#ffffff", size=11, weight=600, anchor="middle"),
     ]
 
@@ -144,16 +144,11 @@ def camera_marks(draft: VehicleDraft, view: ProjectionPanel, sizes: Sizes) -> li
         half = math.tan(0.5 * draft.camera_fov_rad)
         reach = sizes.cone_m
         sides = [view.place(eye + reach * (R_BC[:, 2] + side * half * R_BC[:, 0])) for side in (-1.0, 1.0)]
-        parts.append(
-            f'<path d="M{x:.1f} {y:.1f}L{sides[0][0]:.1f} {sides[0][1]:.1f}L{sides[1][0]:.1f} {sides[1][1]:.1f}Z" '
-            f'fill="{LENS}" fill-opacity="0.16" stroke="{LENS}" stroke-opacity="0.55"/>'
-        )
+        parts.append(polygon((x, y), *sides, fill=LENS, fill_opacity="0.16", stroke=LENS, stroke_opacity="0.55"))
     if along > FACE_ON:
         end_x, end_y = view.place(eye + sizes.cone_m * R_BC[:, 2])
-        parts.append(
-            f'<path d="M{x:.1f} {y:.1f}L{end_x:.1f} {end_y:.1f}" stroke="{LENS}" stroke-width="1.5" '
-            'stroke-dasharray="6 4"/>'
-        )
+        axis = f"M{x:.1f} {y:.1f}L{end_x:.1f} {end_y:.1f}"
+        parts.append(tag("path", d=axis, stroke=LENS, stroke_width="1.5", stroke_dasharray="6 4"))
     return [*parts, camera_mark(x, y)]
 
 
@@ -169,7 +164,7 @@ def centre_marks(draft: VehicleDraft, view: ProjectionPanel) -> list[str]:
 
 def camera_mark(x: float, y: float) -> str:
     """The camera's place."""
-    return _circle(x, y, 6.0, fill=LENS, stroke=INK, width=1.5)
+    return circle(x, y, 6.0, fill=LENS, stroke=INK, stroke_width="1.5")
 
 
 def gravity_mark(x: float, y: float, r: float = 5.5) -> str:
@@ -178,12 +173,12 @@ def gravity_mark(x: float, y: float, r: float = 5.5) -> str:
         f"M{x:.1f} {y:.1f}v{-r:.1f}a{r:.1f} {r:.1f} 0 0 1 {r:.1f} {r:.1f}Z"
         f"M{x:.1f} {y:.1f}v{r:.1f}a{r:.1f} {r:.1f} 0 0 1 {-r:.1f} {-r:.1f}Z"
     )
-    return _circle(x, y, r, fill="#ffffff", stroke=INK, width=1.2) + f'<path d="{quarters}" fill="{INK}"/>'
+    return circle(x, y, r, fill="#ffffff", stroke=INK, stroke_width="1.2") + tag("path", d=quarters, fill=INK)
 
 
 def buoyancy_mark(x: float, y: float, r: float = 5.5) -> str:
     """A ring."""
-    return _circle(x, y, r, fill="#ffffff", stroke=BUOY, width=2.4)
+    return circle(x, y, r, fill="#ffffff", stroke=BUOY, stroke_width="2.4")
 
 
 def arrow(x: float, y: float, end_x: float, end_y: float, colour: str, head: float = 7.0) -> str:
@@ -194,32 +189,9 @@ def arrow(x: float, y: float, end_x: float, end_y: float, colour: str, head: flo
     ux, uy = (end_x - x) / length, (end_y - y) / length
     back_x, back_y = end_x - head * ux, end_y - head * uy
     side = 0.5 * head
-    return (
-        f'<path d="M{x:.1f} {y:.1f}L{back_x:.1f} {back_y:.1f}" stroke="{colour}" stroke-width="1.8"/>'
-        f'<path d="M{end_x:.1f} {end_y:.1f}L{back_x - side * uy:.1f} {back_y + side * ux:.1f}'
-        f'L{back_x + side * uy:.1f} {back_y - side * ux:.1f}Z" fill="{colour}"/>'
-    )
-
-
-def text(
-    x: float, y: float, words: str, *, colour: str = INK, size: int = 12, weight: int = 400, anchor: str = "start"
-) -> str:
-    """One line of text."""
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" fill="{colour}" font-size="{size}" font-weight="{weight}" '
-        f'text-anchor="{anchor}">{escape(words)}</text>'
-    )
-
-
-def svg_page(width: float, height: float, title: str, parts: Sequence[str]) -> str:
-    """Parts on a white page as one self-contained SVG."""
-    head = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" role="img" '
-        f'font-family="system-ui, -apple-system, Segoe UI, Roboto, sans-serif" font-size="12" fill="{INK}">',
-        f"<title>{escape(title)}</title>",
-        f'<rect width="{width:.0f}" height="{height:.0f}" fill="#ffffff"/>',
-    ]
-    return "\n".join([*head, *parts, "</svg>"]) + "\n"
+    tip = ((end_x, end_y), (back_x - side * uy, back_y + side * ux), (back_x + side * uy, back_y - side * ux))
+    shaft = f"M{x:.1f} {y:.1f}L{back_x:.1f} {back_y:.1f}"
+    return tag("path", d=shaft, stroke=colour, stroke_width="1.8") + polygon(*tip, fill=colour)
 
 
 def round_step(least: float) -> float:
@@ -235,9 +207,14 @@ def hull_half_m(draft: VehicleDraft) -> Array:
     return np.asarray(np.maximum(1.1 * np.abs(np.stack([t.p_BT_m for t in draft.thrusters])).max(axis=0), 0.05))
 
 
-def _circle(x: float, y: float, r: float, *, fill: str, stroke: str = "", width: float = 0.0, extra: str = "") -> str:
-    line = f' stroke="{stroke}" stroke-width="{width:g}"' if stroke else ""
-    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}" fill="{fill}"{line}{extra}/>'
+def circle(x: float, y: float, r: float, **look: str | None) -> str:
+    """A circle about a point."""
+    return tag("circle", cx=x, cy=y, r=r, **look)
+
+
+def polygon(*corners: tuple[float, float], **look: str) -> str:
+    """A closed area."""
+    return tag("path", d="M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in corners) + "Z", **look)
 
 
 WIDTH, MARGIN, GAP, PAD, HEAD = 1080.0, 24.0, 16.0, 18.0, 40.0
@@ -366,8 +343,7 @@ def _extent(draft: VehicleDraft, sizes: Sizes) -> tuple[Array, Array]:
 def _panel(draft: VehicleDraft, view: ProjectionPanel, sizes: Sizes, number: int) -> list[str]:
     left, top, width, height = view.box_px
     parts = [
-        f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}" rx="10" fill="#ffffff" '
-        f'stroke="{FRAME}"/>',
+        tag("rect", x=left, y=top, width=width, height=height, rx=10, fill="#ffffff", stroke=FRAME),
         text(left + 14, top + 21, view.title, weight=600, size=13),
         *_axes(view, left + width - 62, top + 16),
     ]
@@ -375,10 +351,9 @@ def _panel(draft: VehicleDraft, view: ProjectionPanel, sizes: Sizes, number: int
     x, y = view.origin_px
     across = float(np.abs(view.right_B) @ half) * view.px_per_m
     along = float(np.abs(view.down_B) @ half) * view.px_per_m
-    dash = "" if draft.size_m is not None else ' stroke-dasharray="5 4"'
+    look = {"stroke": "#9fb0bf", "stroke_width": "1.2", "stroke_dasharray": None if draft.size_m is not None else "5 4"}
     parts.append(
-        f'<rect x="{x - across:.1f}" y="{y - along:.1f}" width="{2 * across:.1f}" height="{2 * along:.1f}" rx="12" '
-        f'fill="{HULL}" stroke="#9fb0bf" stroke-width="1.2"{dash}/>'
+        tag("rect", x=x - across, y=y - along, width=2.0 * across, height=2.0 * along, rx=12, fill=HULL, **look)
     )
     parts += camera_marks(draft, view, sizes)
     # Furthest from the reader first, so that near thrusters lie on top.
@@ -409,19 +384,17 @@ def _axes(view: ProjectionPanel, x: float, y: float) -> list[str]:
 def _legend(draft: VehicleDraft, sizes: Sizes, box: tuple[float, float, float, float], px_per_m: float) -> list[str]:
     left, top, _, height = box
     x = left + 20.0
-    ring = f'<circle cx="{x:.1f}" cy="{{y:.1f}}" r="7" fill="#ffffff" stroke="{INK}" stroke-width="1.5"/>'
+
+    def ring(y: float) -> str:
+        return circle(x, y, 7.0, fill="#ffffff", stroke=INK, stroke_width="1.5")
+
+    def away(y: float) -> str:
+        return tag("path", d=f"M{x - 3:.1f} {y - 3:.1f}l6 6m0 -6l-6 6", stroke=JET, stroke_width="2")
+
     rows: list[tuple[Callable[[float], str], str]] = [
         (lambda y: arrow(x - 12, y, x + 14, y, JET), "jet of positive thrust (the water's way)"),
-        (
-            lambda y: ring.format(y=y) + f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.4" fill="{JET}"/>',
-            "jet toward you",
-        ),
-        (
-            lambda y: (
-                ring.format(y=y) + f'<path d="M{x - 3:.1f} {y - 3:.1f}l6 6m0 -6l-6 6" stroke="{JET}" stroke-width="2"/>'
-            ),
-            "jet away from you",
-        ),
+        (lambda y: ring(y) + circle(x, y, 2.4, fill=JET), "jet toward you"),
+        (lambda y: ring(y) + away(y), "jet away from you"),
     ]
     if draft.X_BC is not None:
         fov = "" if draft.camera_fov_rad is None else f", {math.degrees(draft.camera_fov_rad):.0f} degrees across"
@@ -433,8 +406,9 @@ def _legend(draft: VehicleDraft, sizes: Sizes, box: tuple[float, float, float, f
     stated = {"size": draft.size_m is not None, "propellers": sizes.disk_stated}
     dashed = [word for word, known in stated.items() if not known]
     if dashed:
-        line = f'<path d="M{x - 12:.1f} {{y:.1f}}h26" stroke="{INK}" stroke-width="1.5" stroke-dasharray="4 3"/>'
-        rows.append((lambda y: line.format(y=y), f"{' and '.join(dashed)} not stated, drawn to show"))
+        line = {"stroke": INK, "stroke_width": "1.5", "stroke_dasharray": "4 3"}
+        words = f"{' and '.join(dashed)} not stated, drawn to show"
+        rows.append((lambda y: tag("path", d=f"M{x - 12:.1f} {y:.1f}h26", **line), words))
     step = min(25.0, (height - 80.0) / len(rows))
     parts = []
     for row, (mark, words) in enumerate(rows):
@@ -448,7 +422,8 @@ def _scale_bar(x: float, y: float, px_per_m: float) -> list[str]:
     length_m = round_step(60.0 / px_per_m)
     length = length_m * px_per_m
     said = f"{1000.0 * length_m:.0f} mm" if length_m < 1.0 else f"{length_m:g} m"
+    bar = f"M{x:.1f} {y - 4:.1f}v8m0 -4h{length:.1f}m0 -4v8"
     return [
-        f'<path d="M{x:.1f} {y - 4:.1f}v8m0 -4h{length:.1f}m0 -4v8" fill="none" stroke="{INK}" stroke-width="1.5"/>',
+        tag("path", d=bar, fill="none", stroke=INK, stroke_width="1.5"),
         text(x + length + 10, y + 4, said, colour=MUTED),
     ]

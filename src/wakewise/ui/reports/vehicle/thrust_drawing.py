@@ -9,7 +9,8 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.robot.thrusters.thrust_curve import ThrustCurve
-from wakewise.ui.reports.vehicle.drawing import FRAME, MUTED, round_step, svg_page, text
+from wakewise.ui.reports.vehicle.drawing import FRAME, round_step
+from wakewise.ui.reports.vehicle.svg import MUTED, svg_page, tag, text
 
 CHOSEN, BAND, OTHER = "#0f7bbd", "#eef3f7", "#a9b8c6"
 WIDTH, HEIGHT = 980.0, 500.0
@@ -39,10 +40,8 @@ class Panel:
     def line(self, xs: Array, ys: Array, colour: str, width: float) -> str:
         """A curve through points of the panel."""
         points = " ".join(f"{self.x(float(a)):.1f},{self.y(float(b)):.1f}" for a, b in zip(xs, ys, strict=True))
-        return (
-            f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{width:g}" '
-            'stroke-linejoin="round" stroke-linecap="round"/>'
-        )
+        ends = {"stroke_linejoin": "round", "stroke_linecap": "round"}
+        return tag("polyline", points=points, fill="none", stroke=colour, stroke_width=f"{width:g}", **ends)
 
 
 def curve_svg(curve: ThrustCurve, supply_V: float) -> str:
@@ -77,10 +76,10 @@ def _thrust_panel(curve: ThrustCurve, at: float) -> list[str]:
     bottom = -float(curve.reverse.thrust_N.max())
     panel = Panel(left=74.0, right=476.0, x_range=pulses, y_range=_widened(bottom, top))
     silent = curve.deadband_us(at)
+    left = panel.x(silent[0])
     parts = [
         text(panel.left, TOP - 18, "Thrust (N) over pulse (us)", weight=600),
-        f'<rect x="{panel.x(silent[0]):.1f}" y="{TOP:.1f}" width="{panel.x(silent[1]) - panel.x(silent[0]):.1f}" '
-        f'height="{BOTTOM - TOP:.1f}" fill="{BAND}"/>',
+        tag("rect", x=left, y=TOP, width=panel.x(silent[1]) - left, height=BOTTOM - TOP, fill=BAND),
         *_axes(panel),
     ]
     labels = []
@@ -107,7 +106,7 @@ def _power_panel(curve: ThrustCurve, at: float) -> list[str]:
         parts.append(panel.line(grid, power, colour, width))
         if voltage == at:
             x, y = panel.x(ends[1]), panel.y(float(power[-1]))
-            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{colour}"/>')
+            parts.append(tag("circle", cx=x, cy=y, r=4, fill=colour))
             parts.append(text(x - 9, y - 7, f"{power[-1]:.0f} W", colour=colour, weight=600, anchor="end"))
     return parts
 
@@ -132,12 +131,13 @@ def _axes(panel: Panel) -> list[str]:
     parts = []
     for value in _ticks(*panel.x_range, 7):
         x = panel.x(value)
-        parts.append(f'<path d="M{x:.1f} {TOP:.1f}V{BOTTOM:.1f}" stroke="{FRAME}" stroke-width="0.7"/>')
+        parts.append(tag("path", d=f"M{x:.1f} {TOP:.1f}V{BOTTOM:.1f}", stroke=FRAME, stroke_width="0.7"))
         parts.append(text(x, BOTTOM + 17, f"{value:g}", colour=MUTED, size=11, anchor="middle"))
     for value in _ticks(*panel.y_range, 7):
         y = panel.y(value)
         stroke = MUTED if value == 0.0 else FRAME
-        parts.append(f'<path d="M{panel.left:.1f} {y:.1f}H{panel.right:.1f}" stroke="{stroke}" stroke-width="0.7"/>')
+        line = f"M{panel.left:.1f} {y:.1f}H{panel.right:.1f}"
+        parts.append(tag("path", d=line, stroke=stroke, stroke_width="0.7"))
         parts.append(text(panel.left - 8, y + 4, f"{value:g}", colour=MUTED, size=11, anchor="end"))
     return parts
 

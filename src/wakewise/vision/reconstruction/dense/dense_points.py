@@ -20,6 +20,7 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.core.interfaces import Progress
 from wakewise.core.run_lock import temporary_prefix
 from wakewise.core.threads import in_order
+from wakewise.vision.image_decoding import one_opencv_thread
 from wakewise.vision.reconstruction.dense.fusion import CellMeans, facing_normals, fuse, outlier_mask
 from wakewise.vision.reconstruction.dense.stereo import DepthMap, masked, pair_depth, rectifiable
 from wakewise.vision.reconstruction.outputs.clouds import OrientedPointCloud, read_cloud, write_cloud
@@ -131,15 +132,11 @@ def densify(
     views, points = read_views(sparse, region)
     partners = rank_partners(views, points, region, most=2 * max(VOTING_PHOTOS, settings.stereo_partners))
     scale = _scale(views, region, settings)
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)  # the threads are over photos and pairs
     with tempfile.TemporaryDirectory(prefix=temporary_prefix("depths"), dir=out.parent) as scratch:
         maps = DepthStore(Path(scratch))
-        try:
+        with one_opencv_thread():  # the threads are over photos and pairs
             given = store or PhotoStore(folder)
             spacing = _all_depths(maps, given, views, partners, region, settings, scale, progress)
-        finally:
-            cv2.setNumThreads(before)
         cloud = _fuse_all(maps, partners, settings, spacing, progress) if len(maps) else np.zeros((0, 9))
     if len(cloud) < 100:
         raise StageError(f"dense: {len(cloud)} points survive from {len(maps)} depth maps, at least 100 must")

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.errors import InputError, StageError
+from wakewise.vision.image_decoding import grey_of
 from wakewise.vision.reconstruction.photos.photo_folder import SUFFIXES, decode
 
 Points = NDArray[np.float32]
@@ -191,7 +192,7 @@ def _read(folder: Path) -> dict[str, NDArray[np.uint8]]:
         image = decode(path.read_bytes(), str(path))
         if image is None:
             raise InputError(f"{path}: is no image that can be read")
-        grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        grey = grey_of(image)
         first = next(iter(out.values()), grey)
         if grey.shape != first.shape:
             raise InputError(

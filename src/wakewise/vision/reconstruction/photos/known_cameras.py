@@ -5,7 +5,6 @@ COLMAP's cameras and images are read without the points that its own reader need
 
 from __future__ import annotations
 
-import csv
 import json
 import struct
 from collections.abc import Iterable, Iterator, Mapping
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.csv_separators import other_separator
+from wakewise.core.csv_separators import csv_rows
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import matrix_from_quat
 from wakewise.vision.reconstruction.photos.lenses import COUNTS, LAYOUTS, Lens, read_model
@@ -272,42 +271,30 @@ def _nerfstudio_lens(values: Mapping[str, Any]) -> Lens | None:
 
 def _read_table(path: Path) -> KnownCameras:
     rotations, positions, lenses = {}, {}, {}
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            columns = reader.fieldnames or ()
-            missing = [column for column in _POSE if column not in columns]
-            if missing:
-                raise InputError(
-                    f"{path}: has no column {', '.join(missing)}{other_separator(columns)}; needed is {_KINDS}; "
-                    "places alone are for --reference-cameras"
-                )
-            some = [column for column in _LENS if column in columns]
-            if some and len(some) < len(_LENS):
-                raise InputError(f"{path}: has {', '.join(some)}; a lens needs all of {', '.join(_LENS)}")
-            for row in reader:
-                name = row["name"]
-                values = _numbers(path, reader.line_num, row, _POSE[1:])
-                if name in positions or not name or not np.linalg.norm(values[3:]) > 0.0:
-                    raise InputError(f"{path}: line {reader.line_num}: a name comes once, a quaternion is not 0")
-                positions[name], rotations[name] = values[:3], matrix_from_quat(values[3:])
-                if some:
-                    numbers = _numbers(path, reader.line_num, row, _LENS)
-                    bend = _numbers(path, reader.line_num, row, tuple(c for c in _BEND if c in columns))
-                    params = np.concatenate([numbers[2:], bend, np.zeros(4 - len(bend))])
-                    lenses[name] = Lens(width=int(numbers[0]), height=int(numbers[1]), params=params)
-    except (OSError, UnicodeDecodeError, csv.Error):
-        raise InputError(f"{path}: is no CSV text; needed is {_KINDS}") from None
+    for where, row in csv_rows(path, _POSE, f"{_KINDS}; places alone are for --reference-cameras"):
+        some = [column for column in _LENS if column in row]
+        if some and len(some) < len(_LENS):
+            raise InputError(f"{path}: has {', '.join(some)}; a lens needs all of {', '.join(_LENS)}")
+        name = row["name"]
+        values = _numbers(where, row, _POSE[1:])
+        if name in positions or not name or not np.linalg.norm(values[3:]) > 0.0:
+            raise InputError(f"{where}: a name comes once, a quaternion is not 0")
+        positions[name], rotations[name] = values[:3], matrix_from_quat(values[3:])
+        if some:
+            numbers = _numbers(where, row, _LENS)
+            bend = _numbers(where, row, tuple(c for c in _BEND if c in row))
+            params = np.concatenate([numbers[2:], bend, np.zeros(4 - len(bend))])
+            lenses[name] = Lens(width=int(numbers[0]), height=int(numbers[1]), params=params)
     return KnownCameras(rotations=rotations, positions=positions, lenses=lenses)
 
 
-def _numbers(path: Path, line: int, row: Mapping[str, str | None], columns: tuple[str, ...]) -> Array:
+def _numbers(where: str, row: Mapping[str, str | None], columns: tuple[str, ...]) -> Array:
     try:
         values = np.array([float(row[column] or "") for column in columns])
     except ValueError:
         values = np.array([np.nan])
     if not np.isfinite(values).all():
-        raise InputError(f"{path}: line {line}: {', '.join(columns)} must be numbers, all finite")
+        raise InputError(f"{where}: {', '.join(columns)} must be numbers, all finite")
     return values
 
 
@@ -355,19 +342,11 @@ def read_reference_cameras(path: Path) -> dict[str, Array]:
         )
     wanted = _POSE[:4]
     out: dict[str, Array] = {}
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            missing = [column for column in wanted if column not in (reader.fieldnames or ())]
-            if missing:
-                how = other_separator(reader.fieldnames)
-                raise InputError(f"{path}: has no column {', '.join(missing)}; needed are {', '.join(wanted)}{how}")
-            for row in reader:
-                if row["name"] in out:
-                    raise InputError(f"{path}: line {reader.line_num}: {row['name']} is there twice")
-                out[row["name"]] = _numbers(path, reader.line_num, row, wanted[1:])
-    except (UnicodeDecodeError, csv.Error):
-        raise InputError(f"{path}: is no CSV text; needed is a table with columns {', '.join(wanted)}") from None
+    for where, row in csv_rows(path, wanted, f"a table with columns {', '.join(wanted)}"):
+        name = row["name"] or ""
+        if name in out:
+            raise InputError(f"{where}: {name} is there twice")
+        out[name] = _numbers(where, row, wanted[1:])
     if not out:
         raise InputError(f"{path}: holds no cameras, needs at least 3 rows")
     return out

@@ -21,6 +21,7 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_folder
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.run_lock import exclusive_run
+from wakewise.vision.image_decoding import grey_of, shrunk
 from wakewise.vision.reconstruction.photos.photo_folder import Image
 from wakewise.vision.reconstruction.sfm.colmap import no_stderr
 from wakewise.vision.reconstruction.stages import fingerprint, make_folder, run_stage
@@ -207,7 +208,7 @@ def _analyse_frames(
             progress(min(frame, expected), 2 * expected, "film")
             ok, image = reader.retrieve()
             if ok and image is not None:
-                grey = _small(image)
+                grey = shrunk(grey_of(image), ANALYSED_PX)
                 if before is not None:
                     moved = movement(before, grey)
                     # Where nothing can be followed, as in a turn of murky water, it went on as it did.
@@ -243,15 +244,6 @@ def _write(film: Path, folder: Path, numbers: set[int], progress: Progress, fram
                 (folder / f"frame_{frame:06d}.jpg").write_bytes(coded.tobytes())
                 written += 1
             frame += 1
-
-
-def _small(image: Image) -> Image:
-    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    shrink = ANALYSED_PX / max(grey.shape)
-    return np.asarray(
-        grey if shrink >= 1.0 else cv2.resize(grey, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA),
-        dtype=np.uint8,
-    )
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.threads import in_order
+from wakewise.vision.image_decoding import grey_of, one_opencv_thread, shrunk
 from wakewise.vision.reconstruction.photos.photo_folder import Image, PhotoStore, read_photos, unsupported_files
 from wakewise.vision.reconstruction.photos.video_frames import sharpness_of
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
@@ -108,9 +109,7 @@ def preview_photos(
             raise InputError(f"{folder / photo.name}: {size} pixels, too narrow for a photograph; leave it out")
     names = [photo.name for photo in found]
     thumb_px = next(size for count, size in THUMBS_PX if len(names) <= count)
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
+    with one_opencv_thread():
         seen = []
         for done, one in enumerate(in_order(lambda name: _measured(store.image(name), thumb_px), names, threads)):
             progress(done, 2 * len(names), "photos")
@@ -122,8 +121,6 @@ def preview_photos(
             progress(len(pairs) + done, 2 * len(pairs), "overlap")
             if len(rows) >= LEAST_MATCHES:
                 matched[pair] = rows
-    finally:
-        cv2.setNumThreads(before)
     preview = _preview(
         names, [(p.width, p.height) for p in found], seen, matched, len(pairs), unsupported_files(folder)
     )
@@ -177,8 +174,8 @@ def matches(one: Features, two: Features) -> IntArray:
 
 
 def _measured(image: Image, thumb_px: int) -> _Seen:
-    grey = np.asarray(cv2.cvtColor(_within(image, ANALYSED_PX), cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-    small = _within(image, MATCHED_PX)
+    grey = grey_of(shrunk(image, ANALYSED_PX))
+    small = shrunk(image, MATCHED_PX)
     settings = ReconstructionSettings(max_features=FEATURES, first_octave=0)
     tiny = cv2.resize(small, (12, 9), interpolation=cv2.INTER_AREA).astype(np.float64).ravel()
     tiny -= tiny.mean()
@@ -189,17 +186,9 @@ def _measured(image: Image, thumb_px: int) -> _Seen:
         bright_pct=100.0 * float((grey >= BRIGHT).mean()),
         features=photo_features(small, settings),
         tiny=tiny / max(float(np.linalg.norm(tiny)), 1e-9),
-        thumb=cv2.imencode(".jpg", _within(image, thumb_px), [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes(),
+        thumb=cv2.imencode(".jpg", shrunk(image, thumb_px), [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes(),
         size=(small.shape[1], small.shape[0]),
     )
-
-
-def _within(image: Image, most: int) -> Image:
-    shrink = most / max(image.shape[:2])
-    if shrink >= 1.0:
-        return image
-    size = [max(1, round(shrink * side)) for side in image.shape[1::-1]]
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def _preview(

@@ -19,6 +19,7 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress
 from wakewise.core.threads import in_order
+from wakewise.vision.image_decoding import grey_of, shrunk
 from wakewise.vision.reconstruction.photos.calibration import CalibrationBoard, board_detector
 from wakewise.vision.reconstruction.photos.photo_folder import Image, PhotoStore
 from wakewise.vision.reconstruction.scale.bars import FAMILIES
@@ -40,7 +41,7 @@ def find_targets(
     if family is None:
         family = _told(store, names, wanted, threads, progress)
     out: Sightings = {}
-    jobs = in_order(lambda name: _found(_grey(store.image(name)), [family]), names, threads)
+    jobs = in_order(lambda name: _found(grey_of(store.image(name)), [family]), names, threads)
     for done, (name, found) in enumerate(zip(names, jobs, strict=True)):
         progress(done, len(names), "targets")
         for number, corners in found[family].items():
@@ -52,7 +53,9 @@ def _told(store: PhotoStore, names: list[str], wanted: tuple[int, ...], threads:
     """The family with most of the given targets, over photographs spread over the set."""
     some = names[:: max(1, -(-len(names) // TRIED))]
     count = dict.fromkeys(FAMILIES, 0)
-    for done, found in enumerate(in_order(lambda name: _found(_small(store.image(name)), FAMILIES), some, threads)):
+    for done, found in enumerate(
+        in_order(lambda name: _found(shrunk(grey_of(store.image(name)), TRIED_PX), FAMILIES), some, threads)
+    ):
         progress(done, len(some), "targets")
         for name, marks in found.items():
             count[name] += sum(number in marks for number in wanted)
@@ -67,14 +70,6 @@ def _told(store: PhotoStore, names: list[str], wanted: tuple[int, ...], threads:
 
 def _found(grey: Image, families: Iterable[str]) -> dict[str, dict[int, Array]]:
     return {family: find_squares(grey, family) for family in families}
-
-
-def _small(image: Image) -> Image:
-    grey = _grey(image)
-    shrink = TRIED_PX / max(grey.shape)
-    if shrink >= 1.0:
-        return grey
-    return np.asarray(cv2.resize(grey, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def find_squares(grey: Image, family: str) -> dict[int, Array]:
@@ -104,11 +99,11 @@ def find_board(
     Raises StageError if no marker of a known dictionary is found.
     """
     some = names[:: max(1, -(-len(names) // TRIED))]
-    _, detector = board_detector([_grey(store.image(name)) for name in some], board)
+    _, detector = board_detector([grey_of(store.image(name)) for name in some], board)
     places = np.asarray(detector.getBoard().getChessboardCorners(), dtype=np.float64)
 
     def one(name: str) -> Any:
-        corners, numbers, _, _ = detector.detectBoard(_grey(store.image(name)))
+        corners, numbers, _, _ = detector.detectBoard(grey_of(store.image(name)))
         return ([], []) if numbers is None else (np.asarray(corners).reshape(-1, 1, 2), np.ravel(numbers))
 
     out: dict[int, dict[str, Array]] = {}
@@ -118,10 +113,6 @@ def find_board(
         for corner, number in zip(*one(name), strict=True):
             out.setdefault(int(number), {})[name] = np.asarray(corner, dtype=np.float64) + 0.5
     return dict(enumerate(places)), out
-
-
-def _grey(image: Image) -> Image:
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
 MOST_ERROR_PX = 3.0

@@ -24,6 +24,7 @@ from wakewise.core.files import whole_file
 from wakewise.core.interfaces import Progress
 from wakewise.core.run_lock import temporary_prefix
 from wakewise.core.threads import in_order
+from wakewise.vision.image_decoding import grey_of, one_opencv_thread
 from wakewise.vision.reconstruction.photos.lens_groups import LensGroup, group_photos
 from wakewise.vision.reconstruction.photos.masks import write_for_colmap
 from wakewise.vision.reconstruction.photos.photo_folder import Image, Photo, PhotoStore
@@ -56,7 +57,7 @@ class Features(NamedTuple):
 
 def photo_features(image: Image, settings: ReconstructionSettings) -> Features:
     """The strongest features of a photo, blue-first colours of shape (h, w, 3), in pixels of the photo."""
-    grey = stretched(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY))
+    grey = stretched(grey_of(image))
     height, width = grey.shape
     wanted = 1.0 if settings.first_octave == -1 else 0.5
     shrink = min(wanted, MAX_DOUBLED_PX / (2.0 * max(height, width)))
@@ -109,12 +110,8 @@ def folder_features(store: PhotoStore, names: list[str], settings: Reconstructio
     def one(name: str) -> Features:
         return photo_features(store.image(name), settings)
 
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
+    with one_opencv_thread():
         yield from in_order(one, names, settings.threads)
-    finally:
-        cv2.setNumThreads(before)
 
 
 T = TypeVar("T")

@@ -1,6 +1,6 @@
 """The paper's tables beside ours: one page with pictures (`page.py`), or Markdown and small plots (`results.py`).
 
-`sentences.py` says in both what was found, `plots.py` redraws the paper's figures from our data.
+`sentences.py`: the findings in words. `plots.py`: the paper's figures from our data. `model_sheet.py`: worst models.
 """
 
 from wakewise_paper.reports.reproduction.page import write_pages

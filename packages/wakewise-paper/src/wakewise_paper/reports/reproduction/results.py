@@ -19,11 +19,12 @@ from wakewise.core.arrays import Array
 from wakewise.core.files import whole_file, write_text
 from wakewise.experiments.campaigns.statistics import smallest_effect
 from wakewise.experiments.campaigns.summary import worst_trials
-from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, sheet, winner_text
+from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, winner_text
 from wakewise.ui.reports.svg_style import CARD, CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET
 from wakewise.ui.reports.text import duration, number, shown
 from wakewise_paper.flights import read_series
 from wakewise_paper.reports.reproduction import plots, sentences
+from wakewise_paper.reports.reproduction.model_sheet import model_sheet
 from wakewise_paper.reproduction.claim import CIRCULAR, JUDGED, UNKNOWN, glances
 from wakewise_paper.reproduction.run import COLUMNS, command_of
 from wakewise_paper.reproduction.run import tables as compared_tables
@@ -191,7 +192,7 @@ def _worst(table: Mapping[str, Any], store: Path, out: Path) -> list[str]:
     name, lines = table["table"], []
     for world in table["worlds"]:
         worst = worst_trials(JUDGED[name], world, table["places"])
-        drawn = sheet(worst, store) if any("rmse_mm" in place["figures"] for place in worst.values()) else None
+        drawn = model_sheet(worst, store) if any("rmse_mm" in place["figures"] for place in worst.values()) else None
         if drawn is not None:
             file = f"{name}-worst-{world}.jpg"
             with whole_file(out / file) as temporary:
