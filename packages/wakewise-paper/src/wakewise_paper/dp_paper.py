@@ -2,7 +2,7 @@
 
 Section Gentle Stability: a PID per degree of freedom with Kp 150, Kd 80, Ki 20. The paper gives no units, no gains of
 moments and no feed-forward. Here forces have these gains in N/m, N s/m and N/(m s), moments those of the same
-bandwidth, and there is no feed-forward: what holds the vehicle against weight and current is the integral alone. Gains are not
+bandwidth. There is no feed-forward: the integral alone holds the vehicle against weight and current. Gains are not
 slowed for the delay of estimates and thrusters, as `dp` does. Thrusts are the least that make the wrench.
 """
 
