@@ -54,10 +54,22 @@ def test_the_figures_that_the_records_quote_are_among_them():
     assert known["dynamic", "wake-aware", "completeness_pct", None] == 94.8
     assert known["success", "wake-aware", "success", None] == 98.5
     assert known["station", "wake-aware", "position_rmse_mm", None] == 2.1
-    assert known["station", "wake-aware", "energy_kJ", "dp"] == 31.0
-    asked = {c.than: c.asked for _, c in EVERY if (c.figure, c.reading) == ("roll_pitch_rms_deg", "less_pct")}
-    assert asked == {"dp": None, "manual": 45.0, "mpc-smooth": 45.0, "mpc": 45.0}
-    assert known["station", "wake-aware", "roll_pitch_rms_deg", "dp"] == 45.0
+    assert known["station", "dp-paper", "position_rmse_mm", None] == 2.3
+    energy = {m: known["station", m, "energy_kJ", None] for m in ("dp-paper", "wake-aware")}
+    assert energy == {"dp-paper": 16.2, "wake-aware": 11.2}
+    rivals = ("energy_kJ", "roll_pitch_rms_deg", "target_speed_mean_m_s")
+    assert {f: known["station", "wake-aware", f, "dp-paper"] for f in rivals} == dict(
+        zip(rivals, (31.0, 45.0, 67.0), strict=True)
+    )
+    assert {than for table, _, f, than in known if table == "station" and f in rivals} == {None, "dp-paper"}
+    parts = ("wake-aware", "mpc", "linear", "six thrusters")
+    assert [known["ablation", m, "rmse_mm", None] for m in parts] == [1.9, 4.1, 3.2, 3.8]
+    assert [known["ablation", m, "success", None] for m in parts] == [100.0, 65.0, 75.0, 70.0]
+    assert known["sediment", "wake-aware", "target_speed_mean_m_s", "mpc"] == 62.0
+    shares = {m: known["dynamic", m, "success", None] for m in ("manual", "mpc", "mpc-smooth", "wake-aware")}
+    assert shares == {"manual": 0.0, "mpc": 45.0, "mpc-smooth": 85.0, "wake-aware": 98.3}
+    seen = [known["dynamic", m, "features_per_image", None] for m in ("manual", "mpc", "mpc-smooth", "wake-aware")]
+    assert seen == [156.0, 342.0, 448.0, 523.0]
     whole = {m: known["dynamic", m, "completeness_pct", None] for m in ("manual", "mpc", "mpc-smooth", "wake-aware")}
     assert whole == {"manual": 34.2, "mpc": 68.5, "mpc-smooth": 87.0, "wake-aware": 94.8}
     assert known["success", "mpc", "success", None] == 45.0

@@ -58,6 +58,10 @@ Block = tuple[PlannedTrial, ...]
 """Trials of all methods on one seed, in one world, at one target; their factors name the table as `variation`."""
 
 
+METHOD_PLACES = {"dp-paper": "wakewise_paper.dp_paper:make_dp_paper"}
+"""Methods of this package, by where they are made, so that a worker finds them without entry points."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class TableRequest:
     """What is wanted of a table; None takes the table's own.
@@ -86,7 +90,9 @@ class TrialCell:
     def fields(self) -> dict[str, Any]:
         """Fields of the scenario, by dotted name."""
         target: dict[str, Any] = {} if self.target == OWN else {"target.kind": self.target}
-        return water(self.world).told | target | {"method": self.method, "seed": self.seed}
+        return (
+            water(self.world).told | target | {"method": METHOD_PLACES.get(self.method, self.method), "seed": self.seed}
+        )
 
     def name(self, what: str) -> str:
         """Name of its trial."""
@@ -210,7 +216,7 @@ def _flow(cell: TrialCell) -> Task:
 
 def _ablated(cell: TrialCell) -> Task:
     six = {"method": "wake-aware", "vehicle": "paper-six-thrusters"} if cell.method == "six thrusters" else {}
-    return _flown(cell, "ablation", _ROUND, own=six)
+    return _scanned(cell.name("ablation"), cell.fields() | six, extent=False)
 
 
 def _compared(cell: TrialCell) -> Task:
@@ -310,7 +316,7 @@ def _asked(world: str) -> tuple[str, ...]:
 VARIANTS = ("mpc", "linear", "six thrusters")
 """Methods of the ablation; the whole is `wake-aware`."""
 _FLOWN = (PUMP_TANK, TROUBLE, PAPER)
-_STATION_METHODS = ("manual", "dp", "mpc", "mpc-smooth", "wake-aware")
+_STATION_METHODS = ("manual", "dp-paper", "dp", "weighted-pseudo-inverse", "mpc", "mpc-smooth", "wake-aware")
 
 TABLE: dict[str, TableDefinition] = {
     "dynamic": TableDefinition(
@@ -328,7 +334,12 @@ TABLE: dict[str, TableDefinition] = {
         methods=_STATION_METHODS, worlds=_FLOWN, targets=_own, task=_station, block_s=150.0, weight=3.0
     ),
     "ablation": TableDefinition(
-        methods=("wake-aware", *VARIANTS), worlds=_FLOWN, targets=_own, task=_ablated, block_s=45.0
+        methods=("wake-aware", *VARIANTS),
+        worlds=(PUMP_TANK, TROUBLE),
+        targets=_corals,
+        task=_ablated,
+        block_s=400.0,
+        weight=2.0,
     ),
     "sediment": TableDefinition(
         methods=("mpc", "wake-aware"), worlds=(CACO3, "fluff"), targets=_own, task=_plain_scan, block_s=220.0
