@@ -5,7 +5,7 @@ import pytest
 
 from wakewise.allocation import min_norm_allocation
 from wakewise.control import AllocationSettings, ControlSettings, make_controller
-from wakewise.control.null_space_allocation import CURRENT_SPREAD, DOUBT, RESTART_GAIN, allocation_context
+from wakewise.control.null_space_allocation import CURRENT_SPREAD, RESTART_GAIN, allocation_context
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Goal
 from wakewise.robot.vehicles import load_vehicle
@@ -29,15 +29,6 @@ def watch(wake=None, **mechanisms):
     )
 
 
-class Foreign:
-    """A wake model from outside: a law that is not told of."""
-
-    name = "foreign"
-
-    def unit_velocity(self, points_W, origins_W, directions_W, areas_m2):
-        return RoundJet().unit_velocity(points_W, origins_W, directions_W, areas_m2)
-
-
 def estimate(*current_m_s, **of):
     """An estimate at the origin with a current, or none."""
     return BodyState(X_WB=Pose(np.zeros(3)), current_W_m_s=np.array(current_m_s) if current_m_s else None, **of)
@@ -49,19 +40,6 @@ def test_an_unknown_current_leaves_the_water_still():
     np.testing.assert_array_equal(watch().gram(estimate(), THRUSTS), still)
     np.testing.assert_array_equal(watch(advection=False).gram(estimate(0.05, 0.0, 0.0), THRUSTS), still)
     assert not np.allclose(watch().gram(estimate(0.05, 0.0, 0.0), THRUSTS), still)
-
-
-@pytest.mark.parametrize("current", [(), (0.05, 0.02, 0.0)])
-def test_what_shares_are_chosen_by_is_the_mean_of_two_beliefs(current):
-    """Shares are chosen by both, priced by the reckoned one; the mechanism off, or a foreign model: that alone."""
-    here, eyes = estimate(*current), watch()
-    astray = eyes.view.scattered_gram(here.X_WB)
-    sure = watch(direction_uncertainty=False).influence(here, THRUSTS)
-    seen = eyes.influence(here, THRUSTS)
-    np.testing.assert_allclose(seen.gram, (1.0 - DOUBT) * sure.gram + DOUBT * np.diag(astray), rtol=1e-12)
-    np.testing.assert_array_equal(seen.actual, sure.actual)
-    foreign = Foreign()
-    np.testing.assert_array_equal(watch(foreign).influence(here, THRUSTS).gram, watch(foreign).gram(here, THRUSTS))
 
 
 def test_a_stated_current_is_believed_against_the_estimate():
@@ -153,7 +131,7 @@ def test_where_the_current_brings_the_wash_back_shares_are_gentler_for_knowing_i
     """
     wrench, here = np.array([-2.64, 0.93, -3.33, 0.0, -0.28, 0.0]), estimate(-0.017, -0.083, 0.0)
     floor = ImpingingJet(jet=RoundJet(), bed_z_m=0.6)
-    eyes, blind = watch(floor, direction_uncertainty=False), watch(floor, direction_uncertainty=False, advection=False)
+    eyes, blind = watch(floor), watch(floor, advection=False)
     least = min_norm_allocation(eyes.layout, wrench).thrusts_N
     unknowing = blind.restart(wrench, here, least)[0].thrusts_N
     thrusts = least

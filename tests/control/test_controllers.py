@@ -40,9 +40,7 @@ def test_the_same_wrench_at_less_disturbance(wake):
     """At equal wrench, from rest, the gentle one disturbs no more than its effort weight pays for; often far less."""
     region, settings = (
         small_region(),
-        ControlSettings(
-            allocation={"null_space": False, "merging_jets": False, "advection": False, "direction_uncertainty": False}
-        ),
+        ControlSettings(allocation={"null_space": False, "merging_jets": False, "advection": False}),
     )
     dp, gentle = (make_controller(m, VEHICLE, region, wake_model(wake), settings) for m in INSTANT)
     rng = np.random.default_rng(1)

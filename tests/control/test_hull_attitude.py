@@ -238,9 +238,7 @@ def test_the_cost_is_what_the_allocator_would_pay_there():
     wrench.
     """
     settings = ControlSettings(
-        allocation=dict.fromkeys(
-            ("merging_jets", "advection", "direction_uncertainty", "optimize_attitude", "power_limit"), False
-        )
+        allocation=dict.fromkeys(("merging_jets", "advection", "optimize_attitude", "power_limit"), False)
     )
     controller = make_controller("allocation-only", VEHICLE, region(), believed(), settings)
     goal = looking(VEHICLE, np.radians(40.0))

@@ -22,12 +22,12 @@ def test_defaults_leave_nothing_idle(method):
 def test_levers_that_need_another_are_named():
     """With spare off, what lies behind it is idle for a method that plans, and not for one that does not."""
     off = {"control.allocation.null_space": False}
-    words = "merging_jets, advection, direction_uncertainty, power_limit: nothing without"
+    words = "merging_jets, advection, power_limit: nothing without"
     assert f"control.allocation.{words}" in said("wake-aware", **off)
     assert "control.allocation.advection:" in said(
         "wake-aware",
         **off,
-        **{f"control.allocation.{n}": False for n in ("merging_jets", "direction_uncertainty", "power_limit")},
+        **{f"control.allocation.{n}": False for n in ("merging_jets", "power_limit")},
     )
     assert said("allocation-only", **off) == ""
 

@@ -1,18 +1,14 @@
 """Null-space allocation: of all thrusts that make a wrench, those whose jets disturb the target least.
 
 An `AllocationContext` is the region as the jets reach it: carried by the current that the estimator finds, with
-merging jets and an uncertain direction where the settings say so. An `Allocator` searches with it at the rate of the
-plans and follows the wrench in between; without a context it takes the least thrusts (pseudo-inverse).
+merging jets where the settings say so. An `Allocator` searches with it at the rate of the plans and follows the wrench
+in between; without a context it takes the least thrusts (pseudo-inverse).
 
 In a current the Gram matrix depends on the thrusts: how far a jet is carried depends on how hard it is sent. So thrusts
 are judged by the matrix of their own. Each search (10 Hz) compares the thrusts of before with what the exact allocator
 makes of their matrix, and the next begins at the better. Every 2 s, on a step of its own, a restart compares the least
 thrusts and what the allocator makes of theirs. The price on change keeps thrusts near the last ones; the restart leaves
 a minimum that is poor. So no thrusts are flown longer than that which their own matrix rates worse than the least ones.
-
-A wake model is not the water. With a share of `DOUBT` a jet is taken to miss its direction, and D is the mean of both
-cases. The bound on power uses the first case alone: the second is about the same wherever a vehicle hovers near a
-target.
 """
 
 from __future__ import annotations
@@ -52,10 +48,6 @@ of a tenth to a fifth (I. Nezu and H. Nakagawa, Turbulence in Open-Channel Flows
 controller sends is pushes of a second as often as jets, and a push needs longer. Its front goes as t^(1/4) once it is
 cut off (J. M. Richards, Int. J. Mech. Sci. 7 (1965) 61), a jet's as t^(1/2), so it is on its way once to twice as long,
 half as long again in the mean, give or take half."""
-DOUBT = 0.3
-"""Probability that a jet misses its direction (see `wakewise.wake.disturbance`). Of 64 single pushes the wake model has
-the order right to .73 (docs/research-log/0048). Set before any flight of it; .6 and .9 flew as gently for more power
-(docs/research-log/0070)."""
 RESTART_GAIN = 0.05
 """Share of the cost that a restart must save: less is within what a wake model may claim to know."""
 SEARCH_S = 0.1
@@ -90,16 +82,8 @@ class AllocationContext:
         return self.view.matrices(estimate.X_WB, self.flow(estimate, thrusts_N)).gram
 
     def influence(self, estimate: BodyState, thrusts_N: Array) -> InfluenceMatrices:
-        """Matrices of D at an estimate and in its current: to choose thrusts by, and of thrusts as sent.
-
-        To choose by, the mean over jets that go where they are sent and jets that miss it. As sent, the first alone: a
-        doubt is a reason to choose, but no wash that would be worth power.
-        """
-        found = self.view.matrices(estimate.X_WB, self.flow(estimate, thrusts_N))
-        scattered = self.view.scattered_gram(estimate.X_WB) if self.settings.direction_uncertainty else None
-        if scattered is None:
-            return found
-        return InfluenceMatrices(gram=(1.0 - DOUBT) * found.gram + np.diag(DOUBT * scattered), actual=found.actual)
+        """Matrices of D at an estimate and in its current: to choose thrusts by, and of thrusts as sent."""
+        return self.view.matrices(estimate.X_WB, self.flow(estimate, thrusts_N))
 
     def flow(self, estimate: BodyState, thrusts_N: Array) -> CrossFlow | None:
         """The current, and the thrusts, shape (n,), whose jets it carries; None where it does not count.
@@ -325,11 +309,7 @@ def single_jet_allocator(vehicle: Vehicle, region: Region, wake: WakeModel, sett
     if settings.w_disturbance == 0.0:
         return least_thrust_allocator(vehicle_layout(vehicle), vehicle, region, wake, settings)
     still = settings.model_copy(
-        update={
-            "allocation": settings.allocation.model_copy(
-                update={"merging_jets": False, "advection": False, "direction_uncertainty": False}
-            )
-        }
+        update={"allocation": settings.allocation.model_copy(update={"merging_jets": False, "advection": False})}
     )
     context = allocation_context(vehicle, region, wake, still)
     return Allocator(layout=context.layout, context=context, search_s=0.0)

@@ -35,9 +35,6 @@ class AllocationSettings(Settings):
         default=True, description="jets that meet merge and run on between them; needs null_space"
     )
     advection: bool = Field(default=True, description="the current bends, stops and carries the jets; needs null_space")
-    direction_uncertainty: bool = Field(
-        default=True, description="some of the jets go elsewhere than predicted; needs null_space"
-    )
     power_limit: bool = Field(
         default=True,
         description="limit the power of null-space thrust by the wash that it removes and by a bound on the whole",

@@ -4,7 +4,7 @@ D is the weighted sum of squared water speeds at the points of a region. With ac
 form D = s' G s of the square roots s of the thrusts; G is the Gram (influence) matrix. The simulated tank does not use
 this package.
 
-- `disturbance.py`: D, its Gram matrix, its derivatives; D of jets of uncertain direction.
+- `disturbance.py`: D, its Gram matrix, its derivatives.
 - `gram.py`: compiled Gram matrix and Gauss-Newton sums; `plan_disturbance.py`: the same, faster, for one MPC stage;
   `finite_difference.py`: the same by differences, for models without derivatives.
 - `influence.py`: Gram matrix of a vehicle at a pose, with jets that cross and merge.

@@ -6,16 +6,6 @@ sqrt(|T_i|) this is D = s' G s, s = (sqrt(T+), sqrt(T-)). The Gram matrix G depe
 Incoherent: squares add up, D = sum_j w_j sum_i |v_i(p_j)|^2, which keeps only the diagonal of G. It is linear in the
 split thrusts (T+, T-) >= 0, hence convex, and excludes cancellation of jets.
 
-Uncertain direction (`scattered_jet_gram`): each jet's direction is dispersed about the nominal one by a von
-Mises-Fisher distribution f(theta) = kappa exp(kappa cos theta) / (4 pi sinh kappa). At the distance r from the disk its
-profile is U(r) exp(-(r theta)^2 / w(r)^2), w the width. For a jet narrower than the dispersion the mean square speed at
-an angle theta is
-
-    U(r)^2 (pi / 2) (w(r) / r)^2 f(theta).
-
-Squares of different jets add up. For single thrusts beside a target the nominal model has the order of disturbances
-right with probability 0.73 (docs/research-log/0048), hence this second hypothesis.
-
 Derivatives are by position p_WB in world axes (m), rotation vector theta on the body's side, R_WB exp([theta]) (rad),
 and thrusts (N).
 
@@ -48,7 +38,7 @@ from wakewise.core.jit.njit import njit
 from wakewise.wake.advected_jets import CrossFlow, add_advected_wall_jets, plumes
 from wakewise.wake.finite_difference import FiniteDifferenceWake
 from wakewise.wake.gram import dot, gram_slope_sum, gram_sum, stage_sum
-from wakewise.wake.jets import FAST, AxialJet, as_tuple, own_constants, section_of
+from wakewise.wake.jets import FAST, AxialJet
 from wakewise.wake.learned import free_jet
 from wakewise.wake.wall_jet import ImpingingJet, bed_gram_sum, bed_stage_sum
 
@@ -272,10 +262,6 @@ def _numeric(
     )
 
 
-SCATTER_RAD = float(np.radians(45.0))
-"""Root mean square of the angle of dispersion, taken small: kappa = 2 / angle^2."""
-NEAREST_M = 0.1
-"""Least distance of the dispersion: about a diameter, within which a jet does not spread."""
 _ORIGIN, _LEVEL = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -425,39 +411,6 @@ def advected_velocity(
         walls = (directions_W, areas_m2, model.numbers, thrusts_N)
         add_advected_wall_jets(points_W_m, curves, *walls, flow.current_W_m_s, flow.current_std_m_s, ends, velocity)
     return np.asarray(velocity)
-
-
-@njit
-def scattered_jet_gram(
-    points: Array, weights: Array, origins: Array, axes: Array, areas: Array, kind: int, parameters: Array
-) -> Array:
-    """Mean of D per newton of each jet of uncertain direction, shape (2 m,), in (m/s)^2/N.
-
-    - `points`, `weights`, shape (n, 3) and (n,): of a region, in the world.
-    - `origins`, `axes`, `areas`, shape (m, 3), (m, 3) and (m,): centres of the disks, unit force axes (for T > 0) and
-      areas.
-    - `kind`, `parameters`: the jet's law (`AxialJet.law`).
-
-    Returns shape (2 m,): slot i is thruster i with T > 0 (jet along -axis), slot m + i the same with T < 0. As a
-    diagonal matrix it is G of D = s' G s, as in `wakewise.wake.disturbance.gram`.
-    """
-    m, n = origins.shape[0], points.shape[0]
-    own, numbers, d = own_constants(kind, parameters, areas), as_tuple(parameters), np.zeros(2 * m)
-    kappa = 2.0 / SCATTER_RAD**2
-    even = kappa / (4.0 * np.pi * np.sinh(kappa))
-    for i in range(m):
-        for j in range(n):
-            r2, along = 0.0, 0.0
-            for x in range(3):
-                offset = points[j, x] - origins[i, x]
-                r2 += offset * offset
-                along -= offset * axes[i, x]
-            r = max(np.sqrt(r2), NEAREST_M)
-            speed, _, width = section_of(kind, numbers, own[i], r)
-            square = weights[j] * speed * speed * 0.5 * np.pi * (width / r) ** 2 * even
-            d[i] += square * np.exp(kappa * along / r)
-            d[m + i] += square * np.exp(-kappa * along / r)
-    return d
 
 
 def incoherent(gram: Array) -> Array:

@@ -36,11 +36,10 @@ from wakewise.wake.disturbance import (
     advected_velocity,
     gram,
     incoherent,
-    scattered_jet_gram,
     velocity_gram,
 )
 from wakewise.wake.gram import place
-from wakewise.wake.jets import AxialJet, JetLaw
+from wakewise.wake.jets import AxialJet
 from wakewise.wake.learned import free_jet
 
 if TYPE_CHECKING:
@@ -51,8 +50,7 @@ if TYPE_CHECKING:
 class InfluenceMatrices(NamedTuple):
     """Matrices of D, shape (2 n, 2 n) each: `gram` for the choice of thrusts, `actual` for D of the thrusts themselves.
 
-    They differ only if `gram` has extra costs: jets that may merge, jets of uncertain direction
-    (`wakewise.control.null_space_allocation`).
+    They differ only if `gram` has the extra cost of jets that may merge (`with_merging_jets`).
     """
 
     gram: Array
@@ -113,19 +111,6 @@ class InfluenceModel:
         """Matrices of D for the choice of thrusts and for its value."""
         G = self.gram(X_WB, flow)
         return InfluenceMatrices(gram=G, actual=G)
-
-    def scattered_gram(self, X_WB: Pose) -> Array | None:
-        """Mean of D per newton of each jet of uncertain direction, shape (2 n,) (`scattered_jet_gram`), or None."""
-        if self._law is None:
-            return None
-        return cast(
-            Array, scattered_jet_gram(self.points_W_m, self.weights, *self.places(X_WB), self.areas_m2, *self._law)
-        )
-
-    @cached_property
-    def _law(self) -> JetLaw | None:
-        jet = free_jet(self.wake)
-        return jet.law if isinstance(jet, AxialJet) else None
 
 
 LEAST_COSINE = -0.5

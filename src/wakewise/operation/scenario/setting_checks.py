@@ -15,7 +15,7 @@ PLANNING = frozenset({"pseudo-inverse", "mpc", "mpc-smooth", "linear", "wake-awa
 """Methods of ours with a plan."""
 MITIGATION_METHODS = frozenset({"pseudo-inverse", "linear", "allocation-only", "wake-aware"})
 """Methods of ours with null-space allocation; with a plan, `null_space` turns all of it off but the bed."""
-_NEED_NULL_SPACE = ("merging_jets", "advection", "direction_uncertainty", "power_limit")
+_NEED_NULL_SPACE = ("merging_jets", "advection", "power_limit")
 
 
 def ineffective_settings(scenario: Scenario, vehicle: Vehicle) -> tuple[str, ...]:

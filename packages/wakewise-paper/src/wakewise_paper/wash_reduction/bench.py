@@ -55,7 +55,6 @@ MECHANISMS: dict[str, Settings] = {
     "advection": {"allocation.advection": False},
     "merging-jets": {"allocation.merging_jets": False},
     "wall-jets": {"wake.floor": False},
-    "direction-uncertainty": {"allocation.direction_uncertainty": False},
     "attitude": {"allocation.optimize_attitude": False},
     "power-limit": {"allocation.power_limit": False},
 }
