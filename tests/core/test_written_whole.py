@@ -38,7 +38,7 @@ ALLOWED |= dict.fromkeys(
 )
 ALLOWED |= dict.fromkeys(
     (
-        "wakewise.experiments.campaigns.trial_lock._locked",
+        "wakewise.experiments.campaigns.trial_lock._one_at_a_time",
         "wakewise.core.jit.kernel_cache._alone",
         "wakewise.core.run_lock._take",
     ),

@@ -130,7 +130,7 @@ def write_json(path: Path, value: Any, lasting: bool = False) -> None:
     write_text(path, json.dumps(value, indent=2, allow_nan=False) + "\n", lasting)
 
 
-def write_csv(path: Path, rows: Iterable[Iterable[object]]) -> None:
+def write_rows(path: Path, rows: Iterable[Iterable[object]]) -> None:
     """Write rows as CSV, whole or not at all."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)

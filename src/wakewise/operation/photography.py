@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array
-from wakewise.core.files import whole_file, write_csv, write_text
+from wakewise.core.files import whole_file, write_rows, write_text
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import no_progress
 from wakewise.operation.flight_log import ExposureRecord, read_exposures
@@ -65,7 +65,7 @@ def photograph_flight(parts: Parts, folder: Path, progress: Callable[..., None] 
             ]
         )
     progress(len(exposures), len(exposures))
-    write_csv(folder / "images.csv", [IMAGE_COLUMNS, *rows])
+    write_rows(folder / "images.csv", [IMAGE_COLUMNS, *rows])
     for note in (folder / "images").glob(".*.json"):
         note.unlink()
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.core.errors import EnvironmentFailure, InputError
-from wakewise.core.files import write_csv
+from wakewise.core.files import write_rows
 from wakewise.core.geometry import Pose
 from wakewise.operation.parts import Parts, build
 from wakewise.operation.photography import photo_name, pose_cells
@@ -80,7 +80,7 @@ def write_plan(parts: Parts, folder: Path) -> None:
 def write_views(parts: Parts, folder: Path, views: Iterable[tuple[str, float, Pose]]) -> None:
     """Write planned.csv: names, times and reference poses of photographs."""
     rows = [(photo_name(name, parts.scenario), f"{time_s:.6f}", *pose_cells(X_WC)) for name, time_s, X_WC in views]
-    write_csv(folder / "planned.csv", [("name", "time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"), *rows])
+    write_rows(folder / "planned.csv", [("name", "time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"), *rows])
 
 
 def write_truth(parts: Parts, folder: Path) -> None:

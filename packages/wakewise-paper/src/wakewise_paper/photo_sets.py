@@ -19,7 +19,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError, StageError
-from wakewise.core.files import write_csv
+from wakewise.core.files import write_rows
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_rotvec, quat_multiply
 from wakewise.core.interfaces import Progress, ScalarGrid, no_progress
 from wakewise.experiments.trials.trial import REGION_SHARE
@@ -141,7 +141,7 @@ def write_photos(
         numbers = (*view.X_WC_est.p_m, *view.X_WC[1].p_m, *view.X_WC_est.q)
         rows.append((view.name, *(f"{value:.9f}" for value in numbers)))
     heads = ("name", "x_m", "y_m", "z_m", "true_x_m", "true_y_m", "true_z_m", "qw", "qx", "qy", "qz")
-    write_csv(folder / "poses.csv", [heads, *rows])
+    write_rows(folder / "poses.csv", [heads, *rows])
     return read_photo_set(folder, camera.focal_px)
 
 
