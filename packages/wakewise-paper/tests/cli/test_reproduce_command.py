@@ -50,7 +50,12 @@ def test_json_is_one_object_with_the_promised_keys(made, capsys):
         for row in rows.values()
     )
     less = rows["wake-aware", "wash at the target, less than dp-paper"]
-    assert less["paper"] == 67.0 and less["ours"] == pytest.approx(100.0 * (1.0 - 5.2 / 25.2), abs=0.1) and less["met"] and less["sure"]
+    assert (
+        less["paper"] == 67.0
+        and less["ours"] == pytest.approx(100.0 * (1.0 - 5.2 / 25.2), abs=0.1)
+        and less["met"]
+        and less["sure"]
+    )
     assert rows["wake-aware", "energy, less than dp-paper"]["met"] is False
 
 
