@@ -176,13 +176,15 @@ class MotionStage(ABC):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrackingStage(MotionStage):
-    """PID with feed-forward towards the goal (see `pid.py`)."""
+    """PID towards the goal (see `pid.py`), with feed-forward unless it is to be a plain one."""
 
     pid: Pid
+    feed_forward: bool = True
 
     def step(self, state: PipelineState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PipelineState, Demand]:
         """Decide the wrench for the next `dt_s` seconds."""
-        pid, wrench = self.pid.wrench(state.pid, dt_s, estimate, goal, saturated=state.saturated)
+        decide = self.pid.wrench if self.feed_forward else self.pid.correction
+        pid, wrench = decide(state.pid, dt_s, estimate, goal, saturated=state.saturated)
         if not np.isfinite(wrench.sum()):
             return hold(state, dt_s, "wrench not finite")
         return replace(state, pid=pid, goal_nu=goal.nu_B), Demand(wrench_B=wrench)

@@ -8,32 +8,13 @@ slowed for the delay of estimates and thrusters, as `dp` does. Thrusts are the l
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
-import numpy as np
-
 from wakewise.control import ControlTask, Pipeline
 from wakewise.control.null_space_allocation import least_thrust_allocator, vehicle_layout
-from wakewise.control.pid import Pid, make_pid
-from wakewise.control.pipeline import Demand, MotionStage, PipelineState, hold
-from wakewise.core.interfaces import BodyState, Goal
+from wakewise.control.pid import make_pid
+from wakewise.control.pipeline import TrackingStage
 
 KP_N_M, KD_N_S_M, KI_N_M_S = 150.0, 80.0, 20.0
 """Section Gentle Stability."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PlainPidStage(MotionStage):
-    """PID without feed-forward."""
-
-    pid: Pid
-
-    def step(self, state: PipelineState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PipelineState, Demand]:
-        """Decide the wrench for the next `dt_s` seconds."""
-        pid, wrench = self.pid.correction(state.pid, dt_s, estimate, goal, saturated=state.saturated)
-        if not np.isfinite(wrench.sum()):
-            return hold(state, dt_s, "wrench not finite")
-        return replace(state, pid=pid, goal_nu=goal.nu_B), Demand(wrench_B=wrench)
 
 
 def make_dp_paper(task: ControlTask) -> Pipeline:
@@ -44,6 +25,6 @@ def make_dp_paper(task: ControlTask) -> Pipeline:
     return Pipeline(
         name="dp-paper",
         layout=layout,
-        motion=PlainPidStage(pid=make_pid(task.vehicle, settings, slowed=False)),
+        motion=TrackingStage(pid=make_pid(task.vehicle, settings, slowed=False), feed_forward=False),
         allocator=least_thrust_allocator(layout, task.vehicle, task.region, task.wake, settings),
     )

@@ -23,8 +23,9 @@ except ModuleNotFoundError as fault:
     COMPILED = False
     prange = range
 
-    def njit(function: Callable[..., Any] | None = None, *, apart: bool = False, **options: Any) -> Any:  # noqa: ARG001
+    def njit(function: Callable[..., Any] | None = None, *, apart: bool = False, **options: Any) -> Any:
         """The function as it is written, whatever Numba would be told."""
+        del apart, options
         return (lambda work: work) if function is None else function
 
 

@@ -102,6 +102,9 @@ class QuasiSteadyWater(VehicleInWater):
         origins, axes = self._plant.disks()
         return self._jets(points_W_m, origins, axes, self._plant.thrusts_N, self._plant.vehicle.disk_areas_m2)
 
+    def _advance_water(self) -> None:
+        """Water without memory has nothing to advance."""
+
     def water(self) -> WaterTruth:
         """Water at the target's surface now."""
         speed = self.speeds_m_s(self._surface_W_m)

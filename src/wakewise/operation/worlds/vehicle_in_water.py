@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,7 +21,7 @@ from wakewise.simulation.water import AmbientSum
 _TOLERANCE_S = 1e-9
 
 
-class VehicleInWater:
+class VehicleInWater(ABC):
     """A `Plant` and its own `TruthProvider`; subclasses add the water.
 
     `vehicle` has true parameters. Children of `rng` serve the sensors. `tilt_rad` is the initial angle of the camera's
@@ -67,8 +68,9 @@ class VehicleInWater:
         self._advance_water()
         return self._sensors.collect(self._time) + self._joint.turn(self._time, dt_s)
 
+    @abstractmethod
     def _advance_water(self) -> None:
-        """Advance the water to the time of the vehicle; water without memory has nothing to advance."""
+        """Advance the water to the time of the vehicle."""
 
     def push(self, wrench_B: Array) -> None:
         """A wrench from outside the water that acts until the next call; see `wakewise.core.interfaces.Plant`."""
@@ -92,9 +94,9 @@ class VehicleInWater:
             tilt_rad=self._joint.tilt_rad,
         )
 
+    @abstractmethod
     def water(self) -> WaterTruth:
         """Water at the target now."""
-        raise NotImplementedError
 
     def silt(self) -> ScalarGrid:
         """None: the water is clear."""

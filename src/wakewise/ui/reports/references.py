@@ -125,8 +125,8 @@ def against_dp(trial: Trial) -> ReferenceComparison | None:
     if not flown or not least:
         return None
     words = (
-        "How much less wash there is than with dp is told by a flight of dp in the same water, which `wakewise "
-        "compare` makes: the speed of the water at the target, of the same seed. Until then there is only the wake "
+        "How much less wash there is than with dp is told by a flight of dp in the same water (wakewise "
+        "compare): the speed of the water at the target, of the same seed. Until then there is only the wake "
         "model's estimate of what dp's sharing of the very same forces would have done. D is the weighted sum of "
         "squared jet speeds at the target."
     )

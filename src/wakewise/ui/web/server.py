@@ -207,8 +207,8 @@ class WebServer:
             self._listener.close()
 
     async def meet(self, connection: PageSocket) -> None:
-        """Serve one open WebSocket until it closes; a server with `Site.socket` overrides this."""
-        raise NotImplementedError
+        """Serve one open WebSocket until it closes; here at once, since a server that uses them says how."""
+        await connection.close()
 
     def tasks(self) -> tuple[Coroutine[Any, Any, None], ...]:
         """Coroutines that run while the server runs."""
