@@ -275,7 +275,9 @@ class WaterTruth:
     faces, from end to end, a mean without unit. `silt_lifted_g` is what the bed has given up since the start, settled
     again or not, `silt_suspended_g` what is in the water now. `target_over_1cm_s` and
     `target_over_ambient` are the shares of the surface where the excess is more than 1 cm/s, and more than the mean
-    speed there of the same water without the vehicle (NaN where that is still). NaN where a witness does not know.
+    speed there of the same water without the vehicle (NaN where that is still). `bed_over_threshold` is the share of
+    the bed within 0.2 m of the target's foot where the stress moves the bed's grains (NaN where no grains lie). NaN
+    where a witness does not know.
     """
 
     target_speed_mean_m_s: float
@@ -291,6 +293,7 @@ class WaterTruth:
     silt_suspended_g: float = math.nan
     target_over_1cm_s: float = math.nan
     target_over_ambient: float = math.nan
+    bed_over_threshold: float = math.nan
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -313,7 +316,7 @@ class TargetDeformation:
     surface above the bed, against its shape at rest in still water and without the sliding: `sway_m` is the root mean
     square distance, `sway_peak_m` the largest, and `sway_mean_W_m`, shape (3,), the mean way. `target_stress_Pa` is the
     largest bending stress. `sway_wash_m` is the root mean square distance from where the same water without the vehicle
-    would have the surface.
+    would have the surface, `drag_N` the drag of the water on the whole target.
     """
 
     tips_m: Array
@@ -324,6 +327,7 @@ class TargetDeformation:
     sway_mean_W_m: Array
     target_stress_Pa: float
     sway_wash_m: float = math.nan
+    drag_N: float = math.nan
 
     def __post_init__(self) -> None:
         k = len(self.tips_m)

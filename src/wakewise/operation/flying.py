@@ -65,6 +65,8 @@ class FlightFigures(TypedDict):
     disturbance: float | None
     exceedance_1cm_s_pct: float | None
     exceedance_ambient_pct: float | None
+    bed_over_threshold_pct: float | None
+    bed_over_threshold_s: float | None
     exposure_speed_mean_m_s: float | None
     exposure_speed_p95_m_s: float | None
     exposure_pressure_mean_Pa: float | None
@@ -79,6 +81,7 @@ class FlightFigures(TypedDict):
     sway_about_mean_mm: float | None
     sway_wash_mm: float | None
     target_stress_peak_Pa: float | None
+    target_drag_peak_N: float | None
     shifted_mm: float | None
     position_rmse_mm: float | None
     path_rmse_mm: float | None

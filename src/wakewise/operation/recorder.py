@@ -32,6 +32,7 @@ LOAD = ("load_X_N", "load_Y_N", "load_Z_N", "load_K_Nm", "load_M_Nm", "load_N_Nm
 _WATER = tuple(figure.name for figure in fields(WaterTruth))
 _POSTURE = (
     "sway_m", "sway_peak_m", "sway_x_m", "sway_y_m", "sway_z_m", "target_stress_Pa", "shifted_m", "sway_wash_m",
+    "target_drag_N",
 )  # fmt: skip
 
 
@@ -230,7 +231,8 @@ def _posture_row(posture: TargetDeformation | None) -> Array:
         return np.zeros(0)
     far = float(np.hypot(posture.shift_m[0], posture.shift_m[1]))
     mean = posture.sway_mean_W_m
-    return np.array([posture.sway_m, posture.sway_peak_m, *mean, posture.target_stress_Pa, far, posture.sway_wash_m])
+    swayed = posture.sway_m, posture.sway_peak_m, *mean, posture.target_stress_Pa
+    return np.array([*swayed, far, posture.sway_wash_m, posture.drag_N])
 
 
 def _stance(posture: TargetDeformation | None) -> dict[str, Array]:

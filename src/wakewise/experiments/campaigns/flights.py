@@ -103,8 +103,13 @@ def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress)
 
 def flight_parts(settings: Mapping[str, Any]) -> tuple[Parts, dict[str, Any]]:
     """Parts of the flight that settings of `fly_stage` describe, and figures that its setup functions gave."""
+    return changed_parts(scenario_of(settings), settings)
+
+
+def changed_parts(scenario: Scenario, settings: Mapping[str, Any]) -> tuple[Parts, dict[str, Any]]:
+    """Parts of a scenario after the setup functions of a trial, and the figures that these gave."""
     gathered: dict[str, Any] = {}
-    parts = scenario_of(settings).parts()
+    parts = scenario.parts()
     for name, arguments in (settings.get("setup") or {}).items():
         changed = function_named(name)(parts, **arguments)
         parts, more = changed if isinstance(changed, tuple) else (changed, {})
@@ -125,11 +130,13 @@ def model_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgres
     from wakewise.experiments.campaigns.pictures import keep_pictures  # needs the extras, which flights do without
     from wakewise.experiments.trials.trial import run_trial
 
-    scenario = scenario_of(settings)
     keep = settings["keep"]
     trial = folder / "trial"
-    parts = (scenario if keep == "all" else scenario.replace(**{"reconstruction.mesh": False})).parts()
-    figures = _plain(run_trial(parts, trial, _Stages(progress)))
+    scenario = scenario_of(settings)
+    parts, gathered = changed_parts(
+        scenario if keep == "all" else scenario.replace(**{"reconstruction.mesh": False}), settings
+    )
+    figures = _plain(run_trial(parts, trial, _Stages(progress))) | gathered
     keep_pictures(parts.target, trial, folder)
     if keep != "all":
         for entry in trial.iterdir():

@@ -91,6 +91,9 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "exposure_pressure_p95_Pa": ("Pa", "target_pressure_p95_Pa while the shutter is open", "less"),
     "bed_shear_p95_Pa": ("Pa", "95th percentile of the stress of the whole water on the bed within 0.3 m of the "
                          "target, mean over time", "less"),
+    "bed_over_threshold_pct": ("%", "share of the bed within 0.2 m of the target, and of time, where the stress moves "
+                               "the bed's grains", "less"),
+    "bed_over_threshold_s": ("s", "time in which grains move anywhere on the bed within 0.2 m of the target", "less"),
     "tracer_speed_mean_m_s": ("m/s", "speed of tracers at the target's surface over 1/30 s, as PIV would see the whole "
                               "water, mean over surface and time", "less"),
     "ray_optical_depth": ("", "beam attenuation by silt along the rays from camera to target, end to end, mean over "
@@ -109,6 +112,7 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "sway_about_mean_mm": ("mm", "rms over the exposures of how far the mean of the surface is from that mean place: "
                            "the part by which photographs disagree", "less"),
     "target_stress_peak_Pa": ("Pa", "largest stress in the target's tissue by bending, at any time", "less"),
+    "target_drag_peak_N": ("N", "largest drag of the water on the whole of a target that yields, at any time", "less"),
     "shifted_mm": ("mm", "how far a target that lies loose has slid by the end of the flight", "less"),
     "disturbance": ("m2/s2", "D as the controller's wake model sees it, over the points that its method watches, mean "
                     "over time; methods that watch other points cannot be compared by it", "none"),
@@ -220,7 +224,8 @@ def add_reference_values(gathering: MetricsCollector, parts: Parts, steps: pl.Da
     threshold = grain_threshold_Pa(parts.scenario.tank)
     gathering.add({"grain_threshold_Pa": threshold})
     if threshold is None:
-        gathering.missing(("grain_threshold_Pa",), "neither bed nor water holds loose grains (tank.silt)")
+        no_grains = ("grain_threshold_Pa", "bed_over_threshold_pct", "bed_over_threshold_s")
+        gathering.missing(no_grains, "neither bed nor water holds loose grains (tank.silt)")
 
 
 def allocation_figures(parts: Parts, steps: pl.DataFrame) -> Figures:

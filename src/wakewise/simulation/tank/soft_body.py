@@ -100,6 +100,7 @@ class TargetMotion:
     speeds_m_s: Array = field(init=False)
     alone_m: Array = field(init=False)
     shift_m: Array = field(init=False)
+    drag_N: float = field(init=False, default=0.0)
     _pieces: SurfaceElements = field(init=False)
     _before: Array | None = field(init=False, default=None)
     _ambient_before: Array | None = field(init=False, default=None)
@@ -139,6 +140,7 @@ class TargetMotion:
             self.alone_m, self._alone_m_s, _ = self._swung(
                 self.sway, self.alone_m, self._alone_m_s, load, alone_before, ambient, dt_s
             )
+        self.drag_N = float(np.linalg.norm(force))
         if self.loose is not None:
             slid = slide_m_s(force[:2], water[:, :2].mean(axis=0), self.loose.friction * self.loose.weight_N)
             self.shift_m = self.shift_m + dt_s * slid
@@ -177,6 +179,7 @@ class TargetMotion:
             sway_mean_W_m=away.mean(axis=0),
             target_stress_Pa=stress,
             sway_wash_m=float(np.sqrt(np.mean(np.sum((away - alone) ** 2, axis=1)))),
+            drag_N=self.drag_N,
         )
 
     def _push(self, time_s: float, dt_s: float) -> Array:

@@ -312,7 +312,10 @@ class Tank:
                 self.water, self.silt.laws, grid, X_WC.p_m, density, self._swell, self._water.time_s
             )
             self._measured = replace(
-                measured, silt_lifted_g=1e3 * self.silt.lifted_kg, silt_suspended_g=1e3 * self.silt.suspended_kg
+                measured,
+                silt_lifted_g=1e3 * self.silt.lifted_kg,
+                silt_suspended_g=1e3 * self.silt.suspended_kg,
+                bed_over_threshold=measured.bed_over_threshold if self._muddy else math.nan,
             )
         return self._measured
 

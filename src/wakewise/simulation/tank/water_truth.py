@@ -73,6 +73,8 @@ def water_points(target: Target, radius_m: float) -> Array:
 
 CLOSE_M = 0.3
 """Bed and water within this of the target count as being at it."""
+HABITAT_M = 0.2
+"""Bed within this of the target's foot, where moving grains bury or scour what grows there."""
 
 FRAME_S = 1 / 30
 """Time between the two pictures that a tracer's way is measured over."""
@@ -110,6 +112,7 @@ class TargetProbes:
         self.surface_W_m = surface_points(target, _PROBES, rng)
         self.bed_W_m = bed_points(target.centre_W_m, target.bed_z_m, CLOSE_M)
         self._floor_W_m = self.bed_W_m * [1.0, 1.0, 0.0] + [0.0, 0.0, target.bed_z_m]
+        self._habitat = lengths((self._floor_W_m - target.centre_W_m) * [1.0, 1.0, 0.0]) <= HABITAT_M
         self._water_W_m = water_points(target, CLOSE_M)
         self._all_W_m = np.concatenate([self.surface_W_m, self.bed_W_m, self._floor_W_m])
         self._steady: tuple[ExcessFlow, Array] | None = None  # a water whose ambient motion is steady, and that motion
@@ -142,6 +145,7 @@ class TargetProbes:
             on_bed[:, :2] -= swell.speed_m_s(floor, time_s)[:, None] * swell.ahead
             swell_Pa = swell.stress_Pa(floor, time_s)
         star = friction_velocity_m_s(lengths(on_bed), SHEAR_HEIGHT_M, laws.grain_m)
+        stress_Pa = np.hypot(density_kg_m3 * star**2, swell_Pa)
         every = max(n // _TRACERS, 1)
         drift_m_s = float(lengths(ambient[:n]).mean())
         return WaterTruth(
@@ -151,13 +155,14 @@ class TargetProbes:
             turbidity_per_m=self.turbidity_per_m(laws, silt),
             target_pressure_mean_Pa=float(pressure.mean()),
             target_pressure_p95_Pa=_p95(pressure),
-            bed_shear_p95_Pa=_p95(np.hypot(density_kg_m3 * star**2, swell_Pa)),
+            bed_shear_p95_Pa=_p95(stress_Pa),
             tracer_speed_mean_m_s=float(
                 tracer_speeds_m_s(water, self.surface_W_m[::every], whole[:n:every], FRAME_S, self._bed_z).mean()
             ),
             ray_optical_depth=self.ray_optical_depth(laws, silt, camera_W_m),
             target_over_1cm_s=float((at_target > OVER_M_S).mean()),
             target_over_ambient=float((at_target > drift_m_s).mean()) if drift_m_s > STILL_M_S else math.nan,
+            bed_over_threshold=float((stress_Pa[self._habitat] > laws.threshold_Pa).mean()),
         )
 
     def _ambient_m_s(self, water: ExcessFlow) -> Array:

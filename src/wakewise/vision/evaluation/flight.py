@@ -24,6 +24,7 @@ SWAY_FIGURES = (
     "sway_about_mean_mm",
     "sway_wash_mm",
     "target_stress_peak_Pa",
+    "target_drag_peak_N",
     "shifted_mm",
 )
 
@@ -137,6 +138,7 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
     for key, column in (
         ("exceedance_1cm_s_pct", "target_over_1cm_s"),
         ("exceedance_ambient_pct", "target_over_ambient"),
+        ("bed_over_threshold_pct", "bed_over_threshold"),
     ):
         share = _mean(steps, column, lasts, np.ones(len(time), dtype=np.bool_))
         out[key] = None if share is None else 100.0 * share
@@ -151,6 +153,8 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
         out[key] = None if exposing is None else _mean(steps, column, lasts, exposing)
     share = None if exposing is None else _mean(steps, "target_over_1cm_s", lasts, exposing)
     out["exposure_exceedance_1cm_s_pct"] = None if share is None else 100.0 * share
+    moving = _maybe(steps, "bed_over_threshold")
+    out["bed_over_threshold_s"] = None if moving is None else float((moving[:, 0] > 0.0) @ lasts)
     lifted = _finite(steps, "silt_lifted_g")
     out["silt_lifted_g"] = None if lifted is None else float(lifted[-1])
     suspended = _finite(steps, "silt_suspended_g")
@@ -186,6 +190,8 @@ def sway_figures(steps: pl.DataFrame, exposing: BoolArray | None) -> dict[str, f
         return out
     out["sway_peak_mm"] = 1e3 * float(values[:, 1].max())
     out["target_stress_peak_Pa"] = float(values[:, 2].max())
+    drag = _finite(steps, "target_drag_N")
+    out["target_drag_peak_N"] = None if drag is None else float(drag.max())
     out["shifted_mm"] = 1e3 * float(values[-1, 3])
     if exposing is not None and exposing.any():
         seen = mean[exposing]

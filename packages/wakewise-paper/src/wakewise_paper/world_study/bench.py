@@ -181,8 +181,10 @@ def why(figures: dict[str, Any]) -> dict[str, str]:
     for key in (*FLIGHT_FIGURES, *MODEL_FIGURES, "success_pct"):
         if key not in figures or figures[key] is not None:
             continue
-        if key in ("sway_rms_mm", "sway_wash_mm"):
+        if key in ("sway_rms_mm", "sway_wash_mm", "target_drag_peak_N", "target_stress_peak_Pa"):
             reasons[key] = "the target is rigid"
+        elif key in ("bed_over_threshold_pct", "bed_over_threshold_s"):
+            reasons[key] = "no grains lie on the bed"
         elif key in (*MODEL_FIGURES, "success_pct"):
             reasons[key] = "no scan was made; --models sets for how many seeds" if not figures["models"] else "no model"
         else:
