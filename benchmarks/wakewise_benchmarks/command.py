@@ -6,7 +6,8 @@ What `wakewise bench adversarial-photos` prints: a row a trap, and how many were
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +16,7 @@ import typer
 from wakewise.ui.cli.commands import STUDIES, CliCommand
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, write_page
 from wakewise.ui.cli.options import Json, listed, numbers
+from wakewise_paper.cli.bench_models import show_front, show_models
 from wakewise_paper.cli.bench_operator import show_operator
 from wakewise_paper.cli.bench_wash import show_gentle
 from wakewise_paper.cli.bench_worlds import show_worlds
@@ -31,11 +33,26 @@ def show_traps(result: dict[str, Any]) -> None:
     typer.echo(f"  right {result['right']}, said {result['said']}, silently wrong {result['silent_wrongs']}")
 
 
-_SEEDS = {"gentle": 3, "operator": 3}
+_SEEDS = {"front": 8, "gentle": 3, "models": 1000, "operator": 3}
 """Seeds of a bench that flies, if not given; 10 of the others."""
+_SHOWN: dict[str, Callable[[dict[str, Any]], None]] = {
+    "adversarial-photos": show_traps,
+    "front": show_front,
+    "gentle": show_gentle,
+    "models": show_models,
+    "operator": show_operator,
+    "worlds": show_worlds,
+}
+"""What prints the answer of a bench that has tables of its own."""
+_DRAWN = {
+    "front": ("wakewise_paper.reports.models_bench_plot", "draw_front"),
+    "gentle": ("wakewise_paper.reports.wash_bench_plot", "draw_gentle"),
+    "models": ("wakewise_paper.reports.models_bench_plot", "draw_models"),
+    "operator": ("wakewise_paper.reports.operator_bench_plot", "draw_operator"),
+}
+"""What draws the answer of a bench, by module and name: pictures need an extra."""
 
-
-_LASTS = {"gentle": "hours", "operator": "hours", "worlds": "hours"}
+_LASTS = {"front": "hours", "gentle": "hours", "models": "hours", "operator": "hours", "worlds": "hours"}
 """About how long a bench runs on two free cores, where it is not minutes at most."""
 
 
@@ -49,19 +66,22 @@ def bench(
     seeds: Annotated[
         int | None,
         typer.Option(
-            help="gentle, operator, worlds: flights per method, seeds 1 to this; 3, 3 and 10 if not given.",
+            help="front, gentle, models, operator, worlds: flights per method; 8, 3, what the cases say, 3 and 10.",
             min=1,
             max=1000,
         ),
     ] = None,
     methods: Annotated[
-        str, typer.Option(help="gentle, worlds: methods, with commas between; all if not given.", show_default=False)
+        str,
+        typer.Option(
+            help="front, gentle, models, worlds: methods, with commas between; all if not given.", show_default=False
+        ),
     ] = "",
     scenarios: Annotated[
         str,
         typer.Option(
             help="gentle: which, with commas between: orbit (both vehicles), orbit/paper, worlds, world/mud, paper "
-            "(the paper's own world); traps: by name; all if not given.",
+            "(the paper's own world); models: parts of cases.yaml; traps: by name; all if not given.",
             show_default=False,
         ),
     ] = "",
@@ -71,8 +91,8 @@ def bench(
     worlds: Annotated[
         str,
         typer.Option(
-            help="operator, worlds: which, with commas between; operator flies those with trouble and a calm one, "
-            "worlds all of them, if not given.",
+            help="front, operator, worlds: which, with commas between; operator flies those with trouble and a calm "
+            "one, the others all of theirs, if not given.",
             show_default=False,
         ),
     ] = "",
@@ -95,16 +115,23 @@ def bench(
         ),
     ] = 0,
     fresh: Annotated[
-        bool, typer.Option("--fresh", help="gentle, operator, worlds: fly anew what an earlier run has flown.")
+        bool,
+        typer.Option(
+            "--fresh", help="front, gentle, models, operator, worlds: fly anew what an earlier run has flown."
+        ),
     ] = False,
     workers: Annotated[
-        int, typer.Option(help="gentle, operator, worlds: processes that fly side by side.", min=1, max=64)
+        int,
+        typer.Option(help="front, gentle, models, operator, worlds: processes that fly side by side.", min=1, max=64),
     ] = 2,
     store: Annotated[
-        Path | None, typer.Option(help="gentle, operator, worlds: folder that keeps flights; the cache if not given.")
+        Path | None,
+        typer.Option(
+            help="front, gentle, models, operator, worlds: folder that keeps flights; the cache if not given."
+        ),
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="gentle, operator: draw the figures into this file (.png, .svg).")
+        Path | None, typer.Option(help="front, gentle, models, operator: draw the figures into this file (.png, .svg).")
     ] = None,
     json: Json = False,
 ) -> None:
@@ -119,8 +146,8 @@ def bench(
     from wakewise.experiments.trials import BenchOptions
     from wakewise_benchmarks.registry import BENCHES, run_bench
 
-    if plot is not None and name not in ("gentle", "operator"):
-        raise InputError("--plot: only `wakewise bench gentle` and `wakewise bench operator` draw")
+    if plot is not None and name not in _DRAWN:
+        raise InputError(f"--plot: bench {name or 'without a name'} draws nothing, those that do: {', '.join(_DRAWN)}")
     if plot is not None:
         need("--plot", "reports")
         if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
@@ -156,26 +183,15 @@ def bench(
 
                 add_cockpit(results[each], options)
     if plot is not None:
-        from wakewise_paper.reports.operator_bench_plot import draw_operator
-        from wakewise_paper.reports.wash_bench_plot import draw_gentle
-
-        draw = {"gentle": draw_gentle, "operator": draw_operator}[name]
+        module, function = _DRAWN[name]
+        draw = getattr(import_module(module), function)
         write_page("plot", lambda: draw(results[name], plot))
     if json:
         print_json(results if name == "all" else results[name])
         return
     for each, result in results.items():
         typer.echo(f"\n{each}: {BENCHES[each]}")
-        if each == "gentle":
-            show_gentle(result)
-        elif each == "operator":
-            show_operator(result)
-        elif each == "worlds":
-            show_worlds(result)
-        elif each == "adversarial-photos":
-            show_traps(result)
-        else:
-            _show(result, "  ")
+        _SHOWN.get(each, _show)(result)
 
 
 def _list(benches: Mapping[str, str], json: bool) -> None:
@@ -190,7 +206,7 @@ def _list(benches: Mapping[str, str], json: bool) -> None:
     typer.echo("\nwakewise bench NAME runs one, wakewise bench all runs all of them, one after another: many hours")
 
 
-def _show(result: dict[str, Any], indent: str) -> None:
+def _show(result: dict[str, Any], indent: str = "  ") -> None:
     for key, value in result.items():
         if isinstance(value, dict) and set(value) == {"median_us", "p99_us"}:
             typer.echo(f"{indent}{key:<34}{value['median_us']:>10.1f} us   p99 {value['p99_us']:.1f} us")

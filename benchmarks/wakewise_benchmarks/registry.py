@@ -27,6 +27,8 @@ BENCHES = {
     "dynamics": "one step of the vehicle, with and without Jacobians, and of many vehicles at once",
     "gentle": "what each method does to the target's water where users have the trouble, and what each "
     "mechanism is worth",
+    "front": "wash against energy: our method at several power limits beside every rival, over whole scans",
+    "models": "where wash ruins a model: mechanisms one by one, dose and response, what helps",
     "planner": "the planner against the paper's recipe and IPOPT",
     "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
     "operator": "an operator's velocity obeyed and the target's water spared, by w_track, where users have the trouble",
@@ -42,7 +44,9 @@ BENCHES = {
 _MODULES = {
     "adversarial-photos": "wakewise_benchmarks.adversarial_photos",
     "cold": "wakewise_benchmarks.startup_time",
+    "front": "wakewise_paper.wash_reduction.energy_front",
     "gentle": "wakewise_paper.wash_reduction.bench",
+    "models": "wakewise_paper.model_failure.bench",
     "operator": "wakewise_paper.operator_study.bench",
     "worlds": "wakewise_paper.world_study.bench",
 }

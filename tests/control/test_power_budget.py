@@ -97,6 +97,23 @@ def test_shares_keep_the_bound_that_the_water_asks_for(speed):
     assert dear > TROUBLE and free.disturbance <= found.disturbance <= least.disturbance
 
 
+def test_extra_power_is_multiplied_by_the_setting():
+    """Without extra power the least thrusts fly; with more of it no more wash is left, and no more than that is taken."""
+    G = VIEW.gram(Pose(np.zeros(3))) * (0.012 / speed_m_s(1.0)) ** 2
+    least = min_norm_allocation(LAYOUT, WRENCH, G)
+    limit = power_limit(0.012)
+    found = {
+        excess: PowerBoundedAllocator(layout=LAYOUT, law=LAW, excess=excess).allocate(WRENCH, G, G, WEIGHTS, 3.0)
+        for excess in (0.0, 0.5, 1.0, 2.0)
+    }
+    assert found[0.0].disturbance == pytest.approx(least.disturbance, rel=0.05)
+    wash = [one.disturbance for one in found.values()]
+    assert wash[0] > wash[1] > wash[2] >= wash[3]
+    for excess, one in found.items():
+        extra = drawn_W(one.thrusts_N) / drawn_W(least.thrusts_N) - 1.0
+        assert extra <= excess * (limit - 1.0) + 1e-9
+
+
 def test_two_shares_are_compared_by_cost_and_power():
     """Two percent of power must save a percent of speed, over what counts as calm; without a law the cost decides."""
     bounded, calm = (

@@ -168,10 +168,14 @@ def best_by_power(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PowerBoundedAllocator:
-    """Allocation of least disturbance within the power bound, if there is a power law."""
+    """Allocation of least disturbance within the power bound, if there is a power law.
+
+    `excess` multiplies what the bound allows beyond the power of the least thrusts.
+    """
 
     layout: Layout
     law: PowerLaw | None = None
+    excess: float = 1.0
 
     def allocate(
         self,
@@ -192,7 +196,8 @@ class PowerBoundedAllocator:
         least_N, _ = largest_feasible_share(self.layout, self.layout.inverse @ wrench_B)
         speed_m_s = math.sqrt(max(disturbance_of(actual, least_N), 0.0) / total_weight) / MODEL_BIAS
         share = power_limit(speed_m_s)
-        most_W = share * float(self.law.power_W(least_N)) + (share - CALM) * self.law.standing_W
+        extra_W = (share - 1.0) * float(self.law.power_W(least_N)) + (share - CALM) * self.law.standing_W
+        most_W = float(self.law.power_W(least_N)) + self.excess * extra_W
         calm = _calm(weights, total_weight)
         return best_by_power(self.layout, found, least_N, self.law, most_W, calm, gram, weights, previous_N)
 

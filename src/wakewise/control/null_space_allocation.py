@@ -288,7 +288,9 @@ def allocation_context(
         view=with_merging_jets(view, layout) if settings.allocation.merging_jets else view,
         settings=settings.allocation,
         allocator=PowerBoundedAllocator(
-            layout=layout, law=power_law(vehicle) if settings.allocation.power_limit else None
+            layout=layout,
+            law=power_law(vehicle) if settings.allocation.power_limit else None,
+            excess=settings.allocation.power_excess,
         ),
         weights=weights_of(settings, view.total_weight),
     )

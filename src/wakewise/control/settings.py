@@ -39,6 +39,13 @@ class AllocationSettings(Settings):
         default=True,
         description="limit the power of null-space thrust by the wash that it removes and by a bound on the whole",
     )
+    power_excess: float = Field(
+        default=1.0,
+        ge=0.0,
+        le=10.0,
+        description="multiplies the extra power that this bound allows beyond the least thrusts': less saves energy, "
+        "more removes more wash",
+    )
     optimize_attitude: bool | None = Field(
         default=None,
         description="choose the hull's attitude where the camera's joint keeps the view (mission.aim: auto); null: "

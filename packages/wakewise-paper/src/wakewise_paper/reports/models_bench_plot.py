@@ -1,0 +1,127 @@
+"""Pictures of `wakewise bench models` (dose and response) and of `wakewise bench front` (wash against energy)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from wakewise.core.errors import InputError
+from wakewise.core.files import whole_file
+from wakewise_paper.model_failure.cases import USUAL
+from wakewise_paper.reports.wash_bench_plot import INK, LOOKS, QUIET, SUFFIXES
+from wakewise_paper.wash_reduction.energy_front import LIMITS, RIVALS
+
+RESPONSES = (
+    ("sway_about_mean_mm", "sway between photographs, mm"),
+    ("rmse_mm", "RMSE, mm"),
+    ("completeness_1mm_pct", "complete within 1 mm, %"),
+)
+SUCCESS_RMSE_MM = 3.0
+"""RMSE below which a model can be a success."""
+DOSES = "doses"
+
+
+def draw_models(result: Mapping[str, Any], path: Path) -> None:
+    """Draw dose and response of `wakewise bench models` into a file: a column per quantity, a row per response.
+
+    Raises
+    ------
+    InputError
+        If the file's ending is not one of `SUFFIXES`, or the part with doses was not made.
+    """
+    _check(path)
+    if DOSES not in result["parts"]:
+        raise InputError(f"--plot: draws the part '{DOSES}', which was not made; --scenarios {DOSES}")
+    part = result["parts"][DOSES]
+    axes_of = {name: axis for name, axis in part["axes"].items() if len(_doses(part["rows"], name)) > 1}
+    figure = Figure(figsize=(2.3 * len(axes_of) + 1.2, 6.6), facecolor="white", layout="constrained")
+    grid = figure.subplots(len(RESPONSES), len(axes_of), sharex="col", sharey="row", squeeze=False)
+    methods = list(dict.fromkeys(row["method"] for row in part["rows"]))
+    for (figure_key, title), line in zip(RESPONSES, grid, strict=True):
+        for (name, axis), axes in zip(axes_of.items(), line, strict=True):
+            _respond(axes, part["rows"], name, figure_key, methods)
+            if axes in grid[-1]:
+                axes.set_xlabel(f"{axis['title']}, {axis['unit']}", fontsize=8, color=INK)
+        line[0].set_ylabel(title, fontsize=8, color=INK)
+        if figure_key == "rmse_mm":
+            for axes in line:
+                axes.axhline(SUCCESS_RMSE_MM, color=QUIET, linewidth=0.8, linestyle=":")
+    grid[0][0].legend(fontsize=8, frameon=False)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=150)
+
+
+def draw_front(result: Mapping[str, Any], path: Path) -> None:
+    """Draw wash against energy, both over `dp`'s, a panel per place.
+
+    Raises
+    ------
+    InputError
+        If the file's ending is not one of `SUFFIXES`.
+    """
+    _check(path)
+    places = result["places"]
+    figure = Figure(figsize=(2.9 * len(places) + 0.6, 3.3), facecolor="white", layout="constrained")
+    panels = figure.subplots(1, len(places), sharey=True, squeeze=False)[0]
+    for axes, (name, place) in zip(panels, places.items(), strict=True):
+        _front(axes, place["methods"])
+        axes.set_title(name, fontsize=9, loc="left", color=INK)
+        axes.set_xlabel("energy over dp's", fontsize=8, color=INK)
+        _quiet(axes)
+    panels[0].set_ylabel("wash over dp's", fontsize=8, color=INK)
+    panels[-1].legend(fontsize=7, frameon=False)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=150)
+
+
+def _front(axes: Axes, methods: Mapping[str, Mapping[str, Any]]) -> None:
+    ours = [row for name in LIMITS if (row := methods.get(name)) and row["wash"] is not None]
+    colour, mark = LOOKS["wake-aware"]
+    axes.plot([r["energy"] for r in ours], [r["wash"] for r in ours], "-", color=colour, linewidth=1.0)
+    axes.plot([r["energy"] for r in ours], [r["wash"] for r in ours], ".", color=colour, label="wake-aware, by limit")
+    for name in ("dp", *RIVALS, "wake-aware"):
+        row = {"energy": 1.0, "wash": 1.0} if name == "dp" else methods.get(name)
+        if row and row["wash"] is not None:
+            colour, mark = LOOKS[name]
+            axes.plot([row["energy"]], [row["wash"]], mark, color=colour, label=name)
+
+
+def _respond(axes: Axes, rows: Sequence[Mapping[str, Any]], name: str, key: str, methods: Sequence[str]) -> None:
+    """Response of each method to the doses of one axis; means over seeds."""
+    for method in methods:
+        points = sorted(
+            (row["doses"][name], row[key])
+            for row in rows
+            if row["method"] == method and name in row["doses"] and row[key] is not None
+        )
+        colour, mark = LOOKS[method]
+        axes.plot([x for x, _ in points], [y for _, y in points], f"-{mark}", color=colour, label=method, markersize=4)
+    values = _doses(rows, name)
+    if min(values) > 0.0 and max(values) / min(values) > 10.0:
+        axes.set_xscale("log")
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+    usual = next(row["doses"][name] for row in rows if row["case"] == USUAL)
+    axes.axvline(usual, color=QUIET, linewidth=0.6)
+    axes.set_ylim(bottom=0.0)
+    _quiet(axes)
+
+
+def _doses(rows: Sequence[Mapping[str, Any]], name: str) -> set[float]:
+    return {row["doses"][name] for row in rows if name in row["doses"]}
+
+
+def _quiet(axes: Axes) -> None:
+    axes.tick_params(labelsize=7.5, colors=INK, which="both")
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def _check(path: Path) -> None:
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: ending '{path.suffix}', allowed {', '.join(SUFFIXES)}")
