@@ -98,7 +98,7 @@ def test_shares_keep_the_bound_that_the_water_asks_for(speed):
 
 
 def test_extra_power_is_multiplied_by_the_setting():
-    """Without extra power the least thrusts fly; with more of it no more wash is left, and no more than that is taken."""
+    """Without extra power the least thrusts fly; more of it leaves less wash, and no more than that is taken."""
     G = VIEW.gram(Pose(np.zeros(3))) * (0.012 / speed_m_s(1.0)) ** 2
     least = min_norm_allocation(LAYOUT, WRENCH, G)
     limit = power_limit(0.012)

@@ -74,6 +74,17 @@ def test_a_flight_says_one_line_where_a_block_is_worth_it() -> None:
     assert ballast_proposal(vehicle, still(5.0)) is None
 
 
+def test_the_settling_hover_says_the_ballast_before_the_first_leg(caplog) -> None:
+    """A vehicle four newtons heavy is told so once, as soon as the hover ends; one that is trimmed is not."""
+    for trim_N, lines in ((-4.0, 1), (0.2, 0)):
+        caplog.clear()
+        told = {"tank.mismatch.trim_N": trim_N, "mission.settle_s": 8.0, "tank.current.velocity_m_s": (0.0, 0.0, 0.0)}
+        ww.fly(ww.Scenario.preset("quick", method="dp", world="tank", **told), duration_s=8.5, water_every_s=60.0)
+        said = [record.message for record in caplog.records if "settling hover" in record.message]
+        assert len(said) == lines
+        assert all("N of float" in words and "N heavy" in words for words in said)
+
+
 def test_what_says_nothing_of_trim_is_refused(tmp_path) -> None:
     """A flight too short, a record without loads, a folder that is no trial's."""
     vehicle = load_vehicle("paper")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import sys
@@ -20,6 +21,7 @@ from wakewise.core.interfaces import Plant, TruthProvider, no_progress
 from wakewise.core.jit.precompile import compile_kernels
 from wakewise.core.optional_dependencies import has
 from wakewise.operation.flight_log import ExposureRecord
+from wakewise.operation.flight_trim import ballast_proposal
 from wakewise.operation.loop import Step, run_loop
 from wakewise.operation.parts import Parts
 from wakewise.operation.preflight import check_initial_state
@@ -28,6 +30,8 @@ from wakewise.operation.scenario import Scenario
 from wakewise.scene.missions import SETTLING
 from wakewise.vision.evaluation import flight_figures
 from wakewise.vision.imaging.settings import METERED
+
+log = logging.getLogger(__name__)
 
 FLIGHT_JOBS = ("plan", "fly")
 """What is compiled before a flight, if it is not yet (see `wakewise.core.jit.precompile`)."""
@@ -209,14 +213,30 @@ def fly(
     plant, witness = parts.world.begin()
     recorder = recorder_of(parts, witness, route, water_every_s=water_every_s, exposed=exposed)
 
+    settling = False
+
     def record(step: Step) -> None:
+        nonlocal settling
         recorder(step)
+        if settling and route.leg_name(step.time_s) != SETTLING:
+            _say_trim(parts, recorder)
+        settling = route.leg_name(step.time_s) == SETTLING
         if watch is not None:
             watch(step, witness)
 
     with name_external_parts(parts, recorder):
         loop_of(parts, plant, witness, record)(duration_s=lasts_s, progress=progress)
     return Flight(parts, recorder)
+
+
+def _say_trim(parts: Parts, recorder: FlightRecorder) -> None:
+    """Say what the settling hover shows of the ballast, before the first photograph: ballast spares more than a method.
+
+    The flight goes on: nobody can add a block now, but a pilot may choose to come back up.
+    """
+    words = ballast_proposal(parts.vehicle, recorder.frame())
+    if words is not None:
+        log.warning("settling hover: %s", words)
 
 
 def parts_of(flight: Parts | Scenario) -> Parts:

@@ -5,7 +5,7 @@ import pytest
 
 from wakewise.core.interfaces import ScalarGrid
 from wakewise.scene.targets import Mesh, place_on_bed
-from wakewise.simulation.tank.grains import beam_attenuation_per_m, friction_velocity_m_s
+from wakewise.simulation.tank.grains import beam_attenuation_per_m, friction_velocity_m_s, speed_at_stress_m_s
 from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M, SiltProperties
 from wakewise.simulation.tank.water_truth import FRAME_S, TargetProbes, concentration_at, tracer_speeds_m_s
 
@@ -52,6 +52,26 @@ def test_excess_speeds_and_whole_pressures():
     assert measure.tracer_speed_mean_m_s == pytest.approx(0.5)
     assert measure.turbidity_per_m == measure.ray_optical_depth == 0.0
     assert (measure.target_over_1cm_s, measure.target_over_ambient) == (1.0, 0.0)  # .3 m/s in a stream of .4
+
+
+class Calm(Stream):
+    """Water that runs on one side of a line alone."""
+
+    def excess_velocity(self, points):
+        return np.where(points[:, :1] > PYRAMID.centre_W_m[0], self.excess, 0.0)
+
+
+def test_grains_move_where_the_stress_is_above_their_threshold():
+    """Everywhere in a stream above it, nowhere below it, on half of the bed where half of it has the stream."""
+    probes = TargetProbes(PYRAMID, np.random.default_rng(0))
+    at_limit = speed_at_stress_m_s(LAWS.threshold_Pa / 1000.0, SHEAR_HEIGHT_M, LAWS.grain_m)
+
+    def share(water):
+        return probes.measure(water, LAWS, None, EYE, 1000.0).bed_over_threshold
+
+    assert share(Stream([1.05 * at_limit, 0, 0], [0, 0, 0])) == 1.0
+    assert share(Stream([0.95 * at_limit, 0, 0], [0, 0, 0])) == 0.0
+    assert share(Calm([1.05 * at_limit, 0, 0], [0, 0, 0])) == pytest.approx(0.5, abs=0.1)
 
 
 def test_exceedance_of_still_water_is_not_known():

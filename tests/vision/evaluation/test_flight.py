@@ -150,6 +150,16 @@ def test_missing_columns_give_none_and_no_rows_an_error():
         flight_figures(pl.DataFrame({"time_s": [0.0, 0.0]}))
 
 
+def test_grains_that_move_are_told_as_a_share_and_a_time():
+    """The mean share of the bed over time, and the time in which any of it moves; None where no grains lie."""
+    share = np.where(np.arange(400) < 100, 0.2, 0.0)
+    figures = flight_figures(table(bed_over_threshold=share))
+    assert figures["bed_over_threshold_pct"] == pytest.approx(5.0)
+    assert figures["bed_over_threshold_s"] == pytest.approx(0.25 * figures["duration_s"])
+    none = flight_figures(table(bed_over_threshold=np.full(400, np.nan)))
+    assert none["bed_over_threshold_pct"] is none["bed_over_threshold_s"] is None
+
+
 def test_sway_is_judged_at_the_shutter_and_its_peaks_over_all():
     """Root mean square, mean shape and the spread about it over exposures; peaks and the way slid over the flight."""
     n = 400
@@ -158,7 +168,7 @@ def test_sway_is_judged_at_the_shutter_and_its_peaks_over_all():
     columns = {
         "sway_m": 1.5 * swing, "sway_peak_m": 4.0 * swing + (np.arange(n) == 7) * 0.1, "sway_x_m": swing,
         "sway_y_m": 0.0 * swing, "sway_z_m": 0.0 * swing, "target_stress_Pa": 1e6 * swing,
-        "shifted_m": np.linspace(0.0, 0.02, n), "sway_wash_m": 0.5 * swing,
+        "shifted_m": np.linspace(0.0, 0.02, n), "sway_wash_m": 0.5 * swing, "target_drag_N": 10.0 * swing,
     }  # fmt: skip
     figures = flight_figures(table(exposing=exposing, **columns))
     assert figures["sway_rms_mm"] == pytest.approx(1.5 * np.sqrt(5.0))
@@ -167,6 +177,7 @@ def test_sway_is_judged_at_the_shutter_and_its_peaks_over_all():
     assert figures["sway_about_mean_mm"] == pytest.approx(1.0)
     assert figures["sway_peak_mm"] == pytest.approx(112.0)
     assert figures["target_stress_peak_Pa"] == pytest.approx(3e3)
+    assert figures["target_drag_peak_N"] == pytest.approx(0.03)
     assert figures["shifted_mm"] == pytest.approx(20.0)
     rigid = flight_figures(table(exposing=exposing))
     assert all(rigid[key] is None for key in SWAY_FIGURES)
