@@ -1,4 +1,4 @@
-"""Nobody is called best whom the trials do not show to be; ratios are told as such; a count says of which worlds."""
+"""No method is ahead that the pairs do not tell apart; large differences are ratios; a count says of which world."""
 
 import re
 from dataclasses import replace
@@ -26,42 +26,48 @@ def judged(low=5.0, high=15.0, trials=12, less=10.0, ours=0.9, theirs=1.0, rival
     )  # fmt: skip
 
 
-def test_best_is_who_is_surely_better():
-    """With enough pairs and an interval that holds no zero."""
-    assert winner_text(judged()) == (
-        "wake-aware is best with 0.900 mm RMSE, 10 % (5 to 15) better than mpc-smooth; "
-        "sure, the interval does not hold zero."
-    )
+def test_a_difference_is_stated_with_its_interval_and_its_pairs():
+    """Of 20 pairs or more without a mark; of fewer it is preliminary."""
+    told = "wake-aware: 0.900 mm RMSE, 10 % less than mpc-smooth ({} pairs; interval 5 to 15){}."
+    assert winner_text(judged(trials=20)) == told.format(20, "")
+    assert winner_text(judged(trials=12)) == told.format(12, ", preliminary (n < 20)")
+
+
+def test_a_figure_of_which_more_is_better_is_more_than_the_next_best():
+    """Up to three times in percent, beyond as a ratio."""
+    more = replace(judged(less=122.0, low=100.0, high=150.0, trials=30), less_is_better=False)
+    assert "122 % more than mpc-smooth (30 pairs; interval 100 to 150)" in winner_text(more)
+    far = replace(more, less_pct=310.0, interval_pct=(250.0, 400.0))
+    assert "4.10 times as much as mpc-smooth (30 pairs; interval 3.50 to 5 times)" in winner_text(far)
+
+
+def test_less_than_a_third_is_a_ratio():
+    """And no percentage stands beside it."""
+    said = winner_text(judged(less=88.0, low=85.0, high=91.0))
+    assert "0.120 times as much as mpc-smooth (12 pairs; interval 0.0900 to 0.150 times)" in said and "%" not in said
 
 
 @pytest.mark.parametrize(
-    ("one", "why"),
+    ("one", "told"),
     [
-        (judged(low=-2.69, high=3.0, less=0.258), "undecided, the interval holds zero"),
-        (judged(low=0.0), "undecided, the interval holds zero"),
-        (judged(low=-1.0, trials=3), "3 pairs are too few to be sure"),
-        (judged(trials=1, low=None), "one trial each: no interval"),
+        (judged(low=-2.69, high=3.0), "not told apart: {} (12 pairs; interval -2.69 to 3)."),
+        (judged(low=0.0), "not told apart: {} (12 pairs; interval 0 to 15)."),
+        (judged(low=-1.0, trials=3), "too few pairs: {} (3 pairs; interval -1 to 15)."),
+        (judged(trials=5), "too few pairs: {} (5 pairs; interval 5 to 15)."),
+        (judged(trials=1, low=None), "too few pairs: {} (1 pair; no interval)."),
     ],
 )
-def test_no_difference_is_shown_where_it_may_be_chance(one, why):
-    """Both figures stand there, and nobody is called best."""
+def test_neither_is_ahead_where_the_interval_contains_zero_or_pairs_are_few(one, told):
+    """Both figures stand there with the number of pairs, and neither is less than the other."""
     said = winner_text(one)
-    assert said.startswith("no difference shown: wake-aware 0.900, mpc-smooth 1 mm RMSE") and said.endswith(f"{why}.")
-    assert "best" not in said
-
-
-def test_few_pairs_that_agree_are_told_as_what_came_out():
-    """An interval without zero of a few pairs: who came out better, and that it is not sure."""
-    assert winner_text(judged(trials=3)) == (
-        "wake-aware came out better: wake-aware 0.900, mpc-smooth 1 mm RMSE, 10 % (5 to 15) apart; "
-        "3 pairs are too few to be sure."
-    )
+    assert said == told.format("wake-aware 0.900, mpc-smooth 1 mm RMSE")
+    assert "best" not in said and "less" not in said
 
 
 def test_the_price_of_less_wash_counts_silt():
     """Silt between camera and target stands beside energy; what is alike, or was not measured, is left out."""
     assert cost_text(replace(judged(), silt_ratio=1.81)) == (
-        "It takes as much energy as mpc-smooth. Silt between camera and target: 1.81 times that of mpc-smooth. "
+        "wake-aware takes as much energy as mpc-smooth. Silt between camera and target: 1.81 times that of mpc-smooth. "
         "No trial failed."
     )
     assert "Silt" not in cost_text(judged()) + cost_text(replace(judged(), silt_ratio=1.0))
@@ -75,10 +81,10 @@ def test_the_price_of_less_wash_counts_silt():
     assert found is not None and found.silt_ratio == pytest.approx(3.0) and found.energy_ratio == pytest.approx(1.0)
 
 
-def test_a_page_calls_nobody_best_whom_few_trials_favour(tmp_path):
-    """Headline and table."""
+def test_a_campaigns_page_puts_no_method_ahead_by_two_pairs(tmp_path):
+    """Headline and table say that the pairs are too few."""
     page = campaign_page(campaign(seeds=2), tmp_path)
-    assert "is best" not in page and "2 pairs are too few to be sure" in page
+    assert "less than" not in page and "too few pairs: " in page
 
 
 @pytest.mark.parametrize(
@@ -86,6 +92,9 @@ def test_a_page_calls_nobody_best_whom_few_trials_favour(tmp_path):
     [
         (31.0, (26.0, 35.0), ("31 %", "(26 to 35)")),
         (-81.0, None, ("-81 %", "")),
+        (66.0, (60.0, 66.6), ("66 %", "(60 to 66.6)")),
+        (88.0, None, ("0.120 times as much", "")),
+        (60.0, (50.0, 70.0), ("0.400 times as much", "(0.300 to 0.500 times)")),
         (-200.0, (-200.0, -100.0), ("-200 %", "(-200 to -100)")),
         (-276.0, None, ("3.76 times as much", "")),
         (-11990.0, (-363079.0, -3492.0), ("121 times as much", "(35.9 to 3632 times)")),
@@ -94,7 +103,7 @@ def test_a_page_calls_nobody_best_whom_few_trials_favour(tmp_path):
     ],
 )
 def test_beyond_a_factor_of_three_a_difference_is_a_ratio(less, ends, told):
-    """Value and interval alike."""
+    """Less or more; value and interval have one form."""
     assert percent(less, ends) == told
 
 
