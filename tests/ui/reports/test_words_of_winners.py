@@ -14,6 +14,7 @@ from wakewise.ui.reports.methods_compared import cost_text, winner_text
 from wakewise.ui.reports.page import legend_entry, missing, prose, scene_box
 from wakewise.ui.reports.text import duration, percent
 from wakewise_paper.reports.reproduction import sentences
+from wakewise_paper.reproduction.claim import setup_of
 
 
 def judged(low=5.0, high=15.0, trials=12, less=10.0, ours=0.9, theirs=1.0, rival="mpc-smooth"):
@@ -110,31 +111,74 @@ def test_beyond_a_factor_of_three_a_difference_is_a_ratio(less, ends, told):
 def test_rows_of_the_papers_tables_tell_ratios_so():
     """In tables and in sentences; rows of another kind keep their unit."""
     row = {"reading": "less_pct", "ours": -11990.0, "low": -363079.0, "high": -3492.0, "unit": "%", "world": "field",
-           "target": None, "n": 21, "figure": "silt", "method": "wake-aware"}  # fmt: skip
+           "target": None, "n": 21, "figure": "silt", "method": "wake-aware", "met": False, "met_by_all": None,
+           "told_apart": True, "preliminary": False, "sure": True}  # fmt: skip
     assert sentences.our_value(row) == "121 times as much" and sentences.interval(row) == "35.9 to 3632 times"
-    assert sentences._place(row) == "field: 121 times as much (35.9 to 3632 times), n = 21"
+    assert sentences._measured(row) == "121 times as much (35.9 to 3632 times), n = 21"
     assert sentences.our_value(row | {"reading": "mean", "ours": 4.0, "unit": "mm"}) == "4 mm"
 
 
-def row(world, met, figure="wash", paper=60.0):
+def row(world, met, figure="wash", **told):
     """A row of a table, judged."""
-    return {"world": world, "met": met, "sure": None, "paper": paper, "method": "wake-aware", "figure": figure}
+    row = {"world": world, "met": met, "sure": None, "paper": 60.0, "method": "wake-aware", "figure": figure,
+           "setup": setup_of(world, None), "met_by_all": None, "preliminary": None, "told_apart": None, "ours": 1.0,
+           "low": None, "high": None, "n": 30, "reading": "mean"}  # fmt: skip
+    return row | told
 
 
-def test_a_count_of_what_is_met_says_in_which_worlds():
-    """In the same sentence, with the count of the paper's own set-up; what is of no world says nothing of worlds."""
+def test_a_count_of_what_is_met_names_each_world():
+    """The paper's own set-up first, then world by world; the circular one says that it is."""
     rows = [
-        row("pump-tank", False),
         row("payload", True),
-        row("pump-tank", True, "rmse"),
+        row("paper", True),
+        row("pump-tank", False),
+        row("pump-tank", True, "rmse", sure=True, met_by_all=True),
         row("payload", False, "late"),
     ]
-    said = sentences.met_of({"station": rows})
-    assert said == (
-        "2 of 3 figures that the paper quotes are met in any world at all, and 1 of 2 in pump-tank, the paper's own "
-        "set-up"
+    assert sentences.met_of({"station": rows}) == (
+        "1 of 2 figures met in the paper's own set-up, pump-tank (1 surely, 1 by every method); 1 of 2 in payload; "
+        "1 of 1 in paper (circular)"
     )
-    assert sentences.met_of({"solver": [row("-", True)]}) == "1 of 1 figure that the paper quotes is met"
+    assert sentences.met_of({"solver": [row("-", True)]}) == "1 of 1 figure met without a flight"
+    assert sentences.met_of({"station": []}) == "no figure of the paper is judged here"
+
+
+LESS = {"reading": "less_pct", "ours": 40.0, "low": 30.0, "high": 50.0, "told_apart": True, "sure": True}
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ({}, "met"),
+        ({"n": 12, "preliminary": True}, "met, preliminary (n = 12)"),
+        ({"n": 5, "preliminary": True, "told_apart": False, "sure": False}, "met, too few pairs (n = 5)"),
+        ({"low": -3.0, "told_apart": False, "met": False}, "not met, not told apart (30 pairs; interval -3 to 50)"),
+        ({"low": -3.0, "told_apart": False, "met": None}, "not told apart (30 pairs; interval -3 to 50)"),
+        ({"met_by_all": True}, "met, by every method here"),
+        ({"sure": False}, "met, unsure"),
+    ],
+)
+def test_a_verdict_on_a_difference_says_what_its_pairs_show(told, said):
+    """Few, not told apart, preliminary, or met by every method."""
+    assert sentences.verdict(row("pump-tank", **({"met": True} | LESS | told))) == said
+
+
+def test_a_verdict_on_a_mean_needs_no_pairs():
+    """But says of a single trial that it is one."""
+    assert sentences.verdict(row("payload", False, n=1)) == "not met, one trial"
+    assert sentences.verdict(row("payload", True, n=3, sure=False)) == "met, unsure"
+    assert sentences.verdict(row("payload", None)) == ""
+
+
+def test_the_papers_percentage_has_its_factor_beside_it_beyond_three():
+    """As it stands in the paper, and as ours is given; the standard deviation follows a mean."""
+    quoted = row("payload", True, **LESS, paper_sd=None) | {"paper": 67.0}
+    assert sentences.quoted(quoted) == "67 % (0.330 times as much)"
+    assert sentences.quoted(quoted | {"paper": 31.0}) == "31 %"
+    assert sentences.quoted(row("payload", True, paper_sd=0.4) | {"paper": 1.9}) == "1.9 ± 0.4"
+    more = quoted | {"reading": "more_pct", "paper": 40.0, "ours": 310.0, "low": 250.0, "high": 400.0}
+    assert sentences.quoted(more) == "40 %" and sentences.our_value(more) == "4.10 times as much"
+    assert sentences.interval(more) == "3.50 to 5 times"
 
 
 @pytest.mark.parametrize(

@@ -305,6 +305,11 @@ def _own(_: str) -> tuple[str, ...]:
     return (OWN,)
 
 
+def _silted(world: str) -> tuple[str, ...]:
+    """Of clear water the coral of `caco3`, which is held against it."""
+    return ("branching",) if world == PUMP_TANK else (OWN,)
+
+
 def _nothing(_: str) -> tuple[str, ...]:
     return (NOWHERE,)
 
@@ -342,7 +347,11 @@ TABLE: dict[str, TableDefinition] = {
         weight=2.0,
     ),
     "sediment": TableDefinition(
-        methods=("mpc", "wake-aware"), worlds=(CACO3, "fluff"), targets=_own, task=_plain_scan, block_s=220.0
+        methods=("mpc", "wake-aware"),
+        worlds=(PUMP_TANK, CACO3, "fluff"),
+        targets=_silted,
+        task=_plain_scan,
+        block_s=220.0,
     ),
     "flow": TableDefinition(methods=("dp", "mpc", "wake-aware"), worlds=_FLOWN, targets=_own, task=_flow, block_s=50.0),
     "solver": TableDefinition(
