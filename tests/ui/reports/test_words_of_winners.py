@@ -29,7 +29,7 @@ def judged(low=5.0, high=15.0, trials=12, less=10.0, ours=0.9, theirs=1.0, rival
 
 def test_a_difference_is_stated_with_its_interval_and_its_pairs():
     """Of 20 pairs or more without a mark; of fewer it is preliminary."""
-    told = "wake-aware: 0.900 mm RMSE, 10 % less than mpc-smooth ({} pairs; interval 5 to 15){}."
+    told = "wake-aware: 0.900 mm RMSE, 10 % less than mpc-smooth ({} pairs; interval 5 to 15 %){}."
     assert winner_text(judged(trials=20)) == told.format(20, "")
     assert winner_text(judged(trials=12)) == told.format(12, ", preliminary (n < 20)")
 
@@ -37,7 +37,7 @@ def test_a_difference_is_stated_with_its_interval_and_its_pairs():
 def test_a_figure_of_which_more_is_better_is_more_than_the_next_best():
     """Up to three times in percent, beyond as a ratio."""
     more = replace(judged(less=122.0, low=100.0, high=150.0, trials=30), less_is_better=False)
-    assert "122 % more than mpc-smooth (30 pairs; interval 100 to 150)" in winner_text(more)
+    assert "122 % more than mpc-smooth (30 pairs; interval 100 to 150 %)" in winner_text(more)
     far = replace(more, less_pct=310.0, interval_pct=(250.0, 400.0))
     assert "4.10 times as much as mpc-smooth (30 pairs; interval 3.50 to 5 times)" in winner_text(far)
 
@@ -51,10 +51,10 @@ def test_less_than_a_third_is_a_ratio():
 @pytest.mark.parametrize(
     ("one", "told"),
     [
-        (judged(low=-2.69, high=3.0), "not told apart: {} (12 pairs; interval -2.69 to 3)."),
-        (judged(low=0.0), "not told apart: {} (12 pairs; interval 0 to 15)."),
-        (judged(low=-1.0, trials=3), "too few pairs: {} (3 pairs; interval -1 to 15)."),
-        (judged(trials=5), "too few pairs: {} (5 pairs; interval 5 to 15)."),
+        (judged(low=-2.69, high=3.0), "not told apart: {} (12 pairs; interval -2.69 to 3 %)."),
+        (judged(low=0.0), "not told apart: {} (12 pairs; interval 0 to 15 %)."),
+        (judged(low=-1.0, trials=3), "too few pairs: {} (3 pairs; interval -1 to 15 %)."),
+        (judged(trials=5), "too few pairs: {} (5 pairs; interval 5 to 15 %)."),
         (judged(trials=1, low=None), "too few pairs: {} (1 pair; no interval)."),
     ],
 )
@@ -152,8 +152,8 @@ LESS = {"reading": "less_pct", "ours": 40.0, "low": 30.0, "high": 50.0, "told_ap
         ({}, "met"),
         ({"n": 12, "preliminary": True}, "met, preliminary (n = 12)"),
         ({"n": 5, "preliminary": True, "told_apart": False, "sure": False}, "met, too few pairs (n = 5)"),
-        ({"low": -3.0, "told_apart": False, "met": False}, "not met, not told apart (30 pairs; interval -3 to 50)"),
-        ({"low": -3.0, "told_apart": False, "met": None}, "not told apart (30 pairs; interval -3 to 50)"),
+        ({"low": -3.0, "told_apart": False, "met": False}, "not met, not told apart (30 pairs; interval -3 to 50 %)"),
+        ({"low": -3.0, "told_apart": False, "met": None}, "not told apart (30 pairs; interval -3 to 50 %)"),
         ({"met_by_all": True}, "met, by every method here"),
         ({"sure": False}, "met, unsure"),
     ],

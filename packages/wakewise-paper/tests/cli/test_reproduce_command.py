@@ -71,7 +71,7 @@ def test_people_get_a_table_and_a_page(made, capsys):
     words = " ".join(re.sub("[│┃]", " ", said).split())
     assert "less than dp-paper" in words and "page:" in words
     assert "figures met in the paper's own set-up, pump-tank" in words and "too few pairs" in words
-    assert "0.202" in words and "79.8" not in words
+    assert "0.203" in words and "79.7" not in words
     page = (made / "runs" / "reproduce" / "reproduce.html").read_text(encoding="utf-8")
     assert "The paper" in page and "station" in page
     assert json.loads((made / "runs" / "reproduce" / "results.json").read_text())["tables"]["station"]["rows"]
@@ -107,6 +107,25 @@ def test_bad_input_is_one_line_and_nothing_is_left(made, capsys, arguments, word
     said = capsys.readouterr()
     assert words in said.err and said.out == ""
     assert list(made.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "words"),
+    [
+        ("store.json", '{"format": 0}', "results of format 0, this Wakewise reads 1; give another folder"),
+        ("results.json", '{"tables": {}}', "holds something that is no campaign; give another folder"),
+    ],
+)
+def test_a_store_of_another_version_or_a_folder_of_results_is_refused_in_a_line(made, capsys, file, text, words):
+    """Before anything is compiled or written."""
+    (made / "old").mkdir()
+    (made / "old" / file).write_text(text)
+    assert run(["reproduce", "station", "--store", "old"]) == 2
+    said = capsys.readouterr()
+    (line,) = [line for line in said.err.splitlines() if "old" in line]
+    assert words in line and said.out == ""
+    assert [path.name for path in (made / "old").iterdir()] == [file]
+    assert [path.name for path in made.iterdir()] == ["old"]
 
 
 def test_times_are_read_as_people_write_them():

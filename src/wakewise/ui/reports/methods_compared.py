@@ -32,7 +32,7 @@ from wakewise.ui.reports.svg_style import (
     new_figure,
     style_axes,
 )
-from wakewise.ui.reports.text import number, percent
+from wakewise.ui.reports.text import number, percent, with_unit
 from wakewise.ui.reports.views import SIDES, ViewBounds, draw_cloud
 
 Row = Mapping[str, Any]
@@ -74,7 +74,7 @@ def winner_text(glance: MethodSummary) -> str:
     if glance.means[glance.winner] == glance.means[glance.rival]:
         return f"{glance.winner} and {glance.rival} are even: {value} {glance.words} each."
     much, ends = percent(glance.less_pct, glance.interval_pct, more=not glance.less_is_better)
-    ends = ends.strip("()")
+    ends = with_unit(ends.strip("()"))
     pairs = f"{glance.trials} {'pair' if glance.trials == 1 else 'pairs'}"
     if not glance.is_sure:
         both = f"{glance.winner} {value}, {glance.rival} {number(glance.means[glance.rival])} {glance.words}"

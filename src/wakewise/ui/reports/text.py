@@ -154,10 +154,15 @@ def percent(value: float | None, ends: tuple[float, float] | None = None, *, mor
         return NONE, ""
     known = [value, *(ends or ())]
     ratios = [1.0 + one / 100.0 if more else 1.0 - one / 100.0 for one in known]
-    if 1.0 / TIMES - _ROUNDING <= min(ratios) and max(ratios) <= TIMES + _ROUNDING:
+    if min(ratios) >= 1.0 / TIMES - _ROUNDING and max(ratios) <= TIMES + _ROUNDING:
         return f"{number(value)} %", "" if ends is None else f"({number(ends[0])} to {number(ends[1])})"
     inside = "" if ends is None else f"({number(min(ratios[1:]))} to {number(max(ratios[1:]))} times)"
     return f"{number(ratios[0])} times as much", inside
+
+
+def with_unit(ends: str) -> str:
+    """The interval of a difference that stands by itself: in percent where it is no ratio."""
+    return f"{ends} %" if ends and not ends.endswith("times") else ends
 
 
 def duration(seconds: float | None) -> str:

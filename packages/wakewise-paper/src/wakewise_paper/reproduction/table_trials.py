@@ -128,8 +128,9 @@ def blocks_of(name: str, wish: TableRequest) -> Iterator[Block]:
         If a world, method or target is not known to the table; at once, not when the first is taken.
     """
     table = TABLE[name]
-    worlds = _known("--world", wish.worlds, (NOWHERE,) if table.worlds == (NOWHERE,) else water_names(), table.worlds)
-    methods = _known("--methods", wish.methods, table.methods, table.methods)
+    waters = (NOWHERE,) if table.worlds == (NOWHERE,) else water_names()
+    worlds = _known("--world", wish.worlds, name, waters, table.worlds)
+    methods = _known("--methods", wish.methods, name, table.methods, table.methods)
     wished = None if wish.targets is None or not table.has_targets else tuple(_target(t) for t in wish.targets)
     return _blocks(name, wish, worlds, methods, {world: wished or table.targets(world) for world in worlds})
 
@@ -177,13 +178,13 @@ def _target(name: str) -> str:
 
 
 def _known(
-    option: str, wished: tuple[str, ...] | None, allowed: tuple[str, ...], default: tuple[str, ...]
+    option: str, wished: tuple[str, ...] | None, table: str, allowed: tuple[str, ...], default: tuple[str, ...]
 ) -> tuple[str, ...]:
     if wished is None or allowed == (NOWHERE,):
         return default
     for name in wished:
         if name not in allowed:
-            raise InputError(f"{option}: '{name}' is not known here, allowed: {', '.join(allowed)}")
+            raise InputError(f"{option}: '{name}' is not in table {table}, allowed: {', '.join(allowed)}")
     return tuple(dict.fromkeys(wished))
 
 

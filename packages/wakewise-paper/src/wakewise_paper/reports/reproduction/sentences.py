@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from wakewise.experiments.campaigns.summary import ENOUGH, FEWEST
-from wakewise.ui.reports.text import number, percent, shown
+from wakewise.ui.reports.text import number, percent, shown, with_unit
 from wakewise_paper.reproduction.claim import (
     CIRCULAR,
     DIFFERENCES,
@@ -81,7 +81,7 @@ def _pairs(row: Row) -> list[str]:
         return [f"too few pairs (n = {shown(row['n'])})"]
     said = []
     if row["told_apart"] is False:
-        ends = interval(row)
+        ends = with_unit(interval(row))
         said.append(f"not told apart ({shown(row['n'])} pairs; {f'interval {ends}' if ends else 'no interval'})")
     elif row["sure"] is False:
         said.append("unsure")
@@ -161,7 +161,8 @@ def _measured(row: Row) -> str:
     """Ours with its interval and number, and what stands behind the verdict."""
     ends, told = interval(row), verdict(row).removeprefix("not met").removeprefix("met").removeprefix(", ")
     said = row.get("our_order") or our_value(row)
-    return f"{said}" + (f" ({ends})" if ends else "") + f", n = {shown(row['n'])}" + (f"; {told}" if told else "")
+    pairs = "" if "n = " in told else f", n = {shown(row['n'])}"
+    return f"{said}" + (f" ({ends})" if ends else "") + pairs + (f"; {told}" if told else "")
 
 
 def computer_description() -> dict[str, str]:
