@@ -116,7 +116,7 @@ def _plots(ended: list[Place]) -> str:
     profile = None if leading is None else profiles(leading, ended)
     if leading is not None and profile is not None:
         narrow = profiles(leading, ended, narrow=True)
-        caption = "Share of trials that are at least so good; the curve that rises first is the better one."
+        caption = "Share of trials whose figure is at most that of the axis."
         plots.append(plot(profile, "performance profiles", caption, narrow=narrow))
     content = "".join(plots) or missing("plots", "no trial gave an error of the model or a speed of the water")
     return section("plots", "Trial by trial", "", content)

@@ -123,8 +123,8 @@ def _read(claim: PublishedFigure, trials: TableTrials, worlds: Mapping[str, Tabl
 
 
 def _others(claim: PublishedFigure, trials: TableTrials, worlds: Mapping[str, TableTrials]) -> list[float | None]:
-    """The figure of a claim of every other method here; none of what is no figure of a single method."""
-    if claim.reading in ("order", "spread_pct"):
+    """The figure of a claim of every other method here; none where nothing is asked of it."""
+    if claim.bar is None or claim.side == "none":
         return []
     others = (method for method in trials.methods if method not in (claim.method, claim.than))
     rows = (_read(replace(claim, method=method), trials, worlds) for method in others)

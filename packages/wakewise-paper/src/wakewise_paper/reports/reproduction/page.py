@@ -160,7 +160,7 @@ def _drawn(table: Mapping[str, Any]) -> str:
     profile = profiles(JUDGED[name], places) if name in ("dynamic", "station") else None
     if profile is not None:
         narrow = profiles(JUDGED[name], places, narrow=True)
-        caption = "Share of trials that are at least so good; the curve that rises first is the better method."
+        caption = "Share of trials whose figure is at most that of the axis."
         parts.append(plot(profile, f"performance profiles, {name}", caption, narrow=narrow))
     return "".join(parts)
 
