@@ -93,6 +93,7 @@ class FlightFigures(TypedDict):
     tracking_rmse_mm: float | None
     velocity_deviation_pct: float | None
     roll_pitch_rms_deg: float | None
+    roll_pitch_max_deg: float | None
     attitude_rmse_deg: float | None
     energy_kJ: float | None
     sign_flips_per_s: float | None

@@ -50,7 +50,7 @@ def test_another_format_is_refused_in_a_line(tmp_path: Path) -> None:
     open_store(tmp_path / "c")
     (tmp_path / "c" / "store.json").write_text(json.dumps({"format": 99}))
     for opened in (open_store, read_store):
-        with pytest.raises(InputError, match="results of format 99, this Wakewise reads 1; give another --out"):
+        with pytest.raises(InputError, match="results of format 99, this Wakewise reads 1; give another folder"):
             opened(tmp_path / "c")
 
 

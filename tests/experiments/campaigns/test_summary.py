@@ -22,7 +22,7 @@ def test_who_won_by_how_much_how_sure_and_at_what_price():
     found = summarize(RMSE, "pump-tank", places)
     assert (found.winner, found.rival, found.trials) == ("a", "b", 6)
     assert found.less_pct == pytest.approx(49.2, abs=0.2) and found.energy_ratio == pytest.approx(2.0)
-    assert found.sure.startswith("sure") and found.improvement == 1.0
+    assert found.sure == "told apart, preliminary (n < 20)" and found.improvement == 1.0
 
 
 def test_a_method_whose_models_fail_does_not_win_by_its_survivors():
@@ -35,7 +35,7 @@ def test_a_method_whose_models_fail_does_not_win_by_its_survivors():
 def test_one_trial_each_decides_nothing():
     """And says so."""
     found = summarize(RMSE, "pump-tank", [place("a", 1, 1.0), place("b", 1, 2.0)])
-    assert "one trial each" in found.sure and found.interval_pct is None
+    assert found.sure == "too few pairs (1)" and found.interval_pct is None
 
 
 def test_the_worst_trial_is_one_that_failed_else_the_one_with_the_largest_error():
@@ -49,4 +49,14 @@ def test_few_pairs_that_agree_are_not_sure():
     """Five heads in a row come once in sixteen throws of a coin, either way up."""
     few = [place(who, k, rmse) for k in range(1, 6) for who, rmse in (("a", 1.0), ("b", 2.0))]
     found = summarize(RMSE, "pump-tank", few)
-    assert found.sure == "5 pairs are too few to be sure" and found.interval_pct is not None
+    assert found.sure == "too few pairs (5)" and not found.is_sure and found.interval_pct is not None
+
+
+def test_twenty_pairs_are_no_longer_preliminary():
+    """And a difference that goes both ways is not told apart, however many pairs there are."""
+    clear = [place(who, k, rmse) for k in range(1, 21) for who, rmse in (("a", 1.0), ("b", 2.0))]
+    assert summarize(RMSE, "pump-tank", clear).sure == "told apart"
+    mixed = [
+        place(who, k, 1.0 + 0.1 * ((k + (who == "b")) % 2) - 0.001 * (who == "a")) for k in range(1, 21) for who in "ab"
+    ]
+    assert summarize(RMSE, "pump-tank", mixed).sure == "not told apart"

@@ -148,7 +148,8 @@ def _rows(**changes: Any) -> dict[str, Any]:
         "method": "wake-aware", "target": None, "figure": "wash", "paper": 60.0, "ours": 50.0, "low": 40.0,
         "high": 60.0, "n": 3, "met": True, "world": "pump-tank", "unit": "mm/s", "key": "target_speed_mean_m_s",
         "reading": "mean", "than": None, "asked": 60.0, "side": "less", "paper_says": "60 mm/s", "failed": 0,
-        "sure": True,
+        "sure": True, "setup": "the paper's own", "met_by_all": False, "told_apart": True, "preliminary": True,
+        "baseline": "mpc", "source": "table", "paper_sd": 0.4,
         "how": "flown", "why": {}, "p_t": 0.01, "p_wilcoxon": 0.02, "p_holm": 0.02, "d_z": 1.0, "improvement": 0.9,
         "pairs_for_80_pct": 7,
     } | changes  # fmt: skip

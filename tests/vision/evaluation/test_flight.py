@@ -11,7 +11,7 @@ from wakewise.vision.evaluation.flight import (
     attitude_rmse_deg,
     path_distance,
     rising_edges,
-    roll_pitch_rms_deg,
+    roll_pitch_errors_deg,
     sign_flips,
 )
 
@@ -91,16 +91,25 @@ def test_reversals_ignore_chatter_about_zero():
 
 
 def test_attitude_error_is_against_the_goal():
-    """Three degrees of roll and four of pitch make 3.54 degrees over both; yaw does not count."""
+    """Three degrees of roll and four of pitch are the two errors; yaw does not count."""
     goal = np.array([quat_from_euler(0.0, 0.0, 0.5)])
     true = np.array([quat_from_euler(np.radians(3), np.radians(4), -0.9)])
-    assert roll_pitch_rms_deg(true, goal) == pytest.approx(np.sqrt(12.5))
+    assert roll_pitch_errors_deg(true, goal) == pytest.approx(np.array([[3.0, 4.0]]))
 
 
 def test_a_roll_across_half_a_turn_is_a_small_error():
     """From 179 to -179 degrees are two, not 358."""
     goal, true = (np.array([quat_from_euler(np.radians(roll), 0.0, 0.3)]) for roll in (179.0, -179.0))
-    assert roll_pitch_rms_deg(true, goal) == pytest.approx(np.sqrt(2.0**2 / 2.0), abs=1e-6)
+    assert roll_pitch_errors_deg(true, goal) == pytest.approx(np.array([[2.0, 0.0]]), abs=1e-6)
+
+
+def test_the_largest_lean_is_that_of_the_worst_step_and_of_the_worse_angle():
+    """One step of 2 degrees of roll and -3 of pitch among level ones has a maximum of 3 and an rms of far less."""
+    q = np.array([quat_from_euler(0.0, 0.0, 0.3 * 0.05 * k + np.pi / 2) for k in range(400)])
+    q[200] = quat_from_euler(np.radians(2.0), np.radians(-3.0), 0.3 * 10.0 + np.pi / 2)
+    figures = flight_figures(table().with_columns(pl.Series(f"true_q{k}", q[:, i]) for i, k in enumerate("wxyz")))
+    assert figures["roll_pitch_max_deg"] == pytest.approx(3.0)
+    assert figures["roll_pitch_rms_deg"] == pytest.approx(np.sqrt(13.0 / 800.0))
 
 
 def test_a_step_counts_for_as_long_as_it_lasts():

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from wakewise_paper.reproduction.claim import CLAIMS, TABLES, UNKNOWN, UNQUOTED, PublishedFigure
+from wakewise_paper.reproduction.claim import CLAIMS, TABLES, UNKNOWN, UNMEASURED, UNQUOTED, PublishedFigure
 
 EVERY = [(name, claim) for name, claims in CLAIMS.items() for claim in claims]
 
@@ -48,7 +48,11 @@ def test_a_number_of_the_paper_is_finite_and_one_that_is_not_known_says_so(name,
 
 def test_the_figures_that_the_records_quote_are_among_them():
     """Values, with their method, as the paper's tables and sections have them."""
-    known = {(name, c.method, c.figure, c.than): c.paper for name, c in EVERY if c.paper is not None}
+    known = {
+        (name, c.method, c.figure, c.than): c.paper
+        for name, c in EVERY
+        if c.paper is not None and c.reading not in ("made_pct", "more_pct")
+    }
     rmse = {m: known["dynamic", m, "rmse_mm", None] for m in ("manual", "mpc", "mpc-smooth", "wake-aware")}
     assert rmse == {"manual": 8.7, "mpc": 4.3, "mpc-smooth": 2.8, "wake-aware": 1.9}
     assert known["dynamic", "wake-aware", "completeness_pct", None] == 94.8
@@ -79,6 +83,51 @@ def test_the_figures_that_the_records_quote_are_among_them():
     shares = 100.0 * (1.0 - 0.06 / 0.18)
     assert known["flow", "wake-aware", "piv_speed_m_s", "mpc"] == pytest.approx(shares, abs=0.5)
     assert UNKNOWN
+
+
+def _of(table, figure, **told):
+    """The only claim of a table with this figure and these fields."""
+    (found,) = (
+        c
+        for name, c in EVERY
+        if name == table and c.figure == figure and all(getattr(c, key) == value for key, value in told.items())
+    )
+    return found
+
+
+def test_results_that_are_stated_in_the_text_alone_are_among_them():
+    """Largest roll and pitch, silt, valid models and reductions as the paper words them, each with its section."""
+    most = [_of("station", "roll_pitch_max_deg", method=method) for method in ("wake-aware", "dp-paper")]
+    assert [c.paper for c in most] == [1.2, 2.1] and most[0].side == "less" and "Gentle Stability" in most[0].where
+    silt = _of("sediment", "rmse_mm", reading="more_pct")
+    assert (silt.paper, silt.side, silt.worlds, silt.against) == (40.0, "less", ("caco3",), "pump-tank")
+    made = {m: _of("dynamic", "rmse_mm", method=m, reading="made_pct") for m in ("manual", "mpc-smooth", "wake-aware")}
+    assert [c.paper for c in made.values()] == [0.0, 85.0, 100.0]
+    less = [_of("dynamic", "rmse_mm", than=than) for than in ("manual", "mpc")]
+    assert [c.paper for c in less] == [78.2, 55.0] and all(c.where for c in less)
+    assert _of("solver", "ms_mean", method="wake-aware").sd == 12.0
+    spread = {m: _of("dynamic", "rmse_mm", method=m, reading="mean", itt=False).sd for m in ("manual", "wake-aware")}
+    assert spread == {"manual": 3.2, "wake-aware": 0.4}
+
+
+@pytest.mark.parametrize(("name", "claim"), [pair for pair in EVERY if pair[1].paper is not None])
+def test_every_number_of_the_paper_has_its_table_or_section(name, claim):
+    """Or the figure that it stands in."""
+    assert any(word in claim.where for word in ("table", "section", "figure")), (name, claim.title)
+
+
+def test_results_without_a_measure_here_are_listed_with_the_reason():
+    """With value and place."""
+    assert UNMEASURED and all("section" in one or "figure" in one for one in UNMEASURED)
+    assert all("Not measured here: " in one for one in UNMEASURED)
+
+
+def test_the_baseline_is_the_method_that_the_paper_compares_with():
+    """A quoted difference has its own; what is held against another method here keeps the paper's."""
+    assert _of("dynamic", "rmse_mm", than="manual").baseline == "manual"
+    assert _of("station", "energy_kJ", than="dp").baseline == "dp-paper"
+    assert _of("sediment", "rmse_mm", reading="more_pct").baseline == "wake-aware in clear water"
+    assert _of("solver", "ms_mean", method="wake-aware").baseline is None
 
 
 def test_the_paper_is_named_where_readers_and_citers_look():

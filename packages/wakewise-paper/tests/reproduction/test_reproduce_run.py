@@ -83,6 +83,24 @@ def test_methods_of_one_table_do_not_hinder_another(tmp_path, campaign):
         reproduce(["station"], tmp_path, ReproduceOptions(methods=("magic",)))
 
 
+@pytest.mark.parametrize(
+    ("names", "methods", "words"),
+    [
+        (["station"], ("dp", "linear"), "--methods: 'linear' is not in table station, allowed: manual, dp-paper"),
+        (["flow", "field"], ("dp", "linear"), "'linear' is not in any of the tables flow, field, allowed: dp, mpc"),
+        (["station", "ablation"], ("linear",), "--methods: 'linear' is not in table station, allowed: manual"),
+        (["solver"], ("dp",), "--methods: 'dp' is not in table solver, it has no methods"),
+    ],
+)
+def test_a_method_that_does_not_fit_the_tables_is_refused_beside_one_that_does(
+    tmp_path, campaign, names, methods, words
+):
+    """What is wrong, where, and what would be right; nothing is made."""
+    with pytest.raises(InputError, match=words):
+        reproduce(names, tmp_path / "new", ReproduceOptions(methods=methods))
+    assert not (tmp_path / "new").exists() and campaign == []
+
+
 @pytest.mark.parametrize("options", [{"trials": 0}, {"budget_s": 0.0}])
 def test_what_cannot_be_is_refused(options):
     """No trials, no time."""

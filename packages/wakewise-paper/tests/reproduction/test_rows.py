@@ -124,3 +124,111 @@ def test_one_measurement_gives_rows_by_method_and_flow():
     assert (first["n"], first["met"], first["sure"]) == (200, False, False)
     assert first["low"] < 1.0 < first["high"]
     assert (second["target"], second["ours"], second["met"]) == ("oracle", -3.0, False)
+
+
+def pairs(n, ours, theirs, figure="rmse_mm"):
+    """Trials of two methods on n seeds, each value a function of the seed."""
+    return [made(who, k, {figure: of(k)}) for k in range(1, n + 1) for who, of in (("ours", ours), ("theirs", theirs))]
+
+
+LESS = {"than": "theirs", "paper": None, "asked": 0.0, "side": "more", "unit": "%"}
+
+
+def test_a_difference_whose_interval_contains_zero_is_not_met():
+    """Though its mean is on the right side."""
+    trials = pairs(20, lambda k: 2.0 + 0.5 * (-1) ** k - 0.05, lambda k: 2.0)
+    (row,) = rows_of([claim("less_pct", **LESS)], trials)
+    assert row["ours"] > 0.0 > row["low"] and row["n"] == 20
+    assert (row["met"], row["told_apart"]) == (False, False) and "contains zero" in row["why"]["met"]
+
+
+@pytest.mark.parametrize(
+    ("n", "sure", "told_apart", "preliminary"),
+    [(5, False, False, True), (6, True, True, True), (19, True, True, True), (20, True, True, False)],
+)
+def test_a_difference_needs_six_pairs_to_be_sure_and_twenty_not_to_be_preliminary(n, sure, told_apart, preliminary):
+    """However clear it is."""
+    trials = pairs(n, lambda k: 1.0 + 0.01 * k, lambda k: 2.0 + 0.01 * (k % 3))
+    (row,) = rows_of([claim("less_pct", **LESS)], trials)
+    assert (row["met"], row["n"]) == (True, n)
+    assert (row["sure"], row["told_apart"], row["preliminary"]) == (sure, told_apart, preliminary)
+
+
+def test_a_figure_that_is_no_difference_is_neither_told_apart_nor_preliminary():
+    """With the reason."""
+    (row,) = rows_of([claim()], pairs(3, lambda k: 1.0, lambda k: 2.0))
+    assert (row["told_apart"], row["preliminary"]) == (None, None)
+    assert "no difference" in row["why"]["told_apart"] and "no difference" in row["why"]["preliminary"]
+
+
+def test_a_figure_that_every_method_meets_says_so():
+    """One that a single other method misses, or of which a trial of it gave none, does not."""
+    (every,) = rows_of([claim()], pairs(3, lambda k: 1.0, lambda k: 1.9))
+    (one,) = rows_of([claim()], pairs(3, lambda k: 1.0, lambda k: 2.1))
+    (none,) = rows_of([claim()], [made("ours", 1, {"rmse_mm": 1.0}), made("theirs", 1, {"rmse_mm": None})])
+    (alone,) = rows_of([claim()], [made("ours", 1, {"rmse_mm": 1.0})])
+    assert [row["met_by_all"] for row in (every, one, none, alone)] == [True, False, False, None]
+    assert "no other method" in alone["why"]["met_by_all"]
+
+
+def test_a_difference_that_other_methods_have_as_well_says_so():
+    """The method that all are held against is not among them."""
+    third = [made("third", k, {"rmse_mm": 1.1 + 0.01 * k}) for k in range(1, 9)]
+    trials = [*pairs(8, lambda k: 1.0 + 0.01 * k, lambda k: 4.0), *third]
+    told = claim("less_pct", **LESS | {"paper": 60.0})
+    assert rows_of([told], trials)[0]["met_by_all"] is True
+    assert rows_of([claim("less_pct", **LESS | {"paper": 74.0})], trials)[0]["met_by_all"] is False
+    assert rows_of([told], trials[:16])[0]["met_by_all"] is None
+
+
+def test_planners_and_wake_models_are_held_against_each_other_too():
+    """In the same flow."""
+    figures = {"ours/tank/r2": 0.9, "theirs/tank/r2": 0.95, "ours/sea/r2": 0.9, "theirs/sea/r2": 0.1}
+    rows = once_rows([claim(figure="r2", paper=0.8, side="more")], figures)
+    assert {row["setup"]: row["met_by_all"] for row in rows} == {"flow tank": True, "flow sea": False}
+
+
+def test_a_row_has_baseline_source_and_set_up():
+    """The method that the paper compares with, its table or section, and the paper's own set-up or the world's name."""
+    told = claim(baseline="mpc", where="table Two", sd=0.4)
+    trials = {world: TableTrials([made("ours", 1, {"rmse_mm": 1.0}, world=world)]) for world in ("pump-tank", "reef")}
+    own, reef = table_rows([told], trials)
+    assert (own["baseline"], own["source"], own["paper_sd"]) == ("mpc", "table Two", 0.4)
+    assert (own["setup"], reef["setup"]) == ("the paper's own", "reef")
+    (bare,) = rows_of([claim()], [made("ours", 1, {"rmse_mm": 1.0})])
+    assert (bare["baseline"], bare["source"]) == (None, None) and bare["why"]["source"] and bare["why"]["baseline"]
+
+
+def silt_worlds(n, clear=1.0, silted=1.3):
+    """The same method in clear water and in silt, on n seeds; its target has another name in each."""
+    return {
+        world: TableTrials(
+            made("ours", k, {"rmse_mm": rmse * (1.0 + 0.01 * k)}, world=world, target=target) for k in range(1, n + 1)
+        )
+        for world, rmse, target in (("pump-tank", clear, "branching"), ("caco3", silted, "the world's"))
+    }
+
+
+MORE = {"paper": 40.0, "side": "less", "unit": "%", "against": "pump-tank", "worlds": ("caco3",)}
+
+
+def test_how_much_more_in_silt_is_over_the_same_seeds_in_clear_water():
+    """In that world alone, with its interval; less more than the paper's is met."""
+    (row,) = table_rows([claim("more_pct", **MORE)], silt_worlds(7))
+    assert (row["world"], row["n"], row["met"], row["sure"]) == ("caco3", 7, True, True)
+    assert row["ours"] == pytest.approx(30.0) and row["low"] == pytest.approx(30.0)
+    (worse,) = table_rows([claim("more_pct", **MORE)], silt_worlds(7, silted=1.5))
+    assert worse["met"] is False
+
+
+def test_without_clear_water_there_is_no_verdict_on_silt():
+    """And the row says which world is missing."""
+    (row,) = table_rows([claim("more_pct", **MORE)], {"caco3": silt_worlds(3)["caco3"]})
+    assert (row["ours"], row["met"]) == (None, None) and "pump-tank" in row["why"]["met"]
+
+
+def test_the_share_of_models_that_were_made_counts_failures():
+    """With an exact interval."""
+    trials = [made("ours", k, {"rmse_mm": 1.0}) for k in (1, 2, 3)] + [made("ours", 4, None, reason="fell over")]
+    (row,) = rows_of([claim("made_pct", paper=100.0, side="more", unit="%")], trials)
+    assert (row["ours"], row["n"], row["failed"], row["met"]) == (75.0, 4, 1, False)

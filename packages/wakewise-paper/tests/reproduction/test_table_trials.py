@@ -60,6 +60,14 @@ def test_worlds_and_targets_take_turns():
     ]
 
 
+def test_silt_has_the_same_coral_and_method_in_clear_water_beside_it():
+    """What differs is the silt alone."""
+    clear, silted, _ = blocks_of("sediment", TableRequest(trials=1))
+    fields = [dict(block[0].task.settings["scenario"]) for block in (clear, silted)]
+    assert fields[1].pop("tank.silt.kind") == "caco3-50mg"
+    assert fields[0] == fields[1] and (clear[0].world, silted[0].world) == ("pump-tank", "caco3")
+
+
 def test_wishes_narrow_a_table():
     """Worlds, methods and targets by name; what cannot be flown in the world of nothing stays."""
     wish = TableRequest(trials=1, worlds=("reef",), methods=("mpc-smooth",), targets=("plate",))

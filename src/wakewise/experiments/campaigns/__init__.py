@@ -6,7 +6,7 @@ keeps. - `study.py`: a campaign whose trials a program lists. - `task.py`: one t
 outcome. `store.py`: the folder of a campaign. - `run.py`: the driver's loop. `engines.py`: processes of this computer,
 or a Dask cluster. - `worker.py`: the process that makes trials. `worker_process.py`: starts and watches it. -
 `trial_lock.py`: which process has a trial. `attempt_log.py`: how often it was tried, and how that ended. - `index.py`:
-a cache of all folders. `table.py`: means with intervals. `summary.py`: which method is best, and how sure. -
+a cache of all folders. `table.py`: means with intervals. `summary.py`: the first method against the next best. -
 `statistics.py`: intervals, paired tests, corrections, sample sizes.
 """
 

@@ -77,12 +77,12 @@ def open_store(folder: Path) -> CampaignStore:
     """
     path = folder / _STORE
     if folder.exists() and not folder.is_dir():
-        raise InputError(f"--out {folder}: is a file, must be a folder or not exist")
+        raise InputError(f"{folder}: is a file, must be a folder or not exist")
     if not path.exists():
         # Another driver may be opening it at this moment.
         own = {_STORE, _TRIALS}
         if folder.exists() and any(not e.name.startswith(".") and e.name not in own for e in folder.iterdir()):
-            raise InputError(f"--out {folder}: holds something that is no campaign; give another --out")
+            raise InputError(f"{folder}: holds something that is no campaign; give another folder")
         (folder / _TRIALS).mkdir(parents=True, exist_ok=True)
         write_json(path, {"format": FORMAT}, lasting=True)
     return read_store(folder)
@@ -101,7 +101,7 @@ def read_store(folder: Path) -> CampaignStore:
     except (OSError, ValueError, KeyError, TypeError):
         raise InputError(f"{path}: cannot be read, must say the format of the campaign's folder") from None
     if told != FORMAT:
-        raise InputError(f"{folder}: results of format {told}, this Wakewise reads {FORMAT}; give another --out")
+        raise InputError(f"{folder}: results of format {told}, this Wakewise reads {FORMAT}; give another folder")
     return CampaignStore(folder)
 
 

@@ -1,4 +1,4 @@
-"""Methods compared at a glance: who won, by how much, how sure, at what price, where it failed.
+"""Methods compared at a glance: the first against the next best, by how much, from how many pairs, at what cost.
 
 What of a campaign is compared with what: methods in each world, or whatever else its trials differ in.
 """
@@ -25,16 +25,19 @@ Place = Mapping[str, Any]
 
 
 FEWEST = 6
-"""Pairs from which on a difference can be sure: five all agree by chance alone once in sixteen times."""
+"""Pairs from which on a difference can be told apart from none: five agree by chance alone once in sixteen times."""
+ENOUGH = 20
+"""Pairs from which on a difference is no longer preliminary."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MethodSummary:
     """Methods in one world in a few words.
 
-    `means` are in the unit of `words`, worst last; `less_pct` is how much better the winner is than `rival`, the best
-    of the others, with its interval; `energy_ratio` what it costs over the rival, `silt_ratio` the silt between camera
-    and target over the rival's; `failed` counts trials by method.
+    `means` are in the unit of `words`, worst last; `winner` has the best mean and `rival` the next best. `less_pct` is
+    how much better the winner is in percent, with its interval: how much less where `less_is_better`, else how much
+    more. `energy_ratio` is what it costs over the rival, `silt_ratio` the silt between camera and target over the
+    rival's; `failed` counts trials by method.
     """
 
     world: str
@@ -51,6 +54,7 @@ class MethodSummary:
     failed: dict[str, int]
     trials: int
     silt_ratio: float | None = None
+    less_is_better: bool = True
 
     @property
     def is_sure(self) -> bool:
@@ -59,16 +63,14 @@ class MethodSummary:
 
     @property
     def sure(self) -> str:
-        """How sure the winner is, in words."""
+        """What the pairs show of the difference, in words."""
         if self.rival is None:
             return "there was no other method"
-        if self.trials < 2:
-            return "one trial each: no interval"
         if self.trials < FEWEST:
-            return f"{self.trials} pairs are too few to be sure"
+            return f"too few pairs ({self.trials})"
         if not self.is_sure:
-            return "undecided, the interval holds zero"
-        return "sure, the interval does not hold zero"
+            return "not told apart"
+        return "told apart" if self.trials >= ENOUGH else f"told apart, preliminary (n < {ENOUGH})"
 
 
 def summarize(measure: ComparisonMetric, world: str, places: Sequence[Place]) -> MethodSummary | None:
@@ -116,6 +118,7 @@ def summarize(measure: ComparisonMetric, world: str, places: Sequence[Place]) ->
         rival=rival,
         failed=failed,
         trials=len(both),
+        less_is_better=less,
         **told,
     )
 

@@ -129,6 +129,7 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "estimate_rmse_mm": ("mm", "distance of the estimated vehicle from the true one", "less"),
     "velocity_deviation_pct": ("%", "rms difference of true and wished velocity over the rms wished velocity", "less"),
     "roll_pitch_rms_deg": ("deg", "rms error in roll and pitch", "less"),
+    "roll_pitch_max_deg": ("deg", "largest error in roll or pitch at any step", "less"),
     "attitude_rmse_deg": ("deg", "rms angle between true and wished attitude", "less"),
     "energy_kJ": ("kJ", "electrical energy of the thrusters", "less"),
     "sign_flips_per_s": ("1/s", "reversals of thrust, all thrusters together, per second", "less"),

@@ -173,7 +173,7 @@ def make_page(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Write a page that says who won, by how much, how sure, at what price, and shows where it failed."""
+    """Write a page: the first method against the next best, with pairs, interval and cost, and where trials failed."""
     from dataclasses import asdict
 
     from wakewise.core.optional_dependencies import need

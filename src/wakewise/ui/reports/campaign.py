@@ -1,4 +1,4 @@
-"""A campaign on one page: who won, by how much, how sure, at what price, where it failed."""
+"""A campaign on one page: the first method against the next best, from how many pairs, at what cost; failures."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 from wakewise.core.files import write_text
 from wakewise.experiments.campaigns.summary import (
+    ENOUGH,
     FEWEST,
     MethodSummary,
     Place,
@@ -73,9 +74,11 @@ def _title(judged: Sequence[tuple[ComparisonMetric, MethodSummary]], compared: s
     wins = Counter(one.winner for one in leading if one.rival is not None and one.is_sure)
     what = leading[0].words
     if not wins:
-        return f"No {compared} is surely best in any of {len(leading)} settings ({what})."
+        return f"No {compared} is told apart from the next best in any of {len(leading)} settings ({what})."
     winner, count = wins.most_common(1)[0]
-    return f"{winner} is surely best in {count} of {len(leading)} settings ({what})."
+    few = any(one.is_sure and one.winner == winner and one.trials < ENOUGH for one in leading)
+    preliminary = f", preliminary (n < {ENOUGH})" if few else ""
+    return f"{winner} is ahead of the next best in {count} of {len(leading)} settings ({what}){preliminary}."
 
 
 def _cost(judged: Sequence[tuple[ComparisonMetric, MethodSummary]]) -> str:
@@ -86,13 +89,13 @@ def _cost(judged: Sequence[tuple[ComparisonMetric, MethodSummary]]) -> str:
 def _glance(judged: Sequence[tuple[ComparisonMetric, MethodSummary]], compared: str) -> str:
     if not judged:
         why = f"no seed has ended with every {compared}"
-        return section("glance", "At a glance", "", missing("who won", why))
+        return section("glance", "At a glance", "", missing("the comparison", why))
     rows = [(one.words, one.world, winner_text(one), _chance(one), cost_text(one), one.trials) for _, one in judged]
-    heads = ("judged by", "where", "who won, by how much, how sure", "chance", "at what price", "pairs")
+    heads = ("judged by", "where", "first and next best, difference", "chance", "at what cost", "pairs")
     lead = (
         "Over the seeds and targets that all have; a model that was not made counts as the worst. Chance: how likely a "
-        "trial of the winner beats one of the next best. Each line is a test of its own: of twenty, one is sure by "
-        "accident."
+        "trial of the first beats one of the next best. Each line is a test of its own: of twenty, one tells apart by "
+        "chance."
     )
     return section("glance", "At a glance", lead, parts().table("tttttn", heads, rows, "glance"))
 
@@ -113,7 +116,7 @@ def _plots(ended: list[Place]) -> str:
     profile = None if leading is None else profiles(leading, ended)
     if leading is not None and profile is not None:
         narrow = profiles(leading, ended, narrow=True)
-        caption = "Share of trials that are at least so good; the curve that rises first is the better one."
+        caption = "Share of trials whose figure is at most that of the axis."
         plots.append(plot(profile, "performance profiles", caption, narrow=narrow))
     content = "".join(plots) or missing("plots", "no trial gave an error of the model or a speed of the water")
     return section("plots", "Trial by trial", "", content)

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from wakewise.experiments.campaigns.pictures import MODEL, photographs_of
 from wakewise.experiments.campaigns.statistics import mean_interval, performance_profile
-from wakewise.experiments.campaigns.summary import MethodSummary, Place, worst_trials
+from wakewise.experiments.campaigns.summary import ENOUGH, FEWEST, MethodSummary, Place, worst_trials
 from wakewise.experiments.campaigns.table import ComparisonMetric
 from wakewise.ui.reports.figures import NARROW_IN, WIDTH_IN
 from wakewise.ui.reports.page import error_scale, panel, parts, pictures, template
@@ -32,7 +32,7 @@ from wakewise.ui.reports.svg_style import (
     new_figure,
     style_axes,
 )
-from wakewise.ui.reports.text import number, percent
+from wakewise.ui.reports.text import number, percent, with_unit
 from wakewise.ui.reports.views import SIDES, ViewBounds, draw_cloud
 
 Row = Mapping[str, Any]
@@ -67,35 +67,34 @@ def colours_of(methods: Sequence[str]) -> dict[str, str]:
 
 
 def winner_text(glance: MethodSummary) -> str:
-    """Who won, by how much, how sure; nobody where the interval of the difference holds zero or pairs are few."""
+    """The method with the best mean against the next best; neither is ahead where the pairs do not tell them apart."""
     value = number(glance.means[glance.winner])
     if glance.rival is None:
         return f"{glance.winner}: {value} {glance.words}."
     if glance.means[glance.winner] == glance.means[glance.rival]:
         return f"{glance.winner} and {glance.rival} are even: {value} {glance.words} each."
+    much, ends = percent(glance.less_pct, glance.interval_pct, more=not glance.less_is_better)
+    ends = with_unit(ends.strip("()"))
+    pairs = f"{glance.trials} {'pair' if glance.trials == 1 else 'pairs'}"
     if not glance.is_sure:
         both = f"{glance.winner} {value}, {glance.rival} {number(glance.means[glance.rival])} {glance.words}"
-        much = f", {_better(glance)} apart" if glance.less_pct is not None else ""
-        apart = glance.interval_pct is not None and glance.interval_pct[0] > 0.0
-        head = f"{glance.winner} came out better" if apart else "no difference shown"
-        return f"{head}: {both}{much}; {glance.sure}."
-    said = f"{glance.winner} is best with {value} {glance.words}"
-    if glance.less_pct is not None:
-        said += f", {_better(glance)} better than {glance.rival}"
-    return f"{said}; {glance.sure}."
-
-
-def _better(glance: MethodSummary) -> str:
-    return " ".join(part for part in percent(glance.less_pct, glance.interval_pct, more=True) if part)
+        head = "too few pairs" if glance.trials < FEWEST else "not told apart"
+        return f"{head}: {both} ({pairs}; {f'interval {ends}' if ends else 'no interval'})."
+    link = "as" if much.endswith("as much") else "less than" if glance.less_is_better else "more than"
+    preliminary = f", preliminary (n < {ENOUGH})" if glance.trials < ENOUGH else ""
+    return (
+        f"{glance.winner}: {value} {glance.words}, {much} {link} {glance.rival} "
+        f"({pairs}; interval {ends}){preliminary}."
+    )
 
 
 def cost_text(glance: MethodSummary) -> str:
-    """What the winner costs, and where trials failed."""
+    """What the method with the best mean costs, and where trials failed."""
     said = []
     if glance.energy_ratio is not None:
         alike = abs(glance.energy_ratio - 1.0) < _ALIKE
         much = "as much energy as" if alike else f"{number(glance.energy_ratio)} times the energy of"
-        said.append(f"It takes {much} {glance.rival}.")
+        said.append(f"{glance.winner} takes {much} {glance.rival}.")
     if glance.silt_ratio is not None and abs(glance.silt_ratio - 1.0) >= _ALIKE:
         said.append(f"Silt between camera and target: {number(glance.silt_ratio)} times that of {glance.rival}.")
     lost = {method: count for method, count in glance.failed.items() if count}

@@ -140,22 +140,29 @@ def fixed(value: float | None, places: int, *, scale: float = 1.0, sign: bool = 
 
 
 TIMES = 3.0
-"""Factor from which on a difference is told as one, and no longer in percent."""
+"""Factor beyond which a difference is given as a ratio, and no longer in percent: below a third, or above three."""
+_ROUNDING = 1e-9
 
 
 def percent(value: float | None, ends: tuple[float, float] | None = None, *, more: bool = False) -> tuple[str, str]:
-    """A difference in percent with its interval, "31.0 %" and "(26.0 to 35.0)"; of more than a factor of 3 as that.
+    """A difference with its interval: "31 %" and "(26 to 35)"; beyond a factor of 3 "0.12 times as much" and its ends.
 
-    `value` is how much less in percent, or how much more where `more`, of which -200 % less is 3 times as much.
+    `value` is how much less in percent, or how much more where `more`. Value and interval have one form: where one of
+    them is beyond the factor, all are ratios.
     """
     if value is None:
         return NONE, ""
     known = [value, *(ends or ())]
     ratios = [1.0 + one / 100.0 if more else 1.0 - one / 100.0 for one in known]
-    if max(ratios) <= TIMES:
+    if min(ratios) >= 1.0 / TIMES - _ROUNDING and max(ratios) <= TIMES + _ROUNDING:
         return f"{number(value)} %", "" if ends is None else f"({number(ends[0])} to {number(ends[1])})"
     inside = "" if ends is None else f"({number(min(ratios[1:]))} to {number(max(ratios[1:]))} times)"
-    return f"{number(ratios[0])} times{'' if more else ' as much'}", inside
+    return f"{number(ratios[0])} times as much", inside
+
+
+def with_unit(ends: str) -> str:
+    """The interval of a difference that stands by itself: in percent where it is no ratio."""
+    return f"{ends} %" if ends and not ends.endswith("times") else ends
 
 
 def duration(seconds: float | None) -> str:

@@ -68,11 +68,10 @@ def velocity_deviation_pct(true_WB_q: Array, true_B_m_s: Array, goal_WB_q: Array
     return 100.0 * rms(np.linalg.norm(true_W - goal_W, axis=1)) / goal if goal > 1e-6 else None
 
 
-def roll_pitch_rms_deg(true_WB_q: Array, goal_WB_q: Array) -> float:
-    """RMS in degrees over the roll errors and the pitch errors of all steps together."""
+def roll_pitch_errors_deg(true_WB_q: Array, goal_WB_q: Array) -> Array:
+    """Errors in roll and pitch in degrees, shape (n, 2), between -180 and 180; quaternions (w, x, y, z), (n, 4)."""
     error = euler_from_quat(true_WB_q)[:, :2] - euler_from_quat(goal_WB_q)[:, :2]
-    wrapped = (error + np.pi) % (2 * np.pi) - np.pi
-    return float(np.degrees(rms(wrapped)))
+    return np.asarray(np.degrees((error + np.pi) % (2 * np.pi) - np.pi))
 
 
 def attitude_rmse_deg(true_WB_q: Array, goal_WB_q: Array) -> float:
@@ -212,6 +211,7 @@ def _tracking(steps: pl.DataFrame, time_s: Array) -> dict[str, float | int | Non
             "tracking_rmse_mm",
             "velocity_deviation_pct",
             "roll_pitch_rms_deg",
+            "roll_pitch_max_deg",
             "attitude_rmse_deg",
         )
     )
@@ -228,7 +228,9 @@ def _tracking(steps: pl.DataFrame, time_s: Array) -> dict[str, float | int | Non
         out["tracking_rmse_mm"] = 1e3 * rms(np.linalg.norm(est - goal, axis=1))
     q_true, q_goal = turn["true"], turn["goal"]
     if q_true is not None and q_goal is not None:
-        out["roll_pitch_rms_deg"] = roll_pitch_rms_deg(q_true, q_goal)
+        errors = roll_pitch_errors_deg(q_true, q_goal)
+        out["roll_pitch_rms_deg"] = rms(errors)
+        out["roll_pitch_max_deg"] = float(np.abs(errors).max())
         out["attitude_rmse_deg"] = attitude_rmse_deg(q_true, q_goal)
         if speed["true"] is not None and speed["goal"] is not None:
             out["velocity_deviation_pct"] = velocity_deviation_pct(q_true, speed["true"], q_goal, speed["goal"])

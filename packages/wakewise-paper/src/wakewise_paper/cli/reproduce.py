@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, interval, print_json, print_table, write_page
+from wakewise.ui.cli.console import ProgressBars, print_json, print_table, write_page
 from wakewise.ui.cli.options import Json
 
 _UNITS = {"s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
@@ -123,36 +123,33 @@ def seconds(option: str, text: str) -> float:
 
 def show_table(table: dict[str, Any]) -> None:
     """Rows as people read them: paper, ours, interval, met or not."""
+    from wakewise_paper.reports.reproduction import sentences
+
     counted = f"{table['made']} trials, {table['failed']} failed" if table["made"] else "not made"
-    columns = ("world", "method", "target", "figure", "paper", "ours", "95 %", "n", "unit", "met")
+    columns = ("world", "method", "target", "figure", "paper", "ours", "95 %", "n", "verdict")
     rows = [
         (
             row["world"],
             row["method"],
             row["target"] or "all",
             row["figure"],
-            row["paper"],
-            row["ours"],
-            interval(row["low"], row["high"]),
+            sentences.quoted(row),
+            row.get("our_order") or sentences.our_value(row),
+            sentences.interval(row),
             row["n"],
-            row["unit"],
-            _verdict(row),
+            sentences.verdict(row),
         )
         for row in table["rows"]
     ]
-    print_table("ttttnnnntt", columns, rows, f"{table['table']}: {table['title']} ({counted})")
+    print_table("ttttnnnnt", columns, rows, f"{table['table']}: {table['title']} ({counted})")
+    if table["rows"]:
+        typer.echo(sentences.met_of({table["table"]: table["rows"]}))
     for failure in table["failures"]:
         typer.echo(f"failed: {failure['trial']}: {failure['reason']}")
     if table["left_undone"]:
         typer.echo(f"{table['left_undone']} trials had no room in the budget; the same command goes on")
     for reason in table["why"].values():
         typer.echo(reason)
-
-
-def _verdict(row: dict[str, Any]) -> str:
-    if row["met"] is None:
-        return ""
-    return ("yes" if row["met"] else "no") + ("" if row["sure"] is not False else ", unsure")
 
 
 def _told(table: dict[str, Any]) -> dict[str, Any]:

@@ -1,11 +1,11 @@
-"""What the paper says (`published.yaml`), what each of its tables is judged by, and how many of its figures are met.
+"""What the paper says (`published.yaml`), what each of its tables is judged by, and how many figures are met where.
 
 A number that the paper does not give, or that is not quoted, is None and said so, never guessed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from typing import Any, Literal
@@ -14,9 +14,12 @@ from wakewise.core.safe_yaml import read_yaml
 from wakewise.experiments.campaigns.summary import MethodSummary, Place, summarize
 from wakewise.experiments.campaigns.table import ComparisonMetric
 
-Reading = Literal["mean", "less_pct", "share_pct", "order", "spread_pct"]
-"""What is made of the trials: their mean; how much less than another method's, in percent; the share that succeeded;
-the order of the methods; how much repeats of one thing differ (coefficient of variation)."""
+Reading = Literal["mean", "less_pct", "more_pct", "share_pct", "made_pct", "order", "spread_pct"]
+"""What is made of the trials: their mean; how much less than another method's, or more than in another world, in
+percent; the share that succeeded, or that gave the figure; the order of the methods; how much repeats of one thing
+differ (coefficient of variation)."""
+DIFFERENCES: tuple[Reading, ...] = ("less_pct", "more_pct", "order")
+"""Readings that compare pairs: their number decides what can be said."""
 Side = Literal["less", "more", "none"]
 
 TABLES: dict[str, str] = {
@@ -46,8 +49,10 @@ class PublishedFigure:
     it is not known here; `where` is its section or table; `said` is the claim in words. `side` is which side of the
     paper's value, or of `asked`, is as good: at most ("less"), at least ("more"); "none" where the figure only says how
     it was. `asked` is what is asked where the paper's number is not known but its direction is; `than` names the method
-    of a "less_pct". `scale` is from the trial's unit to this one; `how` is how it is measured here. `itt`: trials that
-    failed count as the worst; else they are left out, as in the paper.
+    of a "less_pct", `against` the world of a "more_pct". `scale` is from the trial's unit to this one; `how` is how it
+    is measured here. `itt`: trials that failed count as the worst; else they are left out, as in the paper. `sd` is
+    the paper's standard deviation, `baseline` the method that the paper compares with. `worlds` are those in which the
+    claim can be judged; all where there is none.
     """
 
     method: str
@@ -62,8 +67,12 @@ class PublishedFigure:
     asked: float | None = None
     than: str | None = None
     reading: Reading = "mean"
+    against: str | None = None
     scale: float = 1.0
     itt: bool = False
+    sd: float | None = None
+    baseline: str | None = None
+    worlds: tuple[str, ...] = ()
 
     @property
     def bar(self) -> float | None:
@@ -80,8 +89,11 @@ class PublishedFigure:
 def read_claims(tree: Mapping[str, Any]) -> dict[str, tuple[PublishedFigure, ...]]:
     """Claims by table, from the values of `published.yaml`, which says how they are written."""
     hows: Mapping[str, str] = tree["hows"]
+    baselines: Mapping[str, str] = tree["baselines"]
     return {
-        table: tuple(_claim(one, hows, tree["unquoted"]) for entry in entries for one in _expanded(entry))
+        table: tuple(
+            _claim(one, hows, tree["unquoted"], baselines.get(table)) for entry in entries for one in _expanded(entry)
+        )
         for table, entries in tree["tables"].items()
     }
 
@@ -98,7 +110,7 @@ def _expanded(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _claim(entry: Mapping[str, Any], hows: Mapping[str, str], unquoted: str) -> PublishedFigure:
+def _claim(entry: Mapping[str, Any], hows: Mapping[str, str], unquoted: str, baseline: str | None) -> PublishedFigure:
     told: dict[str, Any] = {"method": "wake-aware", "unit": "", "side": "none", "said": unquoted, "paper": None}
     told |= {key: value for key, value in entry.items() if value is not None}
     told["how"] = hows.get(told["how"], told["how"])
@@ -108,6 +120,8 @@ def _claim(entry: Mapping[str, Any], hows: Mapping[str, str], unquoted: str) -> 
         told |= {"title": f"{told['title']}, less than {than}", "unit": "%", "reading": "less_pct"}
         told["how"] = f"{told['how']}; ratio of the means over pairs of one seed"
         told["side"] = "none" if told.get("paper") is None and told.get("asked") is None else "more"
+    quoted_than = than if told["paper"] is not None else None
+    told = {"baseline": quoted_than or baseline} | told | {"worlds": tuple(told.get("worlds", ()))}
     return PublishedFigure(**told)
 
 
@@ -115,8 +129,12 @@ _PUBLISHED = read_yaml((resources.files("wakewise_paper.reproduction") / "publis
 CLAIMS = read_claims(_PUBLISHED)
 """By table; `comparison` has none, since the paper's cells are words, which are not quoted here."""
 UNQUOTED: str = _PUBLISHED["unquoted"]
+UNMEASURED: tuple[str, ...] = tuple(
+    "{what}: {said} ({where}). Not measured here: {why}".format(**one) for one in _PUBLISHED["unmeasured"]
+)
+"""Results that the paper states and that no table of ours measures, and why."""
 UNKNOWN: tuple[str, ...] = tuple(_PUBLISHED["unknown"])
-"""What of the paper is not known here, or measures something else than our tables do."""
+"""What of the paper is not known here, or does not agree with another place in it."""
 
 JUDGED = {
     "dynamic": ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True),
@@ -141,30 +159,60 @@ def glances(table: str, places: Sequence[Place]) -> list[MethodSummary]:
 
 
 CIRCULAR = ("paper",)
-"""Worlds whose water is the planner's own model: what is met there alone is told apart."""
+"""Worlds whose water is the planner's own model: what is met there is told apart."""
 SETUP = "pump-tank"
 """The world that is the paper's own set-up: its tank, with the water that pumps move."""
+OWN_SETUP = "the paper's own"
+"""What a row of that world has as its `setup`."""
+NO_FLIGHT = "no flight"
+"""The `setup` of what is computed without one."""
 
 
-def count_met(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, int]:
-    """How many of the figures that the paper quotes are met, each counted once, however many worlds or flows it has.
+def setup_of(world: str, flow: str | None) -> str:
+    """The set-up of a row: the paper's own, the name of a world or of a flow that wake models are held against."""
+    if world == "-":
+        return NO_FLIGHT if flow is None else f"flow {flow}"
+    return OWN_SETUP if world == SETUP else world
 
-    `quoted`: figures with a value of the paper and one of ours; `met`: in some world that is not circular; `surely`:
-    there with the whole interval on that side; `circular`: in a circular world alone; `own`, `own_judged`: in the
-    paper's own set-up, and those that have a value there; `worlds`: those that are judged in a world at all.
+
+@dataclass(frozen=True, kw_only=True)
+class SetupTally:
+    """How many of the paper's figures are met in one set-up.
+
+    `judged`: figures with a value of the paper and one of ours. Of those that are `met`, `surely` have the whole
+    interval on that side, `by_all` are met by every method here and so say nothing of one, and `preliminary` are
+    differences of fewer than `ENOUGH` pairs.
     """
-    found: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
-    for name, rows in tables.items():
-        for row in rows:
-            if row["paper"] is not None and row["met"] is not None:
-                found.setdefault((name, row["method"], row["figure"]), []).append(row)
-    fair = {key: [row for row in rows if row["met"] and row["world"] not in CIRCULAR] for key, rows in found.items()}
-    return {
-        "quoted": len(found),
-        "met": sum(bool(rows) for rows in fair.values()),
-        "surely": sum(any(row["sure"] for row in rows) for rows in fair.values()),
-        "own": sum(any(row["met"] and row["world"] == SETUP for row in rows) for rows in found.values()),
-        "own_judged": sum(any(row["world"] == SETUP for row in rows) for rows in found.values()),
-        "worlds": sum(any(row["world"] != "-" for row in rows) for rows in found.values()),
-        "circular": sum(not fair[key] and any(row["met"] for row in rows) for key, rows in found.items()),
-    }
+
+    setup: str
+    judged: int
+    met: int
+    surely: int
+    by_all: int
+    preliminary: int
+
+
+def tallies(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[SetupTally]:
+    """One for each set-up in which a figure is judged: the paper's own first, circular worlds last."""
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for row in (row for rows in tables.values() for row in rows):
+        if row["paper"] is not None and row["met"] is not None:
+            found.setdefault(row["setup"], []).append(row)
+    return [_tally(setup, found[setup]) for setup in setups(found)]
+
+
+def setups(names: Iterable[str]) -> list[str]:
+    """Set-ups in the order of reports: the paper's own first, then worlds by name as they come, circular ones last."""
+    return sorted(dict.fromkeys(names), key=lambda name: (name != OWN_SETUP, name in CIRCULAR))
+
+
+def _tally(setup: str, rows: Sequence[Mapping[str, Any]]) -> SetupTally:
+    met = [row for row in rows if row["met"]]
+    return SetupTally(
+        setup=setup,
+        judged=len(rows),
+        met=len(met),
+        surely=sum(bool(row["sure"]) for row in met),
+        by_all=sum(bool(row["met_by_all"]) for row in met),
+        preliminary=sum(bool(row["preliminary"]) for row in met),
+    )

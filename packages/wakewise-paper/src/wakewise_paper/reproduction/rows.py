@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,9 @@ from wakewise.experiments.campaigns.statistics import (
     probability_of_improvement,
     share_interval,
 )
-from wakewise.experiments.campaigns.summary import by_target
+from wakewise.experiments.campaigns.summary import ENOUGH, FEWEST, by_target
 from wakewise.experiments.campaigns.task import TrialOutcome
-from wakewise_paper.reproduction.claim import ORDER, PublishedFigure
+from wakewise_paper.reproduction.claim import DIFFERENCES, ORDER, PublishedFigure, setup_of
 from wakewise_paper.reproduction.table_trials import NOWHERE
 
 Row = dict[str, Any]
@@ -34,6 +34,8 @@ Known = tuple[str, int]
 
 ORDER_DRAWS = 4000
 """Draws of the bootstrap that says how often the means stand in the paper's order."""
+ORDER_SURE_PCT = 95.0
+"""Share of these draws from which on the order is sure."""
 NOT_MADE = "not finished"
 """What a campaign says of a trial that it has not come to, or was stopped at."""
 
@@ -92,14 +94,16 @@ def table_rows(claims: Sequence[PublishedFigure], worlds: Mapping[str, TableTria
     for world, trials in worlds.items():
         here: list[Row] = []
         for claim in claims:
+            if claim.worlds and world not in claim.worlds:
+                continue
             if claim.method not in trials.methods and claim.reading != "order":
                 continue
             if claim.than is not None and claim.than not in trials.methods:
                 continue
-            row = _READ[claim.reading](claim, trials)
+            row = _read(claim, trials, worlds)
             if row is None:
                 continue
-            here.append(_whole(claim, world, None, row))
+            here.append(_whole(claim, world, None, row, _others(claim, trials, worlds)))
             targets = trials.targets(claim.method)
             if claim.reading == "mean" and len(targets) > 1 and not claim.itt:
                 here += [
@@ -110,6 +114,21 @@ def table_rows(claims: Sequence[PublishedFigure], worlds: Mapping[str, TableTria
         _correct(here)
         rows += here
     return rows
+
+
+def _read(claim: PublishedFigure, trials: TableTrials, worlds: Mapping[str, TableTrials]) -> Row | None:
+    if claim.reading == "more_pct":
+        return _more_pct(claim, trials, worlds.get(claim.against or ""))
+    return _READ[claim.reading](claim, trials)
+
+
+def _others(claim: PublishedFigure, trials: TableTrials, worlds: Mapping[str, TableTrials]) -> list[float | None]:
+    """The figure of a claim of every other method here; none where nothing is asked of it."""
+    if claim.bar is None or claim.side == "none":
+        return []
+    others = (method for method in trials.methods if method not in (claim.method, claim.than))
+    rows = (_read(replace(claim, method=method), trials, worlds) for method in others)
+    return [None if row is None else row["ours"] for row in rows]
 
 
 def once_rows(claims: Sequence[PublishedFigure], figures: Mapping[str, Any], world: str = NOWHERE) -> list[Row]:
@@ -126,18 +145,40 @@ def once_rows(claims: Sequence[PublishedFigure], figures: Mapping[str, Any], wor
                 found["why"] = "the data do not reach it"
             if not between:
                 found |= _counted(claim, figures)
-            rows.append(_whole(claim, world, target, found))
+            others = [other for name, other in figures.items() if name.split("/")[1:] == key.split("/")[1:]]
+            rows.append(_whole(claim, world, target, found, others if len(others) > 1 else ()))
     return rows
 
 
-def _whole(claim: PublishedFigure, world: str, target: str | None, found: Row, quoted: bool = True) -> Row:
-    """A row with all its keys; of a part of what the paper's figure is about, no paper's figure."""
-    ours, low, high = found["ours"], found["low"], found["high"]
+def _whole(
+    claim: PublishedFigure,
+    world: str,
+    target: str | None,
+    found: Row,
+    others: Sequence[float | None] = (),
+    quoted: bool = True,
+) -> Row:
+    """A row with all its keys; of a part of what the paper's figure is about, no paper's figure.
+
+    `others` has the same figure of the other methods there.
+    """
+    ours, low, high, n = found["ours"], found["low"], found["high"], found["n"]
     met = found.pop("met") if "met" in found else claim.met(ours) if quoted else None
-    sure = None
+    by_all = None if met is None or not others else met and all(bool(claim.met(value)) for value in others)
+    sure = found.pop("sure", None)
     if met is not None and low is not None and high is not None and claim.bar is not None:
         worst = high if (claim.side == "less") == met else low
         sure = claim.met(worst) == met
+    of_pairs = claim.reading in DIFFERENCES and ours is not None
+    known = low is not None and high is not None
+    holds_zero = known and low <= 0.0 <= high
+    apart = known and not holds_zero and n >= FEWEST if of_pairs and claim.reading != "order" else None
+    # No method is less than another where the interval of the difference contains zero.
+    unshown = claim.reading == "less_pct" and bool(met) and holds_zero
+    if unshown:
+        met, sure, by_all = False, False, None if by_all is None else False
+    if of_pairs and met is not None and n < FEWEST:
+        sure = False
     row: Row = {
         "method": claim.method,
         "target": target,
@@ -159,11 +200,27 @@ def _whole(claim: PublishedFigure, world: str, target: str | None, found: Row, q
         "failed": found["failed"],
         "sure": sure,
         "how": claim.how,
+        "met_by_all": by_all,
+        "baseline": claim.baseline,
+        "source": claim.where or None,
+        "setup": setup_of(world, target if world == NOWHERE else None),
+        "told_apart": apart,
+        "preliminary": n < ENOUGH if of_pairs else None,
+        "paper_sd": claim.sd if quoted else None,
     }
     row |= {key: value for key, value in found.items() if key not in row}
     why = {} if "why" not in row else {"ours": row.pop("why")}
     if low is None:
-        why["low"] = why["high"] = _without_interval(claim, found["n"])
+        why["low"] = why["high"] = _without_interval(claim, n)
+    if unshown:
+        why["met"] = "the pairs do not tell the methods apart: the interval contains zero"
+    if by_all is None:
+        why["met_by_all"] = "not judged" if met is None else "there is no other method to hold it against"
+    if apart is None:
+        why["told_apart"] = "no difference of two methods or worlds"
+    if not of_pairs:
+        why["preliminary"] = "no difference of pairs"
+    why |= {key: "the paper has none here" for key in ("baseline", "source", "paper_sd") if row[key] is None}
     if row["paper"] is None:
         why["paper"] = row["paper_says"]
     if met is None:
@@ -174,7 +231,7 @@ def _whole(claim: PublishedFigure, world: str, target: str | None, found: Row, q
 def _without_interval(claim: PublishedFigure, n: int) -> str:
     if n == 1:
         return "a single trial has no interval"
-    return "too few pairs for their spread" if claim.reading == "less_pct" else "not an estimate"
+    return "too few pairs for their spread" if claim.reading in ("less_pct", "more_pct") else "not an estimate"
 
 
 def _mean(claim: PublishedFigure, trials: TableTrials, target: str | None = None) -> Row | None:
@@ -217,6 +274,32 @@ def _less_pct(claim: PublishedFigure, trials: TableTrials) -> Row | None:
     }
 
 
+def _more_pct(claim: PublishedFigure, trials: TableTrials, other: TableTrials | None) -> Row | None:
+    """How much more than the same method in another world, over the seeds that both have."""
+    here = trials.values(claim.method, claim.figure)
+    there = {} if other is None else other.values(claim.method, claim.figure)
+    if not set(here) & set(there):  # a target has another name where it is the world's own
+        here, there = ({("", seed): value for (_, seed), value in side.items()} for side in (here, there))
+    both = [known for known in here if known in there]
+    failed = len(trials.of(claim.method)) - len(here)
+    if not both:
+        why = f"no pair with {claim.against} was flown"
+        return {"ours": None, "low": None, "high": None, "n": 0, "failed": failed, "why": why}
+    compared = compare_pairs(np.array([here[k] for k in both]), np.array([there[k] for k in both]))
+    if compared.ratio is None:
+        return _told(None, None, len(both), failed) | {"why": "nothing to be more than"}
+    ends = compared.interval
+    more = None if ends is None else Interval(100.0 * (ends.low - 1.0), 100.0 * (ends.high - 1.0))
+    return _told(100.0 * (compared.ratio - 1.0), more, len(both), failed) | {"of": compared.of}
+
+
+def _made_pct(claim: PublishedFigure, trials: TableTrials) -> Row | None:
+    """Share of the trials that gave the figure at all."""
+    made, n = len(trials.values(claim.method, claim.figure)), len(trials.of(claim.method))
+    ends = share_interval(made, n)
+    return _told(100.0 * made / n, Interval(100.0 * ends.low, 100.0 * ends.high), n, n - made)
+
+
 def _share_pct(claim: PublishedFigure, trials: TableTrials) -> Row | None:
     values = trials.values(claim.method, claim.figure, itt=True)
     if not values:
@@ -253,7 +336,9 @@ def _order(claim: PublishedFigure, trials: TableTrials) -> Row | None:
     ours = " > ".join(ORDER[k] for k in np.argsort(-means, kind="stable"))
     drawn = table[np.random.default_rng(0).integers(len(table), size=(ORDER_DRAWS, len(table)))].mean(axis=1)
     share = 100.0 * float(_falls(drawn).mean()) if len(table) > 1 else None
-    found = _told(share, None, len(both), 0) | {"our_order": ours, "met": bool(_falls(means[None])[0])}
+    met = bool(_falls(means[None])[0])
+    sure = share is not None and (share if met else 100.0 - share) >= ORDER_SURE_PCT
+    found = _told(share, None, len(both), 0) | {"our_order": ours, "met": met, "sure": sure}
     return found if share is not None else found | {"why": "a single block says only its own order"}
 
 
@@ -294,6 +379,7 @@ _READ = {
     "mean": _mean,
     "less_pct": _less_pct,
     "share_pct": _share_pct,
+    "made_pct": _made_pct,
     "spread_pct": _spread_pct,
     "order": _order,
 }

@@ -174,7 +174,9 @@ def reproduce(names: Sequence[str], folder: Path, options: ReproduceOptions) -> 
     for name in names:
         if name not in TABLES:
             raise InputError(f"table '{name}': not known, allowed: {', '.join(TABLES)}, all")
+    _check_methods(names, options.methods)
     tables = [_Growing(name, blocks_of(name, _fitting(name, options.wish))) for name in names]
+    open_store(folder)  # one of another version is refused before kernels are compiled and a plan is written
     for table in tables:
         table.block_s = TABLE[table.name].block_s
     options.progress(0, 1, "compiling what is not compiled yet")
@@ -187,6 +189,16 @@ def reproduce(names: Sequence[str], folder: Path, options: ReproduceOptions) -> 
     else:
         _within(tables, folder, options, began)
     return {table.name: _figures(table) for table in tables}
+
+
+def _check_methods(names: Sequence[str], methods: Sequence[str] | None) -> None:
+    """Raise InputError if a method is in none of the tables, which would leave it out without a word."""
+    for method in methods or ():
+        if not any(method in TABLE[name].methods for name in names):
+            where = f"table {names[0]}" if len(names) == 1 else f"any of the tables {', '.join(names)}"
+            allowed = dict.fromkeys(own for name in names for own in TABLE[name].methods if own != NOWHERE)
+            known = f"allowed: {', '.join(allowed)}" if allowed else "it has no methods"
+            raise InputError(f"--methods: '{method}' is not in {where}, {known}")
 
 
 def _fitting(name: str, wish: TableRequest) -> TableRequest:

@@ -46,6 +46,7 @@ FIGURES = (
     "estimate_rmse_mm",
     "velocity_deviation_pct",
     "roll_pitch_rms_deg",
+    "roll_pitch_max_deg",
     "energy_kJ",
     "collisions",
     "fallbacks",

@@ -128,8 +128,9 @@ def blocks_of(name: str, wish: TableRequest) -> Iterator[Block]:
         If a world, method or target is not known to the table; at once, not when the first is taken.
     """
     table = TABLE[name]
-    worlds = _known("--world", wish.worlds, (NOWHERE,) if table.worlds == (NOWHERE,) else water_names(), table.worlds)
-    methods = _known("--methods", wish.methods, table.methods, table.methods)
+    waters = (NOWHERE,) if table.worlds == (NOWHERE,) else water_names()
+    worlds = _known("--world", wish.worlds, name, waters, table.worlds)
+    methods = _known("--methods", wish.methods, name, table.methods, table.methods)
     wished = None if wish.targets is None or not table.has_targets else tuple(_target(t) for t in wish.targets)
     return _blocks(name, wish, worlds, methods, {world: wished or table.targets(world) for world in worlds})
 
@@ -177,13 +178,13 @@ def _target(name: str) -> str:
 
 
 def _known(
-    option: str, wished: tuple[str, ...] | None, allowed: tuple[str, ...], default: tuple[str, ...]
+    option: str, wished: tuple[str, ...] | None, table: str, allowed: tuple[str, ...], default: tuple[str, ...]
 ) -> tuple[str, ...]:
     if wished is None or allowed == (NOWHERE,):
         return default
     for name in wished:
         if name not in allowed:
-            raise InputError(f"{option}: '{name}' is not known here, allowed: {', '.join(allowed)}")
+            raise InputError(f"{option}: '{name}' is not in table {table}, allowed: {', '.join(allowed)}")
     return tuple(dict.fromkeys(wished))
 
 
@@ -305,6 +306,11 @@ def _own(_: str) -> tuple[str, ...]:
     return (OWN,)
 
 
+def _silted(world: str) -> tuple[str, ...]:
+    """Of clear water the coral of `caco3`, which is held against it."""
+    return ("branching",) if world == PUMP_TANK else (OWN,)
+
+
 def _nothing(_: str) -> tuple[str, ...]:
     return (NOWHERE,)
 
@@ -342,7 +348,11 @@ TABLE: dict[str, TableDefinition] = {
         weight=2.0,
     ),
     "sediment": TableDefinition(
-        methods=("mpc", "wake-aware"), worlds=(CACO3, "fluff"), targets=_own, task=_plain_scan, block_s=220.0
+        methods=("mpc", "wake-aware"),
+        worlds=(PUMP_TANK, CACO3, "fluff"),
+        targets=_silted,
+        task=_plain_scan,
+        block_s=220.0,
     ),
     "flow": TableDefinition(methods=("dp", "mpc", "wake-aware"), worlds=_FLOWN, targets=_own, task=_flow, block_s=50.0),
     "solver": TableDefinition(

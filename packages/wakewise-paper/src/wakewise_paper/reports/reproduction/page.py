@@ -14,7 +14,15 @@ from wakewise.ui.reports.page import collapsible_section, missing, plot, prose, 
 from wakewise.ui.reports.text import NONE, duration, number, shown
 from wakewise_paper.flights import read_series
 from wakewise_paper.reports.reproduction import plots, sentences
-from wakewise_paper.reproduction.claim import CIRCULAR, JUDGED, UNKNOWN, count_met, glances
+from wakewise_paper.reproduction.claim import (
+    CIRCULAR,
+    JUDGED,
+    OWN_SETUP,
+    UNKNOWN,
+    UNMEASURED,
+    glances,
+    tallies,
+)
 from wakewise_paper.reproduction.worlds import water
 
 PAGE = "reproduce.html"
@@ -54,14 +62,14 @@ def tables_page(tables: Mapping[str, Mapping[str, Any]], store: Path) -> str:
 
 
 def _head(tables: Mapping[str, Mapping[str, Any]]) -> str:
-    counts = count_met({name: table["rows"] for name, table in tables.items()})
+    found = tallies({name: table["rows"] for name, table in tables.items()})
     trials, failed = (sum(table[key] or 0 for table in tables.values()) for key in ("made", "failed"))
     took = duration(sum(table["trial_s"] or 0.0 for table in tables.values()))
+    own = next((one for one in found if one.setup == OWN_SETUP), None)
     title = (
-        f"{counts['met']} of {counts['quoted']} figures of the paper met{sentences.where(counts)}; "
-        f"{counts['surely'] or 'none'} surely"
-        if counts["quoted"]
-        else "No figure of the paper is quoted for this"
+        f"{own.met} of {own.judged} figures met {sentences.place_name(OWN_SETUP)}; {own.surely or 'none'} surely"
+        if own is not None
+        else "No figure of the paper is judged in its own set-up"
     )
     circular = any(w in CIRCULAR for table in tables.values() for w in table["worlds"])
     caution = (
@@ -80,9 +88,8 @@ def _head(tables: Mapping[str, Mapping[str, Any]]) -> str:
     return (
         f'<p class="eyebrow"><span>the paper\'s tables, and ours</span><span><b>{trials}</b> trials, {failed} failed'
         f"</span><span>{took} of trials</span></p><h1>{escape(title)}</h1>"
-        '<p class="why">Met: our mean in some world is as good as the paper\'s. Surely: the whole interval is'
-        + (f". In the paper's own water alone: {counts['circular']} more" if counts["circular"] else "")
-        + f".</p>{caution}"
+        f'<p class="why">{escape(_upper(sentences.met_of({name: table["rows"] for name, table in tables.items()})))}. '
+        f"{escape(sentences.RULES.replace('*', ''))}</p>{caution}"
     )
 
 
@@ -99,8 +106,8 @@ def _glance(tables: Mapping[str, Mapping[str, Any]]) -> str:
     if not rows:
         return ""
     table_ = (
-        "<table><thead><tr><th>table</th><th>world</th><th>who won, by how much, how sure</th>"
-        f'<th>at what price</th><th class="num">trials</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
+        "<table><thead><tr><th>table</th><th>world</th><th>first and next best, difference</th>"
+        f'<th>at what cost</th><th class="num">trials</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
     )
     lead = "Over the seeds that all methods of a table flew. Models that were not made count as the worst."
     return section("glance", "At a glance", lead, f'<div class="wide">{table_}</div>')
@@ -143,7 +150,7 @@ def _drawn(table: Mapping[str, Any]) -> str:
         parts.append(plot(drawn[0], "wake models against flows", "The line is the paper's.", narrow=drawn[1]))
     if name == "operator":
         drawn = (plots.obedience(rows), plots.obedience(rows, narrow=True))
-        caption = "By w_track. Above and left of the dashed lines the paper's claim is met."
+        caption = "By w_track. Below and left of the dashed lines the paper's claim is met."
         parts.append(plot(drawn[0], "obedience and wash", caption, narrow=drawn[1]))
     elif name in JUDGED:
         measure = JUDGED[name]
@@ -153,7 +160,7 @@ def _drawn(table: Mapping[str, Any]) -> str:
     profile = profiles(JUDGED[name], places) if name in ("dynamic", "station") else None
     if profile is not None:
         narrow = profiles(JUDGED[name], places, narrow=True)
-        caption = "Share of trials that are at least so good; the curve that rises first is the better method."
+        caption = "Share of trials whose figure is at most that of the axis."
         parts.append(plot(profile, f"performance profiles, {name}", caption, narrow=narrow))
     return "".join(parts)
 
@@ -217,7 +224,7 @@ def _mark(row: Mapping[str, Any]) -> str:
 
 def _row(row: Mapping[str, Any], several: bool) -> str:
     said = row.get("our_order") or sentences.our_value(row)
-    more = [row["how"], f"paper: {row['paper_says']}"]
+    more = [row["how"], f"paper: {row['paper_says']}" + (f" ({row['source']})" if row["source"] else "")]
     if row.get("p_holm") is not None:
         more.append(f"paired t-test p {_two(row['p_t'])}, Holm {_two(row['p_holm'])}")
     if row.get("p_wilcoxon") is not None:
@@ -233,7 +240,7 @@ def _row(row: Mapping[str, Any], several: bool) -> str:
         if row["reading"] == "order"
         else f'<td class="num" title="{escape(row["paper_says"], quote=True)}">{escape(sentences.quoted(row))}</td>'
         f'<td class="num">{escape(said)}</td><td class="num">{escape(sentences.interval(row))}</td>'
-        f'<td class="unit">{escape("" if row["reading"] == "less_pct" else row["unit"])}</td>'
+        f'<td class="unit">{escape("" if row["reading"] in ("less_pct", "more_pct") else row["unit"])}</td>'
     )
     return (
         f'<tr title="{title}"><td>{_unbroken(row["method"])}</td><td>{escape(row["figure"])}</td>'
@@ -266,13 +273,12 @@ def _temporal(places: Sequence[Mapping[str, Any]], store: Path) -> str:
 
 
 def _limits(tables: Mapping[str, Mapping[str, Any]]) -> str:
-    could, could_not, unknown = sentences.reproduced(tables)
-
     def listed(lines: Sequence[str]) -> str:
         return "<ul>" + "".join(f"<li>{prose(line.replace('**', ''))}</li>" for line in lines) + "</ul>"
 
     content = ""
-    for title, lines in (("Met in some world", could), ("Met in none", could_not), ("Not judged", unknown)):
-        content += collapsible_section(title, listed(lines), str(len(lines))) if lines else ""
+    for title, lines in sentences.reproduced(tables).items():
+        content += collapsible_section(title, listed(lines), str(len(lines)))
+    content += collapsible_section("Stated by the paper, not measured here", listed(UNMEASURED), str(len(UNMEASURED)))
     content += collapsible_section("Not known here of the paper", listed(UNKNOWN), str(len(UNKNOWN)))
     return section("limits", "What could be reproduced, and what not", "Computed from the rows above.", content)

@@ -60,7 +60,7 @@ def over_time(series: Mapping[str, Mapping[str, Array]], narrow: bool = False) -
 
 
 def obedience(rows: Sequence[Row], narrow: bool = False) -> Figure | None:
-    """Deviation from what a pilot asks for against less wash than direct allocation, by w_track; a line per world."""
+    """Deviation from what a pilot asks for against the ratio of wash to direct allocation's; a line per world."""
     lines: dict[str, list[tuple[str, float, float]]] = {}
     for row in rows:
         if row["key"] != "velocity_deviation_pct" or row["ours"] is None or row["target"] is not None:
@@ -75,19 +75,19 @@ def obedience(rows: Sequence[Row], narrow: bool = False) -> Figure | None:
         )
         if other is not None and other["ours"] is not None:
             w_track = str(row["method"]).rpartition(" ")[2]
-            lines.setdefault(row["world"], []).append((w_track, float(row["ours"]), float(other["ours"])))
+            lines.setdefault(row["world"], []).append((w_track, float(row["ours"]), 1.0 - float(other["ours"]) / 100.0))
     if not lines:
         return None
     drawn = new_figure(NARROW_IN if narrow else 0.62 * WIDTH_IN, 3.4)
     axes: Axes = drawn.subplots()
-    style_axes(axes, x="deviation from the velocity asked for (%)", y="less wash than direct (%)", grid="both")
+    style_axes(axes, x="deviation from the velocity asked for (%)", y="wash, times that of direct", grid="both")
     for (world, points), colour in zip(lines.items(), (TEAL, CORAL, VIOLET, SAND, SLATE), strict=False):
         axes.plot([p[1] for p in points], [p[2] for p in points], "o-", color=colour, label=world, linewidth=1.2)
         for w_track, x, y in points:
             axes.annotate(w_track, (x, y), xytext=(4, 4), textcoords="offset points", fontsize=8, color=MUTED)
-    axes.plot([15.0, 15.0, 0.0], [105.0, 60.0, 60.0], color=INK, linewidth=1.0, linestyle=(0, (4, 3)))
+    axes.plot([15.0, 15.0, 0.0], [0.0, 0.4, 0.4], color=INK, linewidth=1.0, linestyle=(0, (4, 3)))
     axes.set_xlim(0.0, max(18.0, 1.1 * max(p[1] for points in lines.values() for p in points)))
-    axes.set_ylim(top=105.0)
+    axes.set_ylim(bottom=0.0)
     add_legend(axes, loc="lower right")
     return drawn
 
