@@ -41,7 +41,7 @@ def test_without_a_budget_all_trials_are_made_at_once(tmp_path, campaign):
     options = ReproduceOptions(trials=2, worlds=("pump-tank",), methods=FIVE)
     told = reproduce(["station"], tmp_path, options)["station"]
     assert [len(call) for call in campaign] == [10]
-    assert (told["trials"], told["seeds"], told["made"], told["failed"]) == (2, [1, 2], 10, 0)
+    assert (told["trials"], told["seeds"], told["made"], told["failed"]) == (2, [3001, 3002], 10, 0)
     assert {row["method"] for row in told["rows"]} == set(FIVE)
 
 
@@ -53,7 +53,7 @@ def test_a_budget_buys_whole_blocks_by_what_they_were_found_to_cost(tmp_path, ca
     )
     told = reproduce(["station"], tmp_path, options)["station"]
     assert [len(call) for call in campaign] == [5, 15]
-    assert (told["made"], told["seeds"]) == (15, [1, 2, 3])
+    assert (told["made"], told["seeds"]) == (15, [3001, 3002, 3003])
     assert said[-2:] == ["the first block of each table: a while left", "a while left"]
 
 

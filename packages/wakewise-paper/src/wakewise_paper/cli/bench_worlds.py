@@ -21,6 +21,7 @@ _COLUMNS = (
     ("energy_kJ", "energy kJ", 1.0),
     ("rmse_mm", "model mm", 1.0),
     ("completeness_pct", "complete %", 1.0),
+    ("completeness_1mm_pct", "1 mm %", 1.0),
     ("success_pct", "success %", 1.0),
 )
 

@@ -26,8 +26,9 @@ def reproduce(
     ],
     trials: Annotated[
         int | None,
-        typer.Option(help="Seeds for each target in each world, from 1; 1 if neither this nor --budget is given."),
+        typer.Option(help="Seeds for each target in each world; 1 if neither this nor --budget is given."),
     ] = None,
+    first_seed: Annotated[int, typer.Option(help="First seed; others than 3001 are for trying things.", min=0)] = 3001,
     budget: Annotated[
         str | None, typer.Option(help="Time for all of it, such as 30min, 2h or 90s: as many trials as fit.")
     ] = None,
@@ -84,6 +85,7 @@ def reproduce(
             store,
             ReproduceOptions(
                 trials=trials,
+                first_seed=first_seed,
                 budget_s=None if budget is None else seconds("--budget", budget),
                 worlds=_listed(worlds),
                 methods=_listed(methods),

@@ -22,6 +22,7 @@ from typing import Any
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.jit.precompile import compile_kernels
+from wakewise.core.settings import seed_number
 from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.campaigns import run as run_campaign
 from wakewise.experiments.campaigns.definition import keep_plan
@@ -31,6 +32,7 @@ from wakewise_paper.reproduction.rows import CompletedTrial, Row, TableTrials, o
 from wakewise_paper.reproduction.table_trials import (
     APPROACHES,
     COMPARED,
+    FIRST_SEED,
     NOWHERE,
     TABLE,
     Block,
@@ -93,12 +95,13 @@ LAST = 1.25
 class ReproduceOptions:
     """How tables are made.
 
-    `trials` counts seeds for each target in each world; with a budget (`budget_s`, wall time for all tables together)
-    it is the most of them. `worlds`, `methods` and `targets` are in place of the tables' own; `duration_s` flies only
+    `trials` counts seeds from `first_seed` for each target in each world; with a budget (`budget_s`, wall time for all
+    tables) it is the most of them. `worlds`, `methods`, `targets` replace the tables' own; `duration_s` flies only
     the first part of each flight; `workers` trials are made at a time; `again` tries trials anew that failed before.
     """
 
     trials: int | None = None
+    first_seed: int = FIRST_SEED
     budget_s: float | None = None
     worlds: tuple[str, ...] | None = None
     methods: tuple[str, ...] | None = None
@@ -111,6 +114,7 @@ class ReproduceOptions:
     def __post_init__(self) -> None:
         if self.trials is not None and not 1 <= self.trials <= MOST_TRIALS:
             raise InputError(f"--trials {self.trials}, allowed 1 to {MOST_TRIALS}")
+        seed_number(self.first_seed, "--first-seed")
         if self.budget_s is not None and not self.budget_s > 0.0:
             raise InputError(f"--budget {self.budget_s:g} s, must be more than 0")
 
@@ -120,6 +124,7 @@ class ReproduceOptions:
         trials = self.trials or (MOST_TRIALS if self.budget_s is not None else 1)
         return TableRequest(
             trials=trials,
+            first_seed=self.first_seed,
             worlds=self.worlds,
             methods=self.methods,
             targets=self.targets,

@@ -35,7 +35,7 @@ FLIGHT_FIGURES = (
 )
 """Of each flight, from the end of settling on."""
 
-MODEL_FIGURES = ("rmse_mm", "completeness_pct", "success", "registered_images")
+MODEL_FIGURES = ("rmse_mm", "completeness_pct", "completeness_1mm_pct", "success", "registered_images")
 """Of each scan. A scan that gave no model is a failure: no success, and no rmse to take a mean of."""
 
 
