@@ -103,8 +103,17 @@ def bench(
     store: Annotated[
         Path | None, typer.Option(help="gentle, operator, worlds: folder that keeps flights; the cache if not given.")
     ] = None,
+    only: Annotated[
+        str,
+        typer.Option(
+            help="truth: which folders of the data, with commas between, such as dynamics,cube_channel; all if not "
+            "given.",
+            show_default=False,
+        ),
+    ] = "",
     plot: Annotated[
-        Path | None, typer.Option(help="gentle, operator: draw the figures into this file (.png, .svg).")
+        Path | None,
+        typer.Option(help="gentle, operator, truth: draw the figures into this file (.png, .svg); of truth the cube."),
     ] = None,
     json: Json = False,
 ) -> None:
@@ -112,15 +121,22 @@ def bench(
 
     A figure that needs reference data which is not there is null, with the reason in `why`. `gentle` flies all of its
     scenarios and worlds for more than an hour on two free cores, some minutes with `--scenarios orbit/paper`; a run
-    that was stopped goes on where it was.
+    that was stopped goes on where it was. `truth` takes a quarter of an hour of one core, most of it for the lattice
+    round a cube and for photographs; `--only` chooses.
     """
     from wakewise.core.errors import STRICT, InputError
     from wakewise.core.optional_dependencies import need
     from wakewise.experiments.trials import BenchOptions
     from wakewise_benchmarks.registry import BENCHES, run_bench
 
-    if plot is not None and name not in ("gentle", "operator"):
-        raise InputError("--plot: only `wakewise bench gentle` and `wakewise bench operator` draw")
+    if plot is not None and name not in ("gentle", "operator", "truth"):
+        raise InputError("--plot: only `wakewise bench gentle`, `operator` and `truth` draw")
+    if name == "truth":
+        if not data.is_dir():
+            raise InputError(f"--data {data}: no such folder; --data or WAKEWISE_DATA must name the reference data")
+        from wakewise_benchmarks.truth import chosen
+
+        chosen(listed(only) or None)
     if plot is not None:
         need("--plot", "reports")
         if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
@@ -149,6 +165,7 @@ def bench(
                 fresh=fresh,
                 workers=workers,
                 store=store,
+                only=listed(only) or None,
             )
             results[each] = run_bench(each, options)
             if each == "operator":
@@ -156,10 +173,11 @@ def bench(
 
                 add_cockpit(results[each], options)
     if plot is not None:
+        from wakewise_benchmarks.cube_channel_plot import draw_cube
         from wakewise_paper.reports.operator_bench_plot import draw_operator
         from wakewise_paper.reports.wash_bench_plot import draw_gentle
 
-        draw = {"gentle": draw_gentle, "operator": draw_operator}[name]
+        draw = {"gentle": draw_gentle, "operator": draw_operator, "truth": draw_cube}[name]
         write_page("plot", lambda: draw(results[name], plot))
     if json:
         print_json(results if name == "all" else results[name])
@@ -174,6 +192,10 @@ def bench(
             show_worlds(result)
         elif each == "adversarial-photos":
             show_traps(result)
+        elif each == "truth":
+            from wakewise_benchmarks.truth import show_truth
+
+            show_truth(result)
         else:
             _show(result, "  ")
 
