@@ -17,8 +17,7 @@ from wakewise_benchmarks.cube_channel_plot import draw_cube
 from wakewise_benchmarks.truth_records import Asked, Part, rows_of
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[3] / "shared" / "data"))
-SLOW = ("cube_channel", "coral_photos", "strecha_fountain", "charuco_aquarium")
-FAST = tuple(name for name in truth.PARTS if name not in SLOW)
+FAST = tuple(name for name, part in truth.PARTS.items() if not part.slow)
 TINY = cc.ChannelCase(cells_per_H=4, low_x=-3.5, high_x=9.0, width=3.0, develop=0.5, average=0.5, reynolds=500.0)
 
 

@@ -69,7 +69,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     cube: dict[str, Any] = {}
     for k, part in enumerate(parts):
         began = time.perf_counter()
-        options.progress(k, len(parts), part.name)
+        options.progress(k, len(parts), f"{part.name}, {part.slow}" if part.slow else part.name)
         found, computed = rows_of(part, options.data, partial(_within, options.progress, k, len(parts)))
         spent[part.name] = time.perf_counter() - began
         rows += found

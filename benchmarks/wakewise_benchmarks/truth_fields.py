@@ -93,7 +93,7 @@ PARTS = (
         name="ocean_optics",
         source="Solonenko and Mobley 2015; cameras of Jiang et al. 2013",
         asked=(
-            Asked(key="signal_per_m", what="attenuation of the target's light, 10 water types: largest error",
+            Asked(key="signal_per_m", what="attenuation of the target's light, 7 water types: largest error",
                   unit="1/m", high=6e-4, how="rounding of the shipped table"),
             Asked(key="veil_per_m", what="attenuation of the veil: largest error", unit="1/m", high=6e-4,
                   how="rounding of the shipped table"),
@@ -130,7 +130,6 @@ PARTS = (
                   low=0.0, how="as good as the measurement itself repeats"),
         ),
         compute=jet_figures,
-        slow="half a minute",
     ),
     Part(
         name="trajectories",

@@ -207,7 +207,6 @@ PARTS = (
                   high=2.0, how=_BAR),
         ),
         compute=doppler_figures,
-        slow="seconds",
     ),
     Part(
         name="currents",
