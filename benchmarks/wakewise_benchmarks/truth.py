@@ -118,8 +118,9 @@ def show_truth(result: Mapping[str, Any]) -> None:
     if cube.get("cells_per_H") is not None:
         typer.echo(
             f"  lattice round the cube: {cube['cells_per_H']} cells to H; Reynolds number {cube['reynolds']:.0f} by "
-            f"the viscosity, {cube['reynolds_effective']:.0f} with the mean eddy viscosity added; measured at 40000\n"
-            f"  and without a bound: rms of U {format_value(cube['u_rms_rel_off_walls'])} farther than "
+            f"the viscosity, {cube['reynolds_effective']:.0f} with the mean eddy viscosity added; "
+            f"measured at {cube_channel.REYNOLDS:.0f}\n"
+            f"  without a bound: rms of U {format_value(cube['u_rms_rel_off_walls'])} farther than "
             f"{cube_channel.OFF_WALLS_H:g} H from walls, of V {format_value(cube['v_rms_rel'])}, of W "
             f"{format_value(cube['w_rms_rel'])}, of the resolved stress uu {format_value(cube['uu_rms_rel'])}; "
             f"reattachment after {format_value(cube['reattachment_H'])} H (measured: {cube_channel.REATTACHMENT_H:g})"
