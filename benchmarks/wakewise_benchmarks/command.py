@@ -16,10 +16,6 @@ import typer
 from wakewise.ui.cli.commands import STUDIES, CliCommand
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, write_page
 from wakewise.ui.cli.options import Json, listed, numbers
-from wakewise_paper.cli.bench_models import show_front, show_models
-from wakewise_paper.cli.bench_operator import show_operator
-from wakewise_paper.cli.bench_wash import show_gentle
-from wakewise_paper.cli.bench_worlds import show_worlds
 
 
 def show_traps(result: dict[str, Any]) -> None:
@@ -35,22 +31,24 @@ def show_traps(result: dict[str, Any]) -> None:
 
 _SEEDS = {"front": 8, "gentle": 3, "models": 1000, "operator": 3}
 """Seeds of a bench that flies, if not given; 10 of the others."""
-_SHOWN: dict[str, Callable[[dict[str, Any]], None]] = {
-    "adversarial-photos": show_traps,
-    "front": show_front,
-    "gentle": show_gentle,
-    "models": show_models,
-    "operator": show_operator,
-    "worlds": show_worlds,
+_SHOWN = {
+    "adversarial-photos": f"{__name__}:show_traps",
+    "front": "wakewise_paper.cli.bench_models:show_front",
+    "gentle": "wakewise_paper.cli.bench_wash:show_gentle",
+    "models": "wakewise_paper.cli.bench_models:show_models",
+    "operator": "wakewise_paper.cli.bench_operator:show_operator",
+    "truth": "wakewise_benchmarks.truth:show_truth",
+    "worlds": "wakewise_paper.cli.bench_worlds:show_worlds",
 }
 """What prints the answer of a bench that has tables of its own."""
 _DRAWN = {
-    "front": ("wakewise_paper.reports.models_bench_plot", "draw_front"),
-    "gentle": ("wakewise_paper.reports.wash_bench_plot", "draw_gentle"),
-    "models": ("wakewise_paper.reports.models_bench_plot", "draw_models"),
-    "operator": ("wakewise_paper.reports.operator_bench_plot", "draw_operator"),
+    "front": "wakewise_paper.reports.models_bench_plot:draw_front",
+    "gentle": "wakewise_paper.reports.wash_bench_plot:draw_gentle",
+    "models": "wakewise_paper.reports.models_bench_plot:draw_models",
+    "operator": "wakewise_paper.reports.operator_bench_plot:draw_operator",
+    "truth": "wakewise_benchmarks.cube_channel_plot:draw_cube",
 }
-"""What draws the answer of a bench, by module and name: pictures need an extra."""
+"""What draws the answer of a bench: pictures need an extra."""
 
 _LASTS = {"front": "hours", "gentle": "hours", "models": "hours", "operator": "hours", "worlds": "hours"}
 """About how long a bench runs on two free cores, where it is not minutes at most."""
@@ -130,8 +128,20 @@ def bench(
             help="front, gentle, models, operator, worlds: folder that keeps flights; the cache if not given."
         ),
     ] = None,
+    only: Annotated[
+        str,
+        typer.Option(
+            help="truth: which folders of the data, with commas between, such as dynamics,cube_channel; all if not "
+            "given.",
+            show_default=False,
+        ),
+    ] = "",
     plot: Annotated[
-        Path | None, typer.Option(help="front, gentle, models, operator: draw the figures into this file (.png, .svg).")
+        Path | None,
+        typer.Option(
+            help="front, gentle, models, operator, truth: draw the figures into this file (.png, .svg); of truth the "
+            "cube."
+        ),
     ] = None,
     json: Json = False,
 ) -> None:
@@ -139,7 +149,8 @@ def bench(
 
     A figure that needs reference data which is not there is null, with the reason in `why`. `gentle` flies all of its
     scenarios and worlds for more than an hour on two free cores, some minutes with `--scenarios orbit/paper`; a run
-    that was stopped goes on where it was.
+    that was stopped goes on where it was. `truth` takes about 7 minutes of one core, most of it for the lattice round a
+    cube and for photographs; `--only` chooses.
     """
     from wakewise.core.errors import STRICT, InputError
     from wakewise.core.optional_dependencies import need
@@ -148,6 +159,12 @@ def bench(
 
     if plot is not None and name not in _DRAWN:
         raise InputError(f"--plot: bench {name or 'without a name'} draws nothing, those that do: {', '.join(_DRAWN)}")
+    if name == "truth":
+        if not data.is_dir():
+            raise InputError(f"--data {data}: no such folder; --data or WAKEWISE_DATA must name the reference data")
+        from wakewise_benchmarks.truth import chosen
+
+        chosen(listed(only) or None)
     if plot is not None:
         need("--plot", "reports")
         if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
@@ -176,6 +193,7 @@ def bench(
                 fresh=fresh,
                 workers=workers,
                 store=store,
+                only=listed(only) or None,
             )
             results[each] = run_bench(each, options)
             if each == "operator":
@@ -183,15 +201,22 @@ def bench(
 
                 add_cockpit(results[each], options)
     if plot is not None:
-        module, function = _DRAWN[name]
-        draw = getattr(import_module(module), function)
+        draw = _named(_DRAWN[name])
         write_page("plot", lambda: draw(results[name], plot))
     if json:
         print_json(results if name == "all" else results[name])
         return
     for each, result in results.items():
         typer.echo(f"\n{each}: {BENCHES[each]}")
-        _SHOWN.get(each, _show)(result)
+        show = _named(_SHOWN[each]) if each in _SHOWN else _show
+        show(result)
+
+
+def _named(place: str) -> Callable[..., None]:
+    """The function of MODULE:NAME, imported now."""
+    module, _, name = place.partition(":")
+    function: Callable[..., None] = getattr(import_module(module), name)
+    return function
 
 
 def _list(benches: Mapping[str, str], json: bool) -> None:

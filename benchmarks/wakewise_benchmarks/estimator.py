@@ -100,7 +100,8 @@ def run(options: BenchOptions) -> dict[str, Any]:
     twist = np.array([_nees(e[6:], P[6:, 6:]) for e, P in last])
     (low, high), (low12, high12) = _bounds(6), _bounds(12)
     why: dict[str, str] = {}
-    drift = _dead_reckoning_pct(options.data)
+    drifts = dead_reckoning_drifts(options.data)
+    drift = float(np.median(drifts)) if drifts else None
     if drift is None:
         why["dead_reckoning_drift_pct"] = "no auv_dvl in the data folder"
     return {
@@ -274,8 +275,11 @@ def _loss(parts: Parts, options: BenchOptions) -> dict[str, Any]:
     }
 
 
-def _dead_reckoning_pct(data: Path | None) -> float | None:
-    """Median end error over distance run of the real Doppler logs, in percent."""
+def dead_reckoning_drifts(data: Path | None) -> list[float]:
+    """End error over distance run of each real Doppler log in `data`/auv_dvl, in percent; empty without logs.
+
+    Files are those of N. Cohen and I. Klein 2025 (doi 10.1016/j.engappai.2025.110221).
+    """
     folders = sorted((data / "auv_dvl").glob("Trajectory*")) if data is not None else []
     drifts = []
     for folder in folders:
@@ -286,8 +290,8 @@ def _dead_reckoning_pct(data: Path | None) -> float | None:
         path = dead_reckoned(log[:n, 0], q, log[:n, 1:4])
         place = local_north_east_down(truth[:n, 2], truth[:n, 1], truth[:n, 3])
         run_m = np.linalg.norm(np.diff(place, axis=0), axis=1).sum()
-        drifts.append(100.0 * np.linalg.norm(path[-1] - place[-1]) / run_m)
-    return float(np.median(drifts)) if drifts else None
+        drifts.append(float(100.0 * np.linalg.norm(path[-1] - place[-1]) / run_m))
+    return drifts
 
 
 def _bounds(components: int) -> tuple[float, float]:

@@ -32,6 +32,7 @@ BENCHES = {
     "planner": "the planner against the paper's recipe and IPOPT",
     "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
     "operator": "an operator's velocity obeyed and the target's water spared, by w_track, where users have the trouble",
+    "truth": "figures held against data that nobody in this project made: measured, asked, reached, met",
     "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
     "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",
     "link": "physics behind a firmware, the relay, the loop at sea, noise, and what every loss leads to",

@@ -122,6 +122,7 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Elsewhere(
         r"wakewise bench operator.*", "packages/wakewise-paper/tests/operator_study/test_operator_bench.py", "operator"
     ),
+    Elsewhere(r"wakewise bench truth.*", "benchmarks/tests/test_truth_bench.py", '"truth"'),
     Elsewhere(r"wakewise bench worlds.*", "packages/wakewise-paper/tests/world_study/test_worlds_bench.py", "worlds"),
     Elsewhere(
         r"wakewise bench gentle.*", "packages/wakewise-paper/tests/wash_reduction/test_gentle_bench.py", "gentle"

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from trajectory_error import paired_instants, read_tum, trajectory_error
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import matrix_from_quat, quat_from_rotvec
+from wakewise_benchmarks.trajectory_error import paired_instants, read_tum, trajectory_error
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[4] / "shared" / "data")) / "trajectories"
 PATH = np.random.default_rng(0).normal(size=(50, 3)).cumsum(axis=0)

@@ -1,9 +1,7 @@
 """Water and silt obey closed forms on flat targets, and the coefficients come from the published tables."""
 
-import csv
 import os
 import pathlib
-from collections import defaultdict
 
 import numpy as np
 import pytest
@@ -14,7 +12,8 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid
 from wakewise.vision.imaging import Lights, PinholeCamera, Render, SiltOptics, attenuate, haze_between, water_optics
-from wakewise.vision.imaging.optics import BACKSCATTER_RATIO, exp_minus, sample_grid, water_types
+from wakewise.vision.imaging.optics import exp_minus, sample_grid, water_types
+from wakewise_benchmarks.optics_tables import band_errors
 
 DATA = pathlib.Path(os.environ.get("WAKEWISE_DATA", pathlib.Path(__file__).parents[4] / "shared" / "data"))
 CAMERA = PinholeCamera(64, 48, np.deg2rad(80))
@@ -150,33 +149,11 @@ def test_band_values_follow_from_the_published_tables():
     folder = DATA / "ocean_optics"
     if not folder.is_dir():
         pytest.skip(f"{folder} is not there")
-    with (folder / "camspec_database.csv").open() as file:
-        rows = list(csv.reader(file))
-    with (folder / "solonenko2015_iop.csv").open() as file:
-        values = list(csv.DictReader(file))
-    nm = np.array(rows[0][2:], dtype=float)
-    curves = {band: [np.array(r[2:], float) for r in rows[1:] if r[1] == band] for band in "RGB"}
-    sensitivity = [np.mean([c / c.max() for c in curves[band]], axis=0) for band in "RGB"]
-    spectra = defaultdict(dict)
-    for row in values:
-        if row["value_per_m"]:
-            spectra[row["water_type"], row["quantity"]][float(row["wavelength_nm"])] = float(row["value_per_m"])
-
-    def spectrum(kind, quantity):
-        table = spectra[kind, quantity]
-        return np.interp(nm, sorted(table), [table[w] for w in sorted(table)])
-
-    for kind in water_types():
-        a, b, daylight = spectrum(kind, "a"), spectrum(kind, "b"), np.exp(-spectrum(kind, "Kd"))
-        back = BACKSCATTER_RATIO * b
-        veil, kept = 0.33 * back / (a + back), np.exp(-0.5 * (a + b))
-        water = water_optics(kind)
-        for k in range(3):
-            w = sensitivity[k] * daylight
-            assert water.signal_per_m[k] == pytest.approx(-2 * np.log((w @ kept) / w.sum()), abs=6e-4)
-            assert water.veil_per_m[k] == pytest.approx(-2 * np.log(((w * veil) @ kept) / (w @ veil)), abs=6e-4)
-            assert water.backscatter_per_m[k] == pytest.approx((w @ back) / w.sum(), abs=6e-6)
-            assert water.veil[k] == pytest.approx((w @ veil) / w.sum(), abs=6e-5)
+    errors = band_errors(folder)
+    assert errors["signal_per_m"] < 6e-4
+    assert errors["veil_per_m"] < 6e-4
+    assert errors["backscatter_per_m"] < 6e-6
+    assert errors["veil"] < 6e-5
 
 
 def test_outside_the_grid_lies_the_outer_one():

@@ -22,7 +22,8 @@ class BenchOptions:
     seeds 1 to this; `methods`, `scenarios`, `worlds` and `w_tracks` (on the paper's scale), None for all; `mechanisms`,
     switched one by one, None for none; `models`, seeds from 1 for which a scan and its model are made; `judge`, seeds
     that are flown in the lattice as well; `bound`, seeds whose optimum is worked out; `fresh` flies anew what is known;
-    `workers` side by side; `store` keeps flights, the user's cache folder if None.
+    `workers` side by side; `store` keeps flights, the user's cache folder if None. `only`: parts of a bench by name,
+    None for all.
     """
 
     data: Path | None = None
@@ -39,6 +40,7 @@ class BenchOptions:
     fresh: bool = False
     workers: int = 2
     store: Path | None = None
+    only: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         for name, value, most in (("seeds", self.seeds, 1000), ("workers", self.workers, 64)):

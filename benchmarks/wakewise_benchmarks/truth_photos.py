@@ -1,0 +1,139 @@
+"""Reconstruction and calibration from real photographs, against surveyed cameras, laser depths and COLMAP's own run."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import Progress
+from wakewise.vision.evaluation.depth_maps import compare_depths, read_depth_views
+from wakewise.vision.reconstruction import (
+    CalibrationBoard,
+    ReconstructionRequest,
+    ReconstructionSettings,
+    calibrate,
+    read_cloud,
+    read_reference_cameras,
+    reconstruct,
+)
+from wakewise_benchmarks.truth_records import Asked, Part
+
+CORAL_FOCAL_PX, FOUNTAIN_FOCAL_PX = 1277.8, 1379.74
+"""By pycolmap on all 31 photographs of the coral, and by the fountain's calibration at half size."""
+
+
+def _photos(folder: Path, into: Path) -> int:
+    """Copy the photographs of a folder that may not be written to; how many there are."""
+    found = sorted(path for path in folder.glob("*") if path.suffix.lower() in (".jpg", ".png"))
+    if not found:
+        raise InputError(f"{folder}: holds no photographs")
+    into.mkdir()
+    for path in found:
+        shutil.copyfile(path, into / path.name)
+    return len(found)
+
+
+def coral_figures(folder: Path, progress: Progress) -> dict[str, float]:
+    """Sparse model of a diver's photographs of one coral."""
+    with tempfile.TemporaryDirectory(prefix="wakewise-truth-") as scratch:
+        photos = Path(scratch) / "photos"
+        count = _photos(folder / "images_1280", photos)
+        settings = ReconstructionSettings(mesh=False, threads=1, check_shared_intrinsics=False)
+        model = reconstruct(
+            photos,
+            Path(scratch) / "model",
+            settings,
+            request=ReconstructionRequest(until="sparse"),
+            progress=progress,
+        )
+    return {
+        "registered_pct": 100.0 * model.registered_images / count,
+        "reprojection_px": model.reprojection_uncut_px,
+        "focal_pct": 100.0 * abs(model.focal_px / CORAL_FOCAL_PX - 1.0),
+        "photos": float(count),
+    }
+
+
+def fountain_figures(folder: Path, progress: Progress) -> dict[str, float | None]:
+    """Model of eleven photographs, with cameras held against a survey and dense points against a laser scan."""
+    cameras = folder / "gt_dense_cameras"
+    with tempfile.TemporaryDirectory(prefix="wakewise-truth-") as scratch:
+        photos, out = Path(scratch) / "photos", Path(scratch) / "model"
+        count = _photos(folder / "images_1536x1024", photos)
+        settings = ReconstructionSettings(mesh=False, threads=1, check_shared_intrinsics=False)
+        model = reconstruct(
+            photos,
+            out,
+            settings,
+            reference_positions=read_reference_cameras(cameras),
+            request=ReconstructionRequest(until="dense"),
+            progress=progress,
+        )
+        views = read_depth_views(folder / "gt_depth_z_m_768x512.npz", cameras)
+        score = compare_depths(np.asarray(read_cloud(out / "dense.ply").points_m, dtype=np.float64), views)
+    return {
+        "registered_pct": 100.0 * model.registered_images / count,
+        "cameras_mm": model.cameras_rmse_mm,
+        "focal_pct": 100.0 * abs(model.focal_px / FOUNTAIN_FOCAL_PX - 1.0),
+        "cloud_mm": score.accuracy_median_mm,
+        "complete_pct": score.completeness_50mm_pct,
+    }
+
+
+def board_figures(folder: Path, _: Progress) -> dict[str, float | None]:
+    """Calibration from boards behind an aquarium's wall, through a lens of strong distortion."""
+    photos = folder / "Example_data" / "worst_case_distortion"
+    found = calibrate(photos, CalibrationBoard(columns=11, rows=8, square_m=0.008, marker_m=0.006))
+    return {"residual_px": found.residual_px, "photos": float(found.photos)}
+
+
+_BAR = "bound of the package's own test"
+_COLMAP = "pycolmap registers all of them"
+PARTS = (
+    Part(
+        name="coral_photos",
+        source="W. Million, divers' photographs of Acropora cervicornis; pycolmap 4.2.1 on them",
+        asked=(
+            Asked(key="registered_pct", what="coral, 31 photographs: registered", unit="%", low=100.0,
+                  how=_COLMAP),
+            Asked(key="reprojection_px", what="coral: mean reprojection error before the last cuts", unit="px",
+                  high=1.2, how="above it a model is called doubtful; pycolmap has 0.64"),
+            Asked(key="focal_pct", what="coral: focal length against pycolmap's", unit="%",
+                  high=2.0, how="two models of one camera"),
+        ),
+        compute=coral_figures,
+        slow="minutes",
+    ),
+    Part(
+        name="strecha_fountain",
+        source="Strecha et al. 2008: surveyed cameras and a laser scan",
+        asked=(
+            Asked(key="registered_pct", what="fountain, 11 photographs: registered", unit="%", low=100.0, how=_COLMAP),
+            Asked(key="cameras_mm", what="fountain: rms distance of cameras from the survey", unit="mm", high=10.0,
+                  how="pycolmap has 6.1"),
+            Asked(key="focal_pct", what="fountain: focal length against the calibration", unit="%", high=0.5,
+                  how="pycolmap has 0.09"),
+            Asked(key="cloud_mm", what="fountain: median distance of dense points from the laser scan", unit="mm",
+                  high=16.0, how="the scan agrees with the cameras to 8 to 16 mm"),
+            Asked(key="complete_pct", what="fountain: share of the scan within 50 mm of the model", unit="%", low=50.0,
+                  how="half of what any camera sees"),
+        ),
+        compute=fountain_figures,
+        slow="minutes",
+    ),
+    Part(
+        name="charuco_aquarium",
+        source="PIVlab, boards through an aquarium wall",
+        asked=(
+            Asked(key="residual_px", what="boards through a wall: residual of the calibration", unit="px", high=0.5,
+                  how=_BAR),
+            Asked(key="photos", what="boards found, of 12 photographs", low=12.0, how=_BAR),
+        ),
+        compute=board_figures,
+        slow="10 s",
+    ),
+)  # fmt: skip
