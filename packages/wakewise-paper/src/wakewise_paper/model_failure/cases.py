@@ -48,7 +48,7 @@ class AxisFile(Settings):
     def dose(self, value: Any) -> float:
         """The quantity in its unit."""
         number = value if self.component is None else value[self.component]
-        return self.scale * float(number)
+        return self.scale * float(number) + 0.0  # no -0
 
 
 class PartFile(Settings):

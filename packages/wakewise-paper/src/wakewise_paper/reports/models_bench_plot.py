@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
@@ -27,7 +27,7 @@ DOSES = "doses"
 
 
 def draw_models(result: Mapping[str, Any], path: Path) -> None:
-    """Draw dose and response of `wakewise bench models` into a file: a column per quantity, a row per response.
+    """Draw dose and response of `wakewise bench models` into a file: a row per quantity, a column per response.
 
     Raises
     ------
@@ -39,17 +39,18 @@ def draw_models(result: Mapping[str, Any], path: Path) -> None:
         raise InputError(f"--plot: draws the part '{DOSES}', which was not made; --scenarios {DOSES}")
     part = result["parts"][DOSES]
     axes_of = {name: axis for name, axis in part["axes"].items() if len(_doses(part["rows"], name)) > 1}
-    figure = Figure(figsize=(2.3 * len(axes_of) + 1.2, 6.6), facecolor="white", layout="constrained")
-    grid = figure.subplots(len(RESPONSES), len(axes_of), sharex="col", sharey="row", squeeze=False)
+    figure = Figure(figsize=(9.0, 1.75 * len(axes_of) + 0.5), facecolor="white", layout="constrained")
+    grid = figure.subplots(len(axes_of), len(RESPONSES), sharey="col", squeeze=False)
     methods = list(dict.fromkeys(row["method"] for row in part["rows"]))
-    for (figure_key, title), line in zip(RESPONSES, grid, strict=True):
-        for (name, axis), axes in zip(axes_of.items(), line, strict=True):
+    for (name, axis), line in zip(axes_of.items(), grid, strict=True):
+        for (figure_key, _), axes in zip(RESPONSES, line, strict=True):
             _respond(axes, part["rows"], name, figure_key, methods)
-            if axes in grid[-1]:
-                axes.set_xlabel(f"{axis['title']}, {axis['unit']}", fontsize=8, color=INK)
-        line[0].set_ylabel(title, fontsize=8, color=INK)
+            axes.set_xlabel(f"{axis['title']}, {axis['unit']}", fontsize=8, color=INK)
+    for (figure_key, title), column in zip(RESPONSES, grid.T, strict=True):
+        column[0].set_title(title, fontsize=9, loc="left", color=INK)
+        column[0].set_ylim(bottom=0.0)
         if figure_key == "rmse_mm":
-            for axes in line:
+            for axes in column:
                 axes.axhline(SUCCESS_RMSE_MM, color=QUIET, linewidth=0.8, linestyle=":")
     grid[0][0].legend(fontsize=8, frameon=False)
     with whole_file(path) as temporary:
@@ -101,14 +102,14 @@ def _respond(axes: Axes, rows: Sequence[Mapping[str, Any]], name: str, key: str,
         )
         colour, mark = LOOKS[method]
         axes.plot([x for x, _ in points], [y for _, y in points], f"-{mark}", color=colour, label=method, markersize=4)
-    values = _doses(rows, name)
-    if min(values) > 0.0 and max(values) / min(values) > 10.0:
+    values = sorted(_doses(rows, name))
+    if values[0] > 0.0 and values[-1] / values[0] > 10.0:
         axes.set_xscale("log")
-    else:
-        axes.xaxis.set_major_locator(MaxNLocator(4))
+    axes.xaxis.set_major_locator(FixedLocator(values))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter("{x:g}")
     usual = next(row["doses"][name] for row in rows if row["case"] == USUAL)
     axes.axvline(usual, color=QUIET, linewidth=0.6)
-    axes.set_ylim(bottom=0.0)
     _quiet(axes)
 
 
