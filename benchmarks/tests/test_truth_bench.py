@@ -179,6 +179,16 @@ def test_what_is_missing_is_null_and_says_why(tmp_path: Path) -> None:
     json.dumps(found)
 
 
+def test_a_file_that_cannot_be_read_leaves_the_other_rows(tmp_path: Path) -> None:
+    """Its own figures are null and name the folder and what was found; the parts beside it are computed."""
+    (tmp_path / "currents").mkdir()
+    (tmp_path / "currents" / "s08010.json").write_text("{}")
+    found = truth.run(BenchOptions(data=tmp_path, only=("currents", "dynamics")))
+    rows = {row["source"]: row for row in found["rows"]}
+    assert rows["currents"]["reached"] is None and str(tmp_path / "currents") in rows["currents"]["why"]
+    assert "is missing" in rows["dynamics"]["why"]
+
+
 def test_without_a_data_folder_the_command_ends_with_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -79,7 +79,7 @@ def bench(
         str,
         typer.Option(
             help="gentle: which, with commas between: orbit (both vehicles), orbit/paper, worlds, world/mud, paper "
-            "(the paper's own world); models: parts of cases.yaml; traps: by name; all if not given.",
+            "(the paper's own world); models: mechanisms, doses, advice, sheltered; traps: by name; all if not given.",
             show_default=False,
         ),
     ] = "",
@@ -139,8 +139,8 @@ def bench(
     plot: Annotated[
         Path | None,
         typer.Option(
-            help="front, gentle, models, operator, truth: draw the figures into this file (.png, .svg); of truth the "
-            "cube."
+            help="front, gentle, models, operator, truth: draw the figures into this file (.png, .svg, .pdf); of truth "
+            "the cube, of models the doses."
         ),
     ] = None,
     json: Json = False,
@@ -159,12 +159,23 @@ def bench(
 
     if plot is not None and name not in _DRAWN:
         raise InputError(f"--plot: bench {name or 'without a name'} draws nothing, those that do: {', '.join(_DRAWN)}")
-    if name == "truth":
-        if not data.is_dir():
-            raise InputError(f"--data {data}: no such folder; --data or WAKEWISE_DATA must name the reference data")
+    for option, given in (
+        ("--methods", methods), ("--scenarios", scenarios), ("--mechanisms", mechanisms), ("--worlds", worlds),
+        ("--only", only),
+    ):  # fmt: skip
+        if given and not listed(given):
+            raise InputError(f"{option} '{given}': no name in it; leave it out for all")
+    if only and name not in ("truth", "all"):
+        raise InputError("--only: of `wakewise bench truth` alone")
+    if name == "truth" and not data.is_dir():
+        raise InputError(f"--data {data}: no such folder; --data or WAKEWISE_DATA must name the reference data")
+    if name in ("truth", "all"):
         from wakewise_benchmarks.truth import chosen
 
         chosen(listed(only) or None)
+    needed = {"models": ("--scenarios", scenarios, "doses"), "truth": ("--only", only, "cube_channel")}.get(name)
+    if plot is not None and needed is not None and needed[1] and needed[2] not in listed(needed[1]):
+        raise InputError(f"--plot: draws {needed[2]}, which {needed[0]} leaves out")
     if plot is not None:
         need("--plot", "reports")
         if plot.suffix.lower() not in (".png", ".svg", ".pdf"):

@@ -70,6 +70,8 @@ def rows_of(part: Part, data: Path | None, progress: Progress) -> tuple[list[dic
             figures = dict(part.compute(data / part.name, progress))
         except (WakewiseError, OSError) as fault:  # what is wrong with the files or the machine, not with the program
             why = " ".join(str(fault).split())
+        except (ValueError, LookupError, StopIteration) as fault:  # a file that does not hold what its readers expect
+            why = f"{data / part.name} cannot be read: {type(fault).__name__}, {' '.join(str(fault).split())}"
     rows = []
     for asked in part.asked:
         value = figures.get(asked.key)

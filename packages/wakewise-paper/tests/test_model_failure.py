@@ -13,6 +13,7 @@ from wakewise_paper.cli.bench_models import show_front, show_models
 from wakewise_paper.model_failure import bench
 from wakewise_paper.model_failure.cases import USUAL, PartFile, cases_of, load_parts
 from wakewise_paper.reports.models_bench_plot import draw_front, draw_models
+from wakewise_paper.reproduction.table_trials import METHOD_PLACES
 from wakewise_paper.wash_reduction import energy_front
 
 
@@ -83,12 +84,32 @@ def test_differences_are_of_pairs_of_one_seed():
 
 def test_a_part_with_one_method_is_held_against_its_first_case():
     """What helps is told over what is flown without help."""
-    cases = cases_of("advice")
-    trials = bench.planned({"advice": cases}, ("dp",), 2)
-    part = bench.part_figures("advice", cases, ("dp",), made_up(trials))
+    cases, methods = cases_of("advice"), ("dp", "weighted-pseudo-inverse", "wake-aware")
+    trials = bench.planned({"advice": cases}, methods, 2)
+    part = bench.part_figures("advice", cases, methods, made_up(trials))
     first, *others = part["rows"]
-    assert first["case"] == "nothing" and "rmse_mm_more" not in first
-    assert all(row["rmse_mm_more"] == pytest.approx(0.0) for row in others)
+    assert (first["case"], first["method"]) == ("unchanged", "dp") and "rmse_mm_more" not in first
+    for row in others:
+        assert row["rmse_mm_more"] == pytest.approx(-0.5 if row["method"] == "wake-aware" else 0.0)
+
+
+@pytest.mark.parametrize("part", load_parts())
+def test_a_row_names_the_method_that_was_flown(part):
+    """What a trial's scenario has is what its factors and the table say, but for the place of a plug-in."""
+    for case in cases_of(part):
+        for method in case.methods:
+            trial = case.trial(method, 2101)
+            assert trial.method == method
+            assert trial.task.settings["scenario"]["method"] in (method, METHOD_PLACES.get(method))
+
+
+def test_a_model_that_was_not_made_counts_as_the_worst_in_differences():
+    """Else a method that fails where it is hard would look better; in means it has no part."""
+    ours = {1: {"rmse_mm": 1.0}, 2: None, 3: {"rmse_mm": None}}
+    theirs = {seed: {"rmse_mm": 2.0} for seed in (1, 2, 3)}
+    told = bench.against(ours, theirs)
+    assert (told["rmse_mm_more"], told["rmse_mm_more_pairs"]) == (pytest.approx((-1.0 + 18.0 + 18.0) / 3.0), 3)
+    assert bench.model_figures(ours)["rmse_mm"] == 1.0
 
 
 def test_doses_are_drawn_and_shown(tmp_path, capsys):
@@ -106,12 +127,20 @@ def test_doses_are_drawn_and_shown(tmp_path, capsys):
         draw_models({"parts": {}}, tmp_path / "none.svg")
     with pytest.raises(InputError, match="ending"):
         draw_models(result, tmp_path / "doses.txt")
+    with pytest.raises(InputError, match="no doses were flown by these methods"):
+        draw_models({"parts": {"doses": parts["doses"] | {"rows": []}}}, tmp_path / "none.svg")
 
 
 def test_an_unknown_part_is_refused():
     """In one line with what there is."""
-    with pytest.raises(InputError, match="scenarios: 'dose' is not known, allowed: mechanisms, doses"):
+    with pytest.raises(InputError, match="--scenarios: 'dose' is not known, allowed: mechanisms, doses"):
         bench.run(BenchOptions(scenarios=("dose",)))
+    with pytest.raises(InputError, match="--methods: needs dp, which the others of part sheltered are held against"):
+        bench.run(BenchOptions(scenarios=("sheltered",), methods=("wake-aware",)))
+    with pytest.raises(InputError, match="--methods: needs dp"):
+        energy_front.run(BenchOptions(seeds=2, methods=("wake-aware",)))
+    with pytest.raises(InputError, match="--seeds 9: the front has 8 seeds"):
+        energy_front.run(BenchOptions(seeds=9))
 
 
 def point(energy, wash):
@@ -160,5 +189,12 @@ def test_the_benches_are_listed_and_refuse_a_picture_that_they_do_not_draw(capsy
     """`bench` lists both; `--plot` names those that draw."""
     assert run(["bench", "--json"]) == 0
     assert {"models", "front"} <= set(json.loads(capsys.readouterr().out)["benches"])
-    assert run(["bench", "dynamics", "--plot", "x.svg"]) == 2
-    assert "those that do: front, gentle, models, operator" in capsys.readouterr().err
+    for words, said in (
+        (["dynamics", "--plot", "x.svg"], "those that do: front, gentle, models, operator"),
+        (["models", "--scenarios", "advice", "--plot", "x.svg"], "draws doses, which --scenarios leaves out"),
+        (["truth", "--only", "dynamics", "--plot", "x.svg", "--data", "."], "draws cube_channel, which --only leaves"),
+        (["models", "--methods", ","], "--methods ',': no name in it"),
+        (["dynamics", "--only", "dynamics"], "--only: of `wakewise bench truth` alone"),
+    ):
+        assert run(["bench", *words]) == 2
+        assert said in " ".join(capsys.readouterr().err.split())

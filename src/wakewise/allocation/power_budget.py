@@ -196,8 +196,8 @@ class PowerBoundedAllocator:
         least_N, _ = largest_feasible_share(self.layout, self.layout.inverse @ wrench_B)
         speed_m_s = math.sqrt(max(disturbance_of(actual, least_N), 0.0) / total_weight) / MODEL_BIAS
         share = power_limit(speed_m_s)
-        extra_W = (share - 1.0) * float(self.law.power_W(least_N)) + (share - CALM) * self.law.standing_W
-        most_W = float(self.law.power_W(least_N)) + self.excess * extra_W
+        base_W = float(self.law.power_W(least_N))
+        most_W = base_W + self.excess * ((share - 1.0) * base_W + (share - CALM) * self.law.standing_W)
         calm = _calm(weights, total_weight)
         return best_by_power(self.layout, found, least_N, self.law, most_W, calm, gram, weights, previous_N)
 

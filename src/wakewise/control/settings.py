@@ -43,8 +43,7 @@ class AllocationSettings(Settings):
         default=1.0,
         ge=0.0,
         le=10.0,
-        description="multiplies the extra power that this bound allows beyond the least thrusts': less saves energy, "
-        "more removes more wash",
+        description="factor on the power that this bound allows beyond that of the minimum-norm thrusts; 0 allows none",
     )
     optimize_attitude: bool | None = Field(
         default=None,

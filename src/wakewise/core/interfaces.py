@@ -276,8 +276,8 @@ class WaterTruth:
     again or not, `silt_suspended_g` what is in the water now. `target_over_1cm_s` and
     `target_over_ambient` are the shares of the surface where the excess is more than 1 cm/s, and more than the mean
     speed there of the same water without the vehicle (NaN where that is still). `bed_over_threshold` is the share of
-    the bed within 0.2 m of the target's foot where the stress moves the bed's grains (NaN where no grains lie). NaN
-    where a witness does not know.
+    the bed within 0.2 m of the target's foot where the stress moves grains (NaN where neither bed nor water holds any).
+    NaN where a witness does not know.
     """
 
     target_speed_mean_m_s: float

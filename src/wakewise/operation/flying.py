@@ -231,10 +231,7 @@ def fly(
 
 
 def _say_trim(parts: Parts, recorder: FlightRecorder) -> None:
-    """Say what the settling hover shows of the ballast, before the first photograph: ballast spares more than a method.
-
-    The flight goes on: nobody can add a block now, but a pilot may choose to come back up.
-    """
+    """Log the ballast that the settling hover asks for, before the first photograph; the flight goes on."""
     words = ballast_proposal(parts.vehicle, recorder.frame())
     if words is not None:
         log.warning("settling hover: %s", words)

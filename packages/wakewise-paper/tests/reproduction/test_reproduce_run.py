@@ -65,6 +65,16 @@ def test_a_budget_is_shared_by_time_spent(tmp_path, campaign):
     assert abs(spent[0] - spent[1]) <= 40.0 and sum(spent) >= 200.0
 
 
+def test_a_trial_that_two_tables_share_is_paid_once(tmp_path, campaign):
+    """550 s of two workers hold 400 of dynamic and half of ablation's 200: the other half is dynamic's already."""
+    options = ReproduceOptions(budget_s=305.0, worlds=("pump-tank",), targets=("brain",))
+    told = reproduce(["dynamic", "ablation"], tmp_path, options)
+    assert told["ablation"]["why"] == {} and told["ablation"]["made"] >= 4
+    assert len(campaign[0]) == 8
+    with_success = reproduce(["dynamic", "success"], tmp_path / "other", options)
+    assert "no room" in with_success["success"]["why"]["rows"]
+
+
 def test_the_same_trials_have_the_same_configuration(tmp_path, campaign):
     """And others another."""
     hashes = [

@@ -91,9 +91,9 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "exposure_pressure_p95_Pa": ("Pa", "target_pressure_p95_Pa while the shutter is open", "less"),
     "bed_shear_p95_Pa": ("Pa", "95th percentile of the stress of the whole water on the bed within 0.3 m of the "
                          "target, mean over time", "less"),
-    "bed_over_threshold_pct": ("%", "share of the bed within 0.2 m of the target, and of time, where the stress moves "
-                               "the bed's grains", "less"),
-    "bed_over_threshold_s": ("s", "time in which grains move anywhere on the bed within 0.2 m of the target", "less"),
+    "bed_over_threshold_pct": ("%", "share of the bed within 0.2 m of the vertical through the target's centre, and of "
+                               "time, where the stress of the whole water moves grains", "less"),
+    "bed_over_threshold_s": ("s", "time in which grains move anywhere on that part of the bed", "less"),
     "tracer_speed_mean_m_s": ("m/s", "speed of tracers at the target's surface over 1/30 s, as PIV would see the whole "
                               "water, mean over surface and time", "less"),
     "ray_optical_depth": ("", "beam attenuation by silt along the rays from camera to target, end to end, mean over "

@@ -226,9 +226,9 @@ LIMITS: tuple[ValidationLimit, ...] = (
 ABSENT: tuple[str, ...] = (
     "The hull blocks no jet, no jet clings to it; its wake has the momentum that drag says, but no eddies of its own.",
     "Thrust does not change near the bed, and only with tank.jets.inflow_loss in the wash of another thruster.",
-    "Wall jets carry no turbulence, do not collide, have no boundary layer. The speed that the log law takes for that "
-    "at 1 cm is the speed at the wall itself, which meets the laws of stress above; the speed at 1 cm would give 0.16 "
-    "(1 N from 0.5 m) and 0.37 (0.25 N from 0.8 m) of them.",
+    "Wall jets carry no turbulence, do not collide, and have no boundary layer. The log law is given the speed at the "
+    "wall, not at 1 cm. With the speed at 1 cm, stress would be 0.16 (1 N from 0.5 m) and 0.37 (0.25 N from 0.8 m) of "
+    "the law above.",
     "Gusts do not carry jets: a jet's axis does not meander, nor does the plane of two that cross.",
     "What has met once does not meet again: a fan passes other jets and fans.",
     "A cable's drag leaves no wake.",

@@ -94,8 +94,8 @@ def _glance(judged: Sequence[tuple[ComparisonMetric, MethodSummary]], compared: 
     heads = ("judged by", "where", "first and next best, difference", "chance", "at what cost", "pairs")
     lead = (
         "Over the seeds and targets that all have; a model that was not made counts as the worst. Chance: how likely a "
-        "trial of the first beats one of the next best. Each line is a test of its own: of twenty, one tells apart by "
-        "chance."
+        "trial of the first beats one of the next best. Each line is a test of its own: one in twenty "
+        "shows a difference by chance."
     )
     return section("glance", "At a glance", lead, parts().table("tttttn", heads, rows, "glance"))
 

@@ -30,7 +30,8 @@ def show_models(result: Mapping[str, Any]) -> None:
         rows = []
         for row in part["rows"]:
             more = row.get("rmse_mm_more")
-            ends = interval(*(row.get("rmse_mm_more_interval") or (None, None)))
+            low, high = row.get("rmse_mm_more_interval") or (None, None)
+            ends = interval(low, high, "no interval")
             told = "" if more is None else f"{more:+.2f} ({ends}; {row['rmse_mm_more_pairs']})"
             rows.append((row["title"], row["method"], row["scans"], *scaled(row, _COLUMNS), told))
         columns = ("case", "method", "scans", *(title for _, title, _ in _COLUMNS), "RMSE more than the base")
@@ -43,7 +44,7 @@ def show_front(result: Mapping[str, Any]) -> None:
     """A table per place: wash and energy over those of `dp`; the knee; our front at each rival's energy."""
     for name, place in result["places"].items():
         rows = [
-            (method, row["pairs"], *(cell for key in ("wash", "energy") for cell in (row[key], _ends(row, key))))
+            (method, row["wash_pairs"], *(cell for key in ("wash", "energy") for cell in (row[key], _ends(row, key))))
             for method, row in place["methods"].items()
         ]
         print_table("tn", ("method", "pairs", "wash", "95 %", "energy", "95 %"), rows, f"{name}: over dp's")

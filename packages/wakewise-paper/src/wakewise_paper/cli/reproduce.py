@@ -26,7 +26,9 @@ def reproduce(
     ],
     trials: Annotated[
         int | None,
-        typer.Option(help="Seeds for each target in each world; 1 if neither this nor --budget is given."),
+        typer.Option(
+            help="Seeds for each target, a third of them beside the paper's own world; 1 without --trials and --budget."
+        ),
     ] = None,
     first_seed: Annotated[int, typer.Option(help="First seed; others than 3001 are for trying things.", min=0)] = 3001,
     budget: Annotated[

@@ -1,20 +1,29 @@
 """Where wash ruins a model: whole scans by mechanism, dose, advice and method, each with its model.
 
 Seeds are the same for all methods and cases of a part, so that scans are compared in pairs. Intervals are 95 % by
-Student's t over pairs; shares have exact ones. A scan without a model is no success and counts as a failure, and has no
-RMSE. A campaign keeps the trials: a run that was stopped goes on.
+Student's t over pairs; shares have exact ones. A scan without a model is no success; it has no part in means of RMSE
+and completeness, and counts as 20 mm and 0 % in their differences. A campaign keeps the trials: a run that was stopped
+goes on.
 """
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.campaigns.definition import PlannedTrial
-from wakewise.experiments.campaigns.statistics import geometric_ratio, mean_figures, mean_interval, share_interval
+from wakewise.experiments.campaigns.statistics import (
+    LEAST_M_S,
+    WORST,
+    geometric_ratio,
+    mean_figures,
+    mean_interval,
+    pairs_of,
+    share_interval,
+)
 from wakewise.experiments.campaigns.study import Row, StudyResult, run_study, selected, store_folder
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise_paper.model_failure.cases import Case, cases_of, load_parts
@@ -62,10 +71,14 @@ def run(options: BenchOptions) -> dict[str, Any]:
         If a part or method is not known.
     """
     began = time.monotonic()
-    parts = selected("scenarios", options.scenarios, tuple(load_parts()))
+    parts = selected("--scenarios", options.scenarios, tuple(load_parts()))
     cases = {part: cases_of(part) for part in parts}
     known = tuple(dict.fromkeys(method for own in cases.values() for case in own for method in case.methods))
-    methods = selected("methods", options.methods, known)
+    methods = selected("--methods", options.methods, known)
+    missing = [part for part, own in cases.items() if not any(base_of(own, case)[1] in methods for case in own)]
+    if missing:
+        base = base_of(cases[missing[0]], cases[missing[0]][0])[1]
+        raise InputError(f"--methods: needs {base}, which the others of part {missing[0]} are held against")
     trials = planned(cases, methods, options.seeds)
     made = run_study("models", trials, options.store or store_folder("models"), options, _engine)
     return {
@@ -92,21 +105,23 @@ def planned(
 def part_figures(
     part: str, cases: Sequence[Case], methods: Sequence[str], made: StudyResult[ModelKey]
 ) -> dict[str, Any]:
-    """Table of a part: a row for each case and method, held against the first method of the case.
-
-    Where a part has one method, its cases are held against the first case.
-    """
+    """Table of a part: a row for each case and method, held against `base_of` it."""
     file = load_parts()[part]
     rows: list[dict[str, Any]] = []
-    across = len(file.methods) == 1
     for case in cases:
         for method in (method for method in case.methods if method in methods):
-            base = (cases[0].name, method) if across else (case.name, case.methods[0])
+            base = base_of(cases, case)
             own, others = (_of(made, part, *which) for which in ((case.name, method), base))
             row = {"case": case.name, "title": case.title, "method": method, "doses": case.doses}
             rows.append(row | model_figures(own) | ({} if base == (case.name, method) else against(own, others)))
     axes = {name: {"title": axis.title, "unit": axis.unit} for name, axis in file.axes.items()}
     return {"title": file.title, "rows": rows, "axes": axes}
+
+
+def base_of(cases: Sequence[Case], case: Case) -> tuple[str, str]:
+    """Case and method that a case is held against: its first method; in a part with one method, the first case."""
+    across = len(load_parts()[case.part].methods) == 1
+    return (cases[0].name, cases[0].methods[0]) if across else (case.name, case.methods[0])
 
 
 def model_figures(rows: Mapping[int, Row | None]) -> dict[str, Any]:
@@ -123,23 +138,25 @@ def against(ours: Mapping[int, Row | None], theirs: Mapping[int, Row | None]) ->
     """Differences and ratios of pairs of one seed, each with its interval and the number of pairs."""
     told: dict[str, Any] = {}
     for figure in (*DIFFERENCES, *RATIOS):
-        pairs = [
-            (float(mine), float(other))
-            for seed in sorted(set(ours) & set(theirs))
-            if (mine := (ours[seed] or {}).get(figure)) is not None
-            and (other := (theirs[seed] or {}).get(figure)) is not None
-            and math.isfinite(mine)
-            and math.isfinite(other)
-        ]
+        pairs = [(mine, other) for other, mine, _ in pairs_of(_judged(theirs), _judged(ours), figure, {})]
         if figure in DIFFERENCES:
             value, ends = mean_interval([mine - other for mine, other in pairs]) if pairs else (None, None)
             name = f"{figure}_more"
         else:
-            pairs = [(mine, other) for mine, other in pairs if mine > 0.0 and other > 0.0]
-            value, ends = geometric_ratio(*zip(*pairs, strict=True)) if pairs else (None, None)
+            least = LEAST_M_S if figure.endswith("m_s") else 1e-9
+            pairs = [(max(mine, least), max(other, least)) for mine, other in pairs]
+            value, ends = geometric_ratio([m for m, _ in pairs], [o for _, o in pairs]) if pairs else (None, None)
             name = f"{figure}_ratio"
         told[name], told[f"{name}_interval"], told[f"{name}_pairs"] = value, ends, len(pairs)
     return told
+
+
+def _judged(rows: Mapping[int, Row | None]) -> dict[int, Row]:
+    """Figures in which a model that was not made is the worst."""
+    return {
+        seed: dict(row or {}) | {key: WORST[key] for key in WORST if (row or {}).get(key) is None}
+        for seed, row in rows.items()
+    }
 
 
 def _of(made: StudyResult[ModelKey], part: str, case: str, method: str) -> dict[int, Row | None]:

@@ -87,7 +87,7 @@ class Case:
         settings = {"scenario": fields, "preset": "quick", "keep": "figures", "setup": self.setup}
         name = f"{self.part}/{self.name}/{method}/{seed}"
         task = Task(name=name, work=MODEL, settings=settings, sources=SOURCES)
-        return study_trial(str(fields["world"]), str(fields["method"]), seed, task, f"{self.part}/{self.name}")
+        return study_trial(str(fields["world"]), method, seed, task, f"{self.part}/{self.name}")
 
 
 @functools.cache

@@ -39,6 +39,8 @@ def draw_models(result: Mapping[str, Any], path: Path) -> None:
         raise InputError(f"--plot: draws the part '{DOSES}', which was not made; --scenarios {DOSES}")
     part = result["parts"][DOSES]
     axes_of = {name: axis for name, axis in part["axes"].items() if len(_doses(part["rows"], name)) > 1}
+    if not axes_of:
+        raise InputError("--plot: no doses were flown by these methods; the part has dp and wake-aware")
     figure = Figure(figsize=(9.0, 1.75 * len(axes_of) + 0.5), facecolor="white", layout="constrained")
     grid = figure.subplots(len(axes_of), len(RESPONSES), sharey="col", squeeze=False)
     methods = list(dict.fromkeys(row["method"] for row in part["rows"]))

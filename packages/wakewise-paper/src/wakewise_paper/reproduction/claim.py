@@ -118,7 +118,7 @@ def _claim(entry: Mapping[str, Any], hows: Mapping[str, str], unquoted: str, bas
         told["paper"] = 100.0 * (1.0 - ratio[0] / ratio[1])
     if (than := told.get("than")) is not None:
         told |= {"title": f"{told['title']}, less than {than}", "unit": "%", "reading": "less_pct"}
-        told["how"] = f"{told['how']}; ratio of the means over pairs of one seed"
+        told["how"] = f"{told['how']}; ratio of the geometric means over pairs of one seed"
         told["side"] = "none" if told.get("paper") is None and told.get("asked") is None else "more"
     quoted_than = than if told["paper"] is not None else None
     told = {"baseline": quoted_than or baseline} | told | {"worlds": tuple(told.get("worlds", ()))}

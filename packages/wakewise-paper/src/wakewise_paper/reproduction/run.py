@@ -39,6 +39,7 @@ from wakewise_paper.reproduction.table_trials import (
     TableRequest,
     blocks_of,
 )
+from wakewise_paper.reproduction.worlds import water
 
 COLUMNS = (
     ("target_speed_mean_m_s", "wash at the target", "mm/s", 1e3),
@@ -151,16 +152,33 @@ class _Growing:
             self.taken.append(block)
         return block
 
-    def is_made(self, block: Block, store: CampaignStore) -> bool:
-        """Whether an earlier run made all of a block."""
-        return all(store.figures(plan.task.key) is not None for plan in block)
+    def leave(self, block: Block, planned: _Planned) -> bool:
+        """Take a block back for which there is no room, but for trials that cost nothing more; whether all of it."""
+        self.taken.remove(block)
+        known = tuple(plan for plan in block if planned.has(plan.task.key))
+        if known:
+            self.taken.append(known)
+        return not known
 
-    def leave(self, block: Block, store: CampaignStore) -> bool:
-        """Take a block back for which there is no room, unless an earlier run made a part of it, which is shown."""
-        begun = any(store.figures(plan.task.key) is not None for plan in block)
-        if not begun:
-            self.taken.remove(block)
-        return not begun
+
+@dataclass
+class _Planned:
+    """What a run makes or knows already, whichever table it is of: tables share trials."""
+
+    store: CampaignStore
+    keys: set[str] = field(default_factory=set)
+
+    def share(self, block: Block) -> float:
+        """Share of a block's trials that are still to be made."""
+        return sum(not self.has(plan.task.key) for plan in block) / len(block)
+
+    def has(self, key: str) -> bool:
+        """Whether a trial costs nothing more."""
+        return key in self.keys or self.store.figures(key) is not None
+
+    def add(self, block: Block) -> None:
+        """Make these, too."""
+        self.keys |= {plan.task.key for plan in block}
 
 
 def reproduce(names: Sequence[str], folder: Path, options: ReproduceOptions) -> dict[str, dict[str, Any]]:
@@ -180,6 +198,8 @@ def reproduce(names: Sequence[str], folder: Path, options: ReproduceOptions) -> 
         if name not in TABLES:
             raise InputError(f"table '{name}': not known, allowed: {', '.join(TABLES)}, all")
     _check_methods(names, options.methods)
+    for world in options.worlds or ():
+        water(world)
     tables = [_Growing(name, blocks_of(name, _fitting(name, options.wish))) for name in names]
     open_store(folder)  # one of another version is refused before kernels are compiled and a plan is written
     for table in tables:
@@ -219,7 +239,7 @@ def _within(tables: list[_Growing], folder: Path, options: ReproduceOptions, beg
     budget_s = options.budget_s or 0.0
     until = began + LAST * budget_s
 
-    store = open_store(folder)
+    planned = _Planned(open_store(folder))
 
     def room_s() -> float:
         return RESERVE * (budget_s - (time.monotonic() - began)) * options.workers
@@ -227,12 +247,15 @@ def _within(tables: list[_Growing], folder: Path, options: ReproduceOptions, beg
     left_s = room_s()
     for table in tables:
         block = table.take()
-        if block is None or table.is_made(block, store):
+        if block is None:
             continue
-        if table.block_s > left_s and len(tables) > 1 and table.leave(block, store):
-            table.why = f"no room in {budget_s / 60.0:.0f} min: its first trials take some {table.block_s:.0f} s"
+        costs_s = table.block_s * planned.share(block)
+        if costs_s > left_s and len(tables) > 1:
+            if table.leave(block, planned):
+                table.why = f"no room in {budget_s / 60.0:.0f} min: its first trials take some {costs_s:.0f} s"
             continue
-        left_s -= table.block_s
+        planned.add(block)
+        left_s -= costs_s
     _make(tables, folder, _telling(options, "the first block of each table"), until)
     left_s = room_s()
     open_tables = [table for table in tables if table.why is None]
@@ -242,12 +265,13 @@ def _within(tables: list[_Growing], folder: Path, options: ReproduceOptions, beg
         if block is None:
             open_tables.remove(cheapest)
             continue
-        if not cheapest.is_made(block, store):
-            if cheapest.block_s > left_s:
-                cheapest.leave(block, store)
-                open_tables.remove(cheapest)
-                continue
-            left_s -= cheapest.block_s
+        costs_s = cheapest.block_s * planned.share(block)
+        if costs_s > left_s:
+            cheapest.leave(block, planned)
+            open_tables.remove(cheapest)
+            continue
+        planned.add(block)
+        left_s -= costs_s
         cheapest.spent_s += cheapest.block_s
     _make(tables, folder, options, until)
 

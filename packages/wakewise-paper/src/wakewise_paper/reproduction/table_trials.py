@@ -61,8 +61,8 @@ Block = tuple[PlannedTrial, ...]
 
 
 FIRST_SEED = 3001
-"""First seed of the tables; nothing was chosen or tuned on seeds from here on."""
-SELDOM = 3
+"""First seed of the tables and of the last part of `bench models`; nothing was chosen or tuned from here on."""
+SEED_STRIDE = 3
 """Worlds beside the paper's own set-up are flown on each third seed, for the sake of more pairs in that set-up."""
 
 METHOD_PLACES = {"dp-paper": "wakewise_paper.dp_paper:make_dp_paper"}
@@ -114,8 +114,8 @@ class TableDefinition:
 
     `block_s` is about how much CPU time a block takes, in seconds, for choosing the first of a budget; `weight` the
     table's share of a budget, over that of others. `once`: nothing in it is drawn, one trial says all. `has_targets`:
-    its targets are things, and others can be put in their place. `seldom` names the worlds that are flown on each
-    `SELDOM`-th seed alone, where the table has others.
+    its targets are things, and others can be put in their place. `every_third` names the worlds that are flown on each
+    `SEED_STRIDE`-th seed alone, where the table has others.
     """
 
     methods: tuple[str, ...]
@@ -126,7 +126,7 @@ class TableDefinition:
     weight: float = 1.0
     once: bool = False
     has_targets: bool = True
-    seldom: tuple[str, ...] = ()
+    every_third: tuple[str, ...] = ()
 
 
 def blocks_of(name: str, wish: TableRequest) -> Iterator[Block]:
@@ -153,9 +153,9 @@ def _blocks(
     targets: Mapping[str, tuple[str, ...]],
 ) -> Iterator[Block]:
     table = TABLE[name]
-    seldom = table.seldom if set(worlds) - set(table.seldom) else ()
+    every_third = table.every_third if set(worlds) - set(table.every_third) else ()
     for seed in range(wish.first_seed, wish.first_seed + (1 if table.once else wish.trials)):
-        flown = [world for world in worlds if world not in seldom or (seed - wish.first_seed) % SELDOM == 0]
+        flown = [world for world in worlds if world not in every_third or (seed - wish.first_seed) % SEED_STRIDE == 0]
         for number in range(max(len(targets[world]) for world in flown)):
             for world in (world for world in flown if number < len(targets[world])):
                 target = targets[world][number]
@@ -341,7 +341,7 @@ TABLE: dict[str, TableDefinition] = {
         task=_scan,
         block_s=400.0,
         weight=4.0,
-        seldom=(TROUBLE, SHELTERED),
+        every_third=(TROUBLE, SHELTERED),
     ),
     "success": TableDefinition(
         methods=("mpc", "wake-aware"),
@@ -350,7 +350,7 @@ TABLE: dict[str, TableDefinition] = {
         task=_varied,
         block_s=200.0,
         weight=2.0,
-        seldom=(TROUBLE, SHELTERED),
+        every_third=(TROUBLE, SHELTERED),
     ),
     "station": TableDefinition(
         methods=_STATION_METHODS,
@@ -359,7 +359,7 @@ TABLE: dict[str, TableDefinition] = {
         task=_station,
         block_s=150.0,
         weight=3.0,
-        seldom=(TROUBLE, PAPER),
+        every_third=(TROUBLE, PAPER),
     ),
     "ablation": TableDefinition(
         methods=("wake-aware", *VARIANTS),
@@ -368,7 +368,7 @@ TABLE: dict[str, TableDefinition] = {
         task=_ablated,
         block_s=200.0,
         weight=2.0,
-        seldom=(TROUBLE,),
+        every_third=(TROUBLE,),
     ),
     "sediment": TableDefinition(
         methods=("mpc", "wake-aware"),
@@ -376,7 +376,7 @@ TABLE: dict[str, TableDefinition] = {
         targets=_silted,
         task=_scan,
         block_s=120.0,
-        seldom=("fluff",),
+        every_third=("fluff",),
     ),
     "flow": TableDefinition(methods=("dp", "mpc", "wake-aware"), worlds=_FLOWN, targets=_own, task=_flow, block_s=50.0),
     "solver": TableDefinition(

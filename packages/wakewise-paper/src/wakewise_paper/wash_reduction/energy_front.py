@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.campaigns.definition import PlannedTrial
-from wakewise.experiments.campaigns.statistics import LEAST_M_S, geometric_ratio
+from wakewise.experiments.campaigns.statistics import LEAST_M_S, geometric_ratio, pairs_of
 from wakewise.experiments.campaigns.study import Key, Row, flight_trial, run_study, selected, store_folder
 from wakewise.experiments.trials.timing import BenchOptions
 
@@ -28,15 +29,15 @@ PLACES: dict[str, dict[str, Any]] = {
     "payload": {"world": "payload"},
     "close": {"world": "close"},
     "sheltered": {"world": "sheltered"},
-    "payload, bluerov2-heavy": {"world": "payload", "vehicle": "bluerov2-heavy"},
+    "payload/bluerov2-heavy": {"world": "payload", "vehicle": "bluerov2-heavy"},
 }
 """Where scans are flown: fields of a scenario by name."""
 LIMITS: dict[str, dict[str, Any]] = {
-    "wake-aware, no extra power": {"control.allocation.power_excess": 0.0},
-    "wake-aware, half": {"control.allocation.power_excess": 0.5},
+    "wake-aware/excess-0": {"control.allocation.power_excess": 0.0},
+    "wake-aware/excess-0.5": {"control.allocation.power_excess": 0.5},
     "wake-aware": {},
-    "wake-aware, twice": {"control.allocation.power_excess": 2.0},
-    "wake-aware, no limit": {"control.allocation.power_limit": False},
+    "wake-aware/excess-2": {"control.allocation.power_excess": 2.0},
+    "wake-aware/no-limit": {"control.allocation.power_limit": False},
 }
 """The front: fields of our method by name, in the order of the power that they allow."""
 DEFAULT = "wake-aware"
@@ -57,11 +58,15 @@ def run(options: BenchOptions) -> dict[str, Any]:
         If a place or method is not known.
     """
     began = time.monotonic()
-    places = selected("worlds", options.worlds, tuple(PLACES))
-    methods = selected("methods", options.methods, METHODS)
+    places = selected("--worlds", options.worlds, tuple(PLACES))
+    methods = selected("--methods", options.methods, METHODS)
+    if BASE not in methods:
+        raise InputError(f"--methods: needs {BASE}, which the others are held against")
+    if options.seeds > MOST_SEEDS:
+        raise InputError(f"--seeds {options.seeds}: the front has {MOST_SEEDS} seeds, {FIRST_SEED} and on")
     trials = {
         (place, method, seed): flight(place, method, seed)
-        for seed in range(FIRST_SEED, FIRST_SEED + min(options.seeds, MOST_SEEDS))
+        for seed in range(FIRST_SEED, FIRST_SEED + options.seeds)
         for place in places
         for method in methods
     }
@@ -75,7 +80,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
 
 def flight(place: str, method: str, seed: int) -> PlannedTrial:
     """The whole path of a quick scan."""
-    fields = {"method": method.partition(",")[0], **PLACES[place], **LIMITS.get(method, {}), "seed": seed}
+    fields = {"method": method.partition("/")[0], **PLACES[place], **LIMITS.get(method, {}), "seed": seed}
     return flight_trial(str(fields["world"]), method, seed, fields, sources=SOURCES, variation=f"front/{place}")
 
 
@@ -93,15 +98,11 @@ def front_of(place: str, methods: Sequence[str], rows: Mapping[Key, Row]) -> dic
 
 def ratios(ours: Mapping[int, Row], theirs: Mapping[int, Row]) -> dict[str, Any]:
     """Wash and energy over those of the base, geometric means over seeds, with intervals; None without pairs."""
-    told: dict[str, Any] = {"pairs": 0}
+    told: dict[str, Any] = {}
     for name, figure, least in (("wash", "target_speed_mean_m_s", LEAST_M_S), ("energy", "energy_kJ", 1e-9)):
-        pairs = [
-            (max(float(mine), least), max(float(other), least))
-            for seed in sorted(set(ours) & set(theirs))
-            if (mine := ours[seed].get(figure)) is not None and (other := theirs[seed].get(figure)) is not None
-        ]
+        pairs = [(max(mine, least), max(other, least)) for other, mine, _ in pairs_of(theirs, ours, figure, {})]
         value, ends = geometric_ratio([m for m, _ in pairs], [o for _, o in pairs]) if pairs else (None, None)
-        told |= {name: value, f"{name}_interval": ends, "pairs": len(pairs)}
+        told |= {name: value, f"{name}_interval": ends, f"{name}_pairs": len(pairs)}
     return told
 
 

@@ -27,7 +27,7 @@ _PERCENT = ("less_pct", "more_pct")
 """Readings that are differences in percent."""
 RULES = (
     "*Surely*: the whole interval is on that side; a difference needs "
-    f"{FEWEST} pairs for that, and is preliminary below {ENOUGH}. A difference whose interval contains zero is not met."
+    f"{FEWEST} pairs for that, and is preliminary below {ENOUGH}. A reduction whose interval contains zero is not met."
 )
 """How figures are judged, beside every count."""
 _PACKAGES = ("wakewise", "numpy", "scipy", "numba", "pycolmap", "embreex", "daqp", "osqp", "opencv-python-headless")
