@@ -142,7 +142,7 @@ def test_a_part_given_in_python_is_named_in_the_record(installed: Path, tmp_path
         ({"method": "reef_parts:nothing"}, "cannot be loaded, AttributeError"),
         ({"method": "no_such_package:make"}, "cannot be loaded, ModuleNotFoundError"),
         ({"method": "stern-onli"}, "did you mean stern-only"),
-        ({"world": "moon"}, "reef, still-tank, quiet-tank"),
+        ({"world": "moon"}, "sheltered, still-tank, quiet-tank"),
         ({"control.wake.model": "top-cat"}, "top-hat"),
         ({"target.kind": "pyramids"}, "pyramids"),
     ],

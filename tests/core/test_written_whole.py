@@ -88,6 +88,7 @@ ALLOWED |= dict.fromkeys(
             "wakewise.vision.reconstruction.photos.masks.write_for_colmap",
         ),
         "wakewise.vision.reconstruction.sfm.per_photo_intrinsics.fit_per_photo_intrinsics",
+        "wakewise_benchmarks.truth_photos._photos",
     ),
     "writes into a temporary folder, which its caller makes",
 )

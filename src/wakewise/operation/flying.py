@@ -232,9 +232,8 @@ def fly(
 
 def _say_trim(parts: Parts, recorder: FlightRecorder) -> None:
     """Log the ballast that the settling hover asks for, before the first photograph; the flight goes on."""
-    words = ballast_proposal(parts.vehicle, recorder.frame())
-    if words is not None:
-        log.warning("settling hover: %s", words)
+    if (words := ballast_proposal(parts.vehicle, recorder.frame())) is not None:
+        log.warning("settling hover: %s; after the flight: wakewise vehicle trim --flight FOLDER --write FILE", words)
 
 
 def parts_of(flight: Parts | Scenario) -> Parts:

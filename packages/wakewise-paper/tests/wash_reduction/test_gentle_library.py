@@ -66,10 +66,10 @@ def test_a_wrong_current_is_wrong_by_what_it_says():
 
 
 def test_names_stand_for_vehicles_and_worlds():
-    """`orbit` is flown by both vehicles, `worlds` are eight; all by default; others are refused."""
+    """`orbit` is flown by both vehicles, `worlds` are nine; all by default; others are refused."""
     assert names_of(("orbit",)) == tuple(f"orbit/{vehicle}" for vehicle in VEHICLES)
-    assert len(names_of(("worlds",))) == 8 and names_of(("world/mud", "calm/paper")) == ("calm/paper", "world/mud")
-    assert len(names_of(None)) == len(SCENARIOS) * len(VEHICLES) + 8 and names_of(()) == ()
+    assert len(names_of(("worlds",))) == 9 and names_of(("world/mud", "calm/paper")) == ("calm/paper", "world/mud")
+    assert len(names_of(None)) == len(SCENARIOS) * len(VEHICLES) + 9 and names_of(()) == ()
     with pytest.raises(InputError, match="allowed: orbit"):
         names_of(("magic",))
     assert METHODS[0] == "dp"

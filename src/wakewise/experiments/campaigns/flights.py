@@ -102,14 +102,9 @@ def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress)
 
 
 def flight_parts(settings: Mapping[str, Any]) -> tuple[Parts, dict[str, Any]]:
-    """Parts of the flight that settings of `fly_stage` describe, and figures that its setup functions gave."""
-    return changed_parts(scenario_of(settings), settings)
-
-
-def changed_parts(scenario: Scenario, settings: Mapping[str, Any]) -> tuple[Parts, dict[str, Any]]:
-    """Parts of a scenario after the setup functions of a trial, and the figures that these gave."""
+    """Parts of the flight that settings of a trial describe, and figures that its setup functions gave."""
     gathered: dict[str, Any] = {}
-    parts = scenario.parts()
+    parts = scenario_of(settings).parts()
     for name, arguments in (settings.get("setup") or {}).items():
         changed = function_named(name)(parts, **arguments)
         parts, more = changed if isinstance(changed, tuple) else (changed, {})
@@ -132,10 +127,9 @@ def model_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgres
 
     keep = settings["keep"]
     trial = folder / "trial"
-    scenario = scenario_of(settings)
-    parts, gathered = changed_parts(
-        scenario if keep == "all" else scenario.replace(**{"reconstruction.mesh": False}), settings
-    )
+    parts, gathered = flight_parts(settings)
+    if keep != "all":
+        parts = parts.replace(**{"reconstruction.mesh": False})
     figures = _plain(run_trial(parts, trial, _Stages(progress))) | gathered
     keep_pictures(parts.target, trial, folder)
     if keep != "all":

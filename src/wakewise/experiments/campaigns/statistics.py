@@ -232,13 +232,9 @@ def _checked(p: Sequence[float] | Array) -> Array:
 # Trials without figures: left out, as the paper does, or counted as the worst, as trials of medicines do. A method that
 # fails on the hard seeds looks better by what is left, so both are shown wherever a model is judged.
 
-WORST: dict[str, float] = {
-    "rmse_mm": 20.0,
-    "completeness_pct": 0.0,
-    "completeness_1mm_pct": 0.0,
-    "completeness_visible_pct": 0.0,
-    "success": 0.0,
-}
+WORST: dict[str, float] = {"rmse_mm": 20.0, "success": 0.0} | dict.fromkeys(
+    ("completeness_pct", "completeness_1mm_pct", "completeness_visible_pct"), 0.0
+)
 """What a trial counts as that was to make a model and made none: the cap of the RMSE, nothing covered, no success."""
 
 Row = Mapping[str, Any]

@@ -84,23 +84,8 @@ def scan(
             raise InputError("--resume: goes on as the folder says, so give nothing beside it but --json")
         resolved, folder = read_scenario(resume / "scenario.yaml"), resume
     result = trial(resolved, folder, ProgressBars(), print_json if json else partial(_print_figures, resolved))
-    if not json:
-        _say_trim(folder)
     if no_report(result.report_fault) and not json:
         typer.echo(f"report: {result.report}")
-
-
-def _say_trim(folder: Path) -> None:
-    """What the flight's hover says of the ballast, where it is worth a block."""
-    from wakewise.core.errors import InputError
-    from wakewise.operation.flight_trim import folder_trim
-
-    try:
-        _, found = folder_trim(folder)
-    except InputError:  # no hover in it, or a vehicle that was given in Python
-        return
-    if found.worth:
-        typer.echo(f"before the next flight: {found.words}; wakewise vehicle trim --flight {folder} --write FILE")
 
 
 def _print_figures(scenario: Scenario, figures: dict[str, Any]) -> None:

@@ -152,10 +152,8 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
         out[key] = None if exposing is None else _mean(steps, column, lasts, exposing)
     share = None if exposing is None else _mean(steps, "target_over_1cm_s", lasts, exposing)
     out["exposure_exceedance_1cm_s_pct"] = None if share is None else 100.0 * share
-    moving = _finite(steps, "bed_over_threshold")
-    out["bed_over_threshold_s"] = None
-    if moving is not None:
-        out["bed_over_threshold_s"] = float((steps["bed_over_threshold"].to_numpy() > 0.0) @ lasts)
+    known = _finite(steps, "bed_over_threshold") is not None
+    out["bed_over_threshold_s"] = float((_columns(steps, "bed_over_threshold")[:, 0] > 0.0) @ lasts) if known else None
     lifted = _finite(steps, "silt_lifted_g")
     out["silt_lifted_g"] = None if lifted is None else float(lifted[-1])
     suspended = _finite(steps, "silt_suspended_g")
