@@ -65,6 +65,20 @@ def test_a_budget_is_shared_by_time_spent(tmp_path, campaign):
     assert abs(spent[0] - spent[1]) <= 40.0 and sum(spent) >= 200.0
 
 
+def test_a_budget_that_is_spent_shows_all_that_is_known(tmp_path, campaign, monkeypatch):
+    """What an earlier run made costs nothing, however late it is: as when pages are written without a flight."""
+    for block in blocks_of("station", TableRequest(trials=3, worlds=("pump-tank",))):
+        for plan in block:
+            place = open_store(tmp_path).place(plan.task.key)
+            place.mkdir()
+            write_figures(place, {"energy_kJ": 1.0}, 9.0)
+    clock = iter(range(0, 10000, 10))
+    monkeypatch.setattr(module.time, "monotonic", lambda: float(next(clock)))
+    options = ReproduceOptions(budget_s=1.0, worlds=("pump-tank",))
+    told = reproduce(["station", "flow"], tmp_path, options)
+    assert told["station"]["seeds"] == [3001, 3002, 3003] and "no room" in told["flow"]["why"]["rows"]
+
+
 def test_a_trial_that_two_tables_share_is_paid_once(tmp_path, campaign):
     """550 s of two workers hold 400 of dynamic and half of ablation's 200: the other half is dynamic's already."""
     options = ReproduceOptions(budget_s=305.0, worlds=("pump-tank",), targets=("brain",))

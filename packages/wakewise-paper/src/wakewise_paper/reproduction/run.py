@@ -242,7 +242,7 @@ def _within(tables: list[_Growing], folder: Path, options: ReproduceOptions, beg
     planned = _Planned(open_store(folder))
 
     def room_s() -> float:
-        return RESERVE * (budget_s - (time.monotonic() - began)) * options.workers
+        return max(0.0, RESERVE * (budget_s - (time.monotonic() - began)) * options.workers)
 
     left_s = room_s()
     for table in tables:
