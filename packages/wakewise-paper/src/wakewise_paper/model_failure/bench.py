@@ -13,20 +13,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.campaigns.definition import PlannedTrial
-from wakewise.experiments.campaigns.statistics import (
-    LEAST_M_S,
-    WORST,
-    geometric_ratio,
-    mean_figures,
-    mean_interval,
-    pairs_of,
-    share_interval,
-)
+from wakewise.experiments.campaigns.statistics import WORST, mean_figures, mean_interval, pairs_of, share_interval
 from wakewise.experiments.campaigns.study import Row, StudyResult, run_study, selected, store_folder
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise_paper.model_failure.cases import Case, cases_of, load_parts
+from wakewise_paper.wash_reduction.energy_front import paired_ratio
 
 FIGURES = (
     "rmse_mm",
@@ -57,8 +49,6 @@ RATIOS = ("target_speed_mean_m_s", "energy_kJ", "sway_wash_mm")
 ModelKey = tuple[str, str, str, int]
 """Part, case, method and seed."""
 
-_engine = ProcessExecutor
-
 
 def run(options: BenchOptions) -> dict[str, Any]:
     """Make the scans that are wanted and not known yet, and gather the tables.
@@ -80,7 +70,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
         base = base_of(cases[missing[0]], cases[missing[0]][0])[1]
         raise InputError(f"--methods: needs {base}, which the others of part {missing[0]} are held against")
     trials = planned(cases, methods, options.seeds)
-    made = run_study("models", trials, options.store or store_folder("models"), options, _engine)
+    made = run_study("models", trials, options.store or store_folder("models"), options)
     return {
         "parts": {part: part_figures(part, cases[part], methods, made) for part in parts},
         **made.counts,
@@ -137,17 +127,15 @@ def model_figures(rows: Mapping[int, Row | None]) -> dict[str, Any]:
 def against(ours: Mapping[int, Row | None], theirs: Mapping[int, Row | None]) -> dict[str, Any]:
     """Differences and ratios of pairs of one seed, each with its interval and the number of pairs."""
     told: dict[str, Any] = {}
-    for figure in (*DIFFERENCES, *RATIOS):
-        pairs = [(mine, other) for other, mine, _ in pairs_of(_judged(theirs), _judged(ours), figure, {})]
-        if figure in DIFFERENCES:
-            value, ends = mean_interval([mine - other for mine, other in pairs]) if pairs else (None, None)
-            name = f"{figure}_more"
-        else:
-            least = LEAST_M_S if figure.endswith("m_s") else 1e-9
-            pairs = [(max(mine, least), max(other, least)) for mine, other in pairs]
-            value, ends = geometric_ratio([m for m, _ in pairs], [o for _, o in pairs]) if pairs else (None, None)
-            name = f"{figure}_ratio"
-        told[name], told[f"{name}_interval"], told[f"{name}_pairs"] = value, ends, len(pairs)
+    mine, others = _judged(ours), _judged(theirs)
+    for figure in DIFFERENCES:
+        more = [own - other for other, own, _ in pairs_of(others, mine, figure, {})]
+        name = f"{figure}_more"
+        told[name], told[f"{name}_interval"] = mean_interval(more) if more else (None, None)
+        told[f"{name}_pairs"] = len(more)
+    for figure in RATIOS:
+        name = f"{figure}_ratio"
+        told[name], told[f"{name}_interval"], told[f"{name}_pairs"] = paired_ratio(mine, others, figure)
     return told
 
 

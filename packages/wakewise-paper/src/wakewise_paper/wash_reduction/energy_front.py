@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.campaigns import ProcessExecutor
 from wakewise.experiments.campaigns.definition import PlannedTrial
-from wakewise.experiments.campaigns.statistics import LEAST_M_S, geometric_ratio, pairs_of
+from wakewise.experiments.campaigns.statistics import LEAST_M_S, Interval, geometric_ratio, pairs_of
 from wakewise.experiments.campaigns.study import Key, Row, flight_trial, run_study, selected, store_folder
 from wakewise.experiments.trials.timing import BenchOptions
 
@@ -40,13 +39,10 @@ LIMITS: dict[str, dict[str, Any]] = {
     "wake-aware/no-limit": {"control.allocation.power_limit": False},
 }
 """The front: fields of our method by name, in the order of the power that they allow."""
-DEFAULT = "wake-aware"
 RIVALS = ("no-forward-jets", "weighted-pseudo-inverse", "allocation-only")
 BASE = "dp"
 METHODS = (BASE, *RIVALS, *LIMITS)
 SOURCES = ("wakewise_paper:wash_reduction/energy_front.py",)
-
-_engine = ProcessExecutor
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
@@ -70,7 +66,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
         for place in places
         for method in methods
     }
-    made = run_study("front", trials, options.store or store_folder("front"), options, _engine)
+    made = run_study("front", trials, options.store or store_folder("front"), options)
     return {
         "places": {place: front_of(place, methods, made.rows) for place in places},
         **made.counts,
@@ -99,11 +95,23 @@ def front_of(place: str, methods: Sequence[str], rows: Mapping[Key, Row]) -> dic
 def ratios(ours: Mapping[int, Row], theirs: Mapping[int, Row]) -> dict[str, Any]:
     """Wash and energy over those of the base, geometric means over seeds, with intervals; None without pairs."""
     told: dict[str, Any] = {}
-    for name, figure, least in (("wash", "target_speed_mean_m_s", LEAST_M_S), ("energy", "energy_kJ", 1e-9)):
-        pairs = [(max(mine, least), max(other, least)) for other, mine, _ in pairs_of(theirs, ours, figure, {})]
-        value, ends = geometric_ratio([m for m, _ in pairs], [o for _, o in pairs]) if pairs else (None, None)
-        told |= {name: value, f"{name}_interval": ends, f"{name}_pairs": len(pairs)}
+    for name, figure in (("wash", "target_speed_mean_m_s"), ("energy", "energy_kJ")):
+        told[name], told[f"{name}_interval"], told[f"{name}_pairs"] = paired_ratio(ours, theirs, figure)
     return told
+
+
+def paired_ratio(
+    ours: Mapping[int, Row], theirs: Mapping[int, Row], figure: str
+) -> tuple[float | None, Interval | None, int]:
+    """Ratio of the geometric means of a figure over pairs of one seed, its interval, and the number of pairs.
+
+    Speeds below `LEAST_M_S` count as that; None without pairs.
+    """
+    least = LEAST_M_S if figure.endswith("m_s") else 1e-9
+    pairs = [(max(mine, least), max(other, least)) for other, mine, _ in pairs_of(theirs, ours, figure, {})]
+    if not pairs:
+        return None, None, 0
+    return *geometric_ratio([m for m, _ in pairs], [o for _, o in pairs]), len(pairs)
 
 
 def knee(points: Mapping[str, Mapping[str, Any]]) -> str | None:
