@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
+from wakewise_paper.reports.wash_bench_plot import check_ending
 
-SUFFIXES = (".png", ".svg", ".pdf")
 MEASURED, LATTICE, GREY = "#22303a", "#c65a3a", "#c9ced1"
 _SCALE_H = 0.45
 """Width in H of a profile that is as fast as the bulk velocity."""
@@ -22,8 +22,7 @@ def draw_cube(result: Mapping[str, Any], path: Path) -> None:
 
     Raises InputError if the file's ending is not one of `SUFFIXES`, or the cube was not computed.
     """
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: ending '{path.suffix}', allowed {', '.join(SUFFIXES)}")
+    check_ending(path)
     cube = result["cube"]
     if not cube.get("profiles"):
         raise InputError(f"{path}: the lattice round the cube was not computed, so there is nothing to draw")

@@ -13,7 +13,7 @@ from matplotlib.ticker import FixedLocator, NullLocator
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
 from wakewise_paper.model_failure.cases import USUAL
-from wakewise_paper.reports.wash_bench_plot import INK, LOOKS, QUIET, SUFFIXES
+from wakewise_paper.reports.wash_bench_plot import INK, LOOKS, QUIET, check_ending
 from wakewise_paper.wash_reduction.energy_front import LIMITS, RIVALS
 
 RESPONSES = (
@@ -34,7 +34,7 @@ def draw_models(result: Mapping[str, Any], path: Path) -> None:
     InputError
         If the file's ending is not one of `SUFFIXES`, or the part with doses was not made.
     """
-    _check(path)
+    check_ending(path)
     if DOSES not in result["parts"]:
         raise InputError(f"--plot: draws the part '{DOSES}', which was not made; --scenarios {DOSES}")
     part = result["parts"][DOSES]
@@ -67,7 +67,7 @@ def draw_front(result: Mapping[str, Any], path: Path) -> None:
     InputError
         If the file's ending is not one of `SUFFIXES`.
     """
-    _check(path)
+    check_ending(path)
     places = result["places"]
     figure = Figure(figsize=(2.9 * len(places) + 0.6, 3.3), facecolor="white", layout="constrained")
     panels = figure.subplots(1, len(places), sharey=True, squeeze=False)[0]
@@ -123,8 +123,3 @@ def _quiet(axes: Axes) -> None:
     axes.tick_params(labelsize=7.5, colors=INK, which="both")
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-
-
-def _check(path: Path) -> None:
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: ending '{path.suffix}', allowed {', '.join(SUFFIXES)}")

@@ -15,10 +15,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
+from wakewise_paper.reports.wash_bench_plot import check_ending
 
-SUFFIXES = (".png", ".svg", ".pdf")
 INK, QUIET, PALE = "#22303a", "#8a979d", "#e7f1ef"
 COLOURS = ("#1f7a78", "#c65a3a", "#5b8fb0", "#b9923a", "#7d4f9e", "#6a8a3a", "#a04a6a", "#4a5a6a")
 ASKED_DEVIATION_PCT, ASKED_REDUCTION_PCT = 15.0, 60.0
@@ -36,8 +35,7 @@ def draw_operator(result: Mapping[str, Any], path: Path) -> None:
     InputError
         If the file's ending is not one of `SUFFIXES`.
     """
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: ending '{path.suffix}', allowed {', '.join(SUFFIXES)}")
+    check_ending(path)
     figure = Figure(figsize=(10.5, 4.6), facecolor="white", layout="constrained")
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     lines = {name: world["w_track"] for name, world in result["worlds"].items()}

@@ -37,8 +37,7 @@ def draw_gentle(result: Mapping[str, Any], path: Path) -> None:
     InputError
         If the file's ending is not one of `SUFFIXES`.
     """
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: ending '{path.suffix}', allowed {', '.join(SUFFIXES)}")
+    check_ending(path)
     names = list(result["scenarios"])
     figure = Figure(figsize=(WIDTH_IN, ROW_IN * max(len(names), 1) + 1.6), facecolor="white", layout="constrained")
     axes = figure.subplots()
@@ -70,3 +69,9 @@ def draw_gentle(result: Mapping[str, Any], path: Path) -> None:
         axes.legend(fontsize=8, frameon=False, ncols=3)
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=150)
+
+
+def check_ending(path: Path) -> None:
+    """Raise InputError for a picture's file whose ending is not one of `SUFFIXES`."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: ending '{path.suffix}', allowed {', '.join(SUFFIXES)}")
