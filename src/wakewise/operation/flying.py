@@ -214,14 +214,14 @@ def fly(
     plant, witness = parts.world.begin()
     recorder = recorder_of(parts, witness, route, water_every_s=water_every_s, exposed=exposed)
 
-    settling = False
+    before = ""
 
     def record(step: Step) -> None:
-        nonlocal settling
+        nonlocal before
         recorder(step)
-        if settling and route.leg_name(step.time_s) != SETTLING:
+        left, before = before, route.leg_name(step.time_s)
+        if left == SETTLING != before:
             _say_trim(parts, recorder)
-        settling = route.leg_name(step.time_s) == SETTLING
         if watch is not None:
             watch(step, witness)
 
