@@ -8,7 +8,7 @@ import sys
 
 MODULES = (
     *("numpy", "scipy", "numba", "polars", "skimage", "daqp", "piqp", "osqp"),
-    *("cv2", "embreex", "pycolmap", "small_gicp", "matplotlib", "foxglove", "pygame"),
+    *("cv2", "embreex", "pycolmap", "small_gicp", "matplotlib", "foxglove", "pygame", "onnxruntime"),
 )
 # Debian's package for a shared library that a wheel may expect on the system.
 PACKAGES = {

@@ -9,15 +9,46 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Literal, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.checks import instance_of
 from wakewise.core.geometry import Pose
 
 S = TypeVar("S")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TargetEstimate:
+    """What the camera knows of the target, and the points of the water round it that are to stay still.
+
+    `time_s` is the time of the picture that it comes from. `status`: `assumed`, a ball at a stated distance;
+    `proposed`, detected and not yet accepted; `tracked`; `lost`, no longer seen and kept where it was. `covariance`,
+    shape (3, 3), is that of the centre. `points_W_m`, `weights` and `distance_m`, shapes (n, 3) and (n,), are the
+    protected region as in `wakewise.scene.targets.Region`; `version` grows with each change of it.
+    """
+
+    time_s: float
+    status: Literal["assumed", "proposed", "tracked", "lost"]
+    centre_W_m: Array
+    covariance: Array
+    radius_m: float
+    points_W_m: Array
+    weights: Array
+    distance_m: Array
+    version: int = 0
+
+    def __post_init__(self) -> None:
+        n = len(self.weights)
+        freeze(self, centre_W_m=(3,), covariance=(3, 3), points_W_m=(n, 3), weights=(n,), distance_m=(n,))
+
+    @property
+    def centre_std_m(self) -> float:
+        """Standard deviation of the centre's distance from the true one."""
+        return math.sqrt(float(np.trace(self.covariance)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,7 +59,8 @@ class BodyState:
     Of an estimate: `load_B`, shape (6,), is the wrench in B that the vehicle's model does not explain (trim, current,
     tether), and `covariance`, shape (12, 12), that of the errors of position in W, of attitude (rotation vector in B)
     and of `nu_B`; `current_W_m_s`, shape (3,), is the water's own motion, and `current_covariance`, shape (3, 3), how
-    sure that is. Each is None where nobody computed it or it is not known yet.
+    sure that is. `target` is what the camera knows of the target. Each is None where nobody computed it or it is not
+    known yet.
     """
 
     X_WB: Pose
@@ -37,6 +69,7 @@ class BodyState:
     covariance: Array | None = None
     current_W_m_s: Array | None = None
     current_covariance: Array | None = None
+    target: TargetEstimate | None = None
 
     def __post_init__(self) -> None:
         instance_of(self.X_WB, Pose, "X_WB")
@@ -52,7 +85,8 @@ class Measurement:
 
     `X_WB` is a camera-based pose, `p_WB_m` a position from optical tracking, shape (3,), `omega_B_rad_s` the gyro and
     `force_B_m_s2` the accelerometer (specific force: -g when at rest), both at the body origin, shape (3,), `depth_m`
-    the pressure sensor (positive down), `tilt_rad` the angle of the camera's joint.
+    the pressure sensor (positive down), `tilt_rad` the angle of the camera's joint. `image`, grey or RGB, uint8, is a
+    picture of the camera. `pose_std`, metres and radians, is the noise of `X_WB` where it is not the filter's setting.
     """
 
     time_s: float
@@ -62,6 +96,8 @@ class Measurement:
     force_B_m_s2: Array | None = None
     depth_m: float | None = None
     tilt_rad: float | None = None
+    image: NDArray[np.uint8] | None = None
+    pose_std: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

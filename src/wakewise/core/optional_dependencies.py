@@ -27,6 +27,7 @@ EXTRAS: dict[str, dict[str, str]] = {
     "gamepad": {"pygame": "pygame-ce"},
     "ros": {"rosbags": "rosbags"},
     "logs": {"foxglove": "foxglove-sdk"},
+    "detector": {"onnxruntime": "onnxruntime"},
     "nerf": {"torch": "torch"},
     "film": {"av": "av"},
     "dask": {"distributed": "distributed"},

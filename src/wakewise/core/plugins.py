@@ -28,6 +28,7 @@ GROUPS = {
     "pilot": "wakewise.pilots",
     "world": "wakewise.worlds",
     "current": "wakewise.currents",
+    "detector": "wakewise.detectors",
 }
 """Entry point group of each kind of part."""
 

@@ -247,7 +247,7 @@ class ErrorStateFilter:
     def _correct(self, work: _WorkingState, measured: Measurement) -> None:
         s, slow = self.settings, self._slow
         if measured.X_WB is not None:
-            self._correct_pose(work, measured.X_WB)
+            self._correct_pose(work, measured.X_WB, measured.pose_std or (s.position_std_m, s.attitude_std_rad))
         if measured.p_WB_m is not None:
             self._correct_sum(work, measured.p_WB_m, 0, slow["tracking"], s.tracking_std_m)
         if measured.depth_m is not None:
@@ -257,8 +257,8 @@ class ErrorStateFilter:
         if measured.force_B_m_s2 is not None:
             self._correct_force(work, measured.force_B_m_s2, measured.time_s)
 
-    def _correct_pose(self, work: _WorkingState, seen: Pose) -> None:
-        """Correct by a camera pose and adapt the process noise."""
+    def _correct_pose(self, work: _WorkingState, seen: Pose, std: tuple[float, float]) -> None:
+        """Correct by a camera pose of a noise in m and rad, and adapt the process noise."""
         if work.rejected_in_a_row >= self.priors.gate_patience:
             work.P += self._start_covariance
         distance, work.noise_scale = correct_by_pose(
@@ -267,8 +267,7 @@ class ErrorStateFilter:
             seen.p_m,
             seen.q,
             self._slow["camera"],
-            self.settings.position_std_m,
-            self.settings.attitude_std_rad,
+            *std,
             self._gate[6],
             work.innovation_mean,
             work.noise_scale,

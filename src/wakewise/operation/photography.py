@@ -125,7 +125,7 @@ def scenes_of(parts: Parts, exposure: ExposureRecord) -> list[Scene]:
     fastest = float(np.linalg.norm(speeds, axis=1).max(initial=0.0))
     pixels = fastest * open_s / max(away_m, NEAREST_M) * float(parts.camera.row[1])
     frames = min(2 * math.ceil(0.5 * (pixels / SMEAR_PX - 1.0)) + 1, MOST_FRAMES) if pixels > SMEAR_PX else 1
-    return [_posed(parts, tips + speeds * (open_s * (k + 0.5) / frames), shift) for k in range(max(frames, 1))]
+    return [posed_scene(parts, tips + speeds * (open_s * (k + 0.5) / frames), shift) for k in range(max(frames, 1))]
 
 
 def moved_m(parts: Parts, exposure: ExposureRecord) -> Array:
@@ -139,7 +139,7 @@ def moved_m(parts: Parts, exposure: ExposureRecord) -> Array:
     return moved
 
 
-def _posed(parts: Parts, tips_m: Array, shift_m: Array) -> Scene:
+def posed_scene(parts: Parts, tips_m: Array, shift_m: Array) -> Scene:
     """The scene with its target's tips moved and the whole of it shifted."""
     yielding, scene = parts.compliance, parts.scene
     moved, normals = np.zeros((scene.first_bed_vertex, 3)), scene.target_normals.astype(np.float64)

@@ -1,0 +1,158 @@
+"""An estimator that localises the vehicle by the map of its camera's pictures, beside its other sensors.
+
+While the map gives poses, those of other sensors are left out: the vehicle is held relative to what it sees. Without
+poses of the map for `UNSEEN_S`, the others count again.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from dataclasses import dataclass, field, replace
+
+import cv2
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Measurement
+from wakewise.estimation import ErrorStateFilter
+from wakewise.estimation.eskf import FilterState
+from wakewise.estimation.settings import Priors
+from wakewise.operation.finding.camera_frames import without_pose
+from wakewise.operation.parts import Parts
+from wakewise.operation.scenario.calibration_error import calibration_with_error
+from wakewise.perception import CalibratedCamera, PerceptionSettings, TargetTracker, TrackerState, grey_picture
+from wakewise.perception.feature_tracks import Grey
+from wakewise.perception.target_tracker import POSE_STD
+from wakewise.robot.vehicles import Vehicle
+from wakewise.vision.imaging import calibrate
+
+UNSEEN_S = 0.5
+REMEMBERED_S = 2.0
+"""How long estimates are kept, for the poses of late pictures."""
+SETTLE_MARGIN_S = 0.03
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CameraEstimatorState:
+    """State of the filter and of the tracker.
+
+    `recent` holds (time, X_WB, tilt) of the last estimates; `posed_s` is the time of the last pose by the map.
+    """
+
+    filter: FilterState
+    tracker: TrackerState
+    time_s: float
+    recent: tuple[tuple[float, Pose, float], ...] = ()
+    tilt_rad: float = 0.0
+    std: tuple[float, float] = (0.02, 0.03)
+    posed_s: float = -math.inf
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CameraEstimator:
+    """`wakewise.core.interfaces.Estimator` of a filter and a tracker.
+
+    `ahead_m` is how far the calibrated camera's projection centre lies before the lens's. `map_from_s`: until then the
+    map's poses are not used. `picture_s` collects the thread time of each picture, as `age_s` does that from a picture
+    to its use.
+    """
+
+    vehicle: Vehicle
+    inner: ErrorStateFilter
+    tracker: TargetTracker
+    ahead_m: float = 0.0
+    use_map: bool = True
+    picture_s: deque[float] = field(default_factory=lambda: deque(maxlen=10000))
+    age_s: deque[float] = field(default_factory=lambda: deque(maxlen=10000))
+
+    def init(self, start: BodyState) -> CameraEstimatorState:
+        """State at the start."""
+        return CameraEstimatorState(
+            filter=self.inner.init(start), tracker=self.tracker.init(), time_s=0.0, recent=((0.0, start.X_WB, 0.0),)
+        )
+
+    def step(
+        self, state: CameraEstimatorState, dt_s: float, measurements: tuple[Measurement, ...], thrusts_N: Array
+    ) -> tuple[CameraEstimatorState, BodyState]:
+        """As the filter; pictures become poses by the map, and the target is part of the estimate."""
+        now_s = state.time_s + dt_s
+        taken: list[Measurement] = []
+        for measured in measurements:
+            if measured.tilt_rad is not None:
+                state = replace(state, tilt_rad=measured.tilt_rad)
+            if measured.image is None:
+                taken.append(measured)
+                continue
+            state, pose = self._seen(state, measured, now_s)
+            if pose is not None:
+                taken.append(pose)
+        if self.use_map and now_s - state.posed_s < UNSEEN_S:
+            taken = [m if m.pose_std is not None else without_pose(m) for m in taken]
+        filtered, estimate = self.inner.step(state.filter, dt_s, tuple(taken), thrusts_N)
+        spread = estimate.covariance
+        state = replace(
+            state,
+            filter=filtered,
+            time_s=now_s,
+            recent=(*(r for r in state.recent if now_s - r[0] <= REMEMBERED_S), (now_s, estimate.X_WB, state.tilt_rad)),
+            std=state.std if spread is None else (_per_axis(spread[:3, :3]), _per_axis(spread[3:6, 3:6])),
+        )
+        return state, replace(estimate, target=state.tracker.target)
+
+    def _seen(
+        self, state: CameraEstimatorState, measured: Measurement, now_s: float
+    ) -> tuple[CameraEstimatorState, Measurement | None]:
+        """Take in a picture; the pose of the vehicle that it gives."""
+        began = time.thread_time()
+        _, X_WB, tilt_rad = min(state.recent, key=lambda r: abs(r[0] - measured.time_s))
+        X_BM = self.vehicle.X_BC_at(tilt_rad) @ Pose(np.array([0.0, 0.0, self.ahead_m]))
+        assert measured.image is not None
+        picture = fitted(grey_picture(measured.image), self.tracker.camera)
+        tracker, found = self.tracker.step(state.tracker, picture, measured.time_s, X_WB @ X_BM, state.std)
+        self.picture_s.append(time.thread_time() - began)
+        self.age_s.append(now_s - measured.time_s)
+        state = replace(state, tracker=tracker)
+        if found is None or not self.use_map:
+            return state, None
+        spread = found.covariance
+        std = (
+            math.hypot(POSE_STD[0], _per_axis(spread[:3, :3])),
+            math.hypot(POSE_STD[1], _per_axis(spread[3:, 3:])),
+        )
+        pose = Measurement(time_s=measured.time_s, X_WB=found.X_WC @ X_BM.inverse(), pose_std=std)
+        return replace(state, posed_s=measured.time_s), pose
+
+
+def _per_axis(covariance: Array) -> float:
+    """Standard deviation per axis of three errors."""
+    return math.sqrt(float(np.trace(covariance)) / 3.0)
+
+
+def fitted(picture: Grey, camera: CalibratedCamera) -> Grey:
+    """A grey picture in the camera's size; one of another shape is left for the tracker to refuse."""
+    height, width = picture.shape
+    if (width, height) == (camera.width, camera.height) or width * camera.height != height * camera.width:
+        return picture
+    return np.asarray(cv2.resize(picture, (camera.width, camera.height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def known_camera(parts: Parts, settings: PerceptionSettings) -> tuple[CalibratedCamera, float]:
+    """The scenario's camera as the crew has calibrated it, for pictures of the perception's width; its `ahead_m`."""
+    known = calibration_with_error(calibrate(parts.camera), parts.scenario.calibration_error, parts.seeds.survey()[1])
+    fx, fy, cx, cy, k1, k2, p1, p2 = known.params.tolist()
+    camera = CalibratedCamera(
+        width=known.width, height=known.height, fx=fx, fy=fy, cx=cx - 0.5, cy=cy - 0.5, distortion=(k1, k2, p1, p2)
+    )
+    return camera.scaled(settings.width_px), known.ahead_m
+
+
+def camera_estimator(parts: Parts, settings: PerceptionSettings, use_map: bool = True) -> CameraEstimator:
+    """Estimator of the parts of a flight with the perception's settings."""
+    camera, ahead_m = known_camera(parts, settings)
+    priors = Priors(settle_s=max(Priors().settle_s, settings.latency_s + SETTLE_MARGIN_S))
+    inner = ErrorStateFilter(parts.vehicle, parts.scenario.estimation, priors=priors)
+    tracker = TargetTracker(camera=camera, settings=settings, seed=parts.scenario.seed)
+    return CameraEstimator(vehicle=parts.vehicle, inner=inner, tracker=tracker, ahead_m=ahead_m, use_map=use_map)

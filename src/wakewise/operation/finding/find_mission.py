@@ -1,0 +1,203 @@
+"""Mission `find`: look at what is in view from two sides, detect the target, approach it, scan it.
+
+The pilot knows where the vehicle starts, and a distance at which something is assumed to be. All its legs are arcs
+about the centre that the camera has found so far, which moves slowly enough for the vehicle to follow.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from wakewise.core.arrays import Array
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Goal, TargetEstimate
+from wakewise.core.settings import Settings
+from wakewise.scene.missions import CameraAim, Leg, MissionSettings, Route
+from wakewise.scene.missions.route import plan_route, rest_to_rest
+
+FOLLOWS_M_S = 0.03
+"""Largest speed at which the legs' centre follows the estimate."""
+LOWEST_RAD = math.radians(5.0)
+
+
+class FindSettings(Settings):
+    """How the target is looked for before it is scanned."""
+
+    look_deg: float = Field(20.0, ge=5.0, le=90.0, description="angle to either side from which it is looked at first")
+    settle_s: float = Field(3.0, ge=0.0, le=60.0, description="hover before the first look")
+    give_up_s: float = Field(60.0, ge=5.0, le=3600.0, description="without a target for so long the flight ends")
+    hold_s: float = Field(0.0, ge=0.0, le=3600.0, description="hover at the standoff before the scan")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Phase:
+    """What is flown: legs about the centre, from a time on."""
+
+    name: Literal["look", "approach", "hold", "scan", "done"]
+    route: Route
+    since_s: float
+
+
+class FindPilot:
+    """A `Pilot` and `PhotoSchedule` that looks, detects, approaches and scans.
+
+    - `start`: camera pose X_WC at the start; `assumed_m`: distance of what it looks at.
+    - `aim`: what aims the camera.
+    """
+
+    def __init__(
+        self,
+        start: Pose,
+        assumed_m: float,
+        aim: CameraAim,
+        mission: MissionSettings,
+        find: FindSettings,
+        found: Callable[[float], None] | None = None,
+    ) -> None:
+        self._aim, self._mission, self._find = aim, mission, find
+        way = start.R[:, 2]
+        self.centre_W_m = start.p_m + assumed_m * way
+        self._here = _on_sphere(start.p_m - self.centre_W_m)
+        self._told = found
+        self._last_s = 0.0
+        self._phase = _Phase(name="look", route=self._look(), since_s=0.0)
+        self.found_s: float | None = None
+
+    @property
+    def phase(self) -> str:
+        """What is being done."""
+        return self._phase.name
+
+    @property
+    def done(self) -> bool:
+        """Whether the mission is over."""
+        return self._phase.name == "done"
+
+    def goal(self, time_s: float, estimate: BodyState) -> Goal:
+        """Reference of the present phase about the centre found so far."""
+        target = estimate.target
+        velocity = self._follow(time_s, target)
+        self._advance(time_s, target)
+        route = replace(self._phase.route, centre_W_m=self.centre_W_m)
+        X_WB, nu_B, tilt = route.reference(time_s - self._phase.since_s, self._aim)
+        nu_B = nu_B.copy()
+        nu_B[:3] += X_WB.R.T @ velocity
+        return Goal(X_WB=X_WB, nu_B=nu_B, tilt_rad=tilt, max_tracking_deviation=self._mission.max_tracking_deviation)
+
+    def leg_name(self, time_s: float) -> str:
+        """What the vehicle is doing."""
+        if self._phase.name != "scan":
+            return self._phase.name
+        return self._phase.route.leg_name(time_s - self._phase.since_s)
+
+    def shutter_s(self, number: int, time_s: float, dt_s: float) -> float | None:
+        """When photograph `number` is taken, if in the step that begins at `time_s`; none before the scan."""
+        if self._phase.name != "scan":
+            return None
+        since_s = self._phase.since_s
+        opens_s = self._phase.route.shutter_s(number, time_s - since_s, dt_s)
+        return None if opens_s is None else opens_s + since_s
+
+    def _look(self) -> Route:
+        """Settle, then arcs to one side, to the other and back, about what is in view."""
+        azimuth, elevation, distance = self._here
+        side = math.radians(self._find.look_deg)
+        legs, starts, clock_s, here = [], [], self._find.settle_s, self._here
+        for name, turn in (("look left", -side), ("look right", side), ("look back", 0.0)):
+            end = np.array([azimuth + turn, elevation, distance])
+            leg = rest_to_rest(name, here, end, self._mission.speed_m_s, self._mission.acceleration_m_s2)
+            legs.append(leg)
+            starts.append(clock_s)
+            clock_s, here = clock_s + leg.duration_s, end
+        return _route(self.centre_W_m, legs, starts, clock_s)
+
+    def _follow(self, time_s: float, target: TargetEstimate | None) -> Array:
+        """Move the centre towards the estimate; its velocity, shape (3,)."""
+        dt_s, self._last_s = time_s - self._last_s, time_s
+        if target is None or target.status == "assumed" or dt_s <= 0.0:
+            return np.zeros(3)
+        way = target.centre_W_m - self.centre_W_m
+        far = float(np.linalg.norm(way))
+        step = way if far <= FOLLOWS_M_S * dt_s else way * (FOLLOWS_M_S * dt_s / far)
+        # In the last centimetre it closes in by a share, so that the wished velocity is smooth.
+        step = step * min(1.0, far / 0.01) if far < 0.01 else step
+        self.centre_W_m = self.centre_W_m + step
+        return np.asarray(step / dt_s)
+
+    def _advance(self, time_s: float, target: TargetEstimate | None) -> None:
+        """Begin the next phase where the present one is over."""
+        phase, into_s = self._phase, time_s - self._phase.since_s
+        known = target is not None and target.status in ("tracked", "lost")
+        if self.found_s is None and known:
+            self.found_s = time_s
+        if phase.name == "look" and into_s >= phase.route.duration_s:
+            if known:
+                self._begin("approach", self._approach(), time_s)
+            elif time_s >= self._find.give_up_s:
+                self._begin("done", _hover(self.centre_W_m, self._at(time_s)), time_s)
+            else:
+                self._here = self._at(time_s)
+                self._begin("look", replace(self._look(), centre_W_m=self.centre_W_m), time_s)
+        elif phase.name == "approach" and into_s >= phase.route.duration_s:
+            if self._find.hold_s > 0.0:
+                self._begin("hold", _hover(self.centre_W_m, self._at(time_s), self._find.hold_s), time_s)
+            else:
+                self._begin("scan", self._scan(time_s), time_s)
+        elif phase.name == "hold" and into_s >= phase.route.duration_s:
+            self._begin("scan", self._scan(time_s), time_s)
+        elif phase.name == "scan" and into_s >= phase.route.duration_s:
+            self._begin("done", _hover(self.centre_W_m, self._at(time_s)), time_s)
+
+    def _begin(self, name: Literal["look", "approach", "hold", "scan", "done"], route: Route, time_s: float) -> None:
+        self._phase = _Phase(name=name, route=route, since_s=time_s)
+
+    def _at(self, time_s: float) -> Array:
+        """Azimuth, elevation and range of the camera that the present phase asks for."""
+        return self._phase.route.on_sphere(time_s - self._phase.since_s)[0]
+
+    def _approach(self) -> Route:
+        """From where the look ended to the standoff at the first orbit's elevation."""
+        here = self._phase.route.legs[-1].end
+        end = np.array([here[0], math.radians(self._mission.elevations_deg[0]), self._mission.standoff_m])
+        leg = rest_to_rest("approach", here, end, self._mission.speed_m_s, self._mission.acceleration_m_s2)
+        return _route(self.centre_W_m, [leg], [0.0], leg.duration_s)
+
+    def _scan(self, time_s: float) -> Route:
+        """The mission's orbits, begun at the azimuth where the vehicle is."""
+        settings = self._mission.model_copy(update={"approach_m": 0.0, "settle_s": 0.0})
+        planned = plan_route(self.centre_W_m, settings)
+        turn = np.array([float(self._at(time_s)[0] - planned.legs[0].start[0]), 0.0, 0.0])
+        legs = tuple(replace(leg, start=leg.start + turn, end=leg.end + turn) for leg in planned.legs)
+        return replace(planned, legs=legs)
+
+
+def _route(centre_W_m: Array, legs: list[Leg], starts: list[float], duration_s: float) -> Route:
+    return Route(
+        centre_W_m=centre_W_m,
+        legs=tuple(legs),
+        starts_s=np.array(starts),
+        exposures_s=np.zeros(0),
+        exposure_names=(),
+        X_WC_planned=(),
+        duration_s=duration_s,
+    )
+
+
+def _hover(centre_W_m: Array, at: Array, duration_s: float = 1.0) -> Route:
+    """Stay at a place on the sphere."""
+    leg = Leg(name="hold", start=at, end=at, length_m=0.0, duration_s=duration_s, speed_m_s=0.1, acceleration_m_s2=0.1)
+    return _route(centre_W_m, [leg], [0.0], duration_s)
+
+
+def _on_sphere(from_centre_W_m: Array) -> Array:
+    """Azimuth, elevation and range, shape (3,), of a camera's place relative to the centre."""
+    x, y, z = from_centre_W_m.tolist()
+    return np.array(
+        [math.atan2(y, x), max(math.atan2(-z, math.hypot(x, y)), LOWEST_RAD), math.sqrt(x * x + y * y + z * z)]
+    )

@@ -1,0 +1,79 @@
+"""A controller whose protected region follows the estimate of the target."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from wakewise.control import make_controller
+from wakewise.control.failsafe import Incidents
+from wakewise.control.pipeline import Pipeline, PipelineState
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import BodyState, Command, Goal, TargetEstimate
+from wakewise.operation.parts import Parts, surroundings_of
+from wakewise.operation.plugin_adapter import flown_controller
+from wakewise.perception.target_shape import ball, protected_region
+from wakewise.planning import Surroundings
+from wakewise.scene.targets import Region
+
+LEAST_S = 0.2
+"""A new region is not taken sooner than this after the last: making a controller takes 10 to 20 ms."""
+
+
+class RegionController:
+    """`wakewise.core.interfaces.Controller` that is made anew, with the same state, when the target's region changes.
+
+    `make` gives the pipeline of a region; `first` is the region before there is an estimate.
+    """
+
+    def __init__(self, make: Callable[[Region, TargetEstimate | None], Pipeline], first: Region) -> None:
+        self._make = make
+        self._pipeline = self._start = make(first, None)
+        self._version, self._age_s = -1, np.inf
+
+    @property
+    def name(self) -> str:
+        """Method name."""
+        return self._pipeline.name
+
+    @property
+    def incidents(self) -> Incidents:
+        """Troubles by kind."""
+        return self._pipeline.incidents
+
+    def init(self) -> PipelineState:
+        """State before the first step."""
+        self._pipeline, self._version, self._age_s = self._start, -1, np.inf
+        return self._pipeline.init()
+
+    def step(self, state: PipelineState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PipelineState, Command]:
+        """As the pipeline of the present region."""
+        target = estimate.target
+        self._age_s += dt_s
+        if target is not None and target.version != self._version and self._age_s >= LEAST_S:
+            region = Region(points_W_m=target.points_W_m, weights=target.weights, distance_m=target.distance_m)
+            self._pipeline = replace(self._make(region, target), incidents=self._pipeline.incidents)
+            self._version, self._age_s = target.version, 0.0
+        return self._pipeline.step(state, dt_s, estimate, goal)
+
+
+def region_controller(parts: Parts, assumed_W_m: Array, radius_m: float) -> RegionController:
+    """Controller of the scenario's method; before there is an estimate it protects a ball at an assumed place."""
+    bounds = surroundings_of(parts.scenario)
+
+    def make(region: Region, target: TargetEstimate | None) -> Pipeline:
+        around = bounds
+        if target is not None:
+            sphere = np.array([[*target.centre_W_m, target.radius_m]])
+            around = Surroundings(
+                planes=bounds.planes,
+                spheres=np.vstack([bounds.spheres, sphere]),
+                names=(*bounds.names, "the target"),
+            )
+        controller = make_controller(parts.scenario.method, parts.vehicle, region, parts.wake, parts.control, around)
+        return flown_controller(controller, parts.vehicle, region, parts.wake, parts.control, False)
+
+    first = protected_region(ball(assumed_W_m, radius_m, 0.1).surface_W_m, None, parts.scenario.target.points)
+    return RegionController(make, first)

@@ -1,0 +1,19 @@
+"""Perception: finds, maps and tracks the target in the camera's pictures.
+
+It knows pictures, the camera's calibration and the estimated pose; never a mesh or the true place of anything.
+
+- `calibrated_camera.py`: pixels to rays and back.
+- `feature_tracks.py`: features from picture to picture.
+- `point_map.py`: their places, an information filter of rays.
+- `relative_pose.py`: the camera's pose by mapped points.
+- `bed_plane.py`: the plane of the bed.
+- `target_shape.py`: centre, size and surface of the target; the protected region.
+- `target_tracker.py`: all of it, picture by picture.
+"""
+
+from wakewise.perception.calibrated_camera import CalibratedCamera
+from wakewise.perception.feature_tracks import grey_picture
+from wakewise.perception.settings import PerceptionSettings
+from wakewise.perception.target_tracker import TargetTracker, TrackerState
+
+__all__ = ["CalibratedCamera", "PerceptionSettings", "TargetTracker", "TrackerState", "grey_picture"]

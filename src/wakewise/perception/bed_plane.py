@@ -1,0 +1,82 @@
+"""Plane of the bed through mapped points: random sample consensus (RANSAC), with gravity known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.core.arrays import Array, freeze
+
+TRIALS = 60
+WITHIN_M = 0.015
+"""Distance from the plane up to which a point is of the bed: sand ripples and the points' own errors."""
+STEEPEST_RAD = math.radians(30.0)
+"""Largest slope of a bed; a wall or the target's side is none."""
+LEAST_SHARE, LEAST_POINTS = 0.25, 15
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BedPlane:
+    """Plane of the bed: unit normal upwards (z < 0 in NED), shape (3,), and a point on it, shape (3,)."""
+
+    up_W: Array
+    at_W_m: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, up_W=(3,), at_W_m=(3,))
+
+    def height_m(self, points_W_m: Array) -> Array:
+        """Height above the plane, shape (n,), of points, shape (n, 3)."""
+        return np.asarray((points_W_m - self.at_W_m) @ self.up_W)
+
+    def below(self, point_W_m: Array) -> Array:
+        """The point of the bed straight below or above a place, shape (3,)."""
+        drop = float((point_W_m - self.at_W_m) @ self.up_W) / float(self.up_W[2])
+        return point_W_m - np.array([0.0, 0.0, drop])
+
+    def hit(self, start_W_m: Array, direction_W: Array) -> Array | None:
+        """Where a ray meets the bed, shape (3,); None if it does not."""
+        towards = float(direction_W @ self.up_W)
+        if towards > -1e-6:
+            return None
+        away = float((self.at_W_m - start_W_m) @ self.up_W) / towards
+        return np.asarray(start_W_m + away * direction_W) if away > 0.0 else None
+
+
+def level_plane(depth_m: float) -> BedPlane:
+    """A level bed at a depth."""
+    return BedPlane(up_W=np.array([0.0, 0.0, -1.0]), at_W_m=np.array([0.0, 0.0, depth_m]))
+
+
+def fit_bed(points_W_m: Array, rng: np.random.Generator) -> BedPlane | None:
+    """The lowest plane, not steeper than `STEEPEST_RAD`, that many points lie on; None if there is none.
+
+    Points, shape (n, 3). A plane counts its points, less those farther below it: nothing lies below the bed.
+    """
+    n = len(points_W_m)
+    if n < LEAST_POINTS:
+        return None
+    best, best_score = None, 0
+    steep = math.cos(STEEPEST_RAD)
+    for _ in range(TRIALS):
+        a, b, c = points_W_m[rng.choice(n, 3, replace=False)]
+        normal = np.cross(b - a, c - a)
+        length = float(np.linalg.norm(normal))
+        if length < 1e-9:
+            continue
+        up = normal / (length if normal[2] < 0.0 else -length)
+        if -up[2] < steep:
+            continue
+        height = (points_W_m - a) @ up
+        score = int(np.sum(np.abs(height) < WITHIN_M)) - 2 * int(np.sum(height < -2.0 * WITHIN_M))
+        if score > best_score:
+            best, best_score = np.abs(height) < WITHIN_M, score
+    if best is None or best_score < max(LEAST_POINTS, LEAST_SHARE * n):
+        return None
+    near = points_W_m[best]
+    middle = near.mean(axis=0)
+    normal = np.linalg.eigh((near - middle).T @ (near - middle))[1][:, 0]
+    up = normal if normal[2] < 0.0 else -normal
+    return BedPlane(up_W=up, at_W_m=middle) if -up[2] >= steep else None

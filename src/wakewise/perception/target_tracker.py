@@ -1,0 +1,564 @@
+"""Finds, maps and tracks the target in the camera's pictures: one picture in, pose and protected region out.
+
+    picture -> features tracked -> pose from mapped points -> rays added to the map
+            -> bed and bodies on it (every `SHAPE_EVERY_S`) -> the target among them -> protected region
+
+The target is the body that the operator designated by a box, else the one nearest to the middle of the picture. Before
+its points are mapped, a ball at a stated distance is protected. A target that sways is followed by the mean shift of
+its points in the picture. One that is no longer seen is reported as lost, and its last region stays.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from wakewise.core.arrays import Array, BoolArray, IntArray
+from wakewise.core.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
+from wakewise.core.interfaces import TargetEstimate
+from wakewise.perception.bed_plane import BedPlane, fit_bed
+from wakewise.perception.bundle_adjustment import Keyframe, adjusted
+from wakewise.perception.calibrated_camera import CalibratedCamera
+from wakewise.perception.feature_tracks import LEAST_CONTRAST, NO_TRACKS, FeatureTracks, Grey, replenish, track
+from wakewise.perception.point_map import PointMap, add_rays, dropped, empty_map, ray_directions
+from wakewise.perception.relative_pose import RelativePose, relative_pose
+from wakewise.perception.settings import PerceptionSettings
+from wakewise.perception.target_shape import (
+    TargetShape,
+    ball,
+    bodies,
+    in_company,
+    protected_region,
+    shape_of,
+    thinned,
+)
+
+SHAPE_EVERY_S = 0.5
+"""How often bed, bodies and region are computed anew."""
+MOST_TURN_RAD = 0.4
+"""A feature seen from so far round looks different: it ends, and is found anew."""
+APART = 45.0
+"""Features over the whole picture are its width over this apart; those about the target a third of that."""
+LEAST_MAPPED = 60
+"""Mapped points from which on the pose is measured by them."""
+LOCK_PARALLAX_RAD = 0.25
+"""Median parallax of those points from which on it is: before, the estimated poses would set the map's scale."""
+CONVERGES_S = 1.0
+"""Pictures of so long after the first are tracked, but make no map."""
+KEYFRAME_M, MOST_KEYFRAMES = 0.02, 30
+"""Until then pictures are kept, so far apart, for a bundle adjustment."""
+MOST_JUMP_M, MOST_JUMP_RAD = 0.15, 0.2
+"""A measured pose farther from the expected one is wrong."""
+LOST_AFTER_S = 0.4
+"""A target of whose points fewer than `LEAST_SEEN` were seen for this time is lost."""
+LEAST_SEEN = 4
+KEEP_S, MOST_POINTS = 120.0, 6000
+CAMERA_STEP_M = 0.03
+"""The places of the camera are noted this far apart."""
+SWAY_STD_M, SWAY_SMOOTHED = 0.02, 0.5
+"""Prior of a target's shift, and the share of its last value that is kept from picture to picture."""
+LEAST_MOVED_M = 0.002
+"""A region that moved by less is the same one."""
+CENTRE_WALK_M = 0.005
+"""Random walk of the centre from one shape to the next: more of the target is seen."""
+CORRELATED = 4.0
+"""Shapes share most of their points: so many of them tell as much as one."""
+BOX_MARGIN = 0.15
+STRONG = 0.1
+"""Cornerness over the best of strong corners."""
+POSE_STD = (0.001, 0.0015)
+"""Least noise of a measured pose, m and rad: calibration, and what the map's own errors leave."""
+_FAR = math.inf
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Designation:
+    """A box of a picture, (left, top, right, bottom) in px of `width`, and the camera's pose when it was drawn."""
+
+    box: tuple[float, float, float, float]
+    width: int
+    X_WC: Pose | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrackerState:
+    """All that the tracker knows. `trouble` says what is wrong with the last picture, empty if nothing is."""
+
+    tracks: FeatureTracks = NO_TRACKS
+    points: PointMap
+    bed: BedPlane | None = None
+    cameras_W_m: Array
+    designation: Designation | None = None
+    shape: TargetShape | None = None
+    members: IntArray
+    shift_W_m: Array
+    target: TargetEstimate | None = None
+    pictures: int = 0
+    first_s: float | None = None
+    last_s: float = -math.inf
+    shaped_s: float = -math.inf
+    seen_s: float = -math.inf
+    proposed_s: float = math.inf
+    accepted: bool = False
+    keyframes: tuple[Keyframe, ...] = ()
+    locked: bool = False
+    localized: bool = False
+    trouble: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TargetTracker:
+    """The tracker of one camera; pure functions of its state."""
+
+    camera: CalibratedCamera
+    settings: PerceptionSettings
+    seed: int = 0
+
+    def init(self) -> TrackerState:
+        """State before the first picture."""
+        return TrackerState(
+            points=empty_map(),
+            cameras_W_m=np.zeros((0, 3)),
+            members=np.zeros(0, np.int64),
+            shift_W_m=np.zeros(3),
+        )
+
+    def designate(self, state: TrackerState, box: tuple[float, float, float, float], width: int) -> TrackerState:
+        """Take what lies in a box of the next picture, in px of a picture of that width, as the target."""
+        left, top, right, bottom = box
+        ordered = (min(left, right), min(top, bottom), max(left, right), max(top, bottom))
+        return replace(state, designation=Designation(box=ordered, width=width), shape=None, target=None, accepted=True)
+
+    def accept(self, state: TrackerState) -> TrackerState:
+        """Accept the proposed target now."""
+        return replace(state, accepted=True)
+
+    def refuse(self, state: TrackerState) -> TrackerState:
+        """Refuse the proposed target; its points are not proposed again."""
+        return replace(state, accepted=False, shape=None, target=None, proposed_s=math.inf)
+
+    def step(
+        self, state: TrackerState, picture: Grey, time_s: float, guess: Pose, std: tuple[float, float]
+    ) -> tuple[TrackerState, RelativePose | None]:
+        """Take in one picture.
+
+        - `picture`, shape (h, w): of the camera's size.
+        - `guess`: camera pose X_WC as the estimator has it; `std`: its standard deviations per axis, m and rad.
+
+        Returns the next state, and the camera's pose by the map; None where the map does not give one.
+        """
+        trouble = self._trouble(state, picture, time_s)
+        if trouble:
+            return self._without(state, time_s, trouble), None
+        tracks = track(state.tracks, picture, self._expected(state, guess))
+        found = self._pose(state, tracks, guess)
+        X_WC = guess if found is None else found.X_WC
+        std_m, std_rad = (max(given, least) for given, least in zip(std, POSE_STD, strict=True))
+        if found is not None:
+            std_m, std_rad = POSE_STD[0], 0.0
+        tracks = tracks.kept(self._turned(state.points, tracks, X_WC) < MOST_TURN_RAD)
+        tracks = self._replenished(state, tracks, picture, X_WC)
+        if self._waits(state, time_s):
+            first_s = time_s if state.first_s is None else state.first_s
+            waiting = replace(
+                state, tracks=tracks, pictures=state.pictures + 1, first_s=first_s, last_s=time_s, trouble=""
+            )
+            return (waiting if state.target is not None else self._assumed(waiting, X_WC, time_s)), None
+        points = add_rays(
+            state.points,
+            tracks.ids,
+            self.camera.slopes(tracks.pixels),
+            X_WC,
+            time_s,
+            self.camera.focal_px,
+            self.settings.assumed_distance_m,
+            self._ray_std(state, tracks.ids, std_m),
+            std_rad,
+        )
+        points = dropped(points, tracks.ids, time_s, KEEP_S, MOST_POINTS)
+        state = replace(
+            state,
+            tracks=tracks,
+            points=points,
+            cameras_W_m=_noted(state.cameras_W_m, X_WC.p_m),
+            pictures=state.pictures + 1,
+            last_s=time_s,
+            localized=found is not None,
+            trouble="" if len(tracks) >= LEAST_MAPPED // 2 else "few features",
+        )
+        if state.designation is not None and state.designation.X_WC is None:
+            state = replace(state, designation=replace(state.designation, X_WC=X_WC))
+        if not state.locked:
+            state = self._towards_lock(state, X_WC, time_s, (std_m, std_rad))
+        state = self._followed(state, X_WC, time_s)
+        if time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6:
+            state = self._reshaped(state, X_WC, time_s)
+        return state, found
+
+    def _waits(self, state: TrackerState, time_s: float) -> bool:
+        """Whether the estimator has only just begun: its first poses jump."""
+        return state.first_s is None or time_s - state.first_s < CONVERGES_S
+
+    def _trouble(self, state: TrackerState, picture: Grey, time_s: float) -> str:
+        if picture.shape != (self.camera.height, self.camera.width):
+            wanted = f"{self.camera.width} x {self.camera.height}"
+            return f"picture of {picture.shape[1]} x {picture.shape[0]} px, must be {wanted}"
+        if time_s <= state.last_s:
+            return f"late picture: of {time_s:.2f} s after one of {state.last_s:.2f} s"
+        last = state.tracks.picture
+        if last is not None and np.array_equal(last, picture):
+            return "frozen camera: the same picture twice"
+        if float(picture.std()) < LEAST_CONTRAST:
+            return "uniform picture: nothing to track"
+        return ""
+
+    def _without(self, state: TrackerState, time_s: float, trouble: str) -> TrackerState:
+        """The state after a picture that shows nothing: the last region stays."""
+        time_s = max(time_s, state.last_s)
+        state = replace(state, trouble=trouble, localized=False, last_s=time_s)
+        return self._reported(state, time_s)
+
+    def _expected(self, state: TrackerState, X_WC: Pose) -> Array | None:
+        """Where features are expected, shape (n, 2), NaN of those that are not mapped."""
+        rows, mapped = _mapped(state.points, state.tracks.ids)
+        if not mapped.any():
+            return None
+        guess = np.full((len(rows), 2), np.nan)
+        guess[mapped] = self.camera.pixels((state.points.points_W_m[rows[mapped]] - X_WC.p_m) @ X_WC.R)
+        before = state.tracks.pixels
+        near = np.linalg.norm(np.nan_to_num(guess - before, nan=_FAR), axis=1) < 0.1 * self.camera.width
+        guess[~near] = np.nan
+        # Features without a place move as those with one do, in the middle.
+        if near.any():
+            guess[~near] = before[~near] + np.median((guess - before)[near], axis=0)
+        return guess
+
+    def _pose(self, state: TrackerState, tracks: FeatureTracks, guess: Pose) -> RelativePose | None:
+        rows, mapped = _mapped(state.points, tracks.ids)
+        if int(mapped.sum()) < LEAST_MAPPED or not state.locked:
+            return None
+        on_bed = mapped & ~np.isin(tracks.ids, state.members)
+        # What stands on the bed may sway: it counts only where the bed shows too little.
+        used = on_bed if int(on_bed.sum()) >= LEAST_MAPPED else mapped
+        rows = rows[used]
+        found = relative_pose(
+            state.points.points_W_m[rows], state.points.std_m[rows], tracks.pixels[used], self.camera, guess
+        )
+        if found is None:
+            return None
+        jump = found.X_WC.p_m - guess.p_m
+        turn = rotvec_from_quat(quat_multiply(quat_conjugate(guess.q), found.X_WC.q))
+        near = np.linalg.norm(jump) < MOST_JUMP_M and np.linalg.norm(turn) < MOST_JUMP_RAD
+        return found if near else None
+
+    def _towards_lock(self, state: TrackerState, X_WC: Pose, time_s: float, std: tuple[float, float]) -> TrackerState:
+        """The state with another keyframe, or, where rays cross well enough, with the map adjusted and locked."""
+        frames, tracks, focal = state.keyframes, state.tracks, self.camera.focal_px
+        if not frames or np.linalg.norm(frames[-1].X_WC.p_m - X_WC.p_m) >= KEYFRAME_M:
+            frame = Keyframe(
+                time_s=time_s, X_WC=X_WC, std=std, ids=tracks.ids, slopes=self.camera.slopes(tracks.pixels)
+            )
+            state = replace(state, keyframes=(*frames, frame)[-MOST_KEYFRAMES:])
+        if not _well_crossed(state.points, tracks):
+            return state
+        places = state.points.points_W_m
+        known = np.isfinite(places[:, 0])
+        frames = adjusted(
+            state.keyframes, {int(i): p for i, p in zip(state.points.ids[known], places[known], strict=True)}, focal
+        )
+        points = empty_map()
+        for frame in frames:
+            points = add_rays(
+                points,
+                frame.ids,
+                frame.slopes,
+                frame.X_WC,
+                frame.time_s,
+                focal,
+                self.settings.assumed_distance_m,
+                POSE_STD[0],
+            )
+        return replace(state, points=points, keyframes=(), locked=True)
+
+    def _turned(self, points: PointMap, tracks: FeatureTracks, X_WC: Pose) -> Array:
+        """Angle between the first and the present ray of each feature, shape (n,)."""
+        rows = points.rows(tracks.ids)
+        known = rows >= 0
+        angle = np.zeros(len(rows))
+        d = ray_directions(self.camera.slopes(tracks.pixels[known]), X_WC)
+        angle[known] = np.arccos(np.clip(np.einsum("ni,ni->n", points.first_W[rows[known]], d), -1.0, 1.0))
+        return angle
+
+    def _replenished(self, state: TrackerState, tracks: FeatureTracks, picture: Grey, X_WC: Pose) -> FeatureTracks:
+        apart = self.camera.width / APART
+        box = self._window(state, X_WC)
+        if box is None:  # strong corners anywhere: what stands on the bed has more of them than sand
+            tracks = replenish(tracks, picture, self.settings.features, apart)
+            most = self.settings.features + self.settings.target_features
+            return replenish(tracks, picture, most, apart / 2.5, quality=STRONG)
+        left, top, right, bottom = box
+        u, v = tracks.pixels.T
+        inside = int(np.sum((u >= left) & (u < right) & (v >= top) & (v < bottom)))
+        window = np.full(picture.shape, 255, np.uint8)
+        window[top:bottom, left:right] = 0
+        tracks = replenish(tracks, picture, self.settings.features + inside, apart, window)
+        most = len(tracks) + self.settings.target_features - inside
+        return replenish(tracks, picture, most, max(apart / 3.0, 3.0), 255 - window)
+
+    def _window(self, state: TrackerState, X_WC: Pose) -> tuple[int, int, int, int] | None:
+        """Box of the picture where the target is expected: its own, or the designated one; None if nowhere."""
+        width, height = self.camera.width, self.camera.height
+        if state.shape is not None and state.shape.seen:
+            p_C = (state.shape.centre_W_m - X_WC.p_m) @ X_WC.R
+            if p_C[2] > 0.05:
+                (u, v), half = (
+                    self.camera.pixels(p_C[None])[0],
+                    1.3 * self.camera.focal_px * state.shape.radius_m / p_C[2],
+                )
+                return _box(u - half, v - half, u + half, v + half, width, height)
+        if state.designation is not None:
+            share = width / state.designation.width
+            left, top, right, bottom = state.designation.box
+            return _box(share * left, share * top, share * right, share * bottom, width, height)
+        return None
+
+    def _ray_std(self, state: TrackerState, ids: IntArray, std_m: float) -> Array:
+        """Standard deviation of each ray's place, shape (n,): of members with the sway, of others the camera's own."""
+        sway = float(np.linalg.norm(state.shift_W_m))
+        return np.where(np.isin(ids, state.members), math.hypot(std_m, sway), std_m)
+
+    def _followed(self, state: TrackerState, X_WC: Pose, time_s: float) -> TrackerState:
+        """The state with the target's shift in this picture, and whether it was seen."""
+        if state.shape is None:
+            return self._reported(state, time_s)
+        at = np.isin(state.tracks.ids, state.members)
+        rows, mapped = _mapped(state.points, state.tracks.ids)
+        at &= mapped
+        shift = SWAY_SMOOTHED * state.shift_W_m
+        if int(at.sum()) >= LEAST_SEEN:
+            found = common_shift(
+                state.points.points_W_m[rows[at]], state.tracks.pixels[at], self.camera, X_WC, SWAY_STD_M
+            )
+            shift = shift + (1.0 - SWAY_SMOOTHED) * found
+        near = self._near(state, X_WC)
+        seen = int(at.sum()) >= LEAST_SEEN or int(near.sum()) >= LEAST_SEEN
+        state = replace(state, shift_W_m=shift, seen_s=time_s if seen else state.seen_s)
+        return self._reported(state, time_s)
+
+    def _near(self, state: TrackerState, X_WC: Pose) -> BoolArray:
+        """Which features lie in the picture of the target, shape (n,); none if its middle is out of the picture."""
+        assert state.shape is not None
+        box = self._window(state, X_WC)
+        p_C = (state.shape.centre_W_m - X_WC.p_m) @ X_WC.R
+        if box is None or p_C[2] < 0.05 or not self.camera.inside(self.camera.pixels(p_C[None]))[0]:
+            return np.zeros(len(state.tracks), np.bool_)
+        left, top, right, bottom = box
+        u, v = state.tracks.pixels.T
+        fresh = np.isin(state.tracks.ids, state.points.ids[state.points.views >= 2])
+        return np.asarray((u > left) & (u < right) & (v > top) & (v < bottom) & fresh)
+
+    def _reshaped(self, state: TrackerState, X_WC: Pose, time_s: float) -> TrackerState:
+        """The state with bed, target and region computed from the map."""
+        points = state.points
+        which = np.flatnonzero(points.mature)
+        rng = np.random.default_rng([self.seed, state.pictures])
+        bed = fit_bed(points.points_W_m[which[-1500:]], rng) or state.bed
+        state = replace(state, bed=bed, shaped_s=time_s)
+        if self.settings.protect == "view":
+            return self._protect_view(state, X_WC, time_s)
+        chosen = None
+        if bed is not None:
+            few = which[thinned(points.points_W_m[which], 0.004)]
+            groups = [few[group] for group in bodies(points.points_W_m[few], bed)]
+            chosen = self._choose(state, groups, X_WC)
+        if chosen is None:
+            return self._assumed(state, X_WC, time_s) if state.shape is None or state.shape.seen == 0 else state
+        assert bed is not None
+        places = points.points_W_m[chosen]
+        shape = _averaged(state.shape, shape_of(places, bed, state.cameras_W_m[-400:], POSE_STD[0]))
+        members = points.ids[chosen[in_company(places)]]
+        proposed_s = min(state.proposed_s, time_s)
+        accepted = state.accepted or time_s - proposed_s >= self.settings.accept_s
+        state = replace(
+            state,
+            shape=shape,
+            members=members,
+            proposed_s=proposed_s,
+            accepted=accepted,
+            seen_s=max(state.seen_s, time_s),
+        )
+        return self._protected(state, time_s)
+
+    def _choose(self, state: TrackerState, groups: list[IntArray], X_WC: Pose) -> IntArray | None:
+        """Indices of the target's points among the bodies; None if none is it."""
+        if not groups:
+            return None
+        places = state.points.points_W_m
+        if state.shape is not None and state.shape.seen:
+            away = [np.linalg.norm(places[group].mean(axis=0) - state.shape.centre_W_m) for group in groups]
+            k = int(np.argmin(away))
+            return groups[k] if away[k] < 1.5 * state.shape.radius_m + 0.03 else None
+        if state.designation is not None and state.designation.X_WC is not None:
+            inside = [self._in_box(places[group], state.designation) for group in groups]
+            k = int(np.argmax(inside))
+            return groups[k] if inside[k] >= LEAST_SEEN else None
+        middles = np.array([places[group].mean(axis=0) for group in groups])
+        p_C = (middles - X_WC.p_m) @ X_WC.R
+        off_axis = np.linalg.norm(p_C[:, :2], axis=1) / np.maximum(p_C[:, 2], 1e-6)
+        off_axis[p_C[:, 2] <= 0.05] = _FAR
+        # A body of many points a little farther from the middle is more likely meant than a stone in it.
+        size = np.array([len(group) for group in groups])
+        k = int(np.argmin(off_axis + 0.2 * (1.0 - size / size.max())))
+        return groups[k] if off_axis[k] < _FAR else None
+
+    def _in_box(self, points_W_m: Array, designation: Designation) -> int:
+        """How many points lie in the designated box, seen from where it was drawn."""
+        assert designation.X_WC is not None
+        share = self.camera.width / designation.width
+        left, top, right, bottom = (share * edge for edge in designation.box)
+        wide, high = BOX_MARGIN * (right - left), BOX_MARGIN * (bottom - top)
+        u, v = self.camera.pixels((points_W_m - designation.X_WC.p_m) @ designation.X_WC.R).T
+        return int(np.sum((u > left - wide) & (u < right + wide) & (v > top - high) & (v < bottom + high)))
+
+    def _assumed(self, state: TrackerState, X_WC: Pose, time_s: float) -> TrackerState:
+        """The state with a ball at the stated distance, or where the ray meets the bed, as target."""
+        designation, width, height = state.designation, self.camera.width, self.camera.height
+        middle, half = np.array([[0.5 * width, 0.5 * height]]), None
+        if designation is not None and designation.X_WC is not None:
+            share = width / designation.width
+            left, top, right, bottom = (share * edge for edge in designation.box)
+            middle = np.array([[0.5 * (left + right), 0.5 * (top + bottom)]])
+            half = 0.5 * max(right - left, bottom - top) / self.camera.focal_px
+            X_WC = designation.X_WC
+        way = ray_directions(self.camera.slopes(middle), X_WC)[0]
+        distance = self.settings.assumed_distance_m
+        if state.bed is not None and (hit := state.bed.hit(X_WC.p_m, way)) is not None:
+            distance = min(float(np.linalg.norm(hit - X_WC.p_m)), 2.0 * distance)
+        radius = self.settings.assumed_radius_m if half is None else max(half * distance, 0.02)
+        shape = ball(X_WC.p_m + distance * way, radius, 0.2 * distance)
+        return self._protected(replace(state, shape=shape, members=np.zeros(0, np.int64)), time_s)
+
+    def _protect_view(self, state: TrackerState, X_WC: Pose, time_s: float) -> TrackerState:
+        """The state with everything mapped in view within a distance as protected."""
+        places = state.points.points_W_m[state.points.mature]
+        p_C = (places - X_WC.p_m) @ X_WC.R
+        near = (np.linalg.norm(p_C, axis=1) < self.settings.view_distance_m) & self.camera.inside(
+            self.camera.pixels(p_C)
+        )
+        if int(near.sum()) < LEAST_MAPPED:
+            return self._assumed(state, X_WC, time_s)
+        seen = places[near][thinned(places[near], 0.02)]
+        middle = seen.mean(axis=0)
+        radius = float(np.quantile(np.linalg.norm(seen - middle, axis=1), 0.95))
+        shape = TargetShape(
+            centre_W_m=middle, covariance=1e-4 * np.eye(3), radius_m=radius, surface_W_m=seen, seen=len(seen)
+        )
+        state = replace(state, shape=shape, accepted=True, seen_s=time_s)
+        return self._protected(state, time_s)
+
+    def _protected(self, state: TrackerState, time_s: float) -> TrackerState:
+        """The state with the region of its shape."""
+        assert state.shape is not None
+        region = protected_region(state.shape.surface_W_m, state.bed, self.settings.points)
+        version = 0 if state.target is None else state.target.version + 1
+        target = TargetEstimate(
+            time_s=time_s,
+            status="assumed",
+            centre_W_m=state.shape.centre_W_m,
+            covariance=state.shape.covariance,
+            radius_m=state.shape.radius_m,
+            points_W_m=region.points_W_m,
+            weights=region.weights,
+            distance_m=region.distance_m,
+            version=version,
+        )
+        return self._reported(replace(state, target=target, shift_W_m=np.zeros(3)), time_s)
+
+    def _reported(self, state: TrackerState, time_s: float) -> TrackerState:
+        """The state with the target's status, and its place moved by the shift."""
+        target, shape = state.target, state.shape
+        if target is None or shape is None:
+            return state
+        status: Literal["assumed", "proposed", "tracked", "lost"] = "assumed"
+        if shape.seen:
+            status = "tracked" if state.accepted else "proposed"
+            if time_s - state.seen_s > LOST_AFTER_S:
+                status = "lost"
+        centre = shape.centre_W_m + state.shift_W_m
+        way = centre - target.centre_W_m
+        if np.linalg.norm(way) < LEAST_MOVED_M:
+            return replace(state, target=replace(target, status=status, time_s=time_s))
+        return replace(
+            state,
+            target=replace(
+                target,
+                status=status,
+                time_s=time_s,
+                centre_W_m=centre,
+                points_W_m=target.points_W_m + way,
+                version=target.version + 1,
+            ),
+        )
+
+
+def common_shift(points_W_m: Array, pixels: Array, camera: CalibratedCamera, X_WC: Pose, std_m: float) -> Array:
+    """Shift of points, shape (n, 3), that explains their pixels, shape (n, 2), best, shape (3,); along the view none.
+
+    Robust least squares with a normal prior of standard deviation `std_m`.
+    """
+    slopes, focal, shift = camera.slopes(pixels), camera.focal_px, np.zeros(3)
+    for _ in range(4):
+        p_C = (points_W_m + shift - X_WC.p_m) @ X_WC.R
+        z = np.maximum(p_C[:, 2], 0.02)
+        miss = focal * (slopes - p_C[:, :2] / z[:, None])
+        J = np.zeros((len(z), 2, 3))
+        J[:, 0, 0] = J[:, 1, 1] = focal / z
+        J[:, 0, 2], J[:, 1, 2] = -focal * p_C[:, 0] / z**2, -focal * p_C[:, 1] / z**2
+        J = J @ X_WC.R.T
+        weights = 1.0 / (1.0 + np.einsum("ni,ni->n", miss, miss) / 4.0**2)
+        H = np.einsum("n,nia,nib->ab", weights, J, J) + np.eye(3) / std_m**2
+        shift = shift + np.linalg.solve(H, np.einsum("n,nia,ni->a", weights, J, miss) - shift / std_m**2)
+    return np.asarray(shift)
+
+
+def _mapped(points: PointMap, ids: IntArray) -> tuple[IntArray, BoolArray]:
+    """Rows of features in the map, and which of them are mature, shapes (n,)."""
+    rows = points.rows(ids)
+    known = rows >= 0
+    mature = np.zeros(len(rows), np.bool_)
+    mature[known] = points.mature[rows[known]]
+    return rows, mature
+
+
+def _averaged(before: TargetShape | None, now: TargetShape) -> TargetShape:
+    """The shape of now, its centre averaged with that of before by their covariances (Kalman filter)."""
+    if before is None or not before.seen:
+        return now
+    P = before.covariance + CENTRE_WALK_M**2 * np.eye(3)
+    gain = P @ np.linalg.inv(P + CORRELATED * now.covariance)
+    centre = before.centre_W_m + gain @ (now.centre_W_m - before.centre_W_m)
+    return replace(now, centre_W_m=centre, covariance=(np.eye(3) - gain) @ P)
+
+
+def _well_crossed(points: PointMap, tracks: FeatureTracks) -> bool:
+    """Whether the mapped points in the picture have been seen from far enough apart to hold the vehicle by them."""
+    rows, mapped = _mapped(points, tracks.ids)
+    if int(mapped.sum()) < LEAST_MAPPED:
+        return False
+    return float(np.median(points.parallax_rad[rows[mapped]])) >= LOCK_PARALLAX_RAD
+
+
+def _noted(cameras_W_m: Array, place_W_m: Array) -> Array:
+    """Places of the camera with one more, where it is far enough from the last."""
+    if len(cameras_W_m) and np.linalg.norm(cameras_W_m[-1] - place_W_m) < CAMERA_STEP_M:
+        return cameras_W_m
+    return np.vstack([cameras_W_m, place_W_m])
+
+
+def _box(left: float, top: float, right: float, bottom: float, width: int, height: int) -> tuple[int, int, int, int]:
+    """Whole pixels of a box within the picture, one at least."""
+    a, b = min(max(int(left), 0), width - 1), min(max(int(top), 0), height - 1)
+    return a, b, min(max(int(right) + 1, a + 1), width), min(max(int(bottom) + 1, b + 1), height)
