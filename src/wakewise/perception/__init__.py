@@ -5,7 +5,7 @@ It knows pictures, the camera's calibration and the estimated pose; never a mesh
 - `calibrated_camera.py`: pixels to rays and back.
 - `feature_tracks.py`: features from picture to picture.
 - `point_map.py`: their places, an information filter of rays.
-- `relative_pose.py`: the camera's pose by mapped points.
+- `resection.py`: the camera's pose by mapped points.
 - `bed_plane.py`: the plane of the bed.
 - `target_shape.py`: centre, size and surface of the target; the protected region.
 - `target_tracker.py`: all of it, picture by picture.

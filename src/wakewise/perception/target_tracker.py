@@ -24,7 +24,7 @@ from wakewise.perception.bundle_adjustment import Keyframe, adjusted
 from wakewise.perception.calibrated_camera import CalibratedCamera
 from wakewise.perception.feature_tracks import LEAST_CONTRAST, NO_TRACKS, FeatureTracks, Grey, replenish, track
 from wakewise.perception.point_map import PointMap, add_rays, dropped, empty_map, ray_directions
-from wakewise.perception.relative_pose import RelativePose, relative_pose
+from wakewise.perception.resection import Resection, resection
 from wakewise.perception.settings import PerceptionSettings
 from wakewise.perception.target_shape import (
     TargetShape,
@@ -142,7 +142,7 @@ class TargetTracker:
 
     def step(
         self, state: TrackerState, picture: Grey, time_s: float, guess: Pose, std: tuple[float, float]
-    ) -> tuple[TrackerState, RelativePose | None]:
+    ) -> tuple[TrackerState, Resection | None]:
         """Take in one picture.
 
         - `picture`, shape (h, w): of the camera's size.
@@ -236,7 +236,7 @@ class TargetTracker:
             guess[~near] = before[~near] + np.median((guess - before)[near], axis=0)
         return guess
 
-    def _pose(self, state: TrackerState, tracks: FeatureTracks, guess: Pose) -> RelativePose | None:
+    def _pose(self, state: TrackerState, tracks: FeatureTracks, guess: Pose) -> Resection | None:
         rows, mapped = _mapped(state.points, tracks.ids)
         if int(mapped.sum()) < LEAST_MAPPED or not state.locked:
             return None
@@ -244,7 +244,7 @@ class TargetTracker:
         # What stands on the bed may sway: it counts only where the bed shows too little.
         used = on_bed if int(on_bed.sum()) >= LEAST_MAPPED else mapped
         rows = rows[used]
-        found = relative_pose(
+        found = resection(
             state.points.points_W_m[rows], state.points.std_m[rows], tracks.pixels[used], self.camera, guess
         )
         if found is None:

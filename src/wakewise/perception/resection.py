@@ -1,4 +1,4 @@
-"""Pose of the camera relative to mapped points: robust reprojection (Gauss-Newton with Cauchy's weights)."""
+"""Resection: the camera's pose from mapped points and their pixels (Gauss-Newton with Cauchy's weights)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LEAST_FITTING = 0.4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RelativePose:
+class Resection:
     """Camera pose X_WC, its covariance, shape (6, 6), of position in W and rotation vector in C, and who fits, (n,).
 
     `residual_px` is the root mean square distance of those that fit.
@@ -32,9 +32,9 @@ class RelativePose:
     residual_px: float
 
 
-def relative_pose(
+def resection(
     points_W_m: Array, point_std_m: Array, pixels: Array, camera: CalibratedCamera, guess: Pose
-) -> RelativePose | None:
+) -> Resection | None:
     """Pose from mapped points, shape (n, 3), at pixels, shape (n, 2), near a guess; None if too few fit.
 
     `point_std_m`, shape (n,): standard deviations of the points, which add to that of their pixels.
@@ -69,7 +69,7 @@ def relative_pose(
         return None
     residual = float(np.sqrt(np.mean(np.einsum("ni,ni->n", miss[fits], miss[fits]))))
     spread2 = max(float(np.mean(error2[fits])), 0.05)
-    return RelativePose(X_WC=pose, covariance=spread2 * np.linalg.inv(H), fits=fits, residual_px=residual)
+    return Resection(X_WC=pose, covariance=spread2 * np.linalg.inv(H), fits=fits, residual_px=residual)
 
 
 def _jacobian(x: Array, y: Array, inverse: Array, focal: float, R_WC: Array) -> Array:
