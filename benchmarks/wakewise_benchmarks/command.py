@@ -37,6 +37,7 @@ _SHOWN = {
     "gentle": "wakewise_paper.cli.bench_wash:show_gentle",
     "models": "wakewise_paper.cli.bench_models:show_models",
     "operator": "wakewise_paper.cli.bench_operator:show_operator",
+    "target": "wakewise_benchmarks.target_finding:show_target",
     "truth": "wakewise_benchmarks.truth:show_truth",
     "worlds": "wakewise_paper.cli.bench_worlds:show_worlds",
 }
@@ -50,7 +51,14 @@ _DRAWN = {
 }
 """What draws the answer of a bench: pictures need an extra."""
 
-_LASTS = {"front": "hours", "gentle": "hours", "models": "hours", "operator": "hours", "worlds": "hours"}
+_LASTS = {
+    "front": "hours",
+    "gentle": "hours",
+    "models": "hours",
+    "operator": "hours",
+    "target": "hours",
+    "worlds": "hours",
+}
 """About how long a bench runs on two free cores, where it is not minutes at most."""
 
 
@@ -64,7 +72,8 @@ def bench(
     seeds: Annotated[
         int | None,
         typer.Option(
-            help="front, gentle, models, operator, worlds: flights per method; 8, 3, what the cases say, 3 and 10.",
+            help="front, gentle, models, operator, target, worlds: flights per method; 8, 3, what the cases say, 3, 10 "
+            "and 10.",
             min=1,
             max=1000,
         ),
@@ -89,8 +98,8 @@ def bench(
     worlds: Annotated[
         str,
         typer.Option(
-            help="front, operator, worlds: which, with commas between; operator flies those with trouble and a calm "
-            "one, the others all of theirs, if not given.",
+            help="front, operator, target, worlds: which, with commas between; operator flies those with trouble and a "
+            "calm one, the others all of theirs, if not given.",
             show_default=False,
         ),
     ] = "",
@@ -115,17 +124,19 @@ def bench(
     fresh: Annotated[
         bool,
         typer.Option(
-            "--fresh", help="front, gentle, models, operator, worlds: fly anew what an earlier run has flown."
+            "--fresh", help="front, gentle, models, operator, target, worlds: fly anew what is known already."
         ),
     ] = False,
     workers: Annotated[
         int,
-        typer.Option(help="front, gentle, models, operator, worlds: processes that fly side by side.", min=1, max=64),
+        typer.Option(
+            help="front, gentle, models, operator, target, worlds: processes that fly side by side.", min=1, max=64
+        ),
     ] = 2,
     store: Annotated[
         Path | None,
         typer.Option(
-            help="front, gentle, models, operator, worlds: folder that keeps flights; the cache if not given."
+            help="front, gentle, models, operator, target, worlds: folder that keeps flights; the cache if not given."
         ),
     ] = None,
     only: Annotated[

@@ -32,6 +32,7 @@ BENCHES = {
     "planner": "the planner against the paper's recipe and IPOPT",
     "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
     "operator": "an operator's velocity obeyed and the target's water spared, by w_track, where users have the trouble",
+    "target": "the target found, mapped and tracked by the camera: how soon, how well, what it is worth",
     "truth": "figures held against data that nobody in this project made: measured, asked, reached, met",
     "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
     "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",
@@ -49,6 +50,7 @@ _MODULES = {
     "gentle": "wakewise_paper.wash_reduction.bench",
     "models": "wakewise_paper.model_failure.bench",
     "operator": "wakewise_paper.operator_study.bench",
+    "target": "wakewise_benchmarks.target_finding",
     "worlds": "wakewise_paper.world_study.bench",
 }
 

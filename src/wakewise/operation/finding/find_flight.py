@@ -12,7 +12,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import BodyState, TruthProvider, no_progress
+from wakewise.core.interfaces import BodyState, Controller, TruthProvider, no_progress
 from wakewise.core.jit.precompile import compile_kernels
 from wakewise.operation.finding.camera_estimator import CameraEstimator, camera_estimator
 from wakewise.operation.finding.camera_frames import CameraFrames
@@ -58,6 +58,7 @@ def fly_find(
     *,
     duration_s: float | None = None,
     use_map: bool = True,
+    known_region: bool = False,
     lost_s: tuple[tuple[float, float], ...] = (),
     progress: Callable[..., None] = no_progress,
     watch: Callable[[Step, TruthProvider | None], None] | None = None,
@@ -70,6 +71,9 @@ def fly_find(
         Longest flight; the mission's own length if not given.
     use_map : bool
         Whether the vehicle is localised by the map; other sensors alone if not.
+    known_region : bool
+        Whether the controller is given the region of the surveyed target in place of what the camera finds; for
+        comparison.
     lost_s : tuple
         Spans in which the camera gives no picture.
     """
@@ -84,7 +88,9 @@ def fly_find(
     frames = CameraFrames(plant, witness, parts, perception, lost_s)
     estimator = camera_estimator(parts, perception, use_map)
     pilot = FindPilot(X_WC, perception.assumed_distance_m, aim, parts.scenario.mission, find)
-    controller = region_controller(parts, pilot.centre_W_m.copy(), perception.assumed_radius_m)
+    controller: Controller[Any] = parts.pipeline
+    if not known_region:
+        controller = region_controller(parts, pilot.centre_W_m.copy(), perception.assumed_radius_m)
     recorder = recorder_of(parts, witness, pilot)
     targets: list[tuple[float, str, Array, float]] = []
     version = -1

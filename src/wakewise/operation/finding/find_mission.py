@@ -7,7 +7,6 @@ about the centre that the camera has found so far, which moves slowly enough for
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -58,13 +57,11 @@ class FindPilot:
         aim: CameraAim,
         mission: MissionSettings,
         find: FindSettings,
-        found: Callable[[float], None] | None = None,
     ) -> None:
         self._aim, self._mission, self._find = aim, mission, find
         way = start.R[:, 2]
         self.centre_W_m = start.p_m + assumed_m * way
         self._here = _on_sphere(start.p_m - self.centre_W_m)
-        self._told = found
         self._last_s = 0.0
         self._phase = _Phase(name="look", route=self._look(), since_s=0.0)
         self.found_s: float | None = None
@@ -120,7 +117,7 @@ class FindPilot:
     def _follow(self, time_s: float, target: TargetEstimate | None) -> Array:
         """Move the centre towards the estimate; its velocity, shape (3,)."""
         dt_s, self._last_s = time_s - self._last_s, time_s
-        if target is None or target.status == "assumed" or dt_s <= 0.0:
+        if target is None or target.status == "assumed" or dt_s <= 0.0 or self._phase.name == "hold":
             return np.zeros(3)
         way = target.centre_W_m - self.centre_W_m
         far = float(np.linalg.norm(way))
