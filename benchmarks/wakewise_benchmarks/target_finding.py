@@ -26,6 +26,7 @@ import numpy as np
 import polars as pl
 from scipy.stats import chi2
 
+from wakewise.control import make_controller
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.core.interfaces import TruthProvider
@@ -35,10 +36,9 @@ from wakewise.experiments.campaigns.statistics import Interval, geometric_ratio,
 from wakewise.experiments.campaigns.study import Row, run_study, selected, store_folder, study_trial
 from wakewise.experiments.campaigns.task import Figures, Task, WorkProgress
 from wakewise.experiments.trials.timing import BenchOptions
-from wakewise.operation.finding.find_flight import FindFlight, fly_find
-from wakewise.operation.finding.find_mission import FindSettings
+from wakewise.operation import Flight, fly
+from wakewise.operation.finding.camera_estimator import CameraEstimator
 from wakewise.operation.loop import Step
-from wakewise.perception import PerceptionSettings
 from wakewise.vision.evaluation import flight_figures
 
 FIRST_SEED, MOST_SEEDS = 4101, 100
@@ -106,13 +106,11 @@ def planned(world: str, arm: str, seed: int, more: Mapping[str, Any]) -> Planned
         **WORLDS[world],
         "method": str(more.get("method", "wake-aware")),
         "seed": seed,
+        "pilot": "find",
+        "find.hold_s": HOLD_S,
+        "perception.latency_s": float(more.get("latency_s", 0.1)),
     }
-    settings = {
-        "scenario": fields,
-        "preset": "quick",
-        "known_region": bool(more.get("known_region", False)),
-        "latency_s": float(more.get("latency_s", 0.1)),
-    }
+    settings = {"scenario": fields, "preset": "quick", "known_region": bool(more.get("known_region", False))}
     task = Task(name=f"{world}/{arm}/{seed}", work=STAGE, settings=settings, sources=SOURCES)
     return study_trial(world, arm, seed, task)
 
@@ -122,7 +120,6 @@ class FlightJudge:
     """Watches a flight: errors of the target's place relative to the camera, and of the vehicle's."""
 
     centre_W_m: Array
-    pilot_phase: list[str] = field(default_factory=list)
     rows: list[tuple[float, ...]] = field(default_factory=list)
     status: list[str] = field(default_factory=list)
 
@@ -148,22 +145,19 @@ def find_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress
     """Figures of one flight that finds its target."""
     del folder
     parts = scenario_of(settings).parts()
+    if settings["known_region"]:
+        controller = make_controller(
+            parts.method, parts.vehicle, parts.region, parts.wake, parts.control, parts.surroundings
+        )
+        parts = parts.replace(controller=controller)
     judge = FlightJudge(centre_W_m=parts.target.centre_W_m)
-    flight = fly_find(
-        parts,
-        PerceptionSettings(latency_s=settings["latency_s"]),
-        FindSettings(hold_s=HOLD_S),
-        duration_s=150.0,
-        known_region=settings["known_region"],
-        watch=judge,
-        progress=progress,
-    )
-    return judged(flight, judge)
+    return judged(fly(parts, checked=False, watch=judge, progress=progress), judge)
 
 
-def judged(flight: FindFlight, judge: FlightJudge) -> dict[str, float | None]:
+def judged(flight: Flight, judge: FlightJudge) -> dict[str, float | None]:
     """Figures of a flight from its record and its judge."""
-    steps = flight.recorder.frame()
+    steps, estimator = flight.steps, flight.parts.estimator
+    assert isinstance(estimator, CameraEstimator)
     legs, table, status = np.array(steps["leg"]), np.array(judge.rows), np.array(judge.status)
     time_s, error = table[:, 0], table[:, 1]
     right = np.isin(status, ("proposed", "tracked")) & (error < flight.parts.target.radius_m)
@@ -179,8 +173,8 @@ def judged(flight: FindFlight, judge: FlightJudge) -> dict[str, float | None]:
         "centre_first_mm": 1e3 * float(error[accepted[0]]) if len(accepted) else None,
         "centre_after_orbit_mm": 1e3 * float(error[scan[-1]]) if len(scan) else None,
         "lost_pct": 100.0 * float(np.mean(status[accepted[0] :] == "lost")) if len(accepted) else None,
-        "picture_ms_p99": 1e3 * float(np.percentile(np.array(flight.estimator.picture_s), 99)),
-        "age_ms_p99": 1e3 * float(np.percentile(np.array(flight.estimator.age_s), 99)),
+        "picture_ms_p99": 1e3 * float(np.percentile(np.array(estimator.seen.picture_s), 99)),
+        "age_ms_p99": 1e3 * float(np.percentile(np.array(estimator.seen.age_s), 99)),
         "duration_s": float(time_s[-1]),
         **holding(table[hold]),
     }

@@ -22,7 +22,7 @@ from wakewise.core.jit.precompile import compile_kernels
 from wakewise.core.optional_dependencies import has
 from wakewise.operation.flight_log import ExposureRecord
 from wakewise.operation.flight_trim import ballast_proposal
-from wakewise.operation.loop import Step, run_loop
+from wakewise.operation.loop import Step, never, run_loop
 from wakewise.operation.parts import Parts
 from wakewise.operation.preflight import check_initial_state
 from wakewise.operation.recorder import FlightRecorder, PhotoSchedule
@@ -212,21 +212,24 @@ def fly(
         check_initial_state(parts)
     progress(0, 1, "at the start")
     plant, witness = parts.world.begin()
-    recorder = recorder_of(parts, witness, route, water_every_s=water_every_s, exposed=exposed)
+    # A pilot that takes its own photographs says when, and when its mission is over.
+    timetable = cast("PhotoSchedule", parts.pilot) if hasattr(parts.pilot, "shutter_s") else route
+    recorder = recorder_of(parts, witness, timetable, water_every_s=water_every_s, exposed=exposed)
 
     before = ""
 
     def record(step: Step) -> None:
         nonlocal before
         recorder(step)
-        left, before = before, route.leg_name(step.time_s)
+        left, before = before, timetable.leg_name(step.time_s)
         if left == SETTLING != before:
             _say_trim(parts, recorder)
         if watch is not None:
             watch(step, witness)
 
     with name_external_parts(parts, recorder):
-        loop_of(parts, plant, witness, record)(duration_s=lasts_s, progress=progress)
+        over = getattr(parts.pilot, "done", never)
+        loop_of(parts, plant, witness, record)(duration_s=lasts_s, progress=progress, stop=over)
     return Flight(parts, recorder)
 
 
@@ -337,6 +340,12 @@ def fly_trial(
     """
     flight = fly(parts, progress=progress, exposed=exposed)
     made, planned = len(flight.recorder.exposures), len(parts.route.exposures_s)
-    if made != planned:
+    if parts.finds:
+        from wakewise.operation.finding.find_parts import write_found
+
+        write_found(parts, folder)
+        if not made:
+            raise StageError("find: no target was found, so nothing was photographed")
+    elif made != planned:
         raise StageError(f"{made} of {planned} exposures were made")
     flight.write(folder)

@@ -39,6 +39,7 @@ from wakewise.simulation.tank.soft_body import DRAG, TargetCompliance, Unanchore
 from wakewise.wake import wake_model
 
 if TYPE_CHECKING:  # imported at first use: rendering and flight checks are not needed to fly
+    from wakewise.operation.finding.region_controller import RegionController
     from wakewise.operation.preflight import PreflightResult
     from wakewise.vision.imaging import LensCamera, PinholeCamera, Scene, SiltOptics
 
@@ -211,9 +212,18 @@ class Parts:
         settings = self.scenario.target
         return region_of(self.surveyed_target, settings.points, self.seeds, settings.fragility_gain)
 
+    @property
+    def finds(self) -> bool:
+        """Whether the pilot looks for the target: then estimator, controller and pilot are not told its place."""
+        return self.scenario.pilot == "find" and "pilot" not in self.given
+
     @ReplaceablePart
     def route(self) -> Route:
         """Camera poses over time, and the times of the exposures."""
+        if self.finds:
+            from wakewise.operation.finding.find_parts import find_route
+
+            return find_route(self)
         centre, mission = self.surveyed_target.centre_W_m, self.scenario.mission
         return plan_route(centre, mission, None if mission.order == "plain" else self.surveyed_current_W_m_s)
 
@@ -263,27 +273,44 @@ class Parts:
     @ReplaceablePart
     def controller(self) -> Controller[Any]:
         """From an estimate and a goal to thrusts."""
+        if self.finds:
+            from wakewise.operation.finding.find_parts import region_controller
+
+            return region_controller(self)
         return make_controller(
             self.scenario.method, self.vehicle, self.region, self.wake, self.control, self.surroundings
         )
 
     @cached_property
-    def pipeline(self) -> Pipeline:
+    def pipeline(self) -> Pipeline | RegionController:
         """The controller with its failsafe and thruster model, as it is flown.
 
         The deadline is enforced in a world that does not wait for its controller (see `World`).
         """
+        if self.finds:
+            from wakewise.operation.finding.find_parts import RegionController
+
+            if isinstance(self.controller, RegionController):
+                return self.controller
         enforce = not getattr(self.world, "waits", True)
         return flown_controller(self.controller, self.vehicle, self.region, self.wake, self.control, enforce)
 
     @ReplaceablePart
     def estimator(self) -> Estimator[Any]:
         """From measurements to an estimate of pose, twist, load and current: an error-state Kalman filter."""
+        if self.finds:
+            from wakewise.operation.finding.find_parts import camera_estimator
+
+            return camera_estimator(self)
         return ErrorStateFilter(self.vehicle, self.scenario.estimation)
 
     @ReplaceablePart
     def world(self) -> World:
         """The simulated or real world: plant and, if simulated, its truth."""
+        if self.finds:
+            from wakewise.operation.finding.find_parts import find_world
+
+            return find_world(self)
         from wakewise.operation.worlds.makers import make_world
 
         return make_world(self)
@@ -296,6 +323,10 @@ class Parts:
     @ReplaceablePart
     def start(self) -> BodyState:
         """Start of the mission, and the first estimate."""
+        if self.finds:
+            from wakewise.operation.finding.find_parts import find_start
+
+            return find_start(self)
         return self.route.body(0.0, self.aim)
 
     @cached_property

@@ -54,8 +54,16 @@ def operator_pilot(parts: Parts) -> Pilot:
     return assisted_pilot(parts, read_input(Path(parts.scenario.control_log)), OperatorState())
 
 
+def finding_pilot(parts: Parts) -> Pilot:
+    """`find`: looks, detects, approaches and scans what the camera finds."""
+    from wakewise.operation.finding.find_parts import find_pilot
+
+    return find_pilot(parts)
+
+
 PILOTS: dict[str, Callable[[Parts], Pilot]] = {
     "route": route_pilot,
+    "find": finding_pilot,
     "human": human_pilot,
     "assisted": assisted_human_pilot,
     "operator": operator_pilot,

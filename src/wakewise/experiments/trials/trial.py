@@ -30,6 +30,7 @@ from wakewise.experiments.trials.metrics import Figures, MetricsCollector, add_r
 from wakewise.experiments.trials.stages import ProgressListener, SilentProgress, StageCosts, of_the_computer
 from wakewise.experiments.trials.surface import SurfaceMaker
 from wakewise.operation import BackgroundRenderer, Parts, Scenario, fly_trial, photograph_flight, read_exposures
+from wakewise.operation.finding.find_parts import found_region
 from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS, parts_of
 from wakewise.operation.teleop.live import collect_flight
@@ -254,6 +255,8 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
         failure = f"{len(names)} photographs were taken, at least {FEWEST_PHOTOS} are needed"
         write_json(folder / "model.json", {"figures": {}, "failure": failure})
         return
+    surveyed = parts.surveyed_target
+    centre_W_m, radius_m = found_region(folder) or (surveyed.centre_W_m, surveyed.radius_m)
     rotations = matrix_from_quat(photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy())
     try:
         model = reconstruct(
@@ -264,7 +267,7 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
             lens=read_lens(folder),
             reference_positions=dict(zip(names, centres, strict=True)),
             reference_rotations=dict(zip(names, rotations, strict=True)),
-            region=(parts.surveyed_target.centre_W_m, REGION_SHARE * parts.surveyed_target.radius_m),
+            region=(centre_W_m, REGION_SHARE * radius_m),
             progress=progress,
         )
         summary: dict[str, Any] = model.summary()

@@ -4,5 +4,5 @@
 - `camera_estimator.py`: an estimator that localises the vehicle by the map of those pictures.
 - `region_controller.py`: a controller whose protected region follows the estimate.
 - `find_mission.py`: look, detect, approach and scan, without the target's place.
-- `find_flight.py`: all of it together.
+- `find_parts.py`: the parts of such a flight, and what it leaves in a trial's folder.
 """

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections import deque
 from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import BodyState, Measurement
+from wakewise.core.interfaces import BodyState, Measurement, TargetEstimate
 from wakewise.estimation import ErrorStateFilter
 from wakewise.estimation.eskf import FilterState
 from wakewise.estimation.settings import Priors
@@ -33,6 +33,7 @@ UNSEEN_S = 0.5
 REMEMBERED_S = 2.0
 """How long estimates are kept, for the poses of late pictures."""
 SETTLE_MARGIN_S = 0.03
+OUTLINE_BGR = (0, 200, 255)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,13 +52,44 @@ class CameraEstimatorState:
     posed_s: float = -math.inf
 
 
+@dataclass(kw_only=True, eq=False)
+class SeenTarget:
+    """What is kept of a flight for its report: the last estimate, and the picture in which the target was accepted."""
+
+    target: TargetEstimate | None = None
+    picture: Grey | None = None
+    X_WC: Pose | None = None
+    shown: TargetEstimate | None = None
+    picture_s: list[float] = field(default_factory=list)
+    age_s: list[float] = field(default_factory=list)
+
+    def clear(self) -> None:
+        """Forget an earlier flight."""
+        self.target = self.picture = self.X_WC = self.shown = None
+        self.picture_s, self.age_s = [], []
+
+    def drawn(self, camera: CalibratedCamera) -> NDArray[np.uint8]:
+        """The picture with the protected surface and its middle drawn over it, BGR, shape (h, w, 3)."""
+        assert self.picture is not None
+        image = np.repeat(self.picture[:, :, None], 3, axis=2)
+        if self.X_WC is None or self.shown is None:
+            return image
+        on_surface = self.shown.points_W_m[self.shown.distance_m <= 0.0]
+        for u, v in camera.pixels((on_surface - self.X_WC.p_m) @ self.X_WC.R):
+            if np.isfinite(u + v):
+                cv2.circle(image, (round(float(u)), round(float(v))), 3, OUTLINE_BGR, 1, cv2.LINE_AA)
+        u, v = camera.pixels((self.shown.centre_W_m - self.X_WC.p_m)[None] @ self.X_WC.R)[0]
+        if np.isfinite(u + v):
+            cv2.drawMarker(image, (round(float(u)), round(float(v))), OUTLINE_BGR, cv2.MARKER_CROSS, 24, 2, cv2.LINE_AA)
+        return image
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CameraEstimator:
     """`wakewise.core.interfaces.Estimator` of a filter and a tracker.
 
-    `ahead_m` is how far the calibrated camera's projection centre lies before the lens's. `map_from_s`: until then the
-    map's poses are not used. `picture_s` collects the thread time of each picture, as `age_s` does that from a picture
-    to its use.
+    `ahead_m` is how far the calibrated camera's projection centre lies before the lens's. `seen` collects what a report
+    shows, the thread time of each picture and the time from a picture to its use.
     """
 
     vehicle: Vehicle
@@ -65,11 +97,11 @@ class CameraEstimator:
     tracker: TargetTracker
     ahead_m: float = 0.0
     use_map: bool = True
-    picture_s: deque[float] = field(default_factory=lambda: deque(maxlen=10000))
-    age_s: deque[float] = field(default_factory=lambda: deque(maxlen=10000))
+    seen: SeenTarget = field(default_factory=SeenTarget)
 
     def init(self, start: BodyState) -> CameraEstimatorState:
         """State at the start."""
+        self.seen.clear()
         return CameraEstimatorState(
             filter=self.inner.init(start), tracker=self.tracker.init(), time_s=0.0, recent=((0.0, start.X_WB, 0.0),)
         )
@@ -112,8 +144,12 @@ class CameraEstimator:
         assert measured.image is not None
         picture = fitted(grey_picture(measured.image), self.tracker.camera)
         tracker, found = self.tracker.step(state.tracker, picture, measured.time_s, X_WB @ X_BM, state.std)
-        self.picture_s.append(time.thread_time() - began)
-        self.age_s.append(now_s - measured.time_s)
+        self.seen.picture_s.append(time.thread_time() - began)
+        self.seen.age_s.append(now_s - measured.time_s)
+        self.seen.target = tracker.target
+        if self.seen.picture is None and tracker.target is not None and tracker.target.status == "tracked":
+            X_WC = X_WB @ X_BM if found is None else found.X_WC
+            self.seen.picture, self.seen.X_WC, self.seen.shown = picture, X_WC, tracker.target
         state = replace(state, tracker=tracker)
         if found is None or not self.use_map:
             return state, None
@@ -149,8 +185,9 @@ def known_camera(parts: Parts, settings: PerceptionSettings) -> tuple[Calibrated
     return camera.scaled(settings.width_px), known.ahead_m
 
 
-def camera_estimator(parts: Parts, settings: PerceptionSettings, use_map: bool = True) -> CameraEstimator:
-    """Estimator of the parts of a flight with the perception's settings."""
+def camera_estimator(parts: Parts, use_map: bool = True) -> CameraEstimator:
+    """Estimator of the parts of a flight; without `use_map` the vehicle is not localised by the map."""
+    settings = parts.scenario.perception
     camera, ahead_m = known_camera(parts, settings)
     priors = Priors(settle_s=max(Priors().settle_s, settings.latency_s + SETTLE_MARGIN_S))
     inner = ErrorStateFilter(parts.vehicle, parts.scenario.estimation, priors=priors)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_integrate
-from wakewise.core.interfaces import BodyState, Measurement, Plant, Truth, TruthProvider
+from wakewise.core.interfaces import BodyState, Measurement, Plant, Truth, TruthProvider, World
 from wakewise.operation.parts import Parts
 from wakewise.operation.photography import posed_scene
 from wakewise.perception import PerceptionSettings
@@ -96,6 +97,28 @@ class CameraFrames:
         if self._posed is None or np.abs(now - self._posed[0]).max() > SHOWN_M:
             self._posed = now, posed_scene(self._parts, stands.tips_m, stands.shift_m)
         return self._posed[1]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CameraWorld:
+    """A `World` whose plant also takes pictures."""
+
+    inner: World
+    parts: Parts
+    settings: PerceptionSettings
+    lost_s: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the world."""
+        return self.inner.name
+
+    def begin(self) -> tuple[Plant, TruthProvider | None]:
+        """As the world; raises InputError of one without truth, which pictures are rendered from."""
+        plant, witness = self.inner.begin()
+        if witness is None:
+            raise InputError(f"world {self.name}: has no truth to render pictures from, take pilot route")
+        return CameraFrames(plant, witness, self.parts, self.settings, self.lost_s), witness
 
 
 def picture_settings(parts: Parts, settings: PerceptionSettings) -> ImagingSettings:

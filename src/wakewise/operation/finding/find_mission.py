@@ -11,27 +11,17 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Goal, TargetEstimate
-from wakewise.core.settings import Settings
+from wakewise.operation.scenario.find_settings import FindSettings
 from wakewise.scene.missions import CameraAim, Leg, MissionSettings, Route
 from wakewise.scene.missions.route import plan_route, rest_to_rest
 
 FOLLOWS_M_S = 0.03
 """Largest speed at which the legs' centre follows the estimate."""
 LOWEST_RAD = math.radians(5.0)
-
-
-class FindSettings(Settings):
-    """How the target is looked for before it is scanned."""
-
-    look_deg: float = Field(20.0, ge=5.0, le=90.0, description="angle to either side from which it is looked at first")
-    settle_s: float = Field(3.0, ge=0.0, le=60.0, description="hover before the first look")
-    give_up_s: float = Field(60.0, ge=5.0, le=3600.0, description="without a target for so long the flight ends")
-    hold_s: float = Field(0.0, ge=0.0, le=3600.0, description="hover at the standoff before the scan")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,9 +49,13 @@ class FindPilot:
         find: FindSettings,
     ) -> None:
         self._aim, self._mission, self._find = aim, mission, find
-        way = start.R[:, 2]
-        self.centre_W_m = start.p_m + assumed_m * way
-        self._here = _on_sphere(start.p_m - self.centre_W_m)
+        self._start, self._assumed_m = start, assumed_m
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        """What is known at the start of a flight."""
+        self.centre_W_m = self._start.p_m + self._assumed_m * self._start.R[:, 2]
+        self._here = on_sphere(self._start.p_m - self.centre_W_m)
         self._last_s = 0.0
         self._phase = _Phase(name="look", route=self._look(), since_s=0.0)
         self.found_s: float | None = None
@@ -71,13 +65,19 @@ class FindPilot:
         """What is being done."""
         return self._phase.name
 
-    @property
     def done(self) -> bool:
         """Whether the mission is over."""
         return self._phase.name == "done"
 
+    def most_s(self) -> float:
+        """Longest time that the mission may take."""
+        scan = plan_route(self.centre_W_m, self._mission)
+        return self._find.give_up_s + 2.0 * self._phase.route.duration_s + self._find.hold_s + scan.duration_s
+
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
         """Reference of the present phase about the centre found so far."""
+        if time_s <= 0.0:
+            self._begin_anew()
         target = estimate.target
         velocity = self._follow(time_s, target)
         self._advance(time_s, target)
@@ -192,7 +192,7 @@ def _hover(centre_W_m: Array, at: Array, duration_s: float = 1.0) -> Route:
     return _route(centre_W_m, [leg], [0.0], duration_s)
 
 
-def _on_sphere(from_centre_W_m: Array) -> Array:
+def on_sphere(from_centre_W_m: Array) -> Array:
     """Azimuth, elevation and range, shape (3,), of a camera's place relative to the centre."""
     x, y, z = from_centre_W_m.tolist()
     return np.array(

@@ -21,9 +21,11 @@ from wakewise.core.plugins import names
 from wakewise.core.settings import Seed, Settings, describe_faults, guess
 from wakewise.estimation import FilterSettings
 from wakewise.operation.scenario.calibration_error import CalibrationErrorSettings
+from wakewise.operation.scenario.find_settings import FindSettings
 from wakewise.operation.scenario.layers import merge_layers, merged, nested, read_tree, replace_fields, with_kinds
 from wakewise.operation.scenario.randomization import FieldDistribution, sample_fields
 from wakewise.operation.worlds.library import load_world, own_file, world_names
+from wakewise.perception.settings import PerceptionSettings
 from wakewise.robot.vehicles.ballast import BallastBlock
 from wakewise.scene.missions import MissionSettings
 from wakewise.scene.targets import TISSUES, TissueProperties, coral_kinds, is_mesh_file
@@ -36,7 +38,7 @@ if TYPE_CHECKING:  # of the shorthand `Scenario.parts` alone: parts are built fr
 
 FLOWS = ("tank", "paper", "lattice", "lattice-jets")
 """Our own water models (see `wakewise.operation.worlds.makers`)."""
-PILOTS = ("route", "human", "assisted", "operator")
+PILOTS = ("route", "find", "human", "assisted", "operator")
 """Our own sources of goals (see `wakewise.operation.pilot_makers`)."""
 
 
@@ -142,12 +144,16 @@ class Scenario(Settings):
         description="fields that the seed draws, by dotted name: two numbers, or log_uniform, choice, horizontal",
     )
     pilot: str = Field(
-        "route", description="source of the goals: route, human, assisted, operator, package.module:make"
+        "route",
+        description="source of the goals: route; find, which is told neither the target's shape nor its place; human, "
+        "assisted, operator, package.module:make",
     )
     control_log: str | None = Field(None, description="inputs of the pilot `operator`: controls.parquet, .csv, .yaml")
     target: TargetSettings = TargetSettings()
     calibration_error: CalibrationErrorSettings = CalibrationErrorSettings()
     mission: MissionSettings = MissionSettings()
+    find: FindSettings = FindSettings()
+    perception: PerceptionSettings = PerceptionSettings()
     control: ControlSettings = ControlSettings()
     estimation: FilterSettings = FilterSettings()
     tank: TankSettings = TankSettings()

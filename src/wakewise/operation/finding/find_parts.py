@@ -1,0 +1,113 @@
+"""Parts of a flight by the pilot `find`, which is told neither the target's mesh nor its place."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from wakewise.core.files import whole_file, write_json
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState
+from wakewise.operation.finding.camera_estimator import CameraEstimator, camera_estimator
+from wakewise.operation.finding.camera_frames import CameraWorld
+from wakewise.operation.finding.find_mission import FindPilot, on_sphere
+from wakewise.operation.finding.region_controller import RegionController, region_controller
+from wakewise.operation.parts import Parts
+from wakewise.operation.worlds.makers import make_world
+from wakewise.scene.missions import Leg, Route
+from wakewise.scene.missions.orbit import camera_pose
+
+START_RANGE_M, START_ELEVATION_DEG = (0.8, 1.1), (20.0, 35.0)
+OFF_AXIS_RAD = math.radians(12.0)
+"""The vehicle starts at a range and elevation drawn evenly, and looks past the target by an angle of this deviation."""
+FOUND_FILE, FOUND_PICTURE = "found.json", "found.png"
+
+__all__ = [
+    "CameraEstimator", "RegionController", "camera_estimator", "find_pilot", "find_route", "find_start", "find_world",
+    "found_region", "region_controller", "write_found",
+]  # fmt: skip
+
+
+def drawn_start(parts: Parts) -> Pose:
+    """Camera pose X_WC of the start: within sight of the true target, whose place the vehicle is not told."""
+    rng = np.random.default_rng([parts.scenario.seed, 43])
+    distance = float(rng.uniform(*START_RANGE_M))
+    elevation, azimuth = math.radians(float(rng.uniform(*START_ELEVATION_DEG))), float(rng.uniform(-math.pi, math.pi))
+    past = distance * math.tan(OFF_AXIS_RAD) * rng.normal(size=3) * np.array([1.0, 1.0, 0.3])
+    return camera_pose(parts.target.centre_W_m + past, azimuth, elevation, distance)
+
+
+def find_start(parts: Parts) -> BodyState:
+    """Start of the vehicle."""
+    X_WC = drawn_start(parts)
+    tilt, _ = parts.aim.tilt(math.asin(-float(X_WC.R[2, 2])))
+    return BodyState(X_WB=X_WC @ parts.aim.mount(tilt).inverse())
+
+
+def find_route(parts: Parts) -> Route:
+    """The start's place for as long as the mission may last: nothing else of its way is known beforehand."""
+    X_WC = drawn_start(parts)
+    centre = X_WC.p_m + parts.scenario.perception.assumed_distance_m * X_WC.R[:, 2]
+    here = on_sphere(X_WC.p_m - centre)
+    duration_s = find_pilot(parts).most_s()
+    leg = Leg(
+        name="find", start=here, end=here, length_m=0.0, duration_s=duration_s, speed_m_s=0.1, acceleration_m_s2=0.1
+    )
+    return Route(
+        centre_W_m=centre,
+        legs=(leg,),
+        starts_s=np.zeros(1),
+        exposures_s=np.zeros(0),
+        exposure_names=(),
+        X_WC_planned=(),
+        duration_s=duration_s,
+    )
+
+
+def find_pilot(parts: Parts) -> FindPilot:
+    """`find`: looks, detects, approaches and scans."""
+    scenario = parts.scenario
+    return FindPilot(
+        drawn_start(parts), scenario.perception.assumed_distance_m, parts.aim, scenario.mission, scenario.find
+    )
+
+
+def find_world(parts: Parts, lost_s: tuple[tuple[float, float], ...] = ()) -> CameraWorld:
+    """The scenario's world with pictures of its camera; `lost_s` as in `CameraFrames`."""
+    return CameraWorld(inner=make_world(parts), parts=parts, settings=parts.scenario.perception, lost_s=lost_s)
+
+
+def write_found(parts: Parts, folder: Path) -> None:
+    """Write found.json, what the flight found and when, and found.png, the target over the picture."""
+    pilot, estimator = parts.pilot, parts.estimator
+    if not isinstance(pilot, FindPilot) or not isinstance(estimator, CameraEstimator):
+        return
+    told: dict[str, Any] = {"found_s": pilot.found_s, "centre_W_m": None, "radius_m": None, "centre_std_m": None}
+    seen = estimator.seen
+    if seen.target is not None and pilot.found_s is not None:
+        target = seen.target
+        told |= {
+            "centre_W_m": target.centre_W_m.tolist(),
+            "radius_m": target.radius_m,
+            "centre_std_m": target.centre_std_m,
+            "centre_error_m": float(np.linalg.norm(target.centre_W_m - parts.target.centre_W_m)),
+            "status": target.status,
+        }
+    if seen.picture is not None:
+        with whole_file(folder / FOUND_PICTURE) as path:
+            path.write_bytes(cv2.imencode(".png", seen.drawn(estimator.tracker.camera))[1].tobytes())
+    write_json(folder / FOUND_FILE, told)
+
+
+def found_region(folder: Path) -> tuple[Any, float] | None:
+    """Centre, shape (3,), and radius of the target that a flight found; None where it did not look for one."""
+    path = folder / FOUND_FILE
+    if not path.exists():
+        return None
+    told = json.loads(path.read_text(encoding="utf-8"))
+    return None if told["centre_W_m"] is None else (np.array(told["centre_W_m"]), float(told["radius_m"]))
