@@ -69,6 +69,8 @@ CORRELATED = 4.0
 BOX_MARGIN = 0.15
 STRONG = 0.1
 """Cornerness over the best of strong corners."""
+AMPLE = 2.0
+"""Factor on the estimator's standard deviations: rays are judged by theirs (`point_map.MOST_MISS`)."""
 POSE_STD = (0.001, 0.0015)
 """Least noise of a measured pose, m and rad: calibration, and what the map's own errors leave."""
 _FAR = math.inf
@@ -156,7 +158,7 @@ class TargetTracker:
         tracks = track(state.tracks, picture, self._expected(state, guess))
         found = self._pose(state, tracks, guess)
         X_WC = guess if found is None else found.X_WC
-        std_m, std_rad = (max(given, least) for given, least in zip(std, POSE_STD, strict=True))
+        std_m, std_rad = (AMPLE * max(given, least) for given, least in zip(std, POSE_STD, strict=True))
         if found is not None:
             std_m, std_rad = POSE_STD[0], 0.0
         tracks = tracks.kept(self._turned(state.points, tracks, X_WC) < MOST_TURN_RAD)
@@ -369,6 +371,8 @@ class TargetTracker:
         state = replace(state, bed=bed, shaped_s=time_s)
         if self.settings.protect == "view":
             return self._protect_view(state, X_WC, time_s)
+        if state.shape is not None and state.shape.seen and time_s - state.seen_s > LOST_AFTER_S:
+            return state  # what is lost stays where it was
         chosen = None
         if bed is not None:
             few = which[thinned(points.points_W_m[which], 0.004)]
@@ -388,7 +392,7 @@ class TargetTracker:
             members=members,
             proposed_s=proposed_s,
             accepted=accepted,
-            seen_s=max(state.seen_s, time_s),
+            seen_s=time_s if state.seen_s == -math.inf else state.seen_s,
         )
         return self._protected(state, time_s)
 
