@@ -247,7 +247,7 @@ class ErrorStateFilter:
     def _correct(self, work: _WorkingState, measured: Measurement) -> None:
         s, slow = self.settings, self._slow
         if measured.X_WB is not None:
-            self._correct_pose(work, measured.X_WB, measured.pose_std or (s.position_std_m, s.attitude_std_rad))
+            self._correct_pose(work, measured.X_WB, measured.pose_std)
         if measured.p_WB_m is not None:
             self._correct_sum(work, measured.p_WB_m, 0, slow["tracking"], s.tracking_std_m)
         if measured.depth_m is not None:
@@ -257,8 +257,11 @@ class ErrorStateFilter:
         if measured.force_B_m_s2 is not None:
             self._correct_force(work, measured.force_B_m_s2, measured.time_s)
 
-    def _correct_pose(self, work: _WorkingState, seen: Pose, std: tuple[float, float]) -> None:
-        """Correct by a camera pose of a noise in m and rad, and adapt the process noise."""
+    def _correct_pose(self, work: _WorkingState, seen: Pose, std: tuple[float, float] | None) -> None:
+        """Correct by a camera pose and adapt the process noise.
+
+        `std`, m and rad, is its noise where it states one: then it has no slow error, since it defines the frame.
+        """
         if work.rejected_in_a_row >= self.priors.gate_patience:
             work.P += self._start_covariance
         distance, work.noise_scale = correct_by_pose(
@@ -266,8 +269,8 @@ class ErrorStateFilter:
             work.P,
             seen.p_m,
             seen.q,
-            self._slow["camera"],
-            *std,
+            self._slow["camera"] if std is None else NOTHING,
+            *(std or (self.settings.position_std_m, self.settings.attitude_std_rad)),
             self._gate[6],
             work.innovation_mean,
             work.noise_scale,

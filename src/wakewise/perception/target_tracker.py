@@ -27,6 +27,7 @@ from wakewise.perception.point_map import PointMap, add_rays, dropped, empty_map
 from wakewise.perception.resection import Resection, resection
 from wakewise.perception.settings import PerceptionSettings
 from wakewise.perception.target_shape import (
+    LEAST_POINTS,
     TargetShape,
     ball,
     bodies,
@@ -62,8 +63,10 @@ SWAY_STD_M, SWAY_SMOOTHED = 0.02, 0.5
 """Prior of a target's shift, and the share of its last value that is kept from picture to picture."""
 LEAST_MOVED_M = 0.002
 """A region that moved by less is the same one."""
-CENTRE_WALK_M = 0.005
+CENTRE_WALK_M = 0.008
 """Random walk of the centre from one shape to the next: more of the target is seen."""
+WORST = 2.0
+"""Largest standard deviation of a body's points over the lower quartile of theirs."""
 CORRELATED = 4.0
 """Shapes share most of their points: so many of them tell as much as one."""
 BOX_MARGIN = 0.15
@@ -381,6 +384,7 @@ class TargetTracker:
         if chosen is None:
             return self._assumed(state, X_WC, time_s) if state.shape is None or state.shape.seen == 0 else state
         assert bed is not None
+        chosen = chosen[_best_known(points.std_m[chosen])]
         places = points.points_W_m[chosen]
         shape = _averaged(state.shape, shape_of(places, bed, state.cameras_W_m[-400:], POSE_STD[0]))
         members = points.ids[chosen[in_company(places)]]
@@ -535,6 +539,12 @@ def _mapped(points: PointMap, ids: IntArray) -> tuple[IntArray, BoolArray]:
     mature = np.zeros(len(rows), np.bool_)
     mature[known] = points.mature[rows[known]]
     return rows, mature
+
+
+def _best_known(std_m: Array) -> BoolArray:
+    """Which points of a body are used, shape (n,): from near, what was mapped from far is left out."""
+    kept = np.asarray(std_m <= WORST * np.quantile(std_m, 0.25))
+    return kept if int(kept.sum()) >= 3 * LEAST_POINTS else np.ones(len(std_m), np.bool_)
 
 
 def _averaged(before: TargetShape | None, now: TargetShape) -> TargetShape:

@@ -159,9 +159,18 @@ class FindPilot:
         return self._phase.route.on_sphere(time_s - self._phase.since_s)[0]
 
     def _approach(self) -> Route:
-        """From where the look ended to the standoff at the first orbit's elevation."""
+        """From where the look ended to the standoff at the first orbit's elevation, aside as far as it looked.
+
+        A straight way to the target would show it from one side, and leave its distance as unsure as before.
+        """
         here = self._phase.route.legs[-1].end
-        end = np.array([here[0], math.radians(self._mission.elevations_deg[0]), self._mission.standoff_m])
+        end = np.array(
+            [
+                here[0] + math.radians(self._find.look_deg),
+                math.radians(self._mission.elevations_deg[0]),
+                self._mission.standoff_m,
+            ]
+        )
         leg = rest_to_rest("approach", here, end, self._mission.speed_m_s, self._mission.acceleration_m_s2)
         return _route(self.centre_W_m, [leg], [0.0], leg.duration_s)
 

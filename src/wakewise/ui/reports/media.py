@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,6 +40,24 @@ def film_html(trial: Trial) -> str:
         source = data_uri(path.read_bytes(), kind) if inside else name
         return str(template("trial.html").film(source, kind.startswith("video"), not inside))
     return ""
+
+
+def found_html(trial: Trial) -> str:
+    """What the flight found with its camera, over the picture in which it was accepted; empty if it did not look."""
+    try:
+        told = json.loads((trial.folder / "found.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return ""
+    if told.get("found_s") is None or told.get("centre_W_m") is None:
+        return str(template("trial.html").found("", "No target was found.", ""))
+    path = trial.folder / "found.png"
+    source = data_uri(path.read_bytes(), "image/png") if path.is_file() else ""
+    error, std = told.get("centre_error_m"), told.get("centre_std_m")
+    words = f"The target was found after {number(told['found_s'])} s."
+    more = f"At the end its centre was known to {number(1e3 * std)} mm" if std is not None else ""
+    if more and error is not None:
+        more += f" by the vehicle's own reckoning, and was {number(1e3 * error)} mm from the true place"
+    return str(template("trial.html").found(source, words, f"{more}." if more else ""))
 
 
 def colours_html(trial: Trial) -> str:

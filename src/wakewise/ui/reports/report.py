@@ -11,7 +11,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
 from wakewise.operation.flight_trim import ballast_proposal
 from wakewise.ui.reports import figures
-from wakewise.ui.reports.media import colours_html, contact_sheet, film_html
+from wakewise.ui.reports.media import colours_html, contact_sheet, film_html, found_html
 from wakewise.ui.reports.model import before_colours, before_mesh, coverage_html, model_section
 from wakewise.ui.reports.page import (
     PageParts,
@@ -167,6 +167,7 @@ def _flown(trial: Trial) -> str:
         "What was flown",
         lead,
         trim_html(trial)
+        + found_html(trial)
         + film_html(trial)
         + plot(
             figures.plan_and_side(trial),
