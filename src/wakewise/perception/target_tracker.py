@@ -131,11 +131,23 @@ class TargetTracker:
             shift_W_m=np.zeros(3),
         )
 
-    def designate(self, state: TrackerState, box: tuple[float, float, float, float], width: int) -> TrackerState:
-        """Take what lies in a box of the next picture, in px of a picture of that width, as the target."""
+    def designate(
+        self, state: TrackerState, box: tuple[float, float, float, float], width: int, *, accepted: bool = True
+    ) -> TrackerState:
+        """Take what lies in a box of the next picture, in px of a picture of that width, as the target.
+
+        A box of a detector is not `accepted`: an operator does so, or time.
+        """
         left, top, right, bottom = box
         ordered = (min(left, right), min(top, bottom), max(left, right), max(top, bottom))
-        return replace(state, designation=Designation(box=ordered, width=width), shape=None, target=None, accepted=True)
+        return replace(
+            state,
+            designation=Designation(box=ordered, width=width),
+            shape=None,
+            target=None,
+            accepted=accepted,
+            proposed_s=math.inf,
+        )
 
     def accept(self, state: TrackerState) -> TrackerState:
         """Accept the proposed target now."""

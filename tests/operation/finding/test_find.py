@@ -18,6 +18,7 @@ from wakewise.operation.finding.camera_frames import CameraFrames
 from wakewise.operation.finding.find_mission import FindPilot
 from wakewise.operation.finding.find_parts import FOUND_PICTURE, found_region, write_found
 from wakewise.operation.finding.region_controller import RegionController
+from wakewise.perception.detector import Detection
 
 SCENARIO = Scenario.preset(
     "quick",
@@ -225,3 +226,33 @@ def test_a_world_without_truth_gives_no_pictures() -> None:
 
     with pytest.raises(InputError, match="no truth"):
         CameraWorld(inner=Sea(), parts=parts, settings=SCENARIO.perception).begin()  # type: ignore[arg-type]
+
+
+def red_box() -> object:
+    """A detector whose answer is a fixed box."""
+
+    class Fixed:
+        name = "fixed"
+        latency_s = 0.01
+
+        def detect(self, image: np.ndarray) -> tuple[Detection, ...]:
+            mask = np.zeros(image.shape[:2], np.bool_)
+            mask[100:160, 200:260] = True
+            return (Detection(mask=mask, score=0.9),)
+
+    return Fixed()
+
+
+def test_a_detectors_box_is_proposed_and_not_accepted(flight: Flight) -> None:
+    """The best detection of the first picture designates the target, which waits for its acceptance."""
+    parts = SCENARIO.replace(**{"perception.detector": f"{__name__}:red_box"}).parts()
+    estimator = parts.estimator
+    assert isinstance(estimator, CameraEstimator)
+    image = np.random.default_rng(0).integers(0, 255, (360, 480, 3)).astype(np.uint8)
+    state = estimator.init(parts.start)
+    thrusts = np.zeros(len(parts.vehicle.thrusters))
+    state, _ = estimator.step(state, 0.02, (Measurement(time_s=0.01, image=image),), thrusts)
+    assert state.tracker.designation is not None
+    assert state.tracker.designation.box == (200, 100, 260, 160)
+    assert not state.tracker.accepted
+    assert flight.parts.estimator.detector is None  # type: ignore[attr-defined]

@@ -24,6 +24,7 @@ from wakewise.operation.finding.camera_frames import without_pose
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario.calibration_error import calibration_with_error
 from wakewise.perception import CalibratedCamera, PerceptionSettings, TargetTracker, TrackerState, grey_picture
+from wakewise.perception.detector import Detector, detect_checked, find_detector
 from wakewise.perception.feature_tracks import Grey
 from wakewise.perception.target_tracker import POSE_STD
 from wakewise.robot.vehicles import Vehicle
@@ -97,6 +98,7 @@ class CameraEstimator:
     tracker: TargetTracker
     ahead_m: float = 0.0
     use_map: bool = True
+    detector: Detector | None = None
     seen: SeenTarget = field(default_factory=SeenTarget)
 
     def init(self, start: BodyState) -> CameraEstimatorState:
@@ -134,6 +136,16 @@ class CameraEstimator:
         )
         return state, replace(estimate, target=state.tracker.target)
 
+    def _detected(self, state: CameraEstimatorState, image: NDArray[np.uint8]) -> CameraEstimatorState:
+        """The state with the best detection of a picture as designated, where there is a detector and no target yet."""
+        tracker = state.tracker
+        if self.detector is None or tracker.designation is not None or image.ndim != 3:
+            return state
+        found = detect_checked(self.detector, image)
+        if not found:
+            return state
+        return replace(state, tracker=self.tracker.designate(tracker, found[0].box, image.shape[1], accepted=False))
+
     def _seen(
         self, state: CameraEstimatorState, measured: Measurement, now_s: float
     ) -> tuple[CameraEstimatorState, Measurement | None]:
@@ -142,6 +154,7 @@ class CameraEstimator:
         _, X_WB, tilt_rad = min(state.recent, key=lambda r: abs(r[0] - measured.time_s))
         X_BM = self.vehicle.X_BC_at(tilt_rad) @ Pose(np.array([0.0, 0.0, self.ahead_m]))
         assert measured.image is not None
+        state = self._detected(state, measured.image)
         picture = fitted(grey_picture(measured.image), self.tracker.camera)
         tracker, found = self.tracker.step(state.tracker, picture, measured.time_s, X_WB @ X_BM, state.std)
         self.seen.picture_s.append(time.thread_time() - began)
@@ -192,4 +205,7 @@ def camera_estimator(parts: Parts, use_map: bool = True) -> CameraEstimator:
     priors = Priors(settle_s=max(Priors().settle_s, settings.latency_s + SETTLE_MARGIN_S))
     inner = ErrorStateFilter(parts.vehicle, parts.scenario.estimation, priors=priors)
     tracker = TargetTracker(camera=camera, settings=settings, seed=parts.scenario.seed)
-    return CameraEstimator(vehicle=parts.vehicle, inner=inner, tracker=tracker, ahead_m=ahead_m, use_map=use_map)
+    detector = None if settings.detector is None else find_detector(settings.detector)
+    return CameraEstimator(
+        vehicle=parts.vehicle, inner=inner, tracker=tracker, ahead_m=ahead_m, use_map=use_map, detector=detector
+    )
