@@ -1,7 +1,7 @@
 """Bundle adjustment of keyframes: camera poses and mapped points by all their rays, with priors on the poses.
 
 Gauss-Newton with Cauchy's weights; points are eliminated by the Schur complement (B. Triggs et al. 2000, Bundle
-adjustment, doi 10.1007/3-540-44480-7_21). Priors set the scale and the frame.
+adjustment, doi 10.1007/3-540-44480-7_21). Priors alone set the scale and the frame.
 """
 
 from __future__ import annotations
@@ -40,6 +40,8 @@ def adjusted(frames: Sequence[Keyframe], points: dict[int, Array], focal_px: flo
 
     - `points`: first places, shape (3,) each, of features by number; those without one are left out.
     """
+    if not frames or not points:
+        return tuple(frames)
     ids = np.array(sorted(points), dtype=np.int64)
     frame_of, point_of, slopes = [], [], []
     for k, frame in enumerate(frames):

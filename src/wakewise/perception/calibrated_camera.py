@@ -15,6 +15,10 @@ from numpy.typing import ArrayLike
 from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError
 
+DISTORTIONS = 4
+_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-12)
+"""OpenCV's own five rounds leave a pixel in the corners of a strong lens."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class CalibratedCamera:
@@ -32,6 +36,8 @@ class CalibratedCamera:
     distortion: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
+        if len(self.distortion) != DISTORTIONS:
+            raise InputError(f"camera: {len(self.distortion)} distortions, needs k1, k2, p1, p2")
         numbers = np.array([self.fx, self.fy, self.cx, self.cy, *self.distortion])
         if not (np.isfinite(numbers).all() and self.fx > 0.0 and self.fy > 0.0 and min(self.width, self.height) > 0):
             raise InputError(f"camera: {self}, needs a size and focal lengths above 0 and finite numbers")
@@ -61,7 +67,9 @@ class CalibratedCamera:
             return np.zeros((0, 2))
         if not any(self.distortion):
             return np.asarray((px[:, 0] - (self.cx, self.cy)) / (self.fx, self.fy))
-        return np.asarray(cv2.undistortPoints(px, self._matrix, np.array(self.distortion))[:, 0], dtype=np.float64)
+        return np.asarray(
+            cv2.undistortPoints(px, self._matrix, np.array(self.distortion), criteria=_CRITERIA)[:, 0], dtype=np.float64
+        )
 
     def pixels(self, points_C_m: Array) -> Array:
         """Pixels, shape (n, 2), of points in the camera frame, shape (n, 3); NaN of those that are not before it."""
@@ -72,6 +80,8 @@ class CalibratedCamera:
         if any(self.distortion):
             r2 = x * x + y * y
             radial = 1.0 + r2 * (k1 + r2 * k2)
+            # Beyond its fold a lens's polynomial brings rays back into the picture.
+            radial = np.where(1.0 + r2 * (3.0 * k1 + 5.0 * r2 * k2) > 0.0, radial, np.nan)
             x, y = (
                 x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
                 y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,

@@ -121,5 +121,5 @@ def replenish(
         ids=np.concatenate([tracks.ids, tracks.next_id + np.arange(len(new))]),
         pixels=np.concatenate([tracks.pixels, new]),
         next_id=tracks.next_id + len(new),
-        picture=tracks.picture,
+        picture=picture,
     )

@@ -26,6 +26,8 @@ PIXEL_STD = 0.6
 """Standard deviation of a tracked pixel, with what the lens's calibration leaves."""
 LEAST_PARALLAX_RAD = 0.06
 """Least angle at which a point's rays must have crossed."""
+LEAST_CROSSING = 1e-6
+"""Least share of a point's information along its rays of that across them."""
 MOST_DEPTH_STD = 0.05
 """Largest standard deviation of a mature point, as a share of its distance."""
 GATE = 4.0
@@ -46,7 +48,8 @@ class PointMap:
 
     Shapes: `ids` (n,), `A` (n, 3, 3), `b` (n, 3), `e` (n,). `points_W_m` (n, 3), NaN until a point can be computed, and
     `std_m` (n,), its largest standard deviation. `first_W` (n, 3) is the direction of the first ray, `parallax_rad`
-    (n,) the largest angle with it. `views` (n,) counts rays, `outliers` (n,) those that missed. `seen_s` (n,) is when
+    (n,) the largest angle with it. `views` (n,) counts rays, `weight` (n,) those that have not faded, `outliers` (n,)
+    those that missed. `seen_s` (n,) is when
     it was last seen, and `facing_W` (n, 3) the sum of unit vectors towards the cameras that saw it.
     """
 
@@ -59,6 +62,7 @@ class PointMap:
     first_W: Array
     parallax_rad: Array
     views: IntArray
+    weight: Array
     outliers: IntArray
     seen_s: Array
     facing_W: Array
@@ -95,6 +99,7 @@ def empty_map() -> PointMap:
         first_W=np.zeros((0, 3)),
         parallax_rad=np.zeros(0),
         views=np.zeros(0, np.int64),
+        weight=np.zeros(0),
         outliers=np.zeros(0, np.int64),
         seen_s=np.zeros(0),
         facing_W=np.zeros((0, 3)),
@@ -141,21 +146,23 @@ def add_rays(
     wrong = mature & (miss > GATE * np.hypot(std, known.std_m[at], where=mature, out=np.full(len(at), np.inf)))
     A, b, e = known.A.copy(), known.b.copy(), known.e.copy()
     add = ~wrong
-    weight = np.where(add, 1.0 / std**2, 0.0)
-    A[at] = fade[:, None, None] * A[at] + weight[:, None, None] * across
+    inverse = np.where(add, 1.0 / std**2, 0.0)
+    A[at] = fade[:, None, None] * A[at] + inverse[:, None, None] * across
     from_ray = across @ X_WC.p_m
-    b[at] = fade[:, None] * b[at] + weight[:, None] * from_ray
-    e[at] = fade * e[at] + weight * (from_ray @ X_WC.p_m)
+    b[at] = fade[:, None] * b[at] + inverse[:, None] * from_ray
+    e[at] = fade * e[at] + inverse * (from_ray @ X_WC.p_m)
     parallax, views, outliers = known.parallax_rad.copy(), known.views.copy(), known.outliers.copy()
     angle = np.arccos(np.clip(np.einsum("ni,ni->n", known.first_W[at], d), -1.0, 1.0))
     parallax[at] = np.where(add, np.maximum(parallax[at], angle), parallax[at])
     views[at] += add
+    count = known.weight.copy()
+    count[at] = fade * count[at] + add
     outliers[at] = np.where(wrong, outliers[at] + 1, np.maximum(outliers[at] - 1, 0))
     seen, facing = known.seen_s.copy(), known.facing_W.copy()
     seen[at] = time_s
     facing[at] -= np.where(add[:, None], d, 0.0)
     places, stds = known.points_W_m.copy(), known.std_m.copy()
-    places[at], stds[at] = _solved(A[at], b[at], e[at], views[at], parallax[at], X_WC.p_m)
+    places[at], stds[at] = _solved(A[at], b[at], e[at], count[at], parallax[at], X_WC.p_m)
     return PointMap(
         ids=known.ids,
         A=A,
@@ -166,6 +173,7 @@ def add_rays(
         first_W=known.first_W,
         parallax_rad=parallax,
         views=views,
+        weight=count,
         outliers=outliers,
         seen_s=seen,
         facing_W=facing,
@@ -173,7 +181,9 @@ def add_rays(
 
 
 def dropped(known: PointMap, tracked: IntArray, time_s: float, keep_s: float, most: int) -> PointMap:
-    """The map without points of many outliers, old points that never became mature, and the oldest beyond `most`."""
+    """The map without points of many outliers, and of those that are tracked no more the ones that never became mature,
+    that were not seen for `keep_s`, and the oldest beyond `most`.
+    """
     live = np.isin(known.ids, tracked)
     stays = (known.outliers < MOST_OUTLIERS) & (live | known.mature) & (live | (time_s - known.seen_s < keep_s))
     if int(stays.sum()) > most:
@@ -197,6 +207,7 @@ def _with_rows(known: PointMap, ids: IntArray, d: Array, time_s: float) -> Point
         "first_W": d[new],
         "parallax_rad": np.zeros(k),
         "views": np.zeros(k, np.int64),
+        "weight": np.zeros(k),
         "outliers": np.zeros(k, np.int64),
         "seen_s": np.full(k, time_s),
         "facing_W": np.zeros((k, 3)),
@@ -206,12 +217,12 @@ def _with_rows(known: PointMap, ids: IntArray, d: Array, time_s: float) -> Point
     return PointMap(**{name: values[order] for name, values in joined.items()})
 
 
-def _solved(
-    A: Array, b: Array, e: Array, views: IntArray, parallax_rad: Array, camera_W_m: Array
-) -> tuple[Array, Array]:
+def _solved(A: Array, b: Array, e: Array, count: Array, parallax_rad: Array, camera_W_m: Array) -> tuple[Array, Array]:
     """Points, shape (n, 3), NaN where rays do not cross; standard deviations, shape (n,), infinite if not mature."""
     points, std = np.full(b.shape, np.nan), np.full(len(b), np.inf)
     crossed = parallax_rad >= 0.5 * LEAST_PARALLAX_RAD
+    spectrum = np.linalg.eigvalsh(A)  # rays that have faded to one direction do not cross any more
+    crossed &= spectrum[:, 0] > LEAST_CROSSING * spectrum[:, -1]
     if not crossed.any():
         return points, std
     cov = np.linalg.inv(A[crossed])
@@ -219,7 +230,7 @@ def _solved(
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(cov)[:, -1], 0.0))
     away = np.linalg.norm(found - camera_W_m, axis=1)
     missed = np.maximum(e[crossed] - np.einsum("ni,ni->n", b[crossed], found), 0.0)
-    miss = np.sqrt(missed / np.maximum(2.0 * views[crossed] - 3.0, 1.0))
+    miss = np.sqrt(missed / np.maximum(2.0 * count[crossed] - 3.0, 1.0))
     good = (parallax_rad[crossed] >= LEAST_PARALLAX_RAD) & (spread < MOST_DEPTH_STD * away) & (miss < MOST_MISS)
     points[crossed], std[crossed] = found, np.where(good, np.maximum(spread, RAY_STD_M), np.inf)
     return points, std

@@ -68,7 +68,7 @@ def resection(
     if int(fits.sum()) < max(LEAST_POINTS, LEAST_FITTING * len(fits)):
         return None
     residual = float(np.sqrt(np.mean(np.einsum("ni,ni->n", miss[fits], miss[fits]))))
-    spread2 = max(float(np.mean(error2[fits])), 0.05)
+    spread2 = max(0.5 * float(np.mean(error2[fits])), 0.025)
     return Resection(X_WC=pose, covariance=spread2 * np.linalg.inv(H), fits=fits, residual_px=residual)
 
 

@@ -94,7 +94,7 @@ def view_sectors(cameras_W_m: Array, about_W_m: Array) -> Array:
     """Level unit directions from which a place was seen, one for each sector of azimuth, shape (k, 2)."""
     level = about_W_m[:2] - cameras_W_m[:, :2]
     azimuth = np.arctan2(level[:, 1], level[:, 0])
-    sector = np.round(azimuth / SECTOR_RAD).astype(int)
+    sector = np.round(azimuth / SECTOR_RAD).astype(int) % round(2.0 * math.pi / SECTOR_RAD)
     means = [math.atan2(*np.sin([azimuth[sector == s], azimuth[sector == s] + math.pi / 2]).sum(axis=1)) for s in
              np.unique(sector)]  # fmt: skip
     return np.array([[math.cos(a), math.sin(a)] for a in means]).reshape(-1, 2)
@@ -126,7 +126,7 @@ def shape_of(points_W_m: Array, bed: BedPlane, cameras_W_m: Array, place_std_m: 
     W = np.array(weights)
     N = (np.array(rows) * W[:, None]).T @ (np.array(rows) * W[:, None])
     plan = np.linalg.solve(N, (np.array(rows) * W[:, None]).T @ (np.array(values) * W))
-    top = float(np.quantile(points_W_m[:, 2], TAIL))
+    top = float(np.quantile(points_W_m[:, 2], BOX_TAIL))  # thin tips are seen by few points
     foot = float(bed.below(np.append(plan, top))[2])
     centre = np.append(plan, 0.5 * (top + foot))
     covariance = np.zeros((3, 3))
@@ -135,9 +135,9 @@ def shape_of(points_W_m: Array, bed: BedPlane, cameras_W_m: Array, place_std_m: 
     covariance += place_std_m**2 / 3.0 * np.eye(3)
     surface, seen = completed(points_W_m, centre)
     radius = float(np.quantile(np.linalg.norm(surface - centre, axis=1), 1.0 - TAIL))
-    low_radius = math.hypot(max(halves), 0.5 * (foot - top))
+    least = max(*halves, 0.5 * (foot - top))
     return TargetShape(
-        centre_W_m=centre, covariance=covariance, radius_m=max(radius, low_radius), surface_W_m=surface, seen=seen
+        centre_W_m=centre, covariance=covariance, radius_m=max(radius, least), surface_W_m=surface, seen=seen
     )
 
 

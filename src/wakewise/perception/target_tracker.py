@@ -19,7 +19,7 @@ import numpy as np
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.core.interfaces import TargetEstimate
-from wakewise.perception.bed_plane import BedPlane, fit_bed
+from wakewise.perception.bed_plane import BedPlane, fit_bed, near_bed
 from wakewise.perception.bundle_adjustment import Keyframe, adjusted
 from wakewise.perception.calibrated_camera import CalibratedCamera
 from wakewise.perception.feature_tracks import LEAST_CONTRAST, NO_TRACKS, FeatureTracks, Grey, replenish, track
@@ -35,6 +35,7 @@ from wakewise.perception.target_shape import (
     protected_region,
     shape_of,
     thinned,
+    view_sectors,
 )
 
 SHAPE_EVERY_S = 0.5
@@ -65,6 +66,10 @@ LEAST_MOVED_M = 0.002
 """A region that moved by less is the same one."""
 CENTRE_WALK_M = 0.008
 """Random walk of the centre from one shape to the next: more of the target is seen."""
+LEAST_MEMBERS, LEAST_SIDES = 25, 2
+"""Fewer points, or seen from fewer sectors of azimuth, and a target is not accepted by time alone."""
+BED_REACH_M = 0.35
+"""The bed under a target is that of the points within this of it."""
 WORST = 2.0
 """Largest standard deviation of a body's points over the lower quartile of theirs."""
 CORRELATED = 4.0
@@ -398,10 +403,12 @@ class TargetTracker:
         assert bed is not None
         chosen = chosen[_best_known(points.std_m[chosen])]
         places = points.points_W_m[chosen]
-        shape = _averaged(state.shape, shape_of(places, bed, state.cameras_W_m[-400:], POSE_STD[0]))
+        under = near_bed(bed, points.points_W_m[which], places.mean(axis=0), BED_REACH_M)
+        shape = _averaged(state.shape, shape_of(places, under, state.cameras_W_m[-400:], POSE_STD[0]))
         members = points.ids[chosen[in_company(places)]]
         proposed_s = min(state.proposed_s, time_s)
-        accepted = state.accepted or time_s - proposed_s >= self.settings.accept_s
+        enough = len(members) >= LEAST_MEMBERS and len(view_sectors(state.cameras_W_m, shape.centre_W_m)) >= LEAST_SIDES
+        accepted = state.accepted or (enough and time_s - proposed_s >= self.settings.accept_s)
         state = replace(
             state,
             shape=shape,

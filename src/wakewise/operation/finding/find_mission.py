@@ -133,23 +133,19 @@ class FindPilot:
         known = target is not None and target.status in ("tracked", "lost")
         if self.found_s is None and known:
             self.found_s = time_s
-        if phase.name == "look" and into_s >= phase.route.duration_s:
-            if known:
-                self._begin("approach", self._approach(), time_s)
-            elif time_s >= self._find.give_up_s:
-                self._begin("done", _hover(self.centre_W_m, self._at(time_s)), time_s)
-            else:
-                self._here = self._at(time_s)
-                self._begin("look", replace(self._look(), centre_W_m=self.centre_W_m), time_s)
-        elif phase.name == "approach" and into_s >= phase.route.duration_s:
-            if self._find.hold_s > 0.0:
-                self._begin("hold", _hover(self.centre_W_m, self._at(time_s), self._find.hold_s), time_s)
-            else:
-                self._begin("scan", self._scan(time_s), time_s)
-        elif phase.name == "hold" and into_s >= phase.route.duration_s:
-            self._begin("scan", self._scan(time_s), time_s)
-        elif phase.name == "scan" and into_s >= phase.route.duration_s:
+        if into_s < phase.route.duration_s:
+            return
+        if phase.name == "scan" or (not known and time_s >= self._find.give_up_s):
             self._begin("done", _hover(self.centre_W_m, self._at(time_s)), time_s)
+        elif phase.name == "look" and target is not None and target.status != "assumed":
+            self._begin("approach", self._approach(), time_s)
+        elif not known:  # what is proposed is looked at from near, what is not from here again
+            self._here = self._at(time_s)
+            self._begin("look", self._look(), time_s)
+        elif phase.name == "approach" and self._find.hold_s > 0.0:
+            self._begin("hold", _hover(self.centre_W_m, self._at(time_s), self._find.hold_s), time_s)
+        else:
+            self._begin("scan", self._scan(time_s), time_s)
 
     def _begin(self, name: Literal["look", "approach", "hold", "scan", "done"], route: Route, time_s: float) -> None:
         self._phase = _Phase(name=name, route=route, since_s=time_s)
