@@ -23,6 +23,7 @@ LAYERS = (
     "control",
     "planning",
     "estimation",
+    "perception",
     "vision",
     "simulation",
     "wake",
