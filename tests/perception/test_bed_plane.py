@@ -10,7 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.core.arrays import Array
-from wakewise.perception.bed_plane import LEAST_POINTS, STEEPEST_RAD, WITHIN_M, BedPlane, fit_bed, level_plane
+from wakewise.perception.bed_plane import (
+    LEAST_POINTS,
+    STEEPEST_RAD,
+    WITHIN_M,
+    BedPlane,
+    fit_bed,
+    level_plane,
+    near_bed,
+)
 
 places = st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)).map(np.array)
 slants = st.tuples(st.floats(0.0, 0.5), st.floats(-math.pi, math.pi))
@@ -171,3 +179,15 @@ def test_the_fit_is_a_function_of_points_and_seed() -> None:
     assert one is not None and other is not None
     np.testing.assert_array_equal(one.up_W, other.up_W)
     np.testing.assert_array_equal(one.at_W_m, other.at_W_m)
+
+
+def test_the_bed_under_a_place_is_that_of_the_points_about_it() -> None:
+    """A plane is moved to the points within reach, by less than its own thickness; few points leave it as it is."""
+    rng, bed = np.random.default_rng(5), level_plane(1.5)
+    near = np.column_stack([rng.uniform(-0.3, 0.3, (60, 2)), np.full(60, 1.506)])
+    far = np.column_stack([rng.uniform(1.0, 2.0, (60, 2)), np.full(60, 1.494)])
+    moved = near_bed(bed, np.concatenate([near, far]), np.zeros(3), 0.35)
+    assert moved.at_W_m[2] == pytest.approx(1.506, abs=1e-9)
+    assert near_bed(bed, near[:5], np.zeros(3), 0.35) is bed
+    high = near + np.array([0.0, 0.0, -0.1])
+    assert near_bed(bed, high, np.zeros(3), 0.35) is bed
