@@ -36,7 +36,7 @@ STD = (0.02, 0.03)
 """Standard deviation of the camera's pose per axis, m and rad, where the estimate states none."""
 _ROUNDED_PX = 1.5
 _NOTES = {
-    "assumed": "target designated; a ball is protected until the camera has seen it from other sides, too",
+    "assumed": "target designated; a ball is protected until it was seen from other sides: move sideways",
     "proposed": "a target is proposed; its region is protected",
     "tracked": "target tracked; its region is protected",
     "lost": "target lost; its last region stays protected",
@@ -100,7 +100,7 @@ class TargetTracking:
         self._taken_s = -np.inf
         self._over = False
         self._said: str | None = None
-        self._thread = threading.Thread(target=self._run, name="target")
+        self._thread = threading.Thread(target=self._run, name="target", daemon=True)
 
     def start(self) -> None:
         """Start the thread, which waits until a target is designated."""
