@@ -196,13 +196,15 @@ class TargetTracking:
                 self._changed.wait_for(partial(self._has_work, request))
                 if self._over:
                     return
-                begins = self._request is not request
-                request, picture, self._waiting = self._request, self._waiting, None
+                begins, request = self._request is not request, self._request
+                first = request.first if begins and request is not None else None
+                picture = first or self._waiting
+                self._waiting = self._waiting if first is not None else None
             if request is None:
                 self._protect(None)
                 continue
             if begins:
-                state, version, picture = self._begun(request), -1, request.first or picture
+                state, version = self._begun(request), -1
             if picture is not None:
                 state, version = self._take(request, state, version, picture)
 
