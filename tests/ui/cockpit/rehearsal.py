@@ -51,6 +51,7 @@ class Rehearsal:
         self.axes, self.photos, self.frames = np.zeros(5), 0, 0
         self.flown: list[tuple[float, np.ndarray]] = []
         self._notes: list[StatusMessage] = []
+        self.designated: list[tuple[tuple[float, ...] | None, int]] = []
         self._began_s, self._last_s = time.monotonic(), time.monotonic()
         angle, height = np.linspace(0.0, 2.0 * math.pi, 200, endpoint=False) * 7.0, np.linspace(-0.95, 0.95, 200)
         ring = np.sqrt(1.0 - height**2)
@@ -163,6 +164,12 @@ class Rehearsal:
             if name not in self.desk or (name in ("w_track", "gain") and not allowed[0] <= value <= allowed[1]):
                 raise InputError(f"desk: {name} {value}, allowed {allowed}")
         self.desk.update(changes)
+
+    def designate(self, box: tuple[float, ...] | None, frame: int) -> None:
+        """Keep the box; the first picture is of no use."""
+        if box is not None and frame == 0:
+            raise InputError("designate: no pictures are drawn")
+        self.designated.append((box, frame))
 
     def picture(self) -> CameraPicture:
         image = np.full((270, 480, 3), (120, 90, 30), np.uint8)

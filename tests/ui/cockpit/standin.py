@@ -76,6 +76,7 @@ class StandIn:
     lease: str | None = None
     asked_by: str | None = None
     photos: int = 0
+    target: Any = None
     started_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -323,7 +324,7 @@ class StandIn:
                 "next": {"position_W_m": (eye + 0.25).round(3).tolist(), "words": "its left flank, from higher up"},
             },
             "photos": self.photos + 12, "loop": {"behind_ms": 0.4, "solve_ms_p99": 7.2, "stick_to_thrust_ms_p99": 96.0},
-            "fallback": None, "helm": None, "spectators": max(0, len(self.clients) - 1),
+            "fallback": None, "target": self.target, "helm": None, "spectators": max(0, len(self.clients) - 1),
         }  # fmt: skip
 
 

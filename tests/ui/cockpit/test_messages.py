@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from wakewise.operation.teleop.input.controls import ACTIONS
-from wakewise.ui.cockpit.messages import ButtonPress, Hello, InvalidMessage, SettingsChange, StickMessage, read_message
+from wakewise.ui.cockpit.messages import (
+    ButtonPress,
+    Hello,
+    InvalidMessage,
+    SettingsChange,
+    StickMessage,
+    TargetDesignation,
+    read_message,
+)
 
 GOOD: list[dict[str, Any]] = [
     {"type": "hello", "token": None, "name": "Ada", "wants": "helm"},
@@ -20,6 +28,8 @@ GOOD: list[dict[str, Any]] = [
     {"type": "press", "what": "capture", "lease": "L"},
     {"type": "desk", "set": {"w_track": 2}, "lease": "L"},
     {"type": "seen", "frame": 7},
+    {"type": "designate", "box": [0.1, 0, 1, 0.5], "frame": 7, "lease": "L"},
+    {"type": "designate", "box": "clear", "lease": "L"},
 ]
 JUNK: list[Any] = [
     None, True, False, 0, -1, 1e308, -1e308, 10**400, -(10**400), 2**53 + 1, "", "x" * 5000, "\x00", "NaN", [], {},
@@ -50,6 +60,20 @@ def test_what_the_protocol_allows_is_read(told: dict[str, Any]) -> None:
         ('{"type": "sticks", "seq": 1, "t": NaN, "axes": [0, 0, 0, 0, 0], "lease": "L"}', "t must be a time"),
         ('{"type": "press", "what": "surface", "lease": "L"}', "what 'surface', allowed capture"),
         ('{"type": "desk", "set": {"gain": [1]}, "lease": "L"}', "set.'gain' must be a number"),
+        (
+            '{"type": "designate", "frame": 7, "lease": "L"}',
+            "top, right and bottom, or 'clear', not None",
+        ),
+        ('{"type": "designate", "box": "all", "frame": 7, "lease": "L"}', "not 'all'"),
+        ('{"type": "designate", "box": [0, 0, 1], "frame": 7, "lease": "L"}', "not a list"),
+        ('{"type": "designate", "box": [0, 0, "1", 1], "frame": 7, "lease": "L"}', "box must be a number, not '1'"),
+        ('{"type": "designate", "box": [0, 0, NaN, 1], "frame": 7, "lease": "L"}', "must lie within 0 to 1"),
+        ('{"type": "designate", "box": [0, 0, Infinity, 1], "frame": 7, "lease": "L"}', "must lie within 0 to 1"),
+        ('{"type": "designate", "box": [-0.1, 0, 1, 1], "frame": 7, "lease": "L"}', "must lie within 0 to 1"),
+        ('{"type": "designate", "box": [0.5, 0, 0.5, 1], "frame": 7, "lease": "L"}', "left before right"),
+        ('{"type": "designate", "box": [0.5, 0, 0.505, 1], "frame": 7, "lease": "L"}', "sides of 0.01 at least"),
+        ('{"type": "designate", "box": [0, 0, 1, 1], "lease": "L"}', "frame must be a whole number"),
+        ('{"type": "designate", "box": [0, 0, 1, 1], "frame": 7}', "lease must be a text"),
         ('{"type": "seen", "frame": -1}', "frame must be a whole number from 0"),
     ],
 )
@@ -102,6 +126,10 @@ def test_a_hundred_thousand_mangled_messages_raise_nothing() -> None:
             assert read.what in ACTIONS
         elif isinstance(read, SettingsChange):
             assert all(isinstance(value, str | float | bool) for value in read.changes.values())
+        elif isinstance(read, TargetDesignation) and read.box is not None:
+            left, top, right, bottom = read.box
+            assert 0.0 <= left < right <= 1.0
+            assert 0.0 <= top < bottom <= 1.0
     assert read_well > 1000
 
 

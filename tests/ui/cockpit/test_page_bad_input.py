@@ -14,7 +14,7 @@ NOTHING = dict.fromkeys(
      "direct_disturbance", "rms_m_s", "direct_rms_m_s", "saved_pct", "predicted_m_s", "true_m_s",
      "depth_m", "roll_deg", "pitch_deg", "heading_deg",
      "tilt_deg", "power_W", "energy_J", "position_W_m", "goal_W_m", "coverage", "photos", "loop", "fallback", "helm",
-     "spectators")
+     "spectators", "target")
 )  # fmt: skip
 ODD = (
     "", "not JSON", "null", "[]", "7", '"state"', "{}", '{"type": 3}', '{"type": "unheard of"}', '{"type": "_"}',
@@ -24,6 +24,10 @@ ODD = (
     {"type": "state", **{name: {"a": [1, None]} for name in NOTHING}},
     {"type": "state", "thrusts_N": [None, "x", 1e308], "predicted_m_s": [1e308, None, -5, "x"], "true_m_s": [],
      "coverage": {"share": 1e9, "patches": [None, "x", -7, 1e308], "next": {"position_W_m": [0], "words": {}}}},
+    {"type": "state", "target": {"status": "toString"}},
+    {"type": "state", "target": {"status": ["lost"], "outline": 3}},
+    {"type": "state", "target": {"status": "lost", "outline": {"u": "x", "v": 1e308, "radius": -1}, "distance_m": "x"}},
+    {"type": "state", "target": {"status": "lost", "outline": {"u": 1e308, "v": 0, "radius": 1e308}, "trouble": {}}},
     {"type": "welcome"}, {"type": "welcome", "vehicle": None, "target": None, "desk": None, "scenario": None},
     {"type": "welcome", "vehicle": {"thrusters": [None, {}, {"limit_N": "x", "name": 3}]},
      "scene_url": "javascript:alert(1)",

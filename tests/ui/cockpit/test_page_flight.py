@@ -72,6 +72,25 @@ def test_a_flight_by_hand_from_the_browser(session: CockpitSession, page: Page, 
     page.until("document.getElementById('banner-more').innerText.includes('the flight is over')")
 
 
+def test_a_box_in_the_picture_of_a_flight_changes_what_is_protected(session: CockpitSession, page: Page) -> None:
+    """The controllers' region is the designated one until it is forgotten; then it is the scenario's."""
+    page.until("document.querySelector('#time').textContent !== '–'", 180.0)
+    page.press("KeyG")
+    page.until("document.body.dataset.helm === 'mine'")
+    page.until("document.getElementById('no-picture').hidden", 60.0)
+    assert session.live is not None
+    methods = session.live.parts.controller.motion.methods
+    own = methods["wake-aware"]
+    assert (session.state() or {})["target"] is None
+    page.press("KeyT")
+    until(lambda: methods["wake-aware"] is not own, "another region", 60.0)
+    page.until("document.getElementById('designated-line').innerText.startsWith('assumed')")
+    page.press("Escape")
+    until(lambda: methods["wake-aware"] is own, "the scenario's region")
+    page.until("document.getElementById('designated').hidden")
+    page.until("document.getElementById('notes').innerText.includes('target forgotten')")
+
+
 def position(session: CockpitSession) -> np.ndarray:
     return np.array((session.state() or {})["position_W_m"])
 

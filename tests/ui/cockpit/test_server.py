@@ -286,6 +286,28 @@ def test_a_dial_out_of_range_is_told_to_who_set_it(server: CockpitServer, show: 
     asyncio.run(tries())
 
 
+def test_only_who_has_the_helm_designates(server: CockpitServer, show: Rehearsal) -> None:
+    """A box of anybody else does nothing; one that is refused or cannot be read is told to who drew it."""
+
+    async def tries() -> None:
+        async with page(server, "helm") as one, page(server) as two:
+            box = [0.1, 0.2, 0.5, 0.6]
+            await two.say(type="designate", box=box, frame=3, lease="guess")
+            await one.say(type="designate", box=box, frame=0, lease=one.lease)
+            assert "no pictures" in (await one.until(lambda told: told["type"] == "note"))["text"]
+            await one.say(type="designate", box=[0.5, 0.2, 0.5, 0.6], frame=3, lease=one.lease)
+            note = await one.until(lambda told: told["type"] == "note")
+            assert "not understood: designate: box must lie" in note["text"]
+            await one.say(type="designate", box=box, frame=3, lease=one.lease)
+            await one.say(type="designate", box="clear", lease=one.lease)
+            async with asyncio.timeout(2.0):
+                while len(show.designated) < 2:
+                    await asyncio.sleep(0.005)
+            assert show.designated == [(tuple(box), 3), (None, 0)]
+
+    asyncio.run(tries())
+
+
 def test_one_picture_is_under_way_until_it_was_seen(server: CockpitServer) -> None:
     """A page that does not acknowledge gets no second one; each has its number and the flight's time."""
 

@@ -12,6 +12,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from wakewise.core.errors import InputError
 from wakewise.operation import Scenario
 from wakewise.ui.cockpit.session import CockpitSession
 
@@ -19,7 +20,7 @@ STATE = (
     "time_s", "mode", "desk", "controls", "thrusts_N", "commanded_m_s", "velocity_m_s", "deviation_pct", "disturbance",
     "direct_disturbance", "rms_m_s", "direct_rms_m_s", "saved_pct", "predicted_m_s", "true_m_s",
     "depth_m", "roll_deg", "pitch_deg", "heading_deg",
-    "tilt_deg", "power_W", "energy_J", "position_W_m", "goal_W_m", "coverage", "photos", "loop", "fallback",
+    "tilt_deg", "power_W", "energy_J", "position_W_m", "goal_W_m", "coverage", "photos", "loop", "fallback", "target",
 )  # fmt: skip
 
 
@@ -83,6 +84,14 @@ def test_a_state_has_all_that_the_wire_promises(flown: tuple[CockpitSession, Han
     assert welcome["preparing"] is None
     assert welcome["desk"]["ranges"]["w_track"] == [0.5, 50.0]
     json.dumps(welcome, allow_nan=False)
+
+
+def test_without_pictures_no_target_is_designated(flown: tuple[CockpitSession, Hands, Path]) -> None:
+    """It is refused in words, and the state has no target."""
+    session, hands, _ = flown
+    with pytest.raises(InputError, match="no pictures are drawn"):
+        session.designate((0.4, 0.4, 0.6, 0.6), 1)
+    assert hands.state["target"] is None
 
 
 def test_sticks_move_the_vehicle_and_the_deviation_is_told(flown: tuple[CockpitSession, Hands, Path]) -> None:

@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.control import make_controller, vehicle_layout
+from wakewise.control import vehicle_layout
 from wakewise.control.bumpless_transfer import switched
-from wakewise.control.pipeline import Pipeline, pipeline_of
 from wakewise.control.velocity_reference import PAPER_W_TRACK, deviation_limit
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Controller, Goal
@@ -33,7 +32,8 @@ from wakewise.operation.teleop.arbitration import (
 from wakewise.operation.teleop.input import CENTRED, Controls, ControlSource
 from wakewise.operation.teleop.input.control_log import ControlLogWriter
 from wakewise.operation.teleop.motion import MotionReference
-from wakewise.operation.teleop.operator_state import WAYS, OperatorSettings, OperatorState
+from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
+from wakewise.operation.teleop.region_methods import RegionMethods, region_methods
 from wakewise.operation.teleop.resumable_mission import ResumableMission, ScanState
 from wakewise.scene.missions import CameraAim
 
@@ -305,17 +305,15 @@ def assisted_pilot(
     )
 
 
-def switched_controller(parts: Parts, wanted: Callable[[], str]) -> Controller[Any]:
-    """A controller that is `wake-aware` or direct (`dp`), as is wanted at each step."""
-    gentle = parts.scenario.method if parts.scenario.method not in ("dp", "manual", "ardusub") else WAYS[0]
-    layout = vehicle_layout(parts.vehicle)
-    made: dict[str, Pipeline] = {
-        way: pipeline_of(
-            make_controller(method, parts.vehicle, parts.region, parts.wake, parts.control, parts.surroundings), layout
-        )
-        for way, method in ((WAYS[0], gentle), (WAYS[1], "dp"))
-    }
-    return switched("operator", made, wanted, layout)
+def switched_controller(
+    parts: Parts, wanted: Callable[[], str], methods: RegionMethods | None = None
+) -> Controller[Any]:
+    """A controller that is `wake-aware` or direct (`dp`), as is wanted at each step.
+
+    `methods`: pipelines whose protected region may change in flight; by default those of the scenario's region.
+    """
+    made = region_methods(parts) if methods is None else methods
+    return switched("operator", made, wanted, vehicle_layout(parts.vehicle))
 
 
 def _emptied(queue: deque[Any]) -> tuple[Any, ...]:

@@ -18,6 +18,10 @@ from wakewise.operation.teleop.input.controls import ACTIONS, CONTROL_AXES, appl
 _WORD = 64  # characters of a name, a token, an id
 _LARGEST = 2**53  # the largest whole number that JavaScript counts to
 _FIELDS = 16
+CLEAR = "clear"
+"""In place of a box: the designated target is forgotten."""
+LEAST_SIDE = 0.01
+"""Least side of a box, in shares of the picture."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,13 +84,34 @@ class PictureAck:
 
 
 @dataclass(frozen=True, kw_only=True)
+class TargetDesignation:
+    """A box of picture `frame` that holds the target; None for the scenario's own target again.
+
+    `box` is (left, top, right, bottom) in shares of the picture, 0 to 1 from its upper left corner.
+    """
+
+    box: tuple[float, float, float, float] | None
+    frame: int
+    lease: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class InvalidMessage:
     """The fault of a message in one line."""
 
     why: str
 
 
-Message = Hello | ControlRequest | ControlConsent | StickMessage | ButtonPress | SettingsChange | PictureAck
+Message = (
+    Hello
+    | ControlRequest
+    | ControlConsent
+    | StickMessage
+    | ButtonPress
+    | SettingsChange
+    | PictureAck
+    | TargetDesignation
+)
 
 
 class _InvalidError(Exception):
@@ -164,6 +189,21 @@ def _seen(told: dict[str, Any]) -> PictureAck:
     return PictureAck(frame=_whole(told, "frame"))
 
 
+def _designate(told: dict[str, Any]) -> TargetDesignation:
+    lease = _word(told, "lease")
+    if told.get("box") == CLEAR:
+        return TargetDesignation(box=None, frame=0, lease=lease)
+    edges = told.get("box")
+    if not isinstance(edges, list) or len(edges) != 4:
+        raise _InvalidError(f"box must be left, top, right and bottom, or {CLEAR!r}, not {_shown(edges)}")
+    left, top, right, bottom = (_number(edge, "box") for edge in edges)
+    if not (0.0 <= left < right <= 1.0 and 0.0 <= top < bottom <= 1.0):  # what is no number, too
+        raise _InvalidError("box must lie within 0 to 1, left before right and top before bottom")
+    if min(right - left, bottom - top) < LEAST_SIDE:
+        raise _InvalidError(f"box must have sides of {LEAST_SIDE:g} at least")
+    return TargetDesignation(box=(left, top, right, bottom), frame=_whole(told, "frame"), lease=lease)
+
+
 _READERS: dict[str, Callable[[dict[str, Any]], Message]] = {
     "hello": _hello,
     "helm": _helm,
@@ -172,6 +212,7 @@ _READERS: dict[str, Callable[[dict[str, Any]], Message]] = {
     "press": _press,
     "desk": _desk,
     "seen": _seen,
+    "designate": _designate,
 }
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from wakewise.ui.cockpit.messages import (
     PictureAck,
     SettingsChange,
     StickMessage,
+    TargetDesignation,
     read_message,
 )
 from wakewise.ui.cockpit.view_model import StatusMessage, ViewModel, as_json
@@ -176,7 +177,10 @@ class CockpitServer(WebServer):
                 mailbox.press(client.id, message.lease, message.what)
             case SettingsChange():
                 if mailbox.may(client.id, message.lease):
-                    self._change_settings(client, message.changes)
+                    self._ask(client, lambda: self.model.change_settings(message.changes))
+            case TargetDesignation():
+                if mailbox.may(client.id, message.lease):
+                    self._ask(client, lambda: self.model.designate(message.box, message.frame))
             case ControlRequest(want=True):
                 words = mailbox.ask(client.id, message.force)
                 self._send_ownership(words, always=client)
@@ -188,9 +192,10 @@ class CockpitServer(WebServer):
             case Hello():
                 client.send(self._welcome(client))
 
-    def _change_settings(self, client: Client, changes: dict[str, Any]) -> None:
+    def _ask(self, client: Client, change: Callable[[], None]) -> None:
+        """Make a change of the flight; a client whose values are refused is told."""
         try:
-            self.model.change_settings(changes)
+            change()
         except InputError as fault:
             client.send(StatusMessage(text=str(fault), level="warn").message())
 

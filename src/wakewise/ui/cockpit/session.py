@@ -13,13 +13,15 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from wakewise.core.errors import StageError, WakewiseError
+from wakewise.core.errors import InputError, StageError, WakewiseError
 from wakewise.operation import Parts, Scenario
-from wakewise.operation.teleop.assisted import AssistedPilot, assisted
+from wakewise.operation.finding.camera_estimator import known_camera
+from wakewise.operation.loop import Step
+from wakewise.operation.teleop.assisted import AssistedPilot, assisted_pilot, switched_controller
 from wakewise.operation.teleop.input.controls import CENTRED, ControlSource
 from wakewise.operation.teleop.live import LiveFlight
 from wakewise.operation.teleop.operator_state import (
@@ -30,6 +32,8 @@ from wakewise.operation.teleop.operator_state import (
     OperatorState,
     tracking_regime,
 )
+from wakewise.operation.teleop.region_methods import RegionMethods, region_methods
+from wakewise.perception import TargetTracker
 from wakewise.ui.cockpit.control_mailbox import ControlMailbox
 from wakewise.ui.cockpit.flight_snapshot import SnapshotRecorder
 from wakewise.ui.cockpit.live_camera import CameraState, LiveCamera
@@ -43,6 +47,7 @@ from wakewise.ui.cockpit.state import (
     scenario_description,
     static_description,
 )
+from wakewise.ui.cockpit.target_tracking import PERCEPTION, SeenPicture, TargetTracking, pose_std
 from wakewise.ui.cockpit.view_model import CameraPicture, StatusMessage
 
 TENDED_S, SCENE_EVERY_S = 0.05, 0.2
@@ -95,6 +100,7 @@ class CockpitSession:
         self.lookout: SnapshotRecorder | None = None
         self._instruments: StateEncoder | None = None
         self._guide: LiveCoverage | None = None
+        self._tracking: TargetTracking | None = None
         self._described: dict[str, Any] = {}
         self.preparing: str | None = "making the parts of the flight"
         self.edition = 0
@@ -118,6 +124,7 @@ class CockpitSession:
         self._over.set()
         if self._thread.is_alive():
             self._thread.join()
+        self._end_tracking()
         if self._camera is not None:
             self._camera.close()
         if self._scene is not None:
@@ -162,6 +169,7 @@ class CockpitSession:
             "desk": self._desk(),
             "controls": rounded(controls.axes, 3),
             "coverage": self._guide.told(X_WC) if self._guide is not None else None,
+            "target": self._tracking.told(step.time_s, X_WC) if self._tracking is not None else None,
             "photos": len(live.exposures),
             "loop": {
                 "behind_ms": number(1e3 * live.behind_s, 2),
@@ -181,6 +189,16 @@ class CockpitSession:
         """Change the operator's settings; raises InputError if a value is out of range."""
         self.desk.set(**changes)
 
+    def designate(self, box: tuple[float, float, float, float] | None, frame: int) -> None:
+        """Designate a box of a picture as the target; raises InputError where no pictures are drawn."""
+        tracking = self._tracking
+        if tracking is None or self._camera is None:
+            raise InputError("designate: no pictures are drawn, in which a target could be tracked")
+        if box is None:
+            tracking.forget()
+        else:
+            tracking.designate(box, frame)
+
     def picture(self) -> CameraPicture | None:
         """The camera picture now."""
         now = self.lookout.now if self.lookout is not None else None
@@ -197,6 +215,7 @@ class CockpitSession:
             return None
         self._silt_shown = now.silt
         self._pictures += 1
+        self._track(now.step, jpeg)
         return CameraPicture(number=self._pictures, time_s=now.step.time_s, jpeg=jpeg)
 
     def _tend(self) -> None:
@@ -238,8 +257,10 @@ class CockpitSession:
             self._gauges = WakeReadout.of(parts)
             self._described = static_description(parts, self._gauges)
         self._say_preparing("making pilot and controllers")
-        flown = assisted(parts, self.mailbox, self.desk)
-        pilot = cast("AssistedPilot", flown.pilot)
+        pilot = assisted_pilot(parts, self.mailbox, self.desk)
+        flown = parts.replace(pilot=pilot)
+        methods = region_methods(flown)
+        flown = flown.replace(controller=switched_controller(flown, lambda: pilot.state.method, methods))
         self._gauges.disturbances(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))  # kernels are read now
         self._gauges.predicted_m_s(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))
         lookout = SnapshotRecorder(
@@ -254,9 +275,33 @@ class CockpitSession:
             self._say_preparing("looking for views of the target")
             self._guide = LiveCoverage(parts)
         live = LiveFlight(flown, folder=self._free_folder(), paced=self._paced, watch=lookout)
+        self._begin_tracking(parts, methods)
         self._pilot, self.lookout, self.live = pilot, lookout, live
         self._instruments = StateEncoder(self._gauges, lookout)
         return live
+
+    def _begin_tracking(self, parts: Parts, methods: RegionMethods) -> None:
+        """A tracker of this flight's pictures, which has no target yet."""
+        if self._camera is None:
+            return
+        camera, ahead_m = known_camera(parts, PERCEPTION)
+        tracker = TargetTracker(camera=camera, settings=PERCEPTION, seed=parts.scenario.seed)
+        self._tracking = TargetTracking(tracker, methods.protect, ahead_m)
+        self._tracking.start()
+
+    def _end_tracking(self) -> None:
+        tracking, self._tracking = self._tracking, None
+        if tracking is not None:
+            tracking.close()
+
+    def _track(self, step: Step, jpeg: bytes) -> None:
+        """Hand a picture to the tracker, with the estimated pose of the camera."""
+        tracking, live = self._tracking, self.live
+        if tracking is None or live is None:
+            return
+        X_WC = step.estimate.X_WB @ live.parts.vehicle.X_BC_at(step.tilt_rad)
+        std = pose_std(step.estimate)
+        tracking.see(SeenPicture(frame=self._pictures, time_s=step.time_s, jpeg=jpeg, X_WC=X_WC, std=std))
 
     def _follow(self, live: LiveFlight) -> None:
         """Forward the pilot's notes, and photographs to the coverage guide."""
@@ -264,6 +309,8 @@ class CockpitSession:
         for note in self._pilot.notes():
             self._notes.append(StatusMessage(text=note.text, level=note.level, time_s=note.time_s))
         for level, text in getattr(self._device, "notes", tuple)():
+            self._say(text, level)
+        for level, text in () if self._tracking is None else self._tracking.notes(live.time_s):
             self._say(text, level)
         fallback = None if live.latest is None else live.latest.command.fallback
         if fallback != self._fallback:
@@ -294,6 +341,7 @@ class CockpitSession:
 
     def _close(self, live: LiveFlight) -> None:
         """Report the end of a flight."""
+        self._end_tracking()
         if live.fault is not None:
             self.fault = live.fault
             self._say(f"the flight ended: {live.fault}", "error")

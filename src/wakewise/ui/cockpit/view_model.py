@@ -66,6 +66,13 @@ class ViewModel(Protocol):
         """Change the operator's settings; raises InputError if a value is out of range."""
         ...
 
+    def designate(self, box: tuple[float, float, float, float] | None, frame: int) -> None:
+        """Designate what lies in a box of picture `frame` as the target; None: the scenario's own target again.
+
+        The box is (left, top, right, bottom) in shares of the picture. Raises InputError if there are no pictures.
+        """
+        ...
+
     def picture(self) -> CameraPicture | None:
         """The camera picture now; called in another thread, where it may wait."""
         ...

@@ -15,6 +15,7 @@ export class Camera {
   #bitmap = null;
   #owed = null;
   #seen_ms = 0;
+  #frame = null;
   bad = 0;
 
   constructor({ canvas, empty, late, link }) {
@@ -29,6 +30,15 @@ export class Camera {
       if (!document.hidden && this.#owed !== null) this.#acknowledge(this.#owed);
     });
     setInterval(() => this.#age(), 500);
+  }
+
+  /** Number of the picture that is shown; null before the first. */
+  get frame() {
+    return this.#frame;
+  }
+
+  get canvas() {
+    return this.#canvas;
   }
 
   #take(data) {
@@ -50,6 +60,7 @@ export class Camera {
         const bitmap = await createImageBitmap(new Blob([new Uint8Array(data, HEADER)], { type: "image/jpeg" }));
         this.#bitmap?.close();
         this.#bitmap = bitmap;
+        this.#frame = frame;
         this.#seen_ms = performance.now();
         soon(() => this.#paint());
       } catch {

@@ -3,6 +3,7 @@
 import { banner } from "./banner.js";
 import { Camera } from "./camera.js";
 import { Coverage } from "./coverage.js";
+import { Designation } from "./designate.js";
 import { Desk, pressed } from "./desk.js";
 import { HELP as PAD_HELP, Pads } from "./gamepad.js";
 import { Helm } from "./helm.js";
@@ -36,7 +37,11 @@ const target = new Target($("target"), $("scale"));
 const coverage = new Coverage({ canvas: $("patches"), share: $("share"), next: $("next") });
 const washes = new Plot($("plot-disturbance"), [{ ink: "--s1" }, { ink: "--s2", dashed: true }], { unit: "rms, mm/s", least: 10, decades: 3 });
 const deviations = new Plot($("plot-deviation"), [{ ink: "--s1" }], { unit: "% of the command", least: 10, most: 100 });
-new Camera({ canvas: $("camera"), empty: $("no-picture"), late: $("late"), link });
+const camera = new Camera({ canvas: $("camera"), empty: $("no-picture"), late: $("late"), link });
+const designation = new Designation({
+  camera, marks: $("marks"), panel: $("designated"), line: $("designated-line"), forget: $("forget"), helm,
+  say: (level, text) => notes.add(level, text),
+});
 
 const now = { link: "connecting", said: "", mode: "hold", preparing: "" };
 const show = () => banner({ ...now, helm, sending: sticks.sending });
@@ -66,7 +71,7 @@ const KEYS = {
   KeyO: () => act("operator"), KeyH: () => act("hold"), KeyM: () => act("scan"), KeyC: () => act("capture"), KeyP: () => act("precise"),
   Minus: () => act("gain_down"), NumpadSubtract: () => act("gain_down"), Equal: () => act("gain_up"), NumpadAdd: () => act("gain_up"),
   BracketLeft: () => desk.nudge(-1), BracketRight: () => desk.nudge(1), KeyX: () => desk.swap(), KeyG: changeHelm, KeyV: nextWash,
-  KeyL: () => theme.next(),
+  KeyL: () => theme.next(), KeyT: () => designation.middle(), Escape: () => designation.forget(),
 };
 
 function onKey(code, event) {
@@ -135,6 +140,7 @@ const takers = {
     showWash();
     desk.update(message.desk ?? {}, message);
     coverage.update(message);
+    designation.update(message.target ?? null);
     washes.add(message.time_s, [millimetres(message.rms_m_s), millimetres(message.direct_rms_m_s)]);
     deviations.add(message.time_s, [message.deviation_pct]);
     pressed("[data-press][data-mode]", (button) => button.dataset.mode === now.mode);

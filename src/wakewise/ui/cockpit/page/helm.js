@@ -62,6 +62,11 @@ export class Helm extends EventTarget {
     return this.mine && this.#link.send({ type: "desk", set: changes, lease: this.lease });
   }
 
+  /** A box of picture `frame` that holds the target, or "clear". */
+  designate(box, frame = 0) {
+    return this.mine && this.#link.send({ type: "designate", box, frame, lease: this.lease });
+  }
+
   /** Hold the place. Whoever is not at the helm asks for it to do so: an emergency is no time for two buttons. */
   stop() {
     if (this.press("hold")) return;

@@ -14,6 +14,7 @@ export const HELP = [
   ["W S", "forward, back"], ["A D", "left, right"], ["↑ ↓", "rise, sink"], ["← → or Q E", "turn"], ["R F", "tilt the camera up, down"],
   ["O H M", "operate, hold, scan"], ["C", "capture a photo"], ["G", "take the helm, or give it back"], ["P", "precise sticks"],
   ["− +", "gain down, up"], ["[ ]", "gentler, more obedient (w_track)"], ["X", "direct or wake-aware"], ["V", "wash: predicted, true, difference"],
+  ["T", "target: what lies in the middle of the picture"], ["Esc", "forget the designated target"],
   ["L", "colours light, dark, as the system"], ["?", "this page"],
 ];
 

@@ -1,0 +1,284 @@
+"""Tracking of the target that the pilot designated by a box of a live picture, in a thread of its own.
+
+What lies in the box is mapped and tracked by `wakewise.perception`, with the estimated pose of the camera at the time
+of each picture. The tracker begins with the picture in which the box was drawn. Neither the flight nor the pictures
+wait for it: the newest picture that waits takes the place of an older one.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import cv2
+import numpy as np
+
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, TargetEstimate
+from wakewise.perception import CalibratedCamera, PerceptionSettings, TargetTracker, TrackerState
+from wakewise.perception.feature_tracks import Grey
+from wakewise.scene.targets import Region
+from wakewise.ui.cockpit.state import number, rounded
+
+PERCEPTION = PerceptionSettings(width_px=480, rate_hz=5.0)
+"""Live pictures change their width under load; they are tracked in one."""
+STALE_S = 2.0
+"""A target is lost if no picture was tracked for this time."""
+KEPT = 32
+"""Last pictures in which a box may have been drawn: about 2 s."""
+NEAREST_M = 0.05
+"""A target nearer to the camera along its axis, or behind it, has no outline."""
+STD = (0.02, 0.03)
+"""Standard deviation of the camera's pose per axis, m and rad, where the estimate states none."""
+_ROUNDED_PX = 1.5
+_NOTES = {
+    "assumed": "target designated; a ball is protected until it was seen from other sides: move sideways",
+    "proposed": "a target is proposed; its region is protected",
+    "tracked": "target tracked; its region is protected",
+    "lost": "target lost; its last region stays protected",
+}
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SeenPicture:
+    """A live picture with its number, and the camera's pose X_WC by the estimate at its time in the flight.
+
+    `std`: standard deviations of that pose per axis, m and rad.
+    """
+
+    frame: int
+    time_s: float
+    jpeg: bytes
+    X_WC: Pose
+    std: tuple[float, float] = STD
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Request:
+    """A box in shares of a picture, and that picture if it is still known."""
+
+    box: Box
+    first: SeenPicture | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Tracked:
+    """The target after a picture; `time_s` is the time of the last one that was used."""
+
+    target: TargetEstimate | None
+    time_s: float
+    trouble: str
+
+
+class TargetTracking:
+    """Tracks a designated target in the pictures of one flight.
+
+    Parameters
+    ----------
+    tracker : TargetTracker
+        Of the camera as the crew has calibrated it.
+    protect : callable
+        Called in the thread with the region of the target when it changes; with None when the target is forgotten.
+    ahead_m : float
+        How far the calibrated camera's projection centre lies before the lens's.
+    """
+
+    def __init__(self, tracker: TargetTracker, protect: Callable[[Region | None], None], ahead_m: float = 0.0) -> None:
+        self._tracker, self._protect = tracker, protect
+        self._X_CM = Pose(np.array([0.0, 0.0, ahead_m]))
+        self._changed = threading.Condition()
+        self._recent: deque[SeenPicture] = deque(maxlen=KEPT)
+        self._waiting: SeenPicture | None = None
+        self._request: _Request | None = None
+        self._last: _Tracked | None = None
+        self._taken_s = -np.inf
+        self._over = False
+        self._said: str | None = None
+        self._thread = threading.Thread(target=self._run, name="target", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread, which waits until a target is designated."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread, after the picture that it has in hand."""
+        with self._changed:
+            self._over = True
+            self._changed.notify()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def see(self, picture: SeenPicture) -> None:
+        """Take a picture in, which is tracked if it is due."""
+        with self._changed:
+            self._recent.append(picture)
+            if self._request is None or picture.time_s < self._taken_s + 1.0 / self._tracker.settings.rate_hz - 1e-6:
+                return
+            self._waiting, self._taken_s = picture, picture.time_s
+            self._changed.notify()
+
+    def designate(self, box: Box, frame: int) -> None:
+        """Track what lies in a box of a picture, (left, top, right, bottom) in shares of it.
+
+        `frame` is the picture's number; the next picture is taken if it is not known any more.
+        """
+        with self._changed:
+            first = next((picture for picture in self._recent if picture.frame == frame), None)
+            self._request, self._last, self._waiting = _Request(box=box, first=first), None, None
+            self._taken_s = -np.inf if first is None else first.time_s
+            self._said = None
+            self._changed.notify()
+
+    def forget(self) -> None:
+        """Track nothing any more, and protect the first region again."""
+        with self._changed:
+            self._request = self._last = self._waiting = None
+            self._changed.notify()
+
+    def told(self, now_s: float, X_WC: Pose) -> dict[str, Any] | None:
+        """The target for the pages; None if none is designated.
+
+        `now_s` is the time of the flight, and `X_WC` the estimated pose of the camera, for which the outline is drawn:
+        a circle with centre u, v in shares of the picture's width and height, and radius in shares of its width.
+        """
+        status, tracked = self._now(now_s)
+        if status is None:
+            return None
+        if tracked is None:
+            nothing = {"outline": None, "distance_m": None, "std_m": None, "age_ms": None}
+            return {"status": status, "trouble": "no picture yet"} | nothing
+        age_s, target, trouble = now_s - tracked.time_s, tracked.target, tracked.trouble
+        if not trouble and age_s > STALE_S:
+            trouble = "no pictures"
+        return {
+            "status": status,
+            "outline": None if target is None else outline(target, self._tracker.camera, X_WC @ self._X_CM),
+            "distance_m": None if target is None else number(float(np.linalg.norm(target.centre_W_m - X_WC.p_m)), 3),
+            "std_m": None if target is None else number(target.centre_std_m, 4),
+            "age_ms": number(1e3 * age_s, 0),
+            "trouble": trouble,
+        }
+
+    def notes(self, now_s: float) -> tuple[tuple[str, str], ...]:
+        """Level and text of what changed since the last call."""
+        status, tracked = self._now(now_s)
+        if status is not None and tracked is None:
+            return ()
+        before, self._said = self._said, status
+        if status == before:
+            return ()
+        if status is None:
+            return (("info", "target forgotten; the scenario's own target is protected"),)
+        return (("warn" if status == "lost" else "info", _NOTES[status]),)
+
+    def _now(self, now_s: float) -> tuple[str | None, _Tracked | None]:
+        """Status, and what is known of the target; both None if none is designated."""
+        with self._changed:
+            request, last = self._request, self._last
+        if request is None:
+            return None, None
+        if last is None or last.target is None:
+            return "assumed", last
+        stale = now_s - last.time_s > STALE_S and last.target.status != "assumed"
+        return "lost" if stale else last.target.status, last
+
+    def _run(self) -> None:
+        request: _Request | None = None
+        state, version = self._tracker.init(), -1
+        while True:
+            with self._changed:
+                self._changed.wait_for(partial(self._has_work, request))
+                if self._over:
+                    return
+                begins, request = self._request is not request, self._request
+                first = request.first if begins and request is not None else None
+                picture = first or self._waiting
+                self._waiting = self._waiting if first is not None else None
+            if request is None:
+                self._protect(None)
+                continue
+            if begins:
+                state, version = self._begun(request), -1
+            if picture is not None:
+                state, version = self._take(request, state, version, picture)
+
+    def _has_work(self, request: _Request | None) -> bool:
+        """Whether there is something to do for the thread, which works for this request."""
+        return self._over or self._request is not request or (request is not None and self._waiting is not None)
+
+    def _begun(self, request: _Request) -> TrackerState:
+        """State before the first picture. The estimator has been at work since the flight began, at time 0."""
+        width, height = self._tracker.camera.width, self._tracker.camera.height
+        left, top, right, bottom = request.box
+        box = (left * width - 0.5, top * height - 0.5, right * width - 0.5, bottom * height - 0.5)
+        return self._tracker.designate(replace(self._tracker.init(), first_s=0.0), box, width)
+
+    def _take(
+        self, request: _Request, state: TrackerState, version: int, picture: SeenPicture
+    ) -> tuple[TrackerState, int]:
+        """Track one picture; the state after it, and the version of the region that is protected.
+
+        What fails becomes a trouble: the flight goes on with the last region, and the next picture is tried.
+        """
+        pictures = state.pictures
+        try:
+            grey = grey_of(picture.jpeg, self._tracker.camera)
+            pose = picture.X_WC @ self._X_CM
+            state, _ = self._tracker.step(state, grey, picture.time_s, pose, picture.std)
+            trouble = state.trouble
+            if state.target is not None and state.target.version != version:
+                self._protect(region_of(state.target))
+                version = state.target.version
+        except Exception as fault:  # tracking that fails must not end, nor may it disturb the flight
+            trouble = f"not tracked, {type(fault).__name__}: {' '.join(str(fault).split())}"[:160]
+        with self._changed:
+            if self._request is request:
+                time_s = picture.time_s if self._last is None or state.pictures > pictures else self._last.time_s
+                self._last = _Tracked(target=state.target, time_s=time_s, trouble=trouble)
+        return state, version
+
+
+def region_of(target: TargetEstimate) -> Region:
+    """The protected region of an estimate."""
+    return Region(points_W_m=target.points_W_m, weights=target.weights, distance_m=target.distance_m)
+
+
+def grey_of(jpeg: bytes, camera: CalibratedCamera) -> Grey:
+    """A JPEG as grey levels in the camera's size, shape (h, w); one of another shape is left for the tracker to refuse.
+
+    Raises ValueError if it is no picture.
+    """
+    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE) if jpeg else None
+    if picture is None:
+        raise ValueError("no picture in the JPEG")
+    height, width = picture.shape
+    if abs(height * camera.width / width - camera.height) > _ROUNDED_PX:
+        return np.asarray(picture, dtype=np.uint8)
+    way = cv2.INTER_AREA if width > camera.width else cv2.INTER_LINEAR
+    same = (width, height) == (camera.width, camera.height)
+    fit = picture if same else cv2.resize(picture, (camera.width, camera.height), interpolation=way)
+    return np.asarray(fit, dtype=np.uint8)
+
+
+def outline(target: TargetEstimate, camera: CalibratedCamera, X_WC: Pose) -> dict[str, float | None] | None:
+    """Circle round the target in a picture taken at the camera's pose; None if it does not lie before the camera."""
+    p_C = X_WC.R.T @ (target.centre_W_m - X_WC.p_m)
+    if not p_C[2] > NEAREST_M:
+        return None
+    u, v = (camera.pixels(p_C[None])[0] + 0.5) / (camera.width, camera.height)
+    radius = camera.focal_px * target.radius_m / float(p_C[2]) / camera.width
+    return dict(zip(("u", "v", "radius"), rounded([u, v, radius], 4), strict=True))
+
+
+def pose_std(estimate: BodyState) -> tuple[float, float]:
+    """Standard deviations of an estimated pose per axis, m and rad."""
+    if estimate.covariance is None:
+        return STD
+    place, turn = np.diag(estimate.covariance)[:6].reshape(2, 3).mean(axis=1)
+    return float(np.sqrt(place)), float(np.sqrt(turn))
