@@ -11,7 +11,7 @@ from tests.perception.conftest import Pictures
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.perception import PerceptionSettings, TargetTracker, TrackerState
-from wakewise.perception.target_tracker import common_shift
+from wakewise.perception.common_shift import common_shift
 
 SETTINGS = PerceptionSettings(width_px=480, accept_s=1.0, assumed_distance_m=0.7)
 STD = (0.002, 0.002)

@@ -71,25 +71,19 @@ def fit_bed(points_W_m: Array, rng: np.random.Generator) -> BedPlane | None:
     n = len(points_W_m)
     if n < LEAST_POINTS:
         return None
-    few = points_W_m[rng.choice(n, min(n, SCORED), replace=False)]
-    best, best_score = None, 0
     steep = math.cos(STEEPEST_RAD)
-    for _ in range(TRIALS):
-        a, b, c = few[rng.choice(len(few), 3, replace=False)]
-        normal = np.cross(b - a, c - a)
-        length = float(np.linalg.norm(normal))
-        if length < 1e-9:
-            continue
-        up = normal / (length if normal[2] < 0.0 else -length)
-        if -up[2] < steep:
-            continue
-        height = (few - a) @ up
-        score = int(np.sum(np.abs(height) < WITHIN_M)) - 2 * int(np.sum(height < -2.0 * WITHIN_M))
-        if score > best_score:
-            best, best_score = (a, up), score
-    if best is None or best_score < LEAST_SHARE * len(few):
+    few = points_W_m[rng.choice(n, min(n, SCORED), replace=False)]
+    a, b, c = few[rng.integers(0, len(few), (3, TRIALS))]
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1)
+    up = normal / np.maximum(length, 1e-12)[:, None] * np.where(normal[:, 2] < 0.0, 1.0, -1.0)[:, None]
+    height = few @ up.T - np.einsum("ti,ti->t", a, up)
+    score = np.sum(np.abs(height) < WITHIN_M, axis=0) - 2 * np.sum(height < -2.0 * WITHIN_M, axis=0)
+    score[(length < 1e-9) | (-up[:, 2] < steep)] = -n
+    k = int(np.argmax(score))
+    if score[k] < LEAST_SHARE * len(few):
         return None
-    near = points_W_m[np.abs((points_W_m - best[0]) @ best[1]) < WITHIN_M]
+    near = points_W_m[np.abs((points_W_m - a[k]) @ up[k]) < WITHIN_M]
     if len(near) < LEAST_POINTS:
         return None
     middle = near.mean(axis=0)

@@ -21,6 +21,8 @@ Grey = NDArray[np.uint8]
 WINDOW_PX, LEVELS = 11, 3
 MOST_BACK_PX = 0.5
 """Largest distance by which a feature tracked back may miss its place."""
+FEW = 0.08
+"""Corners are found anew once more than this share of the features is missing: that takes as long as tracking."""
 QUALITY = 0.01
 """Least cornerness over the best of the picture."""
 LEAST_CONTRAST = 2.0
@@ -94,6 +96,11 @@ def track(tracks: FeatureTracks, picture: Grey, guess: Array | None = None) -> F
     )
 
 
+def shows_nothing(picture: Grey) -> bool:
+    """Whether a picture has less contrast than a dim sensor's noise; a sixteenth of its pixels say so."""
+    return float(picture[::4, ::4].std()) < LEAST_CONTRAST
+
+
 def replenish(
     tracks: FeatureTracks,
     picture: Grey,
@@ -104,11 +111,13 @@ def replenish(
 ) -> FeatureTracks:
     """The same features and new corners, so far from each other and from those that are there, up to `most` in all.
 
+    None are added where fewer than `FEW` of `most` are missing.
+
     `where`, shape (h, w): new ones only where it is not 0; everywhere if not given. `quality`: least cornerness over
     the best.
     """
     room = most - len(tracks)
-    if room <= 0 or float(picture.std()) < LEAST_CONTRAST:
+    if room <= FEW * most or shows_nothing(picture):
         return tracks
     free = np.full(picture.shape, 255, np.uint8) if where is None else where.copy()
     for u, v in np.round(tracks.pixels).astype(int):

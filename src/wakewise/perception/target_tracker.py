@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
@@ -22,12 +23,14 @@ from wakewise.core.interfaces import TargetEstimate
 from wakewise.perception.bed_plane import BedPlane, fit_bed, near_bed
 from wakewise.perception.bundle_adjustment import Keyframe, adjusted
 from wakewise.perception.calibrated_camera import CalibratedCamera
-from wakewise.perception.feature_tracks import LEAST_CONTRAST, NO_TRACKS, FeatureTracks, Grey, replenish, track
+from wakewise.perception.common_shift import common_shift
+from wakewise.perception.feature_tracks import NO_TRACKS, FeatureTracks, Grey, replenish, shows_nothing, track
 from wakewise.perception.point_map import PointMap, add_rays, dropped, empty_map, ray_directions
 from wakewise.perception.resection import Resection, resection
 from wakewise.perception.settings import PerceptionSettings
 from wakewise.perception.target_shape import (
     LEAST_POINTS,
+    VOXEL_M,
     TargetShape,
     ball,
     bodies,
@@ -74,12 +77,14 @@ WORST = 2.0
 """Largest standard deviation of a body's points over the lower quartile of theirs."""
 CORRELATED = 4.0
 """Shapes share most of their points: so many of them tell as much as one."""
+SAME_BALL = 0.05
+"""An assumed ball that moves or grows by less than this share of its distance is the same one."""
 BOX_MARGIN = 0.15
 STRONG = 0.1
 """Cornerness over the best of strong corners."""
 AMPLE = 2.0
 """Factor on the estimator's standard deviations: rays are judged by theirs (`point_map.MOST_MISS`)."""
-POSE_STD = (0.001, 0.0015)
+POSE_STD = (0.0005, 0.001)
 """Least noise of a measured pose, m and rad: calibration, and what the map's own errors leave."""
 _FAR = math.inf
 
@@ -181,6 +186,8 @@ class TargetTracker:
         std_m, std_rad = (AMPLE * max(given, least) for given, least in zip(std, POSE_STD, strict=True))
         if found is not None:
             std_m, std_rad = POSE_STD[0], 0.0
+        if state.designation is not None and state.designation.X_WC is None:
+            state = replace(state, designation=replace(state.designation, X_WC=X_WC))
         tracks = tracks.kept(self._turned(state.points, tracks, X_WC) < MOST_TURN_RAD)
         tracks = self._replenished(state, tracks, picture, X_WC)
         if self._waits(state, time_s):
@@ -211,8 +218,6 @@ class TargetTracker:
             localized=found is not None,
             trouble="" if len(tracks) >= LEAST_MAPPED // 2 else "few features",
         )
-        if state.designation is not None and state.designation.X_WC is None:
-            state = replace(state, designation=replace(state.designation, X_WC=X_WC))
         if not state.locked:
             state = self._towards_lock(state, X_WC, time_s, (std_m, std_rad))
         state = self._followed(state, X_WC, time_s)
@@ -233,7 +238,7 @@ class TargetTracker:
         last = state.tracks.picture
         if last is not None and np.array_equal(last, picture):
             return "frozen camera: the same picture twice"
-        if float(picture.std()) < LEAST_CONTRAST:
+        if shows_nothing(picture):
             return "uniform picture: nothing to track"
         return ""
 
@@ -395,7 +400,8 @@ class TargetTracker:
             return state  # what is lost stays where it was
         chosen = None
         if bed is not None:
-            few = which[thinned(points.points_W_m[which], 0.004)]
+            best_first = which[np.argsort(points.std_m[which], kind="stable")]
+            few = best_first[thinned(points.points_W_m[best_first])]
             groups = [few[group] for group in bodies(points.points_W_m[few], bed)]
             chosen = self._choose(state, groups, X_WC)
         if chosen is None:
@@ -405,7 +411,9 @@ class TargetTracker:
         places = points.points_W_m[chosen]
         under = near_bed(bed, points.points_W_m[which], places.mean(axis=0), BED_REACH_M)
         shape = _averaged(state.shape, shape_of(places, under, state.cameras_W_m[-400:], POSE_STD[0]))
-        members = points.ids[chosen[in_company(places)]]
+        kept = places[in_company(places)]
+        near = np.asarray(KDTree(kept).query(points.points_W_m[which], distance_upper_bound=VOXEL_M)[0]) < np.inf
+        members = points.ids[which[near]]
         proposed_s = min(state.proposed_s, time_s)
         enough = len(members) >= LEAST_MEMBERS and len(view_sectors(state.cameras_W_m, shape.centre_W_m)) >= LEAST_SIDES
         accepted = state.accepted or (enough and time_s - proposed_s >= self.settings.accept_s)
@@ -465,7 +473,11 @@ class TargetTracker:
         if state.bed is not None and (hit := state.bed.hit(X_WC.p_m, way)) is not None:
             distance = min(float(np.linalg.norm(hit - X_WC.p_m)), 2.0 * distance)
         radius = self.settings.assumed_radius_m if half is None else max(half * distance, 0.02)
-        shape = ball(X_WC.p_m + distance * way, radius, 0.2 * distance)
+        shape, before = ball(X_WC.p_m + distance * way, radius, 0.2 * distance), state.shape
+        if before is not None and state.target is not None and not before.seen:
+            moved = float(np.linalg.norm(shape.centre_W_m - before.centre_W_m))
+            if moved + abs(shape.radius_m - before.radius_m) < SAME_BALL * distance:
+                return self._reported(state, time_s)
         return self._protected(replace(state, shape=shape, members=np.zeros(0, np.int64)), time_s)
 
     def _protect_view(self, state: TrackerState, X_WC: Pose, time_s: float) -> TrackerState:
@@ -529,26 +541,6 @@ class TargetTracker:
                 version=target.version + 1,
             ),
         )
-
-
-def common_shift(points_W_m: Array, pixels: Array, camera: CalibratedCamera, X_WC: Pose, std_m: float) -> Array:
-    """Shift of points, shape (n, 3), that explains their pixels, shape (n, 2), best, shape (3,); along the view none.
-
-    Robust least squares with a normal prior of standard deviation `std_m`.
-    """
-    slopes, focal, shift = camera.slopes(pixels), camera.focal_px, np.zeros(3)
-    for _ in range(4):
-        p_C = (points_W_m + shift - X_WC.p_m) @ X_WC.R
-        z = np.maximum(p_C[:, 2], 0.02)
-        miss = focal * (slopes - p_C[:, :2] / z[:, None])
-        J = np.zeros((len(z), 2, 3))
-        J[:, 0, 0] = J[:, 1, 1] = focal / z
-        J[:, 0, 2], J[:, 1, 2] = -focal * p_C[:, 0] / z**2, -focal * p_C[:, 1] / z**2
-        J = J @ X_WC.R.T
-        weights = 1.0 / (1.0 + np.einsum("ni,ni->n", miss, miss) / 4.0**2)
-        H = np.einsum("n,nia,nib->ab", weights, J, J) + np.eye(3) / std_m**2
-        shift = shift + np.linalg.solve(H, np.einsum("n,nia,ni->a", weights, J, miss) - shift / std_m**2)
-    return np.asarray(shift)
 
 
 def _mapped(points: PointMap, ids: IntArray) -> tuple[IntArray, BoolArray]:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from wakewise.control.pipeline import PipelineState
+from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import BodyState, Measurement, TargetEstimate
+from wakewise.core.interfaces import BodyState, Measurement, Plant, TargetEstimate
 from wakewise.operation import Flight, Parts, Scenario, fly
 from wakewise.operation.finding.camera_estimator import CameraEstimator
-from wakewise.operation.finding.camera_frames import CameraFrames
+from wakewise.operation.finding.camera_frames import CameraFrames, CameraWorld
 from wakewise.operation.finding.find_mission import FindPilot
 from wakewise.operation.finding.find_parts import FOUND_PICTURE, found_region, write_found
 from wakewise.operation.finding.region_controller import RegionController
@@ -36,10 +38,10 @@ SCENARIO = Scenario.preset(
 FLIGHT_S = 13.0
 
 
-def target_at(centre_W_m: tuple[float, float, float], version: int = 0, status: str = "tracked") -> TargetEstimate:
+def target_at(centre_W_m: Array, version: int = 0, status: str = "tracked") -> TargetEstimate:
     """An estimate of a target with two points."""
     assert status in ("assumed", "tracked")
-    centre = np.array(centre_W_m)
+    centre = np.asarray(centre_W_m, dtype=np.float64)
     return TargetEstimate(
         time_s=0.0,
         status="tracked" if status == "tracked" else "assumed",
@@ -108,7 +110,7 @@ def test_a_flight_flown_again_is_the_same(flight: Flight) -> None:
 
 
 def test_pictures_arrive_late_and_stamped(flight: Flight) -> None:
-    """A picture is handed over after its latency, with the time at which it was taken; none while the camera is lost."""
+    """A picture is handed over after its latency with the time at which it was taken; none while the camera is lost."""
     parts = flight.parts
     plant, witness = parts.world.begin()
     assert isinstance(plant, CameraFrames)
@@ -120,7 +122,10 @@ def test_pictures_arrive_late_and_stamped(flight: Flight) -> None:
         came += [((k + 1) * 0.02, m.time_s) for m in plant.step(thrusts, 0.02) if m.image is not None]
     assert len(came) == 3
     assert [now_s - taken_s for now_s, taken_s in came] == pytest.approx([settings.latency_s] * 3, abs=0.021)
-    blind = CameraFrames(*parts.world.inner.begin(), parts, settings, lost_s=((0.0, 1.0),))  # type: ignore[attr-defined]
+    assert isinstance(parts.world, CameraWorld)
+    inner, knows = parts.world.inner.begin()
+    assert knows is not None
+    blind = CameraFrames(inner, knows, parts, settings, lost_s=((0.0, 1.0),))
     assert all(m.image is None for _ in range(20) for m in blind.step(thrusts, 0.02))
 
 
@@ -131,7 +136,7 @@ def test_the_controller_takes_over_a_new_region_and_keeps_its_state(flight: Flig
     start, goal = flight.parts.start, flight.parts.pilot.goal(0.0, flight.parts.start)
     made = [id(controller._pipeline)]
     for version in (0, 0, 1):
-        seen = BodyState(X_WB=start.X_WB, target=target_at((0.3, 0.0, 1.4), version))
+        seen = BodyState(X_WB=start.X_WB, target=target_at(np.array([0.3, 0.0, 1.4]), version))
         for _ in range(11):
             state, command = controller.step(state, 0.02, seen, goal)
         made.append(id(controller._pipeline))
@@ -152,12 +157,12 @@ def test_the_mission_goes_from_look_to_scan_and_ends() -> None:
     parts = SCENARIO.replace(**{"find.hold_s": 2.0, "mission.elevations_deg": (30.0,), "mission.views": (8,)}).parts()
     pilot = parts.pilot
     assert isinstance(pilot, FindPilot)
-    centre = tuple(parts.target.centre_W_m.tolist())
+    centre = parts.target.centre_W_m
     seen: list[str] = []
     photographs, ranges = 0, []
     for k in range(int(pilot.most_s() / 0.1)):
         time_s = 0.1 * k
-        goal = pilot.goal(time_s, BodyState(X_WB=parts.start.X_WB, target=target_at(centre)))  # type: ignore[arg-type]
+        goal = pilot.goal(time_s, BodyState(X_WB=parts.start.X_WB, target=target_at(centre)))
         if not seen or seen[-1] != pilot.phase:
             seen.append(pilot.phase)
         photographs += pilot.shutter_s(photographs, time_s, 0.1) is not None
@@ -178,7 +183,9 @@ def test_without_a_target_the_mission_gives_up() -> None:
     assert isinstance(pilot, FindPilot)
     time_s = 0.0
     while not pilot.done():
-        pilot.goal(time_s, BodyState(X_WB=parts.start.X_WB, target=target_at((9.0, 9.0, 1.0), status="assumed")))
+        pilot.goal(
+            time_s, BodyState(X_WB=parts.start.X_WB, target=target_at(np.array([9.0, 9.0, 1.0]), status="assumed"))
+        )
         assert pilot.shutter_s(0, time_s, 0.1) is None
         time_s += 0.1
         assert time_s < 120.0
@@ -189,7 +196,7 @@ def test_goals_have_the_velocity_of_their_own_motion() -> None:
     """The wished twist agrees with the difference of wished positions, also while the centre moves."""
     parts = SCENARIO.parts()
     pilot = parts.pilot
-    estimate = BodyState(X_WB=parts.start.X_WB, target=target_at(tuple(parts.target.centre_W_m.tolist())))  # type: ignore[arg-type]
+    estimate = BodyState(X_WB=parts.start.X_WB, target=target_at(parts.target.centre_W_m))
     goals = [pilot.goal(0.02 * k, estimate) for k in range(400)]
     places = np.array([goal.X_WB.p_m for goal in goals])
     rates = np.array([goal.X_WB.R @ goal.nu_B[:3] for goal in goals])
@@ -205,8 +212,6 @@ def test_poses_of_other_sensors_are_left_out_while_the_map_gives_some(flight: Fl
     wrong = Measurement(time_s=0.02, X_WB=Pose(start.X_WB.p_m + np.array([0.02, 0.0, 0.0]), start.X_WB.q))
     fresh = estimator.init(start)
     _, moved = estimator.step(fresh, 0.02, (wrong,), thrusts)
-    from dataclasses import replace
-
     _, kept = estimator.step(replace(fresh, posed_s=0.0), 0.02, (wrong,), thrusts)
     assert moved.X_WB.p_m[0] - start.X_WB.p_m[0] > 0.01
     assert abs(kept.X_WB.p_m[0] - start.X_WB.p_m[0]) < 1e-3
@@ -219,13 +224,11 @@ def test_a_world_without_truth_gives_no_pictures() -> None:
     class Sea:
         name = "sea"
 
-        def begin(self) -> tuple[object, None]:
-            return object(), None
-
-    from wakewise.operation.finding.camera_frames import CameraWorld
+        def begin(self) -> tuple[Plant, None]:
+            return parts.world.begin()[0], None
 
     with pytest.raises(InputError, match="no truth"):
-        CameraWorld(inner=Sea(), parts=parts, settings=SCENARIO.perception).begin()  # type: ignore[arg-type]
+        CameraWorld(inner=Sea(), parts=parts, settings=SCENARIO.perception).begin()
 
 
 def red_box() -> object:
@@ -255,4 +258,4 @@ def test_a_detectors_box_is_proposed_and_not_accepted(flight: Flight) -> None:
     assert state.tracker.designation is not None
     assert state.tracker.designation.box == (200, 100, 260, 160)
     assert not state.tracker.accepted
-    assert flight.parts.estimator.detector is None  # type: ignore[attr-defined]
+    assert getattr(flight.parts.estimator, "detector", "missing") is None
