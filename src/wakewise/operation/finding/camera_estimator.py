@@ -35,9 +35,9 @@ REMEMBERED_S = 2.0
 """How long estimates are kept, for the poses of late pictures."""
 SETTLE_MARGIN_S = 0.03
 FORCE_WALK_N, ACCELERATION_NOISE_M_S2 = 0.04, 0.002
-"""Process noise as in `wakewise.estimation.settings.Priors`, larger. The vehicle's own wash comes back from bed and target
-and pushes it. With poses at 62 Hz the filter finds its noise too small within a second; with 5 pictures a second it does
-not, lags, and in still water the hover went round a cycle of 6 mm and 4 s."""
+"""Process noise as in `wakewise.estimation.settings.Priors`, larger: the vehicle's own wash comes back from bed and
+target and pushes it. With poses at 62 Hz the filter finds its noise too small within a second; with 5 pictures a second
+it does not, lags, and in still water the hover went round a cycle of 6 mm and 4 s."""
 OUTLINE_BGR = (0, 200, 255)
 
 
