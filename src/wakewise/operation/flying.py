@@ -200,7 +200,11 @@ def fly(
     if not (isinstance(water_every_s, (float, int)) and water_every_s == math.inf):  # never
         finite_number(water_every_s, "water_every_s", above=0.0)
     parts = parts_of(flight)
-    route, _ = parts.route, parts.vehicle  # what cannot be used is refused before minutes of compiling
+    route, _, _ = (
+        parts.route,
+        parts.vehicle,
+        parts.estimator,
+    )  # what cannot be used is refused before minutes of compiling
     dt_s = 1.0 / parts.scenario.control.rate_hz
     lasts_s = route.duration_s if duration_s is None else finite_number(duration_s, "duration_s")
     if round(lasts_s / dt_s) < 1:
@@ -212,6 +216,8 @@ def fly(
         check_initial_state(parts)
     progress(0, 1, "at the start")
     plant, witness = parts.world.begin()
+    if (begin := getattr(parts.pilot, "begin", None)) is not None:
+        begin()
     # A pilot that takes its own photographs says when, and when its mission is over.
     timetable = cast("PhotoSchedule", parts.pilot) if hasattr(parts.pilot, "shutter_s") else route
     recorder = recorder_of(parts, witness, timetable, water_every_s=water_every_s, exposed=exposed)
@@ -344,8 +350,11 @@ def fly_trial(
         from wakewise.operation.finding.find_parts import write_found
 
         write_found(parts, folder)
-        if not made:
+        pilot: Any = parts.pilot
+        if pilot.found_s is None:
             raise StageError("find: no target was found, so nothing was photographed")
+        if made != pilot.planned:
+            raise StageError(f"find: the target was found, but {made} of {pilot.planned} exposures were made")
     elif made != planned:
         raise StageError(f"{made} of {planned} exposures were made")
     flight.write(folder)

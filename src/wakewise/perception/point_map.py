@@ -33,9 +33,9 @@ MOST_DEPTH_STD = 0.05
 GATE = 4.0
 """Rays farther off a mature point than this many standard deviations are outliers."""
 MOST_OUTLIERS = 4
-"""A point of so many outliers more than rays that fit, counted down by those, is dropped."""
+"""A point with so many outliers is dropped; each ray that fits takes one off the count."""
 MOST_MISS = 0.6
-"""Largest root mean square miss of a mature point's rays, in their standard deviations, which are stated amply."""
+"""Largest root mean square miss of a mature point's rays in their standard deviations, which are chosen large."""
 FORGETS_S = 30.0
 """Time constant in which information fades."""
 RAY_STD_M = 0.002
@@ -181,8 +181,9 @@ def add_rays(
 
 
 def dropped(known: PointMap, tracked: IntArray, time_s: float, keep_s: float, most: int) -> PointMap:
-    """The map without points of many outliers, and of those that are tracked no more the ones that never became mature,
-    that were not seen for `keep_s`, and the oldest beyond `most`.
+    """The map without points of many outliers, points that ended before they were mature, and old points.
+
+    Old are those that are tracked no more and were not seen for `keep_s`, and the oldest beyond `most`.
     """
     live = np.isin(known.ids, tracked)
     stays = (known.outliers < MOST_OUTLIERS) & (live | known.mature) & (live | (time_s - known.seen_s < keep_s))

@@ -31,7 +31,10 @@ class PerceptionSettings(Settings):
     assumed_radius_m: float = Field(0.15, description="radius of the target until it is measured", gt=0.01, le=5.0)
     view_distance_m: float = Field(1.5, description="view: what is farther off is not protected", gt=0.1, le=20.0)
     accept_s: float = Field(
-        2.0, description="a detected target that nobody refuses is accepted after this time", ge=0.0, le=600.0
+        2.0,
+        description="a proposed target is accepted after this time, once it was mapped from two sides",
+        ge=0.0,
+        le=600.0,
     )
     points: int = Field(300, description="points of the protected region", ge=20, le=10000)
     detector: str | None = Field(

@@ -38,7 +38,6 @@ from wakewise.perception.target_shape import (
     protected_region,
     shape_of,
     thinned,
-    view_sectors,
 )
 
 SHAPE_EVERY_S = 0.5
@@ -69,8 +68,10 @@ LEAST_MOVED_M = 0.002
 """A region that moved by less is the same one."""
 CENTRE_WALK_M = 0.008
 """Random walk of the centre from one shape to the next: more of the target is seen."""
-LEAST_MEMBERS, LEAST_SIDES = 25, 2
-"""Fewer points, or seen from fewer sectors of azimuth, and a target is not accepted by time alone."""
+LEAST_MEMBERS, LEAST_APART_RAD = 25, math.radians(15.0)
+"""Fewer points, or seen from a smaller angle in azimuth, and a target is not accepted by time alone."""
+DETECTED_S = 5.0
+"""A detector's box in which no body is mapped for so long is dropped, and the detector asked again."""
 BED_REACH_M = 0.35
 """The bed under a target is that of the points within this of it."""
 WORST = 2.0
@@ -96,6 +97,7 @@ class Designation:
     box: tuple[float, float, float, float]
     width: int
     X_WC: Pose | None = None
+    since_s: float = math.inf
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,6 +113,8 @@ class TrackerState:
     members: IntArray
     shift_W_m: Array
     target: TargetEstimate | None = None
+    versions: int = 0
+    """Regions so far: a controller takes a region for new by its number, also after another designation."""
     pictures: int = 0
     first_s: float | None = None
     last_s: float = -math.inf
@@ -163,10 +167,6 @@ class TargetTracker:
         """Accept the proposed target now."""
         return replace(state, accepted=True)
 
-    def refuse(self, state: TrackerState) -> TrackerState:
-        """Refuse the proposed target; its points are not proposed again."""
-        return replace(state, accepted=False, shape=None, target=None, proposed_s=math.inf)
-
     def step(
         self, state: TrackerState, picture: Grey, time_s: float, guess: Pose, std: tuple[float, float]
     ) -> tuple[TrackerState, Resection | None]:
@@ -187,7 +187,7 @@ class TargetTracker:
         if found is not None:
             std_m, std_rad = POSE_STD[0], 0.0
         if state.designation is not None and state.designation.X_WC is None:
-            state = replace(state, designation=replace(state.designation, X_WC=X_WC))
+            state = replace(state, designation=replace(state.designation, X_WC=X_WC, since_s=time_s))
         tracks = tracks.kept(self._turned(state.points, tracks, X_WC) < MOST_TURN_RAD)
         tracks = self._replenished(state, tracks, picture, X_WC)
         if self._waits(state, time_s):
@@ -341,11 +341,11 @@ class TargetTracker:
         if state.shape is not None and state.shape.seen:
             p_C = (state.shape.centre_W_m - X_WC.p_m) @ X_WC.R
             if p_C[2] > 0.05:
-                (u, v), half = (
-                    self.camera.pixels(p_C[None])[0],
-                    1.3 * self.camera.focal_px * state.shape.radius_m / p_C[2],
-                )
-                return _box(u - half, v - half, u + half, v + half, width, height)
+                u, v = self.camera.pixels(p_C[None])[0]
+                half = 1.3 * self.camera.focal_px * state.shape.radius_m / p_C[2]
+                if math.isfinite(u + v):  # beyond the lens's fold there is no pixel
+                    return _box(u - half, v - half, u + half, v + half, width, height)
+            return None
         if state.designation is not None:
             share = width / state.designation.width
             left, top, right, bottom = state.designation.box
@@ -405,6 +405,9 @@ class TargetTracker:
             groups = [few[group] for group in bodies(points.points_W_m[few], bed)]
             chosen = self._choose(state, groups, X_WC)
         if chosen is None:
+            box = state.designation
+            if box is not None and not state.accepted and time_s - box.since_s > DETECTED_S:
+                state = replace(state, designation=None)
             return self._assumed(state, X_WC, time_s) if state.shape is None or state.shape.seen == 0 else state
         assert bed is not None
         chosen = chosen[_best_known(points.std_m[chosen])]
@@ -415,7 +418,7 @@ class TargetTracker:
         near = np.asarray(KDTree(kept).query(points.points_W_m[which], distance_upper_bound=VOXEL_M)[0]) < np.inf
         members = points.ids[which[near]]
         proposed_s = min(state.proposed_s, time_s)
-        enough = len(members) >= LEAST_MEMBERS and len(view_sectors(state.cameras_W_m, shape.centre_W_m)) >= LEAST_SIDES
+        enough = len(members) >= LEAST_MEMBERS and _seen_apart(state.cameras_W_m, shape.centre_W_m)
         accepted = state.accepted or (enough and time_s - proposed_s >= self.settings.accept_s)
         state = replace(
             state,
@@ -478,7 +481,8 @@ class TargetTracker:
             moved = float(np.linalg.norm(shape.centre_W_m - before.centre_W_m))
             if moved + abs(shape.radius_m - before.radius_m) < SAME_BALL * distance:
                 return self._reported(state, time_s)
-        return self._protected(replace(state, shape=shape, members=np.zeros(0, np.int64)), time_s)
+        fresh = replace(state, shape=shape, members=np.zeros(0, np.int64), shift_W_m=np.zeros(3))
+        return self._protected(fresh, time_s)
 
     def _protect_view(self, state: TrackerState, X_WC: Pose, time_s: float) -> TrackerState:
         """The state with everything mapped in view within a distance as protected."""
@@ -502,7 +506,6 @@ class TargetTracker:
         """The state with the region of its shape."""
         assert state.shape is not None
         region = protected_region(state.shape.surface_W_m, state.bed, self.settings.points)
-        version = 0 if state.target is None else state.target.version + 1
         target = TargetEstimate(
             time_s=time_s,
             status="assumed",
@@ -512,9 +515,9 @@ class TargetTracker:
             points_W_m=region.points_W_m,
             weights=region.weights,
             distance_m=region.distance_m,
-            version=version,
+            version=state.versions,
         )
-        return self._reported(replace(state, target=target, shift_W_m=np.zeros(3)), time_s)
+        return self._reported(replace(state, target=target, versions=state.versions + 1), time_s)
 
     def _reported(self, state: TrackerState, time_s: float) -> TrackerState:
         """The state with the target's status, and its place moved by the shift."""
@@ -524,7 +527,7 @@ class TargetTracker:
         status: Literal["assumed", "proposed", "tracked", "lost"] = "assumed"
         if shape.seen:
             status = "tracked" if state.accepted else "proposed"
-            if time_s - state.seen_s > LOST_AFTER_S:
+            if state.accepted and time_s - state.seen_s > LOST_AFTER_S:
                 status = "lost"
         centre = shape.centre_W_m + state.shift_W_m
         way = centre - target.centre_W_m
@@ -532,13 +535,14 @@ class TargetTracker:
             return replace(state, target=replace(target, status=status, time_s=time_s))
         return replace(
             state,
+            versions=state.versions + 1,
             target=replace(
                 target,
                 status=status,
                 time_s=time_s,
                 centre_W_m=centre,
                 points_W_m=target.points_W_m + way,
-                version=target.version + 1,
+                version=state.versions,
             ),
         )
 
@@ -566,6 +570,13 @@ def _averaged(before: TargetShape | None, now: TargetShape) -> TargetShape:
     gain = P @ np.linalg.inv(P + CORRELATED * now.covariance)
     centre = before.centre_W_m + gain @ (now.centre_W_m - before.centre_W_m)
     return replace(now, centre_W_m=centre, covariance=(np.eye(3) - gain) @ P)
+
+
+def _seen_apart(cameras_W_m: Array, about_W_m: Array) -> bool:
+    """Whether places of the camera lie `LEAST_APART_RAD` apart in azimuth about a place."""
+    level = cameras_W_m[-100:, :2] - about_W_m[:2]
+    level = level / np.maximum(np.linalg.norm(level, axis=1, keepdims=True), 1e-9)
+    return bool((level @ level.T).min(initial=1.0) <= math.cos(LEAST_APART_RAD))
 
 
 def _well_crossed(points: PointMap, tracks: FeatureTracks) -> bool:

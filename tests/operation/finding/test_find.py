@@ -259,3 +259,29 @@ def test_a_detectors_box_is_proposed_and_not_accepted(flight: Flight) -> None:
     assert state.tracker.designation.box == (200, 100, 260, 160)
     assert not state.tracker.accepted
     assert getattr(flight.parts.estimator, "detector", "missing") is None
+
+
+def test_a_flight_that_is_over_can_be_flown_again() -> None:
+    """The pilot of the same parts begins anew, also after a mission that ended."""
+    parts = SCENARIO.replace(**{"find.give_up_s": 5.0, "perception.rate_hz": 0.5}).parts()
+    first = fly(parts, checked=False)
+    assert 5.0 <= first.recorder.duration_s < 6.0
+    assert fly(parts, checked=False).steps["true_x_m"].to_list() == first.steps["true_x_m"].to_list()
+
+
+@pytest.mark.parametrize(
+    ("fields", "word"),
+    [({"perception.protect": "view"}, "perception.protect"), ({"mission.order": "current"}, "mission.order")],
+)
+def test_what_needs_the_targets_place_is_refused(fields: dict[str, str], word: str) -> None:
+    """One line names the field that does not go with the pilot."""
+    with pytest.raises(InputError, match=word):
+        SCENARIO.replace(**fields)
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"centre_W_m": [0, 1]}', '{"centre_W_m": "here", "radius_m": 1}'])
+def test_a_broken_record_of_what_was_found_is_refused(text: str, tmp_path: Path) -> None:
+    """found.json that is cut off, or is something else, is told in one line."""
+    (tmp_path / "found.json").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="centre_W_m"):
+        found_region(tmp_path)

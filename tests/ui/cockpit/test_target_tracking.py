@@ -20,6 +20,7 @@ CAMERA = CalibratedCamera(width=480, height=360, fx=420.0, fy=420.0, cx=239.5, c
 BED_M, CENTRE_W_M, RADIUS_M = 1.5, np.array([0.0, 0.0, 1.42]), 0.1
 BOX = (0.36, 0.3, 0.64, 0.7)
 FRAME_S, STEP_RAD = 0.2, 0.02
+STD = (0.003, 0.003)
 
 
 class Water:
@@ -68,7 +69,7 @@ class Rig:
         """The next picture, tracked where a target is designated."""
         self.frame, self.time_s, self.X_WC = self.frame + 1, self.time_s + FRAME_S, self.pose()
         data = self.water.jpeg(self.X_WC, width) if jpeg is None else jpeg
-        self.tracking.see(SeenPicture(frame=self.frame, time_s=self.time_s, jpeg=data, X_WC=self.X_WC))
+        self.tracking.see(SeenPicture(frame=self.frame, time_s=self.time_s, jpeg=data, X_WC=self.X_WC, std=STD))
 
     def told(self) -> dict:
         told = self.tracking.told(self.time_s, self.X_WC)

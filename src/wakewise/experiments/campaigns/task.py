@@ -26,16 +26,18 @@ FLIES = (
     "core",
     "estimation",
     "operation",
+    "perception",
     "planning",
     "robot",
     "scene",
     "simulation",
     "vision/evaluation",
+    "vision/imaging",
     "wake",
 )
-"""Parts of the package that can change a flight."""
+"""Parts of the package that can change a flight; pictures do where the pilot is `find`."""
 
-PHOTOGRAPHS = (*FLIES, "vision/imaging", "vision/reconstruction", "experiments/trials")
+PHOTOGRAPHS = (*FLIES, "vision/reconstruction", "experiments/trials")
 """Parts of the package that can change a model made from a flight's photographs."""
 
 _SOURCES = {".py", ".yaml", ".csv", ".json"}

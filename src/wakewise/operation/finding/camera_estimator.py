@@ -38,6 +38,10 @@ FORCE_WALK_N, ACCELERATION_NOISE_M_S2 = 0.04, 0.002
 """Process noise as in `wakewise.estimation.settings.Priors`, larger: the vehicle's own wash comes back from bed and
 target and pushes it. With poses at 62 Hz the filter finds its noise too small within a second; with 5 pictures a second
 it does not, lags, and in still water the hover went round a cycle of 6 mm and 4 s."""
+ASPECT_PX = 1.5
+"""A picture whose shape fits the camera's to this is reduced to it."""
+PATIENCE = 3
+"""Poses by the map that are rejected in a row before the filter doubts itself: they come at 5 Hz, not at 62."""
 OUTLINE_BGR = (0, 200, 255)
 
 
@@ -127,7 +131,7 @@ class CameraEstimator:
             state, pose = self._seen(state, measured, now_s)
             if pose is not None:
                 taken.append(pose)
-        if self.use_map and now_s - state.posed_s < UNSEEN_S:
+        if self.use_map and now_s - state.posed_s < self._unseen_s():
             taken = [m if m.pose_std is not None else without_pose(m) for m in taken]
         filtered, estimate = self.inner.step(state.filter, dt_s, tuple(taken), thrusts_N)
         spread = estimate.covariance
@@ -139,6 +143,11 @@ class CameraEstimator:
             std=state.std if spread is None else (_per_axis(spread[:3, :3]), _per_axis(spread[3:6, 3:6])),
         )
         return state, replace(estimate, target=state.tracker.target)
+
+    def _unseen_s(self) -> float:
+        """Time without a pose by the map after which others count: two pictures and their latency at least."""
+        settings = self.tracker.settings
+        return max(UNSEEN_S, settings.latency_s + 2.5 / settings.rate_hz)
 
     def _detected(self, state: CameraEstimatorState, image: NDArray[np.uint8]) -> CameraEstimatorState:
         """The state with the best detection of a picture as designated, where there is a detector and no target yet."""
@@ -187,7 +196,9 @@ def _per_axis(covariance: Array) -> float:
 def fitted(picture: Grey, camera: CalibratedCamera) -> Grey:
     """A grey picture in the camera's size; one of another shape is left for the tracker to refuse."""
     height, width = picture.shape
-    if (width, height) == (camera.width, camera.height) or width * camera.height != height * camera.width:
+    if (width, height) == (camera.width, camera.height) or abs(
+        width * camera.height / height - camera.width
+    ) > ASPECT_PX:
         return picture
     return np.asarray(cv2.resize(picture, (camera.width, camera.height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
@@ -210,6 +221,7 @@ def camera_estimator(parts: Parts, use_map: bool = True) -> CameraEstimator:
         settle_s=max(Priors().settle_s, settings.latency_s + SETTLE_MARGIN_S),
         force_walk_N=FORCE_WALK_N,
         acceleration_noise_m_s2=ACCELERATION_NOISE_M_S2,
+        gate_patience=PATIENCE,
     )
     inner = ErrorStateFilter(parts.vehicle, parts.scenario.estimation, priors=priors)
     tracker = TargetTracker(camera=camera, settings=settings, seed=parts.scenario.seed)

@@ -53,9 +53,10 @@ class CameraFrames:
             self._taken += 1
             if not any(begin <= self._time_s < end for begin, end in self._lost_s):
                 image = self._picture(self._witness.observe())
-                self._under_way.append(
-                    (self._time_s + self._perception.latency_s, Measurement(time_s=self._time_s, image=image))
-                )
+                # The shutter opens now; the picture is that of the middle of its exposure and readout.
+                middle_s = self._time_s + 0.5 * self._imaging.window_s
+                arrives_s = max(middle_s + self._perception.latency_s, self._time_s + self._imaging.window_s)
+                self._under_way.append((arrives_s, Measurement(time_s=middle_s, image=image)))
         due = tuple(m for arrives_s, m in self._under_way if arrives_s <= self._time_s + _TICK_S)
         self._under_way = self._under_way[len(due) :]
         return measurements + due

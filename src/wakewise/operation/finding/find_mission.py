@@ -50,10 +50,10 @@ class FindPilot:
     ) -> None:
         self._aim, self._mission, self._find = aim, mission, find
         self._start, self._assumed_m = start, assumed_m
-        self._begin_anew()
+        self.begin()
 
-    def _begin_anew(self) -> None:
-        """What is known at the start of a flight."""
+    def begin(self) -> None:
+        """Forget an earlier flight: what is known at the start of one."""
         self.centre_W_m = self._start.p_m + self._assumed_m * self._start.R[:, 2]
         self._here = on_sphere(self._start.p_m - self.centre_W_m)
         self._last_s = 0.0
@@ -69,6 +69,11 @@ class FindPilot:
         """Whether the mission is over."""
         return self._phase.name == "done"
 
+    @property
+    def planned(self) -> int:
+        """How many photographs the scan has."""
+        return sum(self._mission.views)
+
     def most_s(self) -> float:
         """Longest time that the mission may take."""
         scan = plan_route(self.centre_W_m, self._mission)
@@ -76,8 +81,6 @@ class FindPilot:
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
         """Reference of the present phase about the centre found so far."""
-        if time_s <= 0.0:
-            self._begin_anew()
         target = estimate.target
         velocity = self._follow(time_s, target)
         self._advance(time_s, target)
@@ -133,9 +136,13 @@ class FindPilot:
         known = target is not None and target.status in ("tracked", "lost")
         if self.found_s is None and known:
             self.found_s = time_s
-        if into_s < phase.route.duration_s:
+        if phase.name == "done":
             return
-        if phase.name == "scan" or (not known and time_s >= self._find.give_up_s):
+        if self.found_s is None and time_s >= self._find.give_up_s:
+            self._begin("done", _hover(self.centre_W_m, self._at(time_s)), time_s)
+        elif into_s < phase.route.duration_s:
+            return
+        elif phase.name == "scan":
             self._begin("done", _hover(self.centre_W_m, self._at(time_s)), time_s)
         elif phase.name == "look" and target is not None and target.status != "assumed":
             self._begin("approach", self._approach(), time_s)

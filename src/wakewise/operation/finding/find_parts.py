@@ -10,6 +10,8 @@ from typing import Any
 import cv2
 import numpy as np
 
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file, write_json
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
@@ -42,6 +44,11 @@ def drawn_start(parts: Parts) -> Pose:
     return camera_pose(parts.target.centre_W_m + past, azimuth, elevation, distance)
 
 
+def start_camera(parts: Parts) -> Pose:
+    """Camera pose X_WC at the start: the drawn one, or that of a start that was given."""
+    return parts.start.X_WB @ parts.aim.mount(0.0) if "start" in parts.given else drawn_start(parts)
+
+
 def find_start(parts: Parts) -> BodyState:
     """Start of the vehicle."""
     X_WC = drawn_start(parts)
@@ -50,8 +57,8 @@ def find_start(parts: Parts) -> BodyState:
 
 
 def find_route(parts: Parts) -> Route:
-    """The start's place for as long as the mission may last: nothing else of its way is known beforehand."""
-    X_WC = drawn_start(parts)
+    """The start's place for as long as the mission may last: nothing else of its path is known beforehand."""
+    X_WC = start_camera(parts)
     centre = X_WC.p_m + parts.scenario.perception.assumed_distance_m * X_WC.R[:, 2]
     here = on_sphere(X_WC.p_m - centre)
     duration_s = find_pilot(parts).most_s()
@@ -98,16 +105,36 @@ def write_found(parts: Parts, folder: Path) -> None:
             "centre_error_m": float(np.linalg.norm(target.centre_W_m - parts.target.centre_W_m)),
             "status": target.status,
         }
+    (folder / FOUND_PICTURE).unlink(missing_ok=True)
     if seen.picture is not None:
         with whole_file(folder / FOUND_PICTURE) as path:
             path.write_bytes(cv2.imencode(".png", seen.drawn(estimator.tracker.camera))[1].tobytes())
     write_json(folder / FOUND_FILE, told)
 
 
-def found_region(folder: Path) -> tuple[Any, float] | None:
-    """Centre, shape (3,), and radius of the target that a flight found; None where it did not look for one."""
+def read_found(folder: Path) -> dict[str, Any] | None:
+    """What found.json of a trial's folder holds; None where there is none.
+
+    Raises InputError if it cannot be read or holds something else.
+    """
     path = folder / FOUND_FILE
     if not path.exists():
         return None
-    told = json.loads(path.read_text(encoding="utf-8"))
-    return None if told["centre_W_m"] is None else (np.array(told["centre_W_m"]), float(told["radius_m"]))
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+        centre = told["centre_W_m"]
+        known = centre is None or (np.array(centre, dtype=np.float64).shape == (3,) and float(told["radius_m"]) > 0.0)
+    except (OSError, ValueError, KeyError, TypeError):
+        known = False
+    if not known:
+        raise InputError(f"{path}: must hold the found target's centre_W_m and radius_m; remove it to fly again")
+    found: dict[str, Any] = told
+    return found
+
+
+def found_region(folder: Path) -> tuple[Array, float] | None:
+    """Centre, shape (3,), and radius of the target that a flight found; None where it did not look for one."""
+    told = read_found(folder)
+    if told is None or told["centre_W_m"] is None:
+        return None
+    return np.array(told["centre_W_m"], dtype=np.float64), float(told["radius_m"])

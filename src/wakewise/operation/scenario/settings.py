@@ -172,6 +172,14 @@ class Scenario(Settings):
             raise ValueError(f"{hint}allowed are {', '.join(known)}, or package.module:make")
         return value
 
+    @model_validator(mode="after")
+    def _find_can_be_flown(self) -> Self:
+        if self.pilot == "find" and self.perception.protect == "view":
+            raise ValueError("perception.protect: view has no target to scan, take target with pilot find")
+        if self.pilot == "find" and self.mission.order != "plain":
+            raise ValueError("mission.order: current needs the target's place beforehand, take plain with pilot find")
+        return self
+
     @field_validator("name")
     @classmethod
     def _names_a_folder(cls, value: str) -> str:

@@ -20,6 +20,7 @@ from wakewise.control import vehicle_layout
 from wakewise.control.bumpless_transfer import switched
 from wakewise.control.velocity_reference import PAPER_W_TRACK, deviation_limit
 from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState, Controller, Goal
 from wakewise.operation.parts import Parts
 from wakewise.operation.teleop.arbitration import (
@@ -275,7 +276,11 @@ def assisted(parts: Parts, source: ControlSource, desk: OperatorState, begin: Op
     -------
     Parts
         `pilot` and `controller` replaced; the body's attitude is the pilot's, so the method does not lean it.
+
+    Raises InputError of a scenario whose pilot is `find`, which flies by itself.
     """
+    if parts.finds:
+        raise InputError("pilot: find flies by itself, take wakewise scan, or pilot route to fly by hand")
     pilot = assisted_pilot(parts, source, desk, begin)
     flown = parts.replace(pilot=pilot)
     return flown.replace(controller=switched_controller(flown, lambda: pilot.state.method))

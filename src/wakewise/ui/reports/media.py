@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError, StageError
+from wakewise.operation.finding.find_parts import read_found
 from wakewise.ui.reports.page import collapsible_section, panel, parts, template
 from wakewise.ui.reports.svg_style import data_uri
 from wakewise.ui.reports.text import number
@@ -45,8 +45,10 @@ def film_html(trial: Trial) -> str:
 def found_html(trial: Trial) -> str:
     """What the flight found with its camera, over the picture in which it was accepted; empty if it did not look."""
     try:
-        told = json.loads((trial.folder / "found.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        told = read_found(trial.folder)
+    except InputError:
+        return ""
+    if told is None:
         return ""
     if told.get("found_s") is None or told.get("centre_W_m") is None:
         return str(template("trial.html").found("", "No target was found.", ""))
