@@ -216,10 +216,11 @@ def fly(
         check_initial_state(parts)
     progress(0, 1, "at the start")
     plant, witness = parts.world.begin()
-    if (begin := getattr(parts.pilot, "begin", None)) is not None:
-        begin()
+    if parts.finds:
+        pilot: Any = parts.pilot
+        pilot.begin()
     # A pilot that takes its own photographs says when, and when its mission is over.
-    timetable = cast("PhotoSchedule", parts.pilot) if hasattr(parts.pilot, "shutter_s") else route
+    timetable = cast("PhotoSchedule", parts.pilot) if parts.finds else route
     recorder = recorder_of(parts, witness, timetable, water_every_s=water_every_s, exposed=exposed)
 
     before = ""
@@ -234,7 +235,7 @@ def fly(
             watch(step, witness)
 
     with name_external_parts(parts, recorder):
-        over = getattr(parts.pilot, "done", never)
+        over = pilot.done if parts.finds else never
         loop_of(parts, plant, witness, record)(duration_s=lasts_s, progress=progress, stop=over)
     return Flight(parts, recorder)
 

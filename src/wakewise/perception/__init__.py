@@ -14,9 +14,16 @@ It knows pictures, the camera's calibration and the estimated pose; never a mesh
 - `target_tracker.py`: all of it, picture by picture.
 """
 
-from wakewise.perception.calibrated_camera import CalibratedCamera
-from wakewise.perception.feature_tracks import grey_picture
-from wakewise.perception.settings import PerceptionSettings
-from wakewise.perception.target_tracker import TargetTracker, TrackerState
+from typing import TYPE_CHECKING
+
+from wakewise.core.lazy_imports import lazy_attributes
+
+if TYPE_CHECKING:
+    from wakewise.perception.calibrated_camera import CalibratedCamera
+    from wakewise.perception.feature_tracks import grey_picture
+    from wakewise.perception.settings import PerceptionSettings
+    from wakewise.perception.target_tracker import TargetTracker, TrackerState
 
 __all__ = ["CalibratedCamera", "PerceptionSettings", "TargetTracker", "TrackerState", "grey_picture"]
+
+lazy_attributes(__name__, "photos")

@@ -14,7 +14,7 @@ from wakewise.vision.reconstruction.sfm.guided_matching import (
     MAX_ANGLE_RAD,
     RATIO,
     PhotoFeatures,
-    Resection,
+    RelativePose,
     match_by_poses,
     match_pair,
     pose_supported,
@@ -37,14 +37,14 @@ def scene(rng, n=300, noise_rad=3e-4, t=(0.1, 0.03, 0.02)):
     R, t = matrix_from_quat(quat_from_rotvec(np.array([0.05, -0.2, 0.03]))), np.array(t)
     X_2 = X_1 @ R.T + t
     first, second = (X[:, :2] / X[:, 2:] + rng.normal(0.0, noise_rad, (n, 2)) for X in (X_1, X_2))
-    return first, second, Resection(R_21=R, t_2=t / np.linalg.norm(t))
+    return first, second, RelativePose(R_21=R, t_2=t / np.linalg.norm(t))
 
 
 def off(pose, rng, turn_rad, shift):
     """The pose, turned and with another baseline."""
     t = pose.t_2 + rng.normal(0.0, shift, 3)
     R = matrix_from_quat(quat_from_rotvec(rng.normal(0.0, turn_rad, 3))) @ pose.R_21
-    return Resection(R_21=R, t_2=t / np.linalg.norm(t))
+    return RelativePose(R_21=R, t_2=t / np.linalg.norm(t))
 
 
 def twin(first, second, pose):
@@ -122,8 +122,8 @@ def test_matches_by_chance_are_not_trusted():
 def test_no_baseline_is_no_pose():
     """Two cameras in one place have no epipolar lines; elsewhere the essential matrix is that of the two poses."""
     R = np.eye(3)
-    assert Resection.between(R, np.zeros(3), R, np.zeros(3)) is None
-    pose = Resection.between(R, np.array([0.2, 0.0, 0.0]), R, np.zeros(3))
+    assert RelativePose.between(R, np.zeros(3), R, np.zeros(3)) is None
+    pose = RelativePose.between(R, np.array([0.2, 0.0, 0.0]), R, np.zeros(3))
     np.testing.assert_allclose(pose.essential, skew([1.0, 0.0, 0.0]))
 
 

@@ -30,7 +30,6 @@ from wakewise.experiments.trials.metrics import Figures, MetricsCollector, add_r
 from wakewise.experiments.trials.stages import ProgressListener, SilentProgress, StageCosts, of_the_computer
 from wakewise.experiments.trials.surface import SurfaceMaker
 from wakewise.operation import BackgroundRenderer, Parts, Scenario, fly_trial, photograph_flight, read_exposures
-from wakewise.operation.finding.find_parts import found_region
 from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS, parts_of
 from wakewise.operation.teleop.live import collect_flight
@@ -248,6 +247,8 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
 
     Raises EnvironmentFailure if the disk is full, or a file cannot be read or written.
     """
+    from wakewise.operation.finding.find_parts import found_region  # needs OpenCV, which flights do without
+
     photos = pl.read_csv(folder / "images.csv")
     names = photos["name"].to_list()
     centres = photos.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
