@@ -11,7 +11,7 @@ from perception_cases import CAMERA, disturbed, looking, slopes_of, turn_between
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.perception.calibrated_camera import CalibratedCamera
-from wakewise.perception.resection import LEAST_POINTS, Resection, _jacobian, resection
+from wakewise.perception.resection import LEAST_POINTS, Resection, pixel_jacobian, resection
 
 TRUE = looking(np.array([0.0, 0.1, 1.0]), np.array([0.8, 0.0, 1.5]))
 GUESS = disturbed(TRUE, np.array([0.03, -0.02, 0.02]), np.array([0.02, 0.01, -0.03]))
@@ -127,12 +127,12 @@ def test_pixels_that_nothing_explains_give_no_pose() -> None:
     assert resection(behind, CERTAIN, pixels_of(points), CAMERA, GUESS) is None
 
 
-def test_the_jacobian_is_that_of_finite_differences() -> None:
+def test_thepixel_jacobian_is_that_of_finite_differences() -> None:
     """Pixels change with position in W and rotation vector in C as the derivative says."""
     points, focal = points_in_view(np.random.default_rng(7), 9), CAMERA.focal_px
     p_C = (points - TRUE.p_m) @ TRUE.R
     x, y = (p_C[:, :2] / p_C[:, 2:]).T
-    J = _jacobian(x, y, 1.0 / p_C[:, 2], focal, TRUE.R)
+    J = pixel_jacobian(x, y, 1.0 / p_C[:, 2], focal, TRUE.R)
 
     def moved(k: int, step: float) -> Pose:
         error = np.zeros(6)

@@ -164,17 +164,6 @@ def test_the_height_is_that_above_the_bed() -> None:
     assert found.centre_W_m[2] == pytest.approx(0.5 * (1.3 + foot), abs=0.004)
 
 
-def test_a_shape_elsewhere_is_the_same() -> None:
-    """`moved` shifts centre and surface, and nothing else."""
-    shape = ball(CENTRE, RADIUS_M, 0.01)
-    way = np.array([0.1, -0.2, 0.05])
-    other = shape.moved(way)
-    np.testing.assert_allclose(other.centre_W_m, CENTRE + way)
-    np.testing.assert_allclose(other.surface_W_m, shape.surface_W_m + way)
-    np.testing.assert_array_equal(other.covariance, shape.covariance)
-    assert (other.radius_m, other.seen) == (shape.radius_m, shape.seen)
-
-
 @pytest.mark.parametrize(("depth_share", "true_m"), [(0.0, 0.9), (0.5, 0.9), (0.9, 0.9)])
 def test_the_middle_s_depth_is_fitted_with_the_share(depth_share: float, true_m: float) -> None:
     """Depths that lie nearer than the middle by a share of the half chord give the middle to 2 % of the half width."""

@@ -200,11 +200,8 @@ def fly(
     if not (isinstance(water_every_s, (float, int)) and water_every_s == math.inf):  # never
         finite_number(water_every_s, "water_every_s", above=0.0)
     parts = parts_of(flight)
-    route, _, _ = (
-        parts.route,
-        parts.vehicle,
-        parts.estimator,
-    )  # what cannot be used is refused before minutes of compiling
+    route = parts.route
+    _ = parts.vehicle, parts.estimator  # what cannot be used is refused before minutes of compiling
     dt_s = 1.0 / parts.scenario.control.rate_hz
     lasts_s = route.duration_s if duration_s is None else finite_number(duration_s, "duration_s")
     if round(lasts_s / dt_s) < 1:

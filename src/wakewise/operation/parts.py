@@ -274,9 +274,9 @@ class Parts:
     def controller(self) -> Controller[Any]:
         """From an estimate and a goal to thrusts."""
         if self.finds:
-            from wakewise.operation.finding.find_parts import region_controller
+            from wakewise.operation.finding.find_parts import find_controller
 
-            return region_controller(self)
+            return find_controller(self)
         return make_controller(
             self.scenario.method, self.vehicle, self.region, self.wake, self.control, self.surroundings
         )
@@ -288,7 +288,7 @@ class Parts:
         The deadline is enforced in a world that does not wait for its controller (see `World`).
         """
         if self.finds:
-            from wakewise.operation.finding.find_parts import RegionController
+            from wakewise.operation.finding.region_controller import RegionController
 
             if isinstance(self.controller, RegionController):
                 return self.controller
@@ -299,7 +299,7 @@ class Parts:
     def estimator(self) -> Estimator[Any]:
         """From measurements to an estimate of pose, twist, load and current: an error-state Kalman filter."""
         if self.finds:
-            from wakewise.operation.finding.find_parts import camera_estimator
+            from wakewise.operation.finding.camera_estimator import camera_estimator
 
             return camera_estimator(self)
         return ErrorStateFilter(self.vehicle, self.scenario.estimation)

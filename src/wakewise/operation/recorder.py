@@ -160,10 +160,10 @@ class FlightRecorder:
             exposure = ExposureRecord(
                 time_s=opens_s,
                 X_WC_true=tuple(
-                    _moved(truth.state, opens_s - step.time_s + after_s) @ self._mount(truth.tilt_rad)
+                    moved(truth.state, opens_s - step.time_s + after_s) @ self._mount(truth.tilt_rad)
                     for after_s in np.linspace(0.0, self.exposure_s, self.instants)
                 ),
-                X_WC_est=_moved(step.estimate, opens_s - step.time_s + 0.5 * self.exposure_s)
+                X_WC_est=moved(step.estimate, opens_s - step.time_s + 0.5 * self.exposure_s)
                 @ self._mount(step.tilt_rad),
                 silt=self.witness.silt(),
                 X_WC_before=self._before(),
@@ -247,7 +247,7 @@ def _flakes_before(witness: TruthProvider, X_WC: Pose) -> FlakeCloud | None:
     return found
 
 
-def _moved(state: BodyState, dt_s: float) -> Pose:
+def moved(state: BodyState, dt_s: float) -> Pose:
     """X_WB after a short while at constant twist; the error is a dt^2 / 2, 0.02 mm over 28 ms at 0.05 m/s2."""
     X_WB = state.X_WB
     return Pose(

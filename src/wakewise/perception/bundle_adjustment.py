@@ -7,12 +7,13 @@ adjustment, doi 10.1007/3-540-44480-7_21). Priors alone set the scale and the fr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.geometry import Pose, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
+from wakewise.perception.resection import pixel_jacobian
 
 ROUNDS = 10
 PIXEL_STD, CAUCHY_PX = 0.3, 1.5
@@ -70,15 +71,8 @@ def adjusted(frames: Sequence[Keyframe], points: dict[int, Array], focal_px: flo
         x, y = p_C[:, 0] * inverse, p_C[:, 1] * inverse
         miss = focal_px * (seen - np.stack([x, y], axis=1))
         weight = 1.0 / (1.0 + np.einsum("oi,oi->o", miss, miss) / CAUCHY_PX**2) / PIXEL_STD**2
-        by_C = np.zeros((len(cam), 2, 3))
-        by_C[:, 0, 0] = by_C[:, 1, 1] = inverse
-        by_C[:, 0, 2], by_C[:, 1, 2] = -x * inverse, -y * inverse
-        J_point = focal_px * by_C @ np.swapaxes(R[cam], 1, 2)
-        J_pose = np.empty((len(cam), 2, 6))
-        J_pose[:, :, :3] = -J_point
-        J_pose[:, 0, 3], J_pose[:, 0, 4], J_pose[:, 0, 5] = x * y, -(1.0 + x * x), y
-        J_pose[:, 1, 3], J_pose[:, 1, 4], J_pose[:, 1, 5] = 1.0 + y * y, -x * y, -x
-        J_pose[:, :, 3:] *= focal_px
+        J_pose = pixel_jacobian(x, y, inverse, focal_px, R[cam])
+        J_point = -J_pose[:, :, :3]
         wJ = weight[:, None, None] * J_pose
         H = np.zeros((n, 6, n, 6))
         diagonal, g = np.zeros((n, 6, 6)), np.zeros((n, 6))
@@ -114,7 +108,4 @@ def adjusted(frames: Sequence[Keyframe], points: dict[int, Array], focal_px: flo
         places = places + move
         if float(np.abs(step).max()) < 1e-6:
             break
-    return tuple(
-        Keyframe(time_s=f.time_s, X_WC=pose, std=f.std, ids=f.ids, slopes=f.slopes)
-        for f, pose in zip(frames, poses, strict=True)
-    )
+    return tuple(replace(frame, X_WC=pose) for frame, pose in zip(frames, poses, strict=True))

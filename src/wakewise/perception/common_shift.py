@@ -11,6 +11,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.perception.calibrated_camera import CalibratedCamera
+from wakewise.perception.resection import pixel_jacobian
 
 ROUNDS = 4
 CAUCHY_PX = 4.0
@@ -27,11 +28,9 @@ def common_shift(points_W_m: Array, pixels: Array, camera: CalibratedCamera, X_W
     for _ in range(ROUNDS):
         p_C = (points_W_m + shift - X_WC.p_m) @ X_WC.R
         z = np.maximum(p_C[:, 2], NEAREST_M)
-        miss = focal * (slopes - p_C[:, :2] / z[:, None])
-        J = np.zeros((len(z), 2, 3))
-        J[:, 0, 0] = J[:, 1, 1] = focal / z
-        J[:, 0, 2], J[:, 1, 2] = -focal * p_C[:, 0] / z**2, -focal * p_C[:, 1] / z**2
-        J = J @ X_WC.R.T
+        slope = p_C[:, :2] / z[:, None]
+        miss = focal * (slopes - slope)
+        J = -pixel_jacobian(slope[:, 0], slope[:, 1], 1.0 / z, focal, X_WC.R)[:, :, :3]
         weights = 1.0 / (1.0 + np.einsum("ni,ni->n", miss, miss) / CAUCHY_PX**2)
         H = np.einsum("n,nia,nib->ab", weights, J, J) + np.eye(3) / std_m**2
         shift = shift + np.linalg.solve(H, np.einsum("n,nia,ni->a", weights, J, miss) - shift / std_m**2)

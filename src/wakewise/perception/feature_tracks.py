@@ -16,11 +16,14 @@ from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
+from wakewise.perception.calibrated_camera import CalibratedCamera
 
 Grey = NDArray[np.uint8]
 WINDOW_PX, LEVELS = 11, 3
 MOST_BACK_PX = 0.5
 """Largest distance by which a feature tracked back may miss its place."""
+ROUNDED_PX = 1.5
+"""A picture of another size has the camera's shape if its height, brought to the camera's width, fits to this."""
 FEW = 0.08
 """Corners are found anew once more than this share of the features is missing: that takes as long as tracking."""
 QUALITY = 0.01
@@ -68,6 +71,16 @@ def grey_picture(image: NDArray[Any]) -> Grey:
     if picture.shape[2] != 3:
         raise InputError(f"picture: {picture.shape[2]} colours, needs red, green and blue, or grey alone")
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
+
+
+def fitted(picture: Grey, camera: CalibratedCamera) -> Grey:
+    """A grey picture in the camera's size; one of another shape is left for the tracker to refuse."""
+    height, width = picture.shape
+    same = (width, height) == (camera.width, camera.height)
+    if same or abs(height * camera.width / width - camera.height) > ROUNDED_PX:
+        return picture
+    way = cv2.INTER_AREA if width > camera.width else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(picture, (camera.width, camera.height), interpolation=way), dtype=np.uint8)
 
 
 def track(tracks: FeatureTracks, picture: Grey, guess: Array | None = None) -> FeatureTracks:

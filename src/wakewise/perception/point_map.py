@@ -49,8 +49,7 @@ class PointMap:
     Shapes: `ids` (n,), `A` (n, 3, 3), `b` (n, 3), `e` (n,). `points_W_m` (n, 3), NaN until a point can be computed, and
     `std_m` (n,), its largest standard deviation. `first_W` (n, 3) is the direction of the first ray, `parallax_rad`
     (n,) the largest angle with it. `views` (n,) counts rays, `weight` (n,) those that have not faded, `outliers` (n,)
-    those that missed. `seen_s` (n,) is when
-    it was last seen, and `facing_W` (n, 3) the sum of unit vectors towards the cameras that saw it.
+    those that missed, and `seen_s` (n,) is when it was last seen.
     """
 
     ids: IntArray
@@ -65,7 +64,6 @@ class PointMap:
     weight: Array
     outliers: IntArray
     seen_s: Array
-    facing_W: Array
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -102,7 +100,6 @@ def empty_map() -> PointMap:
         weight=np.zeros(0),
         outliers=np.zeros(0, np.int64),
         seen_s=np.zeros(0),
-        facing_W=np.zeros((0, 3)),
     )
 
 
@@ -158,9 +155,8 @@ def add_rays(
     count = known.weight.copy()
     count[at] = fade * count[at] + add
     outliers[at] = np.where(wrong, outliers[at] + 1, np.maximum(outliers[at] - 1, 0))
-    seen, facing = known.seen_s.copy(), known.facing_W.copy()
+    seen = known.seen_s.copy()
     seen[at] = time_s
-    facing[at] -= np.where(add[:, None], d, 0.0)
     places, stds = known.points_W_m.copy(), known.std_m.copy()
     places[at], stds[at] = _solved(A[at], b[at], e[at], count[at], parallax[at], X_WC.p_m)
     return PointMap(
@@ -176,7 +172,6 @@ def add_rays(
         weight=count,
         outliers=outliers,
         seen_s=seen,
-        facing_W=facing,
     )
 
 
@@ -211,7 +206,6 @@ def _with_rows(known: PointMap, ids: IntArray, d: Array, time_s: float) -> Point
         "weight": np.zeros(k),
         "outliers": np.zeros(k, np.int64),
         "seen_s": np.full(k, time_s),
-        "facing_W": np.zeros((k, 3)),
     }
     joined = {name: np.concatenate([getattr(known, name), blank[name]]) for name in blank}
     order = np.argsort(joined["ids"], kind="stable")

@@ -55,7 +55,7 @@ def resection(
         sigma2 = 1.0 + (focal * inverse * point_std_m) ** 2
         error2 = np.einsum("ni,ni->n", miss, miss) / sigma2
         weights = np.where(ahead, 1.0 / ((1.0 + error2 / SCALE_PX**2) * sigma2), 0.0)
-        J = _jacobian(x, y, inverse, focal, pose.R)
+        J = pixel_jacobian(x, y, inverse, focal, pose.R)
         H = np.einsum("n,nia,nib->ab", weights, J, J)
         try:
             step = np.linalg.solve(H, np.einsum("n,nia,ni->a", weights, J, miss))
@@ -72,14 +72,18 @@ def resection(
     return Resection(X_WC=pose, covariance=spread2 * np.linalg.inv(H), fits=fits, residual_px=residual)
 
 
-def _jacobian(x: Array, y: Array, inverse: Array, focal: float, R_WC: Array) -> Array:
-    """Derivative of pixels by position in W and rotation vector in C, shape (n, 2, 6)."""
+def pixel_jacobian(x: Array, y: Array, inverse: Array, focal: float, R_WC: Array) -> Array:
+    """Derivative of pixels by the camera's position in W and rotation vector in C, shape (n, 2, 6).
+
+    That by the point's position in W is the first three columns with the other sign. `x`, `y`, `inverse`, shape (n,):
+    slopes of the points and their inverse depths; `R_WC`, shape (3, 3), or (n, 3, 3) of points in several pictures.
+    """
     n = len(x)
     by_point = np.zeros((n, 2, 3))
     by_point[:, 0, 0] = by_point[:, 1, 1] = inverse
     by_point[:, 0, 2], by_point[:, 1, 2] = -x * inverse, -y * inverse
     J = np.empty((n, 2, 6))
-    J[:, :, :3] = -by_point @ R_WC.T
+    J[:, :, :3] = -by_point @ np.swapaxes(R_WC, -1, -2)
     # A turn w of the camera moves a point in its frame by p x w.
     J[:, 0, 3], J[:, 0, 4], J[:, 0, 5] = x * y, -(1.0 + x * x), y
     J[:, 1, 3], J[:, 1, 4], J[:, 1, 5] = 1.0 + y * y, -x * y, -x

@@ -9,7 +9,7 @@ The side that has not been seen is the seen one, mirrored through the upright ax
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -68,10 +68,6 @@ class TargetShape:
     def centre_std_m(self) -> float:
         """Standard deviation of the distance of the centre from the true one."""
         return math.sqrt(float(np.trace(self.covariance)))
-
-    def moved(self, way_W_m: Array) -> TargetShape:
-        """The same shape elsewhere."""
-        return replace(self, centre_W_m=self.centre_W_m + way_W_m, surface_W_m=self.surface_W_m + way_W_m)
 
 
 def bodies(points_W_m: Array, bed: BedPlane) -> list[IntArray]:

@@ -124,7 +124,6 @@ class TrackerState:
     accepted: bool = False
     keyframes: tuple[Keyframe, ...] = ()
     locked: bool = False
-    localized: bool = False
     trouble: str = ""
 
 
@@ -215,7 +214,6 @@ class TargetTracker:
             cameras_W_m=_noted(state.cameras_W_m, X_WC.p_m),
             pictures=state.pictures + 1,
             last_s=time_s,
-            localized=found is not None,
             trouble="" if len(tracks) >= LEAST_MAPPED // 2 else "few features",
         )
         if not state.locked:
@@ -245,7 +243,7 @@ class TargetTracker:
     def _without(self, state: TrackerState, time_s: float, trouble: str) -> TrackerState:
         """The state after a picture that shows nothing: the last region stays."""
         time_s = max(time_s, state.last_s)
-        state = replace(state, trouble=trouble, localized=False, last_s=time_s)
+        state = replace(state, trouble=trouble, last_s=time_s)
         return self._reported(state, time_s)
 
     def _expected(self, state: TrackerState, X_WC: Pose) -> Array | None:

@@ -1,7 +1,7 @@
 """An estimator that localises the vehicle by the map of its camera's pictures, beside its other sensors.
 
 While the map gives poses, those of other sensors are left out: the vehicle is held relative to what it sees. Without
-poses of the map for `UNSEEN_S`, the others count again.
+poses of the map for a while (`UNSEEN_S`), the others count again.
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ from wakewise.operation.parts import Parts
 from wakewise.operation.scenario.calibration_error import calibration_with_error
 from wakewise.perception import CalibratedCamera, PerceptionSettings, TargetTracker, TrackerState, grey_picture
 from wakewise.perception.detector import Detector, detect_checked, find_detector
-from wakewise.perception.feature_tracks import Grey
+from wakewise.perception.feature_tracks import Grey, fitted
 from wakewise.perception.target_tracker import POSE_STD
 from wakewise.robot.vehicles import Vehicle
 from wakewise.vision.imaging import calibrate
 
 UNSEEN_S = 0.5
+"""Least time without a pose by the map after which those of other sensors count again."""
 REMEMBERED_S = 2.0
 """How long estimates are kept, for the poses of late pictures."""
 SETTLE_MARGIN_S = 0.03
@@ -38,8 +39,6 @@ FORCE_WALK_N, ACCELERATION_NOISE_M_S2 = 0.04, 0.002
 """Process noise as in `wakewise.estimation.settings.Priors`, larger: the vehicle's own wash comes back from bed and
 target and pushes it. With poses at 62 Hz the filter finds its noise too small within a second; with 5 pictures a second
 it does not, lags, and in still water the hover went round a cycle of 6 mm and 4 s."""
-ASPECT_PX = 1.5
-"""A picture whose shape fits the camera's to this is reduced to it."""
 PATIENCE = 3
 """Poses by the map that are rejected in a row before the filter doubts itself: they come at 5 Hz, not at 62."""
 OUTLINE_BGR = (0, 200, 255)
@@ -105,7 +104,6 @@ class CameraEstimator:
     inner: ErrorStateFilter
     tracker: TargetTracker
     ahead_m: float = 0.0
-    use_map: bool = True
     detector: Detector | None = None
     seen: SeenTarget = field(default_factory=SeenTarget)
 
@@ -131,7 +129,7 @@ class CameraEstimator:
             state, pose = self._seen(state, measured, now_s)
             if pose is not None:
                 taken.append(pose)
-        if self.use_map and now_s - state.posed_s < self._unseen_s():
+        if now_s - state.posed_s < self._unseen_s():
             taken = [m if m.pose_std is not None else without_pose(m) for m in taken]
         filtered, estimate = self.inner.step(state.filter, dt_s, tuple(taken), thrusts_N)
         spread = estimate.covariance
@@ -177,7 +175,7 @@ class CameraEstimator:
             X_WC = X_WB @ X_BM if found is None else found.X_WC
             self.seen.picture, self.seen.X_WC, self.seen.shown = picture, X_WC, tracker.target
         state = replace(state, tracker=tracker)
-        if found is None or not self.use_map:
+        if found is None:
             return state, None
         spread = found.covariance
         std = (
@@ -193,16 +191,6 @@ def _per_axis(covariance: Array) -> float:
     return math.sqrt(float(np.trace(covariance)) / 3.0)
 
 
-def fitted(picture: Grey, camera: CalibratedCamera) -> Grey:
-    """A grey picture in the camera's size; one of another shape is left for the tracker to refuse."""
-    height, width = picture.shape
-    if (width, height) == (camera.width, camera.height) or abs(
-        width * camera.height / height - camera.width
-    ) > ASPECT_PX:
-        return picture
-    return np.asarray(cv2.resize(picture, (camera.width, camera.height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-
-
 def known_camera(parts: Parts, settings: PerceptionSettings) -> tuple[CalibratedCamera, float]:
     """The scenario's camera as the crew has calibrated it, for pictures of the perception's width; its `ahead_m`."""
     known = calibration_with_error(calibrate(parts.camera), parts.scenario.calibration_error, parts.seeds.survey()[1])
@@ -213,8 +201,8 @@ def known_camera(parts: Parts, settings: PerceptionSettings) -> tuple[Calibrated
     return camera.scaled(settings.width_px), known.ahead_m
 
 
-def camera_estimator(parts: Parts, use_map: bool = True) -> CameraEstimator:
-    """Estimator of the parts of a flight; without `use_map` the vehicle is not localised by the map."""
+def camera_estimator(parts: Parts) -> CameraEstimator:
+    """Estimator of the parts of a flight."""
     settings = parts.scenario.perception
     camera, ahead_m = known_camera(parts, settings)
     priors = Priors(
@@ -226,6 +214,4 @@ def camera_estimator(parts: Parts, use_map: bool = True) -> CameraEstimator:
     inner = ErrorStateFilter(parts.vehicle, parts.scenario.estimation, priors=priors)
     tracker = TargetTracker(camera=camera, settings=settings, seed=parts.scenario.seed)
     detector = None if settings.detector is None else find_detector(settings.detector)
-    return CameraEstimator(
-        vehicle=parts.vehicle, inner=inner, tracker=tracker, ahead_m=ahead_m, use_map=use_map, detector=detector
-    )
+    return CameraEstimator(vehicle=parts.vehicle, inner=inner, tracker=tracker, ahead_m=ahead_m, detector=detector)

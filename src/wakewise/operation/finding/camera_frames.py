@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-from wakewise.core.geometry import Pose, quat_integrate
-from wakewise.core.interfaces import BodyState, Measurement, Plant, Truth, TruthProvider, World
+from wakewise.core.interfaces import Measurement, Plant, Truth, TruthProvider, World
 from wakewise.operation.parts import Parts
 from wakewise.operation.photography import posed_scene
+from wakewise.operation.recorder import moved
 from wakewise.perception import PerceptionSettings
 from wakewise.vision.imaging import ImagingSettings, Scene, photograph
 
@@ -107,7 +107,6 @@ class CameraWorld:
     inner: World
     parts: Parts
     settings: PerceptionSettings
-    lost_s: tuple[tuple[float, float], ...] = ()
 
     @property
     def name(self) -> str:
@@ -119,7 +118,7 @@ class CameraWorld:
         plant, witness = self.inner.begin()
         if witness is None:
             raise InputError(f"world {self.name}: has no truth to render pictures from, take pilot route")
-        return CameraFrames(plant, witness, self.parts, self.settings, self.lost_s), witness
+        return CameraFrames(plant, witness, self.parts, self.settings), witness
 
 
 def picture_settings(parts: Parts, settings: PerceptionSettings) -> ImagingSettings:
@@ -127,12 +126,6 @@ def picture_settings(parts: Parts, settings: PerceptionSettings) -> ImagingSetti
     given = parts.scenario.imaging
     height = max(16, round(settings.width_px * given.height / given.width))
     return given.model_copy(update={"width": settings.width_px, "height": height, "samples": 1})
-
-
-def moved(state: BodyState, dt_s: float) -> Pose:
-    """X_WB after a short while at constant twist."""
-    X_WB = state.X_WB
-    return Pose(X_WB.p_m + X_WB.R @ state.nu_B[:3] * dt_s, quat_integrate(X_WB.q, state.nu_B[3:], dt_s))
 
 
 def without_pose(measurement: Measurement) -> Measurement:

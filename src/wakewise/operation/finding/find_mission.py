@@ -17,7 +17,7 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Goal, TargetEstimate
 from wakewise.operation.scenario.find_settings import FindSettings
 from wakewise.scene.missions import CameraAim, Leg, MissionSettings, Route
-from wakewise.scene.missions.route import plan_route, rest_to_rest
+from wakewise.scene.missions.route import open_route, plan_route, rest_to_rest
 
 FOLLOWS_M_S = 0.03
 """Largest speed at which the legs' centre follows the estimate."""
@@ -139,18 +139,18 @@ class FindPilot:
         if phase.name == "done":
             return
         if self.found_s is None and time_s >= self._find.give_up_s:
-            self._begin("done", _hover(self.centre_W_m, self._at(time_s)), time_s)
+            self._begin("done", open_route(self.centre_W_m, 1.0, "done", self._at(time_s)), time_s)
         elif into_s < phase.route.duration_s:
             return
         elif phase.name == "scan":
-            self._begin("done", _hover(self.centre_W_m, self._at(time_s)), time_s)
+            self._begin("done", open_route(self.centre_W_m, 1.0, "done", self._at(time_s)), time_s)
         elif phase.name == "look" and target is not None and target.status != "assumed":
             self._begin("approach", self._approach(), time_s)
         elif not known:  # what is proposed is looked at from near, what is not from here again
             self._here = self._at(time_s)
             self._begin("look", self._look(), time_s)
         elif phase.name == "approach" and self._find.hold_s > 0.0:
-            self._begin("hold", _hover(self.centre_W_m, self._at(time_s), self._find.hold_s), time_s)
+            self._begin("hold", open_route(self.centre_W_m, self._find.hold_s, "hold", self._at(time_s)), time_s)
         else:
             self._begin("scan", self._scan(time_s), time_s)
 
@@ -196,12 +196,6 @@ def _route(centre_W_m: Array, legs: list[Leg], starts: list[float], duration_s: 
         X_WC_planned=(),
         duration_s=duration_s,
     )
-
-
-def _hover(centre_W_m: Array, at: Array, duration_s: float = 1.0) -> Route:
-    """Stay at a place on the sphere."""
-    leg = Leg(name="hold", start=at, end=at, length_m=0.0, duration_s=duration_s, speed_m_s=0.1, acceleration_m_s2=0.1)
-    return _route(centre_W_m, [leg], [0.0], duration_s)
 
 
 def on_sphere(from_centre_W_m: Array) -> Array:

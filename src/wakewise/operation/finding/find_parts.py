@@ -15,24 +15,19 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file, write_json
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
-from wakewise.operation.finding.camera_estimator import CameraEstimator, camera_estimator
+from wakewise.operation.finding.camera_estimator import CameraEstimator
 from wakewise.operation.finding.camera_frames import CameraWorld
 from wakewise.operation.finding.find_mission import FindPilot, on_sphere
 from wakewise.operation.finding.region_controller import RegionController, region_controller
 from wakewise.operation.parts import Parts
 from wakewise.operation.worlds.makers import make_world
-from wakewise.scene.missions import Leg, Route
+from wakewise.scene.missions import Route, open_route
 from wakewise.scene.missions.orbit import camera_pose
 
 START_RANGE_M, START_ELEVATION_DEG = (0.8, 1.1), (20.0, 35.0)
 OFF_AXIS_RAD = math.radians(12.0)
 """The vehicle starts at a range and elevation drawn evenly, and looks past the target by an angle of this deviation."""
 FOUND_FILE, FOUND_PICTURE = "found.json", "found.png"
-
-__all__ = [
-    "CameraEstimator", "RegionController", "camera_estimator", "find_pilot", "find_route", "find_start", "find_world",
-    "found_region", "region_controller", "write_found",
-]  # fmt: skip
 
 
 def drawn_start(parts: Parts) -> Pose:
@@ -61,32 +56,24 @@ def find_route(parts: Parts) -> Route:
     X_WC = start_camera(parts)
     centre = X_WC.p_m + parts.scenario.perception.assumed_distance_m * X_WC.R[:, 2]
     here = on_sphere(X_WC.p_m - centre)
-    duration_s = find_pilot(parts).most_s()
-    leg = Leg(
-        name="find", start=here, end=here, length_m=0.0, duration_s=duration_s, speed_m_s=0.1, acceleration_m_s2=0.1
-    )
-    return Route(
-        centre_W_m=centre,
-        legs=(leg,),
-        starts_s=np.zeros(1),
-        exposures_s=np.zeros(0),
-        exposure_names=(),
-        X_WC_planned=(),
-        duration_s=duration_s,
-    )
+    return open_route(centre, find_pilot(parts).most_s(), "find", here)
 
 
 def find_pilot(parts: Parts) -> FindPilot:
     """`find`: looks, detects, approaches and scans."""
     scenario = parts.scenario
-    return FindPilot(
-        drawn_start(parts), scenario.perception.assumed_distance_m, parts.aim, scenario.mission, scenario.find
-    )
+    ahead_m = scenario.perception.assumed_distance_m
+    return FindPilot(start_camera(parts), ahead_m, parts.aim, scenario.mission, scenario.find)
 
 
-def find_world(parts: Parts, lost_s: tuple[tuple[float, float], ...] = ()) -> CameraWorld:
-    """The scenario's world with pictures of its camera; `lost_s` as in `CameraFrames`."""
-    return CameraWorld(inner=make_world(parts), parts=parts, settings=parts.scenario.perception, lost_s=lost_s)
+def find_controller(parts: Parts) -> RegionController:
+    """Controller whose region follows the estimate."""
+    return region_controller(parts, start_camera(parts))
+
+
+def find_world(parts: Parts) -> CameraWorld:
+    """The scenario's world with pictures of its camera."""
+    return CameraWorld(inner=make_world(parts), parts=parts, settings=parts.scenario.perception)
 
 
 def write_found(parts: Parts, folder: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from wakewise.control import make_controller
 from wakewise.control.failsafe import Incidents
 from wakewise.control.pipeline import Pipeline, PipelineState
+from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Command, Goal, TargetEstimate
 from wakewise.operation.parts import Parts, surroundings_of
 from wakewise.operation.plugin_adapter import flown_controller
@@ -58,9 +59,12 @@ class RegionController:
         return self._pipeline.step(state, dt_s, estimate, goal)
 
 
-def region_controller(parts: Parts) -> RegionController:
-    """Controller of the scenario's method; before there is an estimate it protects a ball at the stated distance."""
-    settings, X_WC = parts.scenario.perception, parts.start.X_WB @ parts.aim.mount(parts.start_tilt_rad)
+def region_controller(parts: Parts, X_WC: Pose) -> RegionController:
+    """Controller of the scenario's method; before there is an estimate it protects a ball at the stated distance.
+
+    `X_WC`: camera pose at the start.
+    """
+    settings = parts.scenario.perception
     assumed_W_m, radius_m = X_WC.p_m + settings.assumed_distance_m * X_WC.R[:, 2], settings.assumed_radius_m
     bounds = surroundings_of(parts.scenario)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -228,9 +229,11 @@ def plan_route(centre_W_m: Array, settings: MissionSettings, current_W_m_s: Arra
     )
 
 
-def open_route(centre_W_m: Array, duration_s: float, name: str = "free") -> Route:
-    """A stretch of time without legs or photographs, for pilots that need no route."""
-    still = np.array([0.0, 0.0, 1.0])
+def open_route(
+    centre_W_m: Array, duration_s: float, name: str = "free", still: Sequence[float] | Array = (0.0, 0.0, 1.0)
+) -> Route:
+    """A stretch of time at one place, azimuth, elevation and range, without photographs."""
+    still = np.array(still)
     leg = Leg(
         name=name,
         start=still,

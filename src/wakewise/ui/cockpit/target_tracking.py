@@ -20,7 +20,7 @@ import numpy as np
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, TargetEstimate
 from wakewise.perception import CalibratedCamera, PerceptionSettings, TargetTracker, TrackerState
-from wakewise.perception.feature_tracks import Grey
+from wakewise.perception.feature_tracks import Grey, fitted
 from wakewise.scene.targets import Region
 from wakewise.ui.cockpit.state import number, rounded
 
@@ -34,7 +34,6 @@ NEAREST_M = 0.05
 """A target nearer to the camera along its axis, or behind it, has no outline."""
 STD = (0.02, 0.03)
 """Standard deviation of the camera's pose per axis, m and rad, where the estimate states none."""
-_ROUNDED_PX = 1.5
 _NOTES = {
     "assumed": "target designated; a ball is protected until it was seen from other sides: move sideways",
     "proposed": "a target is proposed; its region is protected",
@@ -257,13 +256,7 @@ def grey_of(jpeg: bytes, camera: CalibratedCamera) -> Grey:
     picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE) if jpeg else None
     if picture is None:
         raise ValueError("no picture in the JPEG")
-    height, width = picture.shape
-    if abs(height * camera.width / width - camera.height) > _ROUNDED_PX:
-        return np.asarray(picture, dtype=np.uint8)
-    way = cv2.INTER_AREA if width > camera.width else cv2.INTER_LINEAR
-    same = (width, height) == (camera.width, camera.height)
-    fit = picture if same else cv2.resize(picture, (camera.width, camera.height), interpolation=way)
-    return np.asarray(fit, dtype=np.uint8)
+    return fitted(np.asarray(picture, dtype=np.uint8), camera)
 
 
 def outline(target: TargetEstimate, camera: CalibratedCamera, X_WC: Pose) -> dict[str, float | None] | None:
