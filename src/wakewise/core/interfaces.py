@@ -27,8 +27,8 @@ class TargetEstimate:
 
     `time_s` is the time of the last picture, also of one that showed nothing. `status`: `assumed`, a ball at a stated
     distance; `proposed`, detected and not yet accepted; `tracked`; `lost`, no longer seen and kept where it was.
-    `covariance`, shape (3, 3), is that of the centre. `points_W_m`, `weights` and `distance_m`, shapes (n, 3) and (n,), are the
-    protected region as in `wakewise.scene.targets.Region`; `version` grows with each change of it.
+    `covariance`, shape (3, 3), is that of the centre. `points_W_m`, `weights` and `distance_m`, shapes (n, 3) and (n,),
+    are the protected region as in `wakewise.scene.targets.Region`; `version` grows with each change of it.
     """
 
     time_s: float

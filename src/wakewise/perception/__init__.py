@@ -9,7 +9,8 @@ It knows pictures, the camera's calibration and the estimated pose; never a mesh
 - `bed_plane.py`: the plane of the bed.
 - `target_shape.py`: centre, size and surface of the target; the protected region.
 - `common_shift.py`: how a swaying target is followed.
-- `bundle_adjustment.py`: poses of the first pictures, before the map holds the camera.
+- `bundle_adjustment.py`, `map_initialization.py`: poses of the first pictures, before the map gives the camera's.
+- `designation.py`: which body is the target.
 - `detector.py`, `onnx_model.py`, `onnx_detector.py`: detectors of a user's own.
 - `target_tracker.py`: all of it, picture by picture.
 """

@@ -103,6 +103,15 @@ def empty_map() -> PointMap:
     )
 
 
+def mapped_rows(points: PointMap, ids: IntArray) -> tuple[IntArray, BoolArray]:
+    """Rows of features in the map, and which of them are mature, shapes (n,)."""
+    rows = points.rows(ids)
+    known = rows >= 0
+    mature = np.zeros(len(rows), np.bool_)
+    mature[known] = points.mature[rows[known]]
+    return rows, mature
+
+
 def ray_directions(slopes: Array, X_WC: Pose) -> Array:
     """Unit directions in W, shape (n, 3), of slopes in the camera frame, shape (n, 2)."""
     d = np.column_stack([slopes, np.ones(len(slopes))]) @ X_WC.R.T

@@ -9,7 +9,7 @@ The side that has not been seen is the seen one, mirrored through the upright ax
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -33,6 +33,15 @@ NEARER, NEARER_STD = 0.4, 0.3
 """Prior of k: between a bush and a boulder."""
 CORRELATED = 4.0
 """So many neighbouring points tell as much as one."""
+WORST = 2.0
+"""Largest standard deviation of a body's points over the lower quartile of theirs."""
+SHARED = 4.0
+"""Shapes of one body share most of their points: so many of them tell as much as one."""
+CENTRE_WALK_M = 0.008
+"""Random walk of the centre from one shape to the next: more of the target is seen."""
+LEAST_APART_RAD = math.radians(15.0)
+RECENT = 100
+"""A target was seen from two sides if of so many last places of the camera two lie this far apart in azimuth."""
 LONELY = 2.5
 """Points whose third neighbour is farther off than this many times the median are outliers."""
 TALLEST_M = 2.0
@@ -159,6 +168,29 @@ def middle_depth(depth_m: Array, aside_m: Array, half_m: float) -> tuple[float, 
         found = np.linalg.solve(H, J.T @ depth_m / (CORRELATED * spread**2) + wish)
         spread = max(float(np.std(depth_m - J @ found)), 0.1 * half_m)
     return float(found[0]), math.sqrt(float(np.linalg.inv(H)[0, 0]))
+
+
+def best_known(std_m: Array) -> BoolArray:
+    """Which points of a body are used, shape (n,): from near, what was mapped from far is left out."""
+    kept = np.asarray(std_m <= WORST * np.quantile(std_m, 0.25))
+    return kept if int(kept.sum()) >= 3 * LEAST_POINTS else np.ones(len(std_m), np.bool_)
+
+
+def averaged(before: TargetShape | None, now: TargetShape) -> TargetShape:
+    """The shape of now, its centre averaged with that of before by their covariances (Kalman filter)."""
+    if before is None or not before.seen:
+        return now
+    P = before.covariance + CENTRE_WALK_M**2 * np.eye(3)
+    gain = P @ np.linalg.inv(P + SHARED * now.covariance)
+    centre = before.centre_W_m + gain @ (now.centre_W_m - before.centre_W_m)
+    return replace(now, centre_W_m=centre, covariance=(np.eye(3) - gain) @ P)
+
+
+def seen_from_two_sides(cameras_W_m: Array, about_W_m: Array) -> bool:
+    """Whether a place was seen from two sides, by the places of the camera, shape (k, 3)."""
+    level = cameras_W_m[-RECENT:, :2] - about_W_m[:2]
+    level = level / np.maximum(np.linalg.norm(level, axis=1, keepdims=True), 1e-9)
+    return bool((level @ level.T).min(initial=1.0) <= math.cos(LEAST_APART_RAD))
 
 
 def thinned(points_W_m: Array, voxel_m: float = VOXEL_M) -> IntArray:

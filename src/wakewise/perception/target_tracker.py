@@ -6,6 +6,8 @@
 The target is the body that the operator designated by a box, else the one nearest to the middle of the picture. Before
 its points are mapped, a ball at a stated distance is protected. A target that sways is followed by the mean shift of
 its points in the picture. One that is no longer seen is reported as lost, and its last region stays.
+
+The module is long because the steps of a picture share one state; what needs no state is in modules of its own.
 """
 
 from __future__ import annotations
@@ -21,21 +23,24 @@ from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.core.interfaces import TargetEstimate
 from wakewise.perception.bed_plane import BedPlane, fit_bed, near_bed
-from wakewise.perception.bundle_adjustment import Keyframe, adjusted
+from wakewise.perception.bundle_adjustment import Keyframe
 from wakewise.perception.calibrated_camera import CalibratedCamera
 from wakewise.perception.common_shift import common_shift
+from wakewise.perception.designation import Designation, assumed_ball, choose_body, same_ball
 from wakewise.perception.feature_tracks import NO_TRACKS, FeatureTracks, Grey, replenish, shows_nothing, track
-from wakewise.perception.point_map import PointMap, add_rays, dropped, empty_map, ray_directions
+from wakewise.perception.map_initialization import initial_map, well_crossed, with_keyframe
+from wakewise.perception.point_map import PointMap, add_rays, dropped, empty_map, mapped_rows, ray_directions
 from wakewise.perception.resection import Resection, resection
 from wakewise.perception.settings import PerceptionSettings
 from wakewise.perception.target_shape import (
-    LEAST_POINTS,
     VOXEL_M,
     TargetShape,
-    ball,
+    averaged,
+    best_known,
     bodies,
     in_company,
     protected_region,
+    seen_from_two_sides,
     shape_of,
     thinned,
 )
@@ -48,12 +53,8 @@ APART = 45.0
 """Features over the whole picture are its width over this apart; those about the target a third of that."""
 LEAST_MAPPED = 60
 """Mapped points from which on the pose is measured by them."""
-LOCK_PARALLAX_RAD = 0.25
-"""Median parallax of those points from which on it is: before, the estimated poses would set the map's scale."""
 CONVERGES_S = 1.0
 """Pictures of so long after the first are tracked, but make no map."""
-KEYFRAME_M, MOST_KEYFRAMES = 0.02, 30
-"""Until then pictures are kept, so far apart, for a bundle adjustment."""
 MOST_JUMP_M, MOST_JUMP_RAD = 0.15, 0.2
 """A measured pose farther from the expected one is wrong."""
 LOST_AFTER_S = 0.4
@@ -66,38 +67,18 @@ SWAY_STD_M, SWAY_SMOOTHED = 0.02, 0.5
 """Prior of a target's shift, and the share of its last value that is kept from picture to picture."""
 LEAST_MOVED_M = 0.002
 """A region that moved by less is the same one."""
-CENTRE_WALK_M = 0.008
-"""Random walk of the centre from one shape to the next: more of the target is seen."""
-LEAST_MEMBERS, LEAST_APART_RAD = 25, math.radians(15.0)
-"""Fewer points, or seen from a smaller angle in azimuth, and a target is not accepted by time alone."""
+LEAST_MEMBERS = 25
+"""Fewer points, and a target is not accepted by time alone."""
 DETECTED_S = 5.0
 """A detector's box in which no body is mapped for so long is dropped, and the detector asked again."""
 BED_REACH_M = 0.35
 """The bed under a target is that of the points within this of it."""
-WORST = 2.0
-"""Largest standard deviation of a body's points over the lower quartile of theirs."""
-CORRELATED = 4.0
-"""Shapes share most of their points: so many of them tell as much as one."""
-SAME_BALL = 0.05
-"""An assumed ball that moves or grows by less than this share of its distance is the same one."""
-BOX_MARGIN = 0.15
 STRONG = 0.1
 """Cornerness over the best of strong corners."""
 AMPLE = 2.0
 """Factor on the estimator's standard deviations: rays are judged by theirs (`point_map.MOST_MISS`)."""
 POSE_STD = (0.0005, 0.001)
 """Least noise of a measured pose, m and rad: calibration, and what the map's own errors leave."""
-_FAR = math.inf
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Designation:
-    """A box of a picture, (left, top, right, bottom) in px of `width`, and the camera's pose when it was drawn."""
-
-    box: tuple[float, float, float, float]
-    width: int
-    X_WC: Pose | None = None
-    since_s: float = math.inf
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,7 +104,7 @@ class TrackerState:
     proposed_s: float = math.inf
     accepted: bool = False
     keyframes: tuple[Keyframe, ...] = ()
-    locked: bool = False
+    initialized: bool = False
     trouble: str = ""
 
 
@@ -216,8 +197,8 @@ class TargetTracker:
             last_s=time_s,
             trouble="" if len(tracks) >= LEAST_MAPPED // 2 else "few features",
         )
-        if not state.locked:
-            state = self._towards_lock(state, X_WC, time_s, (std_m, std_rad))
+        if not state.initialized:
+            state = self._towards_map(state, X_WC, time_s, (std_m, std_rad))
         state = self._followed(state, X_WC, time_s)
         if time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6:
             state = self._reshaped(state, X_WC, time_s)
@@ -248,13 +229,13 @@ class TargetTracker:
 
     def _expected(self, state: TrackerState, X_WC: Pose) -> Array | None:
         """Where features are expected, shape (n, 2), NaN of those that are not mapped."""
-        rows, mapped = _mapped(state.points, state.tracks.ids)
+        rows, mapped = mapped_rows(state.points, state.tracks.ids)
         if not mapped.any():
             return None
         guess = np.full((len(rows), 2), np.nan)
         guess[mapped] = self.camera.pixels((state.points.points_W_m[rows[mapped]] - X_WC.p_m) @ X_WC.R)
         before = state.tracks.pixels
-        near = np.linalg.norm(np.nan_to_num(guess - before, nan=_FAR), axis=1) < 0.1 * self.camera.width
+        near = np.linalg.norm(np.nan_to_num(guess - before, nan=np.inf), axis=1) < 0.1 * self.camera.width
         guess[~near] = np.nan
         # Features without a place move as those with one do, in the middle.
         if near.any():
@@ -262,8 +243,8 @@ class TargetTracker:
         return guess
 
     def _pose(self, state: TrackerState, tracks: FeatureTracks, guess: Pose) -> Resection | None:
-        rows, mapped = _mapped(state.points, tracks.ids)
-        if int(mapped.sum()) < LEAST_MAPPED or not state.locked:
+        rows, mapped = mapped_rows(state.points, tracks.ids)
+        if int(mapped.sum()) < LEAST_MAPPED or not state.initialized:
             return None
         on_bed = mapped & ~np.isin(tracks.ids, state.members)
         # What stands on the bed may sway: it counts only where the bed shows too little.
@@ -279,34 +260,15 @@ class TargetTracker:
         near = np.linalg.norm(jump) < MOST_JUMP_M and np.linalg.norm(turn) < MOST_JUMP_RAD
         return found if near else None
 
-    def _towards_lock(self, state: TrackerState, X_WC: Pose, time_s: float, std: tuple[float, float]) -> TrackerState:
-        """The state with another keyframe, or, where rays cross well enough, with the map adjusted and locked."""
-        frames, tracks, focal = state.keyframes, state.tracks, self.camera.focal_px
-        if not frames or np.linalg.norm(frames[-1].X_WC.p_m - X_WC.p_m) >= KEYFRAME_M:
-            frame = Keyframe(
-                time_s=time_s, X_WC=X_WC, std=std, ids=tracks.ids, slopes=self.camera.slopes(tracks.pixels)
-            )
-            state = replace(state, keyframes=(*frames, frame)[-MOST_KEYFRAMES:])
-        if not _well_crossed(state.points, tracks):
-            return state
-        places = state.points.points_W_m
-        known = np.isfinite(places[:, 0])
-        frames = adjusted(
-            state.keyframes, {int(i): p for i, p in zip(state.points.ids[known], places[known], strict=True)}, focal
-        )
-        points = empty_map()
-        for frame in frames:
-            points = add_rays(
-                points,
-                frame.ids,
-                frame.slopes,
-                frame.X_WC,
-                frame.time_s,
-                focal,
-                self.settings.assumed_distance_m,
-                POSE_STD[0],
-            )
-        return replace(state, points=points, keyframes=(), locked=True)
+    def _towards_map(self, state: TrackerState, X_WC: Pose, time_s: float, std: tuple[float, float]) -> TrackerState:
+        """The state with another keyframe, or with the map initialised."""
+        tracks, focal = state.tracks, self.camera.focal_px
+        seen = Keyframe(time_s=time_s, X_WC=X_WC, std=std, ids=tracks.ids, slopes=self.camera.slopes(tracks.pixels))
+        frames = with_keyframe(state.keyframes, seen)
+        if not well_crossed(state.points, tracks.ids, LEAST_MAPPED):
+            return replace(state, keyframes=frames)
+        points = initial_map(frames, state.points, focal, self.settings.assumed_distance_m, POSE_STD[0])
+        return replace(state, points=points, keyframes=(), initialized=True)
 
     def _turned(self, points: PointMap, tracks: FeatureTracks, X_WC: Pose) -> Array:
         """Angle between the first and the present ray of each feature, shape (n,)."""
@@ -345,9 +307,7 @@ class TargetTracker:
                     return _box(u - half, v - half, u + half, v + half, width, height)
             return None
         if state.designation is not None:
-            share = width / state.designation.width
-            left, top, right, bottom = state.designation.box
-            return _box(share * left, share * top, share * right, share * bottom, width, height)
+            return _box(*state.designation.scaled(width), width, height)
         return None
 
     def _ray_std(self, state: TrackerState, ids: IntArray, std_m: float) -> Array:
@@ -360,7 +320,7 @@ class TargetTracker:
         if state.shape is None:
             return self._reported(state, time_s)
         at = np.isin(state.tracks.ids, state.members)
-        rows, mapped = _mapped(state.points, state.tracks.ids)
+        rows, mapped = mapped_rows(state.points, state.tracks.ids)
         at &= mapped
         shift = SWAY_SMOOTHED * state.shift_W_m
         if int(at.sum()) >= LEAST_SEEN:
@@ -401,22 +361,24 @@ class TargetTracker:
             best_first = which[np.argsort(points.std_m[which], kind="stable")]
             few = best_first[thinned(points.points_W_m[best_first])]
             groups = [few[group] for group in bodies(points.points_W_m[few], bed)]
-            chosen = self._choose(state, groups, X_WC)
+            chosen = choose_body(
+                points.points_W_m, groups, state.shape, state.designation, self.camera, X_WC, LEAST_SEEN
+            )
         if chosen is None:
             box = state.designation
             if box is not None and not state.accepted and time_s - box.since_s > DETECTED_S:
                 state = replace(state, designation=None)
             return self._assumed(state, X_WC, time_s) if state.shape is None or state.shape.seen == 0 else state
         assert bed is not None
-        chosen = chosen[_best_known(points.std_m[chosen])]
+        chosen = chosen[best_known(points.std_m[chosen])]
         places = points.points_W_m[chosen]
         under = near_bed(bed, points.points_W_m[which], places.mean(axis=0), BED_REACH_M)
-        shape = _averaged(state.shape, shape_of(places, under, state.cameras_W_m[-400:], POSE_STD[0]))
+        shape = averaged(state.shape, shape_of(places, under, state.cameras_W_m[-400:], POSE_STD[0]))
         kept = places[in_company(places)]
         near = np.asarray(KDTree(kept).query(points.points_W_m[which], distance_upper_bound=VOXEL_M)[0]) < np.inf
         members = points.ids[which[near]]
         proposed_s = min(state.proposed_s, time_s)
-        enough = len(members) >= LEAST_MEMBERS and _seen_apart(state.cameras_W_m, shape.centre_W_m)
+        enough = len(members) >= LEAST_MEMBERS and seen_from_two_sides(state.cameras_W_m, shape.centre_W_m)
         accepted = state.accepted or (enough and time_s - proposed_s >= self.settings.accept_s)
         state = replace(
             state,
@@ -428,57 +390,11 @@ class TargetTracker:
         )
         return self._protected(state, time_s)
 
-    def _choose(self, state: TrackerState, groups: list[IntArray], X_WC: Pose) -> IntArray | None:
-        """Indices of the target's points among the bodies; None if none is it."""
-        if not groups:
-            return None
-        places = state.points.points_W_m
-        if state.shape is not None and state.shape.seen:
-            away = [np.linalg.norm(places[group].mean(axis=0) - state.shape.centre_W_m) for group in groups]
-            k = int(np.argmin(away))
-            return groups[k] if away[k] < 1.5 * state.shape.radius_m + 0.03 else None
-        if state.designation is not None and state.designation.X_WC is not None:
-            inside = [self._in_box(places[group], state.designation) for group in groups]
-            k = int(np.argmax(inside))
-            return groups[k] if inside[k] >= LEAST_SEEN else None
-        middles = np.array([places[group].mean(axis=0) for group in groups])
-        p_C = (middles - X_WC.p_m) @ X_WC.R
-        off_axis = np.linalg.norm(p_C[:, :2], axis=1) / np.maximum(p_C[:, 2], 1e-6)
-        off_axis[p_C[:, 2] <= 0.05] = _FAR
-        # A body of many points a little farther from the middle is more likely meant than a stone in it.
-        size = np.array([len(group) for group in groups])
-        k = int(np.argmin(off_axis + 0.2 * (1.0 - size / size.max())))
-        return groups[k] if off_axis[k] < _FAR else None
-
-    def _in_box(self, points_W_m: Array, designation: Designation) -> int:
-        """How many points lie in the designated box, seen from where it was drawn."""
-        assert designation.X_WC is not None
-        share = self.camera.width / designation.width
-        left, top, right, bottom = (share * edge for edge in designation.box)
-        wide, high = BOX_MARGIN * (right - left), BOX_MARGIN * (bottom - top)
-        u, v = self.camera.pixels((points_W_m - designation.X_WC.p_m) @ designation.X_WC.R).T
-        return int(np.sum((u > left - wide) & (u < right + wide) & (v > top - high) & (v < bottom + high)))
-
     def _assumed(self, state: TrackerState, X_WC: Pose, time_s: float) -> TrackerState:
         """The state with a ball at the stated distance, or where the ray meets the bed, as target."""
-        designation, width, height = state.designation, self.camera.width, self.camera.height
-        middle, half = np.array([[0.5 * width, 0.5 * height]]), None
-        if designation is not None and designation.X_WC is not None:
-            share = width / designation.width
-            left, top, right, bottom = (share * edge for edge in designation.box)
-            middle = np.array([[0.5 * (left + right), 0.5 * (top + bottom)]])
-            half = 0.5 * max(right - left, bottom - top) / self.camera.focal_px
-            X_WC = designation.X_WC
-        way = ray_directions(self.camera.slopes(middle), X_WC)[0]
-        distance = self.settings.assumed_distance_m
-        if state.bed is not None and (hit := state.bed.hit(X_WC.p_m, way)) is not None:
-            distance = min(float(np.linalg.norm(hit - X_WC.p_m)), 2.0 * distance)
-        radius = self.settings.assumed_radius_m if half is None else max(half * distance, 0.02)
-        shape, before = ball(X_WC.p_m + distance * way, radius, 0.2 * distance), state.shape
-        if before is not None and state.target is not None and not before.seen:
-            moved = float(np.linalg.norm(shape.centre_W_m - before.centre_W_m))
-            if moved + abs(shape.radius_m - before.radius_m) < SAME_BALL * distance:
-                return self._reported(state, time_s)
+        shape, before = assumed_ball(self.camera, self.settings, state.designation, state.bed, X_WC), state.shape
+        if before is not None and state.target is not None and same_ball(before, shape):
+            return self._reported(state, time_s)
         fresh = replace(state, shape=shape, members=np.zeros(0, np.int64), shift_W_m=np.zeros(3))
         return self._protected(fresh, time_s)
 
@@ -543,46 +459,6 @@ class TargetTracker:
                 version=state.versions,
             ),
         )
-
-
-def _mapped(points: PointMap, ids: IntArray) -> tuple[IntArray, BoolArray]:
-    """Rows of features in the map, and which of them are mature, shapes (n,)."""
-    rows = points.rows(ids)
-    known = rows >= 0
-    mature = np.zeros(len(rows), np.bool_)
-    mature[known] = points.mature[rows[known]]
-    return rows, mature
-
-
-def _best_known(std_m: Array) -> BoolArray:
-    """Which points of a body are used, shape (n,): from near, what was mapped from far is left out."""
-    kept = np.asarray(std_m <= WORST * np.quantile(std_m, 0.25))
-    return kept if int(kept.sum()) >= 3 * LEAST_POINTS else np.ones(len(std_m), np.bool_)
-
-
-def _averaged(before: TargetShape | None, now: TargetShape) -> TargetShape:
-    """The shape of now, its centre averaged with that of before by their covariances (Kalman filter)."""
-    if before is None or not before.seen:
-        return now
-    P = before.covariance + CENTRE_WALK_M**2 * np.eye(3)
-    gain = P @ np.linalg.inv(P + CORRELATED * now.covariance)
-    centre = before.centre_W_m + gain @ (now.centre_W_m - before.centre_W_m)
-    return replace(now, centre_W_m=centre, covariance=(np.eye(3) - gain) @ P)
-
-
-def _seen_apart(cameras_W_m: Array, about_W_m: Array) -> bool:
-    """Whether places of the camera lie `LEAST_APART_RAD` apart in azimuth about a place."""
-    level = cameras_W_m[-100:, :2] - about_W_m[:2]
-    level = level / np.maximum(np.linalg.norm(level, axis=1, keepdims=True), 1e-9)
-    return bool((level @ level.T).min(initial=1.0) <= math.cos(LEAST_APART_RAD))
-
-
-def _well_crossed(points: PointMap, tracks: FeatureTracks) -> bool:
-    """Whether the mapped points in the picture have been seen from far enough apart to hold the vehicle by them."""
-    rows, mapped = _mapped(points, tracks.ids)
-    if int(mapped.sum()) < LEAST_MAPPED:
-        return False
-    return float(np.median(points.parallax_rad[rows[mapped]])) >= LOCK_PARALLAX_RAD
 
 
 def _noted(cameras_W_m: Array, place_W_m: Array) -> Array:
