@@ -107,6 +107,7 @@ def _more(_folder: Path) -> None:
         ww.fly(_scenario(vehicle=vehicle), duration_s=1.0)
     for kind in ("branching", "plate"):
         _ = _scenario(**{"target.kind": kind}).parts().region
+    ww.fly(_scenario(pilot="find"), duration_s=12.0, checked=False)  # the map is made after some 6 s
 
 
 JOBS = {"plan": _plan, "fly": _fly, "photograph": _photograph, "reconstruct": _reconstruct, "more": _more}

@@ -1,4 +1,4 @@
-"""What the tests of the perception share: a camera, poses that look at a place, and the slopes of points."""
+"""What the tests of the perception share: a camera, poses that look at a place, slopes and pixels of points."""
 
 from __future__ import annotations
 
@@ -18,6 +18,11 @@ def slopes_of(points_W_m: Array, X_WC: Pose) -> Array:
     """Slopes of the rays to points before the camera, shape (n, 2)."""
     p_C = (points_W_m - X_WC.p_m) @ X_WC.R
     return p_C[:, :2] / p_C[:, 2:]
+
+
+def pixels_of(points_W_m: Array, X_WC: Pose, camera: CalibratedCamera = CAMERA) -> Array:
+    """Pixels of points, shape (n, 2)."""
+    return camera.pixels((points_W_m - X_WC.p_m) @ X_WC.R)
 
 
 def disturbed(X_WC: Pose, way_m: Array, turn_rad: Array) -> Pose:

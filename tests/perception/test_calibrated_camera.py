@@ -91,12 +91,32 @@ def test_a_reduced_camera_sees_the_same_ray_at_the_corresponding_pixel(camera: C
 
 def test_scaling_there_and_back_changes_nothing() -> None:
     """Twice the width and half of it again is the same camera; the focal length goes with the width."""
-    camera = replace(PINHOLE, distortion=(-0.2, 0.05, 0.001, -0.002))
+    camera = replace(PINHOLE, distortion=(-0.2, 0.05, 0.001, -0.002), readout_s=0.016)
     back = camera.scaled(1280).scaled(640)
     assert (back.width, back.height, back.distortion) == (640, 480, camera.distortion)
+    assert camera.scaled(320).readout_s == camera.readout_s
     for name in ("fx", "fy", "cx", "cy", "focal_px"):
         assert getattr(back, name) == pytest.approx(getattr(camera, name), abs=1e-12)
     assert camera.scaled(320).focal_px == pytest.approx(0.5 * camera.focal_px)
+
+
+@pytest.mark.parametrize("distortion", [(0.0, 0.0, 0.0, 0.0), (-0.2, 0.05, 0.001, -0.002)])
+def test_a_straightened_picture_shows_each_ray_where_a_lens_without_distortion_does(
+    distortion: tuple[float, float, float, float],
+) -> None:
+    """The pixel from which it is taken is the one that the camera has of the straight lens's ray."""
+    camera, pixels = replace(PINHOLE, distortion=distortion), np.array([[320, 240], [20, 30], [600, 450], [100, 400]])
+    x, y = camera.straightening
+    assert x.shape == y.shape == (480, 640)
+    u, v = pixels.T
+    np.testing.assert_allclose(
+        np.column_stack([x[v, u], y[v, u]]), camera.pixels(ahead(PINHOLE.slopes(pixels))), atol=1e-3
+    )
+
+
+def test_a_shutter_is_global_if_nothing_else_is_said() -> None:
+    """The readout takes no time."""
+    assert PINHOLE.readout_s == 0.0
 
 
 def test_the_focal_length_is_the_mean_of_both() -> None:
@@ -143,6 +163,8 @@ def test_the_picture_ends_at_the_centres_of_its_outermost_pixels() -> None:
         {"cx": np.inf},
         {"cy": np.nan},
         {"distortion": (0.0, np.nan, 0.0, 0.0)},
+        {"readout_s": np.nan},
+        {"readout_s": np.inf},
     ],
 )
 def test_numbers_that_no_camera_has_are_refused(wrong: dict[str, Any]) -> None:

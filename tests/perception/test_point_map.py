@@ -19,7 +19,9 @@ from wakewise.perception.point_map import (
     add_rays,
     dropped,
     empty_map,
+    joined,
     ray_directions,
+    solved,
 )
 
 MIDDLE = np.array([0.8, 0.0, 1.5])
@@ -181,6 +183,46 @@ def test_rows_are_those_of_the_numbers() -> None:
     np.testing.assert_array_equal(empty_map().rows(np.array([3, 1])), [-1, -1])
     assert len(WELL.rows(np.zeros(0, np.int64))) == 0
     assert len(empty_map()) == 0 and not len(empty_map().mature)
+
+
+@pytest.mark.parametrize("which", [IDS % 2 == 0, np.array([24, 3, 11])])
+def test_joined_maps_have_the_points_of_both(which: BoolArray | IntArray) -> None:
+    """A map that was parted and joined is the map, sorted by number; with an empty one nothing changes."""
+    part, rest = (
+        WELL.chosen(which),
+        WELL.chosen(np.delete(np.arange(len(IDS)), which if which.dtype != np.bool_ else np.flatnonzero(which))),
+    )
+    for both in (joined(part, rest), joined(rest, part), joined(WELL, empty_map()), joined(empty_map(), WELL)):
+        for name in PointMap.__dataclass_fields__:
+            np.testing.assert_array_equal(getattr(both, name), getattr(WELL, name))
+
+
+def test_known_places_are_of_all_points_that_have_one() -> None:
+    """Points that can be computed are known before they are mature; those whose rays do not cross are not."""
+    distance = float(np.linalg.norm(MIDDLE - np.array([0.0, 0.0, 1.0])))
+    known = mapped(PLACES, arc(0.8 * LEAST_PARALLAX_RAD * distance, 20))
+    known = add_rays(known, np.array([3, 60]), np.zeros((2, 2)), arc(0.6, 2)[0], 20 * DT, FOCAL, 0.8)
+    ids, places = known.known_places()
+    assert 0 < len(ids) < len(known)
+    assert not known.mature[known.rows(ids)].all()
+    assert not {3, 60} & set(ids.tolist())
+    np.testing.assert_array_equal(ids, known.ids[~np.isnan(known.points_W_m).any(axis=1)])
+    np.testing.assert_array_equal(places, known.points_W_m[known.rows(ids)])
+    assert [len(part) for part in empty_map().known_places()] == [0, 0]
+
+
+def test_points_are_solved_from_their_information() -> None:
+    """What a map's rays add up to gives its places and deviations; no parallax gives none, many misses no maturity."""
+    camera = arc(0.6, 40)[-1].p_m
+    places, std = solved(WELL.A, WELL.b, WELL.e, WELL.weight, WELL.parallax_rad, camera)
+    np.testing.assert_allclose(places, PLACES, atol=1e-9)
+    np.testing.assert_allclose(std, WELL.std_m)
+    narrow, never = solved(WELL.A, WELL.b, WELL.e, WELL.weight, np.zeros(len(WELL)), camera)
+    assert np.isnan(narrow).all()
+    assert np.isinf(never).all()
+    missed, unsure = solved(WELL.A, WELL.b, WELL.e + 2.0 * WELL.weight, WELL.weight, WELL.parallax_rad, camera)
+    np.testing.assert_allclose(missed, PLACES, atol=1e-9)
+    assert np.isinf(unsure).all()
 
 
 @pytest.mark.parametrize("which", [IDS % 2 == 0, np.array([0, 7, 20])])

@@ -13,7 +13,7 @@ from wakewise.core.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.perception import PerceptionSettings, TargetTracker, TrackerState
 from wakewise.perception.common_shift import common_shift
 
-SETTINGS = PerceptionSettings(width_px=480, accept_s=1.0, assumed_distance_m=0.7)
+SETTINGS = PerceptionSettings(width_px=480, accept_s=0.3, assumed_distance_m=0.7)
 STD = (0.002, 0.002)
 PERIOD_S = 0.2
 
@@ -150,6 +150,18 @@ def test_a_picture_that_shows_nothing_leaves_the_region(
     assert after.target is not None
     assert state.target is not None
     assert np.array_equal(state.target.points_W_m, after.target.points_W_m)
+
+
+def test_after_a_picture_that_shows_nothing_speeds_are_of_the_whole_time(arc: Pictures) -> None:
+    """Features that are found again move by their way since the last good picture over the time since then."""
+    tracker = tracker_of(arc)
+    before, _ = tracker.step(tracker.init(), arc.pictures[0], 0.0, arc.poses[0], STD)
+    nothing, _ = tracker.step(before, np.full_like(arc.pictures[1], 90), PERIOD_S, arc.poses[1], STD)
+    after, _ = tracker.step(nothing, arc.pictures[2], 2.0 * PERIOD_S, arc.poses[2], STD)
+    kept = np.isin(after.tracks.ids, before.tracks.ids)
+    assert kept.sum() > 100
+    way = after.tracks.pixels[kept] - before.tracks.pixels[np.searchsorted(before.tracks.ids, after.tracks.ids[kept])]
+    np.testing.assert_allclose(after.tracks.speeds[kept], way / (2.0 * PERIOD_S))
 
 
 def test_a_late_picture_is_refused(arc: Pictures, after: TrackerState) -> None:

@@ -24,6 +24,8 @@ _CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-12)
 class CalibratedCamera:
     """OpenCV's model: size and intrinsics in px, distortion k1, k2, p1, p2; the first pixel's centre is (0, 0).
 
+    A rolling shutter reads the rows within `readout_s`, top row first; 0 of a global one.
+
     COLMAP puts that centre at (0.5, 0.5): its cx and cy are half a pixel more.
     """
 
@@ -34,11 +36,12 @@ class CalibratedCamera:
     cx: float
     cy: float
     distortion: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    readout_s: float = 0.0
 
     def __post_init__(self) -> None:
         if len(self.distortion) != DISTORTIONS:
             raise InputError(f"camera: {len(self.distortion)} distortions, needs k1, k2, p1, p2")
-        numbers = np.array([self.fx, self.fy, self.cx, self.cy, *self.distortion])
+        numbers = np.array([self.fx, self.fy, self.cx, self.cy, *self.distortion, self.readout_s])
         if not (np.isfinite(numbers).all() and self.fx > 0.0 and self.fy > 0.0 and min(self.width, self.height) > 0):
             raise InputError(f"camera: {self}, needs a size and focal lengths above 0 and finite numbers")
 
@@ -58,6 +61,7 @@ class CalibratedCamera:
             cx=(self.cx + 0.5) * share - 0.5,
             cy=(self.cy + 0.5) * share - 0.5,
             distortion=self.distortion,
+            readout_s=self.readout_s,
         )
 
     def slopes(self, pixels: ArrayLike) -> Array:
@@ -94,6 +98,19 @@ class CalibratedCamera:
         right, low = self.width - 1 - margin_px, self.height - 1 - margin_px
         within = (u >= margin_px) & (u <= right) & (v >= margin_px) & (v <= low)
         return np.asarray(within & np.isfinite(u) & np.isfinite(v))
+
+    @cached_property
+    def straightening(self) -> tuple[Array, Array]:
+        """Where the pixels of a picture without distortion lie in one with it, x and y, shapes (h, w), float32."""
+        straight = cv2.initUndistortRectifyMap(
+            self._matrix,
+            np.array(self.distortion),
+            np.eye(3),
+            self._matrix,
+            (self.width, self.height),
+            cv2.CV_32FC1,
+        )
+        return np.asarray(straight[0]), np.asarray(straight[1])
 
     @cached_property
     def _matrix(self) -> Array:

@@ -30,15 +30,17 @@ QUALITY = 0.01
 """Least cornerness over the best of the picture."""
 LEAST_CONTRAST = 2.0
 """Grey levels of standard deviation below which a picture shows nothing to track: about the noise of a dim sensor."""
+SHORTEST_S = 1e-3
 _CRITERIA = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.02)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FeatureTracks:
-    """Features of the last picture: their numbers, shape (n,), and pixels, shape (n, 2)."""
+    """Features of the last picture: their numbers, shape (n,), pixels, (n, 2), and speeds in px/s, (n, 2)."""
 
     ids: IntArray
     pixels: Array
+    speeds: Array
     next_id: int = 0
     picture: Grey | None = field(default=None, repr=False)
 
@@ -47,10 +49,15 @@ class FeatureTracks:
 
     def kept(self, which: BoolArray) -> FeatureTracks:
         """Those features that are chosen, shape (n,)."""
-        return FeatureTracks(ids=self.ids[which], pixels=self.pixels[which], next_id=self.next_id, picture=self.picture)
+        return replace(self, ids=self.ids[which], pixels=self.pixels[which], speeds=self.speeds[which])
+
+    def at_middle(self, camera: CalibratedCamera) -> Array:
+        """Pixels as if all rows were read at the middle of the readout, shape (n, 2)."""
+        late_s = camera.readout_s * ((self.pixels[:, 1] + 0.5) / camera.height - 0.5)
+        return np.asarray(self.pixels - late_s[:, None] * self.speeds)
 
 
-NO_TRACKS = FeatureTracks(ids=np.zeros(0, np.int64), pixels=np.zeros((0, 2)))
+NO_TRACKS = FeatureTracks(ids=np.zeros(0, np.int64), pixels=np.zeros((0, 2)), speeds=np.zeros((0, 2)))
 
 
 def grey_picture(image: NDArray[Any]) -> Grey:
@@ -83,8 +90,8 @@ def fitted(picture: Grey, camera: CalibratedCamera) -> Grey:
     return np.asarray(cv2.resize(picture, (camera.width, camera.height), interpolation=way), dtype=np.uint8)
 
 
-def track(tracks: FeatureTracks, picture: Grey, guess: Array | None = None) -> FeatureTracks:
-    """Features of the last picture found again in the next.
+def track(tracks: FeatureTracks, picture: Grey, after_s: float, guess: Array | None = None) -> FeatureTracks:
+    """Features of the last picture found again in the next, which was taken `after_s` later.
 
     `guess`, shape (n, 2): where they are expected, NaN where nothing is known; their last pixels if not given.
     """
@@ -104,9 +111,9 @@ def track(tracks: FeatureTracks, picture: Grey, guess: Array | None = None) -> F
     height, width = picture.shape
     kept = (found[:, 0] == 1) & (returned[:, 0] == 1) & (np.linalg.norm(back - before, axis=1) <= MOST_BACK_PX)
     kept &= (after[:, 0] >= 0) & (after[:, 0] < width) & (after[:, 1] >= 0) & (after[:, 1] < height)
-    return FeatureTracks(
-        ids=tracks.ids[kept], pixels=after[kept].astype(np.float64), next_id=tracks.next_id, picture=picture
-    )
+    pixels = after.astype(np.float64)
+    speeds = (pixels - tracks.pixels) / max(after_s, SHORTEST_S)
+    return replace(tracks, pixels=pixels, speeds=speeds, picture=picture).kept(kept)
 
 
 def shows_nothing(picture: Grey) -> bool:
@@ -139,9 +146,11 @@ def replenish(
     if found is None:
         return tracks
     new = found[:, 0].astype(np.float64)
+    speed = np.median(tracks.speeds, axis=0) if len(tracks) else np.zeros(2)
     return FeatureTracks(
         ids=np.concatenate([tracks.ids, tracks.next_id + np.arange(len(new))]),
         pixels=np.concatenate([tracks.pixels, new]),
+        speeds=np.concatenate([tracks.speeds, np.tile(speed, (len(new), 1))]),
         next_id=tracks.next_id + len(new),
         picture=picture,
     )

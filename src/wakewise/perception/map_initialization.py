@@ -1,21 +1,35 @@
-"""Initialisation of the map: keyframes with the estimator's poses, adjusted once their rays cross well enough.
+"""Keyframes, and the map made from them by bundle adjustment: first when rays cross well enough, then as it grows.
 
-Before that the estimated poses, which are off by millimetres and tenths of a degree, would set the map's scale: it was
-6 % off where rays had crossed at .06 rad.
+Before the first one the estimated poses, which are off by millimetres and tenths of a degree, would set the map's
+scale: it was 6 % off where rays had crossed at .06 rad.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from wakewise.core.arrays import IntArray
-from wakewise.perception.bundle_adjustment import Keyframe, adjusted
-from wakewise.perception.point_map import PointMap, add_rays, empty_map, mapped_rows
+from wakewise.perception.bundle_adjustment import (
+    PIXEL_STD,
+    BundleAdjustment,
+    Keyframe,
+    after_round,
+)
+from wakewise.perception.point_map import PIXEL_STD as MAP_PIXEL_STD
+from wakewise.perception.point_map import PointMap, joined, mapped_rows, solved
 
 PARALLAX_RAD = 0.25
 """Median parallax of the mapped points in the picture from which on the map is initialised."""
-KEYFRAME_M, MOST_KEYFRAMES = 0.02, 30
+KEYFRAME_M, MOST_KEYFRAMES = 0.025, 100
 """Keyframes are so far apart, and the last ones are kept."""
+NEW_KEYFRAMES = 8
+"""So many new keyframes, and the map is adjusted again."""
+ADJUSTED_STD = (0.005, 0.005)
+"""Standard deviations of a keyframe's pose that was adjusted before: they hold frame and scale; m and rad."""
+NEW_STD = (0.02, 0.02)
+"""Those of a pose by the map since: it follows the map's errors."""
 
 
 def with_keyframe(frames: tuple[Keyframe, ...], frame: Keyframe) -> tuple[Keyframe, ...]:
@@ -33,13 +47,55 @@ def well_crossed(points: PointMap, ids: IntArray, least: int) -> bool:
     return float(np.median(points.parallax_rad[rows[mapped]])) >= PARALLAX_RAD
 
 
-def initial_map(
-    frames: tuple[Keyframe, ...], points: PointMap, focal_px: float, guess_m: float, place_std_m: float
-) -> PointMap:
-    """The map made anew from adjusted keyframes; `points` gives the first places, the rest as for `add_rays`."""
-    known = np.isfinite(points.points_W_m[:, 0])
-    first = {int(i): place for i, place in zip(points.ids[known], points.points_W_m[known], strict=True)}
-    made = empty_map()
-    for frame in adjusted(frames, first, focal_px):
-        made = add_rays(made, frame.ids, frame.slopes, frame.X_WC, frame.time_s, focal_px, guess_m, place_std_m)
-    return made
+def adjusted_whole(adjustment: BundleAdjustment) -> BundleAdjustment:
+    """The adjustment after as many rounds as it needs."""
+    while not adjustment.done:
+        adjustment = after_round(adjustment)
+    return adjustment
+
+
+def adjusted_map(adjustment: BundleAdjustment, before: PointMap) -> PointMap:
+    """The map with the adjusted points in place of what it had of them; other points stay as they are."""
+    a = adjustment
+    origins = np.stack([pose.p_m for pose in a.poses])
+    times = np.array([frame.time_s for frame in a.frames])
+    point_of = np.repeat(np.arange(len(a.ids)), np.diff(a.starts))
+    rays = a.points_W_m[point_of] - origins[a.frame_of]
+    rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    first = rays[a.starts[:-1]]
+    cosine = np.minimum.reduceat(np.einsum("oi,oi->o", rays, first[point_of]), a.starts[:-1])
+    views = np.diff(a.starts)
+    # The map's pixels are less certain: those of one point are not independent of each other.
+    share = (PIXEL_STD / MAP_PIXEL_STD) ** 2
+    A = share * a.information
+    b = np.einsum("mij,mj->mi", A, a.points_W_m)
+    e = np.einsum("mi,mi->m", b, a.points_W_m) + share * a.misfit
+    parallax = np.arccos(np.clip(cosine, -1.0, 1.0))
+    places, std = solved(A, b, e, views.astype(np.float64), parallax, origins[-1])
+    fresh = PointMap(
+        ids=a.ids,
+        A=A,
+        b=b,
+        e=e,
+        points_W_m=places,
+        std_m=std,
+        first_W=first,
+        parallax_rad=parallax,
+        views=views,
+        weight=views.astype(np.float64),
+        outliers=np.zeros(len(a.ids), np.int64),
+        seen_s=np.maximum.reduceat(times[a.frame_of], a.starts[:-1]),
+    )
+    fresh = fresh.chosen(fresh.mature | ~np.isin(a.ids, before.ids))
+    return joined(before.chosen(~np.isin(before.ids, fresh.ids)), fresh)
+
+
+def moved_since(frames: tuple[Keyframe, ...], adjustment: BundleAdjustment) -> tuple[Keyframe, ...]:
+    """Keyframes after an adjustment: its own where they are kept, later ones moved as its last one was."""
+    own = {frame.time_s: frame for frame in adjustment.adjusted_frames()}
+    last = adjustment.frames[-1].X_WC
+    shift = adjustment.poses[-1] @ last.inverse()
+    return tuple(
+        replace(own[frame.time_s], std=ADJUSTED_STD) if frame.time_s in own else replace(frame, X_WC=shift @ frame.X_WC)
+        for frame in frames
+    )

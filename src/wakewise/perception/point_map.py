@@ -73,6 +73,11 @@ class PointMap:
         """Which points are known well enough to be used, shape (n,)."""
         return np.asarray(np.isfinite(self.points_W_m[:, 0]) & (self.std_m < np.inf))
 
+    def known_places(self) -> tuple[IntArray, Array]:
+        """Features that have a place, mature or not, and their places; shapes (k,) and (k, 3)."""
+        known = np.isfinite(self.points_W_m[:, 0])
+        return self.ids[known], self.points_W_m[known]
+
     def rows(self, ids: IntArray) -> IntArray:
         """Rows of features, -1 of those that are not in the map; shapes (m,)."""
         if not len(self.ids):
@@ -167,7 +172,7 @@ def add_rays(
     seen = known.seen_s.copy()
     seen[at] = time_s
     places, stds = known.points_W_m.copy(), known.std_m.copy()
-    places[at], stds[at] = _solved(A[at], b[at], e[at], count[at], parallax[at], X_WC.p_m)
+    places[at], stds[at] = solved(A[at], b[at], e[at], count[at], parallax[at], X_WC.p_m)
     return PointMap(
         ids=known.ids,
         A=A,
@@ -192,8 +197,21 @@ def dropped(known: PointMap, tracked: IntArray, time_s: float, keep_s: float, mo
     live = np.isin(known.ids, tracked)
     stays = (known.outliers < MOST_OUTLIERS) & (live | known.mature) & (live | (time_s - known.seen_s < keep_s))
     if int(stays.sum()) > most:
-        stays &= known.seen_s >= np.partition(known.seen_s[stays], -most)[-most]
+        oldest_first = np.flatnonzero(stays)[np.argsort(known.seen_s[stays], kind="stable")]
+        stays[oldest_first[:-most]] = False
     return known if stays.all() else known.chosen(stays)
+
+
+def joined(one: PointMap, other: PointMap) -> PointMap:
+    """The points of two maps that have none in common."""
+    ids = np.concatenate([one.ids, other.ids])
+    order = np.argsort(ids, kind="stable")
+    return PointMap(
+        **{
+            name: np.concatenate([getattr(one, name), getattr(other, name)])[order]
+            for name in PointMap.__dataclass_fields__
+        }
+    )
 
 
 def _with_rows(known: PointMap, ids: IntArray, d: Array, time_s: float) -> PointMap:
@@ -202,26 +220,24 @@ def _with_rows(known: PointMap, ids: IntArray, d: Array, time_s: float) -> Point
     k = int(new.sum())
     if k == 0:
         return known
-    blank = {
-        "ids": ids[new],
-        "A": np.zeros((k, 3, 3)),
-        "b": np.zeros((k, 3)),
-        "e": np.zeros(k),
-        "points_W_m": np.full((k, 3), np.nan),
-        "std_m": np.full(k, np.inf),
-        "first_W": d[new],
-        "parallax_rad": np.zeros(k),
-        "views": np.zeros(k, np.int64),
-        "weight": np.zeros(k),
-        "outliers": np.zeros(k, np.int64),
-        "seen_s": np.full(k, time_s),
-    }
-    joined = {name: np.concatenate([getattr(known, name), blank[name]]) for name in blank}
-    order = np.argsort(joined["ids"], kind="stable")
-    return PointMap(**{name: values[order] for name, values in joined.items()})
+    fresh = PointMap(
+        ids=ids[new],
+        A=np.zeros((k, 3, 3)),
+        b=np.zeros((k, 3)),
+        e=np.zeros(k),
+        points_W_m=np.full((k, 3), np.nan),
+        std_m=np.full(k, np.inf),
+        first_W=d[new],
+        parallax_rad=np.zeros(k),
+        views=np.zeros(k, np.int64),
+        weight=np.zeros(k),
+        outliers=np.zeros(k, np.int64),
+        seen_s=np.full(k, time_s),
+    )
+    return joined(known, fresh)
 
 
-def _solved(A: Array, b: Array, e: Array, count: Array, parallax_rad: Array, camera_W_m: Array) -> tuple[Array, Array]:
+def solved(A: Array, b: Array, e: Array, count: Array, parallax_rad: Array, camera_W_m: Array) -> tuple[Array, Array]:
     """Points, shape (n, 3), NaN where rays do not cross; standard deviations, shape (n,), infinite if not mature."""
     points, std = np.full(b.shape, np.nan), np.full(len(b), np.inf)
     crossed = parallax_rad >= 0.5 * LEAST_PARALLAX_RAD

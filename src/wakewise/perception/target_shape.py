@@ -31,6 +31,8 @@ ACROSS_STD_M = 0.004
 """Standard deviation of a middle across a view, besides what the number of points brings."""
 NEARER, NEARER_STD = 0.4, 0.3
 """Prior of k: between a bush and a boulder."""
+UNROUND = 0.2
+"""Standard deviation of a middle along a view, by the half width: bodies are not round."""
 CORRELATED = 4.0
 """So many neighbouring points tell as much as one."""
 WORST = 2.0
@@ -157,7 +159,8 @@ def in_company(points_W_m: Array) -> BoolArray:
 def middle_depth(depth_m: Array, aside_m: Array, half_m: float) -> tuple[float, float]:
     """Depth of a body's middle along a view and its standard deviation, from depths and places across it, shape (n,).
 
-    Fits depth = c - k sqrt(half^2 - aside^2) with a normal prior on k.
+    Fits depth = c - k sqrt(half^2 - aside^2) with a normal prior on k; c is no nearer than the middle of what was seen,
+    as what was not lies behind it.
     """
     chord = np.sqrt(np.maximum(half_m**2 - aside_m**2, 0.0))
     J = np.stack([np.ones_like(chord), -chord], axis=1)
@@ -167,7 +170,8 @@ def middle_depth(depth_m: Array, aside_m: Array, half_m: float) -> tuple[float, 
         H = J.T @ J / (CORRELATED * spread**2) + prior
         found = np.linalg.solve(H, J.T @ depth_m / (CORRELATED * spread**2) + wish)
         spread = max(float(np.std(depth_m - J @ found)), 0.1 * half_m)
-    return float(found[0]), math.sqrt(float(np.linalg.inv(H)[0, 0]))
+    least = 0.5 * float(np.quantile(depth_m, TAIL) + np.quantile(depth_m, 1.0 - TAIL))
+    return max(float(found[0]), least), math.hypot(math.sqrt(float(np.linalg.inv(H)[0, 0])), UNROUND * half_m)
 
 
 def best_known(std_m: Array) -> BoolArray:

@@ -23,15 +23,33 @@ from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.core.interfaces import TargetEstimate
 from wakewise.perception.bed_plane import BedPlane, fit_bed, near_bed
-from wakewise.perception.bundle_adjustment import Keyframe
+from wakewise.perception.bundle_adjustment import LENS, BundleAdjustment, Keyframe, after_round, begin_adjustment
 from wakewise.perception.calibrated_camera import CalibratedCamera
 from wakewise.perception.common_shift import common_shift
 from wakewise.perception.designation import Designation, assumed_ball, choose_body, same_ball
 from wakewise.perception.feature_tracks import NO_TRACKS, FeatureTracks, Grey, replenish, shows_nothing, track
-from wakewise.perception.map_initialization import initial_map, well_crossed, with_keyframe
+from wakewise.perception.map_initialization import (
+    NEW_KEYFRAMES,
+    NEW_STD,
+    adjusted_map,
+    adjusted_whole,
+    moved_since,
+    well_crossed,
+    with_keyframe,
+)
+from wakewise.perception.plane_sweep import PlaneSweep, compared, swept_depth
 from wakewise.perception.point_map import PointMap, add_rays, dropped, empty_map, mapped_rows, ray_directions
 from wakewise.perception.resection import Resection, resection
 from wakewise.perception.settings import PerceptionSettings
+from wakewise.perception.surface_map import (
+    CELL_M,
+    SWEEP_RAD,
+    SurfaceMap,
+    empty_surface,
+    sweep_target,
+    turned_about,
+    with_sweep,
+)
 from wakewise.perception.target_shape import (
     VOXEL_M,
     TargetShape,
@@ -69,6 +87,9 @@ LEAST_MOVED_M = 0.002
 """A region that moved by less is the same one."""
 LEAST_MEMBERS = 25
 """Fewer points, and a target is not accepted by time alone."""
+MOST_CENTRE_STD_M = 0.0125
+"""A target whose centre is less sure is accepted by time alone only after `PATIENT` times as long."""
+PATIENT = 3.0
 DETECTED_S = 5.0
 """A detector's box in which no body is mapped for so long is dropped, and the detector asked again."""
 BED_REACH_M = 0.35
@@ -86,8 +107,16 @@ class TrackerState:
     """All that the tracker knows. `trouble` says what is wrong with the last picture, empty if nothing is."""
 
     tracks: FeatureTracks = NO_TRACKS
+    camera: CalibratedCamera
+    """As adjusted so far, by `lens`, shape (7,): `bundle_adjustment.LENS_STD`."""
+    lens: Array
     points: PointMap
     bed: BedPlane | None = None
+    surface: SurfaceMap
+    sweep: PlaneSweep | None = None
+    """Under way: one more picture is compared in each picture."""
+    swept_from_W_m: Array | None = None
+    """Where the camera was in the last sweep."""
     cameras_W_m: Array
     designation: Designation | None = None
     shape: TargetShape | None = None
@@ -99,11 +128,17 @@ class TrackerState:
     pictures: int = 0
     first_s: float | None = None
     last_s: float = -math.inf
+    tracked_s: float = -math.inf
+    """Time of the picture of `tracks`."""
     shaped_s: float = -math.inf
     seen_s: float = -math.inf
     proposed_s: float = math.inf
     accepted: bool = False
     keyframes: tuple[Keyframe, ...] = ()
+    adjustment: BundleAdjustment | None = None
+    """Under way: a round in each picture."""
+    adjusted_s: float = -math.inf
+    """Time of the last keyframe that was adjusted."""
     initialized: bool = False
     trouble: str = ""
 
@@ -119,7 +154,10 @@ class TargetTracker:
     def init(self) -> TrackerState:
         """State before the first picture."""
         return TrackerState(
+            camera=self.camera,
+            lens=np.zeros(LENS),
             points=empty_map(),
+            surface=empty_surface(),
             cameras_W_m=np.zeros((0, 3)),
             members=np.zeros(0, np.int64),
             shift_W_m=np.zeros(3),
@@ -138,6 +176,9 @@ class TargetTracker:
             state,
             designation=Designation(box=ordered, width=width),
             shape=None,
+            surface=empty_surface(),
+            sweep=None,
+            swept_from_W_m=None,
             target=None,
             accepted=accepted,
             proposed_s=math.inf,
@@ -160,7 +201,7 @@ class TargetTracker:
         trouble = self._trouble(state, picture, time_s)
         if trouble:
             return self._without(state, time_s, trouble), None
-        tracks = track(state.tracks, picture, self._expected(state, guess))
+        tracks = track(state.tracks, picture, time_s - state.tracked_s, self._expected(state, guess))
         found = self._pose(state, tracks, guess)
         X_WC = guess if found is None else found.X_WC
         std_m, std_rad = (AMPLE * max(given, least) for given, least in zip(std, POSE_STD, strict=True))
@@ -168,21 +209,27 @@ class TargetTracker:
             std_m, std_rad = POSE_STD[0], 0.0
         if state.designation is not None and state.designation.X_WC is None:
             state = replace(state, designation=replace(state.designation, X_WC=X_WC, since_s=time_s))
-        tracks = tracks.kept(self._turned(state.points, tracks, X_WC) < MOST_TURN_RAD)
+        tracks = tracks.kept(self._turned(state, tracks, X_WC) < MOST_TURN_RAD)
         tracks = self._replenished(state, tracks, picture, X_WC)
         if self._waits(state, time_s):
             first_s = time_s if state.first_s is None else state.first_s
             waiting = replace(
-                state, tracks=tracks, pictures=state.pictures + 1, first_s=first_s, last_s=time_s, trouble=""
+                state,
+                tracks=tracks,
+                tracked_s=time_s,
+                pictures=state.pictures + 1,
+                first_s=first_s,
+                last_s=time_s,
+                trouble="",
             )
             return (waiting if state.target is not None else self._assumed(waiting, X_WC, time_s)), None
         points = add_rays(
             state.points,
             tracks.ids,
-            self.camera.slopes(tracks.pixels),
+            state.camera.slopes(tracks.at_middle(state.camera)),
             X_WC,
             time_s,
-            self.camera.focal_px,
+            state.camera.focal_px,
             self.settings.assumed_distance_m,
             self._ray_std(state, tracks.ids, std_m),
             std_rad,
@@ -191,14 +238,16 @@ class TargetTracker:
         state = replace(
             state,
             tracks=tracks,
+            tracked_s=time_s,
             points=points,
             cameras_W_m=_noted(state.cameras_W_m, X_WC.p_m),
             pictures=state.pictures + 1,
             last_s=time_s,
             trouble="" if len(tracks) >= LEAST_MAPPED // 2 else "few features",
         )
-        if not state.initialized:
-            state = self._towards_map(state, X_WC, time_s, (std_m, std_rad))
+        state = self._adjusted(self._kept(state, X_WC, time_s, (std_m, std_rad)))
+        if found is not None:
+            state = _swept(state, time_s)
         state = self._followed(state, X_WC, time_s)
         if time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6:
             state = self._reshaped(state, X_WC, time_s)
@@ -233,7 +282,7 @@ class TargetTracker:
         if not mapped.any():
             return None
         guess = np.full((len(rows), 2), np.nan)
-        guess[mapped] = self.camera.pixels((state.points.points_W_m[rows[mapped]] - X_WC.p_m) @ X_WC.R)
+        guess[mapped] = state.camera.pixels((state.points.points_W_m[rows[mapped]] - X_WC.p_m) @ X_WC.R)
         before = state.tracks.pixels
         near = np.linalg.norm(np.nan_to_num(guess - before, nan=np.inf), axis=1) < 0.1 * self.camera.width
         guess[~near] = np.nan
@@ -251,7 +300,11 @@ class TargetTracker:
         used = on_bed if int(on_bed.sum()) >= LEAST_MAPPED else mapped
         rows = rows[used]
         found = resection(
-            state.points.points_W_m[rows], state.points.std_m[rows], tracks.pixels[used], self.camera, guess
+            state.points.points_W_m[rows],
+            state.points.std_m[rows],
+            tracks.at_middle(state.camera)[used],
+            state.camera,
+            guess,
         )
         if found is None:
             return None
@@ -260,22 +313,50 @@ class TargetTracker:
         near = np.linalg.norm(jump) < MOST_JUMP_M and np.linalg.norm(turn) < MOST_JUMP_RAD
         return found if near else None
 
-    def _towards_map(self, state: TrackerState, X_WC: Pose, time_s: float, std: tuple[float, float]) -> TrackerState:
-        """The state with another keyframe, or with the map initialised."""
-        tracks, focal = state.tracks, self.camera.focal_px
-        seen = Keyframe(time_s=time_s, X_WC=X_WC, std=std, ids=tracks.ids, slopes=self.camera.slopes(tracks.pixels))
-        frames = with_keyframe(state.keyframes, seen)
-        if not well_crossed(state.points, tracks.ids, LEAST_MAPPED):
-            return replace(state, keyframes=frames)
-        points = initial_map(frames, state.points, focal, self.settings.assumed_distance_m, POSE_STD[0])
-        return replace(state, points=points, keyframes=(), initialized=True)
+    def _kept(self, state: TrackerState, X_WC: Pose, time_s: float, std: tuple[float, float]) -> TrackerState:
+        """The state with another keyframe, where the camera has moved."""
+        tracks = state.tracks
+        std = NEW_STD if state.initialized else std
+        seen = Keyframe(
+            time_s=time_s,
+            X_WC=X_WC,
+            std=std,
+            ids=tracks.ids,
+            pixels=tracks.at_middle(state.camera),
+            picture=tracks.picture,
+            speed_px_s=np.median(tracks.speeds, axis=0) if len(tracks) else np.zeros(2),
+        )
+        return replace(state, keyframes=with_keyframe(state.keyframes, seen))
 
-    def _turned(self, points: PointMap, tracks: FeatureTracks, X_WC: Pose) -> Array:
+    def _adjusted(self, state: TrackerState) -> TrackerState:
+        """The state with the map initialised at once, or with one round more of a later adjustment."""
+        adjustment = state.adjustment
+        if not state.initialized:
+            if not well_crossed(state.points, state.tracks.ids, LEAST_MAPPED):
+                return state
+            begun = begin_adjustment(state.keyframes, *state.points.known_places(), self.camera, state.lens)
+            if begun is None:
+                return state
+            return replace(_applied(state, adjusted_whole(begun), empty_map()), initialized=True)
+        if adjustment is None:
+            fresh = sum(frame.time_s > state.adjusted_s for frame in state.keyframes)
+            if fresh < NEW_KEYFRAMES:
+                return state
+            adjustment = begin_adjustment(state.keyframes, *state.points.known_places(), self.camera, state.lens)
+            if adjustment is None:
+                return state
+        adjustment = after_round(adjustment)
+        if adjustment.done:
+            return _applied(state, adjustment, state.points)
+        return replace(state, adjustment=adjustment)
+
+    def _turned(self, state: TrackerState, tracks: FeatureTracks, X_WC: Pose) -> Array:
         """Angle between the first and the present ray of each feature, shape (n,)."""
+        points = state.points
         rows = points.rows(tracks.ids)
         known = rows >= 0
         angle = np.zeros(len(rows))
-        d = ray_directions(self.camera.slopes(tracks.pixels[known]), X_WC)
+        d = ray_directions(state.camera.slopes(tracks.at_middle(state.camera)[known]), X_WC)
         angle[known] = np.arccos(np.clip(np.einsum("ni,ni->n", points.first_W[rows[known]], d), -1.0, 1.0))
         return angle
 
@@ -301,8 +382,8 @@ class TargetTracker:
         if state.shape is not None and state.shape.seen:
             p_C = (state.shape.centre_W_m - X_WC.p_m) @ X_WC.R
             if p_C[2] > 0.05:
-                u, v = self.camera.pixels(p_C[None])[0]
-                half = 1.3 * self.camera.focal_px * state.shape.radius_m / p_C[2]
+                u, v = state.camera.pixels(p_C[None])[0]
+                half = 1.3 * state.camera.focal_px * state.shape.radius_m / p_C[2]
                 if math.isfinite(u + v):  # beyond the lens's fold there is no pixel
                     return _box(u - half, v - half, u + half, v + half, width, height)
             return None
@@ -325,7 +406,11 @@ class TargetTracker:
         shift = SWAY_SMOOTHED * state.shift_W_m
         if int(at.sum()) >= LEAST_SEEN:
             found = common_shift(
-                state.points.points_W_m[rows[at]], state.tracks.pixels[at], self.camera, X_WC, SWAY_STD_M
+                state.points.points_W_m[rows[at]],
+                state.tracks.at_middle(state.camera)[at],
+                state.camera,
+                X_WC,
+                SWAY_STD_M,
             )
             shift = shift + (1.0 - SWAY_SMOOTHED) * found
         near = self._near(state, X_WC)
@@ -338,7 +423,7 @@ class TargetTracker:
         assert state.shape is not None
         box = self._window(state, X_WC)
         p_C = (state.shape.centre_W_m - X_WC.p_m) @ X_WC.R
-        if box is None or p_C[2] < 0.05 or not self.camera.inside(self.camera.pixels(p_C[None]))[0]:
+        if box is None or p_C[2] < 0.05 or not state.camera.inside(state.camera.pixels(p_C[None]))[0]:
             return np.zeros(len(state.tracks), np.bool_)
         left, top, right, bottom = box
         u, v = state.tracks.pixels.T
@@ -356,22 +441,23 @@ class TargetTracker:
             return self._protect_view(state, X_WC, time_s)
         if state.shape is not None and state.shape.seen and time_s - state.seen_s > LOST_AFTER_S:
             return state  # what is lost stays where it was
+        surface = state.surface.chosen(state.surface.confirmed)
+        places_W_m = np.concatenate([points.points_W_m[which], surface.points_W_m])
+        std_m = np.concatenate([points.std_m[which], np.full(len(surface), CELL_M)])
         chosen = None
         if bed is not None:
-            best_first = which[np.argsort(points.std_m[which], kind="stable")]
-            few = best_first[thinned(points.points_W_m[best_first])]
-            groups = [few[group] for group in bodies(points.points_W_m[few], bed)]
-            chosen = choose_body(
-                points.points_W_m, groups, state.shape, state.designation, self.camera, X_WC, LEAST_SEEN
-            )
+            best_first = np.argsort(std_m, kind="stable")
+            few = best_first[thinned(places_W_m[best_first])]
+            groups = [few[group] for group in bodies(places_W_m[few], bed)]
+            chosen = choose_body(places_W_m, groups, state.shape, state.designation, state.camera, X_WC, LEAST_SEEN)
         if chosen is None:
             box = state.designation
             if box is not None and not state.accepted and time_s - box.since_s > DETECTED_S:
                 state = replace(state, designation=None)
             return self._assumed(state, X_WC, time_s) if state.shape is None or state.shape.seen == 0 else state
         assert bed is not None
-        chosen = chosen[best_known(points.std_m[chosen])]
-        places = points.points_W_m[chosen]
+        chosen = chosen[best_known(std_m[chosen])]
+        places = places_W_m[chosen]
         under = near_bed(bed, points.points_W_m[which], places.mean(axis=0), BED_REACH_M)
         shape = averaged(state.shape, shape_of(places, under, state.cameras_W_m[-400:], POSE_STD[0]))
         kept = places[in_company(places)]
@@ -379,7 +465,8 @@ class TargetTracker:
         members = points.ids[which[near]]
         proposed_s = min(state.proposed_s, time_s)
         enough = len(members) >= LEAST_MEMBERS and seen_from_two_sides(state.cameras_W_m, shape.centre_W_m)
-        accepted = state.accepted or (enough and time_s - proposed_s >= self.settings.accept_s)
+        wait_s = self.settings.accept_s * (1.0 if shape.centre_std_m <= MOST_CENTRE_STD_M else PATIENT)
+        accepted = state.accepted or (enough and time_s - proposed_s >= wait_s)
         state = replace(
             state,
             shape=shape,
@@ -392,7 +479,7 @@ class TargetTracker:
 
     def _assumed(self, state: TrackerState, X_WC: Pose, time_s: float) -> TrackerState:
         """The state with a ball at the stated distance, or where the ray meets the bed, as target."""
-        shape, before = assumed_ball(self.camera, self.settings, state.designation, state.bed, X_WC), state.shape
+        shape, before = assumed_ball(state.camera, self.settings, state.designation, state.bed, X_WC), state.shape
         if before is not None and state.target is not None and same_ball(before, shape):
             return self._reported(state, time_s)
         fresh = replace(state, shape=shape, members=np.zeros(0, np.int64), shift_W_m=np.zeros(3))
@@ -402,8 +489,8 @@ class TargetTracker:
         """The state with everything mapped in view within a distance as protected."""
         places = state.points.points_W_m[state.points.mature]
         p_C = (places - X_WC.p_m) @ X_WC.R
-        near = (np.linalg.norm(p_C, axis=1) < self.settings.view_distance_m) & self.camera.inside(
-            self.camera.pixels(p_C)
+        near = (np.linalg.norm(p_C, axis=1) < self.settings.view_distance_m) & state.camera.inside(
+            state.camera.pixels(p_C)
         )
         if int(near.sum()) < LEAST_MAPPED:
             return self._assumed(state, X_WC, time_s)
@@ -459,6 +546,38 @@ class TargetTracker:
                 version=state.versions,
             ),
         )
+
+
+def _swept(state: TrackerState, time_s: float) -> TrackerState:
+    """The state with one more picture compared of the sweep under way, or with a sweep begun at a new keyframe."""
+    sweep, shape = state.sweep, state.shape
+    if sweep is None:
+        last = state.keyframes[-1]
+        if shape is None or not shape.seen or last.time_s < time_s:
+            return state
+        before = state.swept_from_W_m
+        if before is not None and turned_about(shape.centre_W_m, before, last.X_WC.p_m) < SWEEP_RAD:
+            return state
+        begun = sweep_target(state.keyframes, shape.centre_W_m, shape.radius_m, state.camera)
+        return state if begun is None else replace(state, sweep=begun, swept_from_W_m=last.X_WC.p_m)
+    sweep = compared(sweep, state.camera)
+    if not sweep.done:
+        return replace(state, sweep=sweep)
+    surface = with_sweep(state.surface, swept_depth(sweep, state.camera), state.camera, state.bed)
+    return replace(state, surface=surface, sweep=None)
+
+
+def _applied(state: TrackerState, adjustment: BundleAdjustment, before: PointMap) -> TrackerState:
+    """The state with the adjusted lens, keyframes and points; `before` holds the points that are kept beside them."""
+    return replace(
+        state,
+        camera=adjustment.adjusted_camera(),
+        lens=adjustment.lens,
+        points=adjusted_map(adjustment, before),
+        keyframes=moved_since(state.keyframes, adjustment),
+        adjustment=None,
+        adjusted_s=adjustment.frames[-1].time_s,
+    )
 
 
 def _noted(cameras_W_m: Array, place_W_m: Array) -> Array:

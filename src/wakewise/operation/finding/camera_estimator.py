@@ -196,7 +196,14 @@ def known_camera(parts: Parts, settings: PerceptionSettings) -> tuple[Calibrated
     known = calibration_with_error(calibrate(parts.camera), parts.scenario.calibration_error, parts.seeds.survey()[1])
     fx, fy, cx, cy, k1, k2, p1, p2 = known.params.tolist()
     camera = CalibratedCamera(
-        width=known.width, height=known.height, fx=fx, fy=fy, cx=cx - 0.5, cy=cy - 0.5, distortion=(k1, k2, p1, p2)
+        width=known.width,
+        height=known.height,
+        fx=fx,
+        fy=fy,
+        cx=cx - 0.5,
+        cy=cy - 0.5,
+        distortion=(k1, k2, p1, p2),
+        readout_s=parts.scenario.imaging.readout_s,
     )
     return camera.scaled(settings.width_px), known.ahead_m
 
