@@ -2,7 +2,8 @@
 
 Seen along a level direction, a target's outline gives its middle across that direction; two directions give its middle
 in plan. Along a direction, points lie nearer than the middle by a share k of the half chord q of a round body,
-s = c - k q: k is 1 of a body whose near side alone is seen and 0 of one that is seen through. Both c and k are fitted.
+s = c - k q: k is 1 of a body whose near side alone is seen and 0 of one that is seen through. Both c and k are fitted,
+unless so much of its depth was seen that c is the middle of that.
 The side that has not been seen is the seen one, mirrored through the upright axis of the centre.
 """
 
@@ -33,6 +34,8 @@ NEARER, NEARER_STD = 0.4, 0.3
 """Prior of k: between a bush and a boulder."""
 UNROUND = 0.2
 """Standard deviation of a middle along a view, by the half width: bodies are not round."""
+SEEN_THROUGH = (0.5, 0.75)
+"""Share of the width that was seen in depth, from which on a body begins to be, and is, taken as seen through."""
 CORRELATED = 4.0
 """So many neighbouring points tell as much as one."""
 WORST = 2.0
@@ -159,8 +162,8 @@ def in_company(points_W_m: Array) -> BoolArray:
 def middle_depth(depth_m: Array, aside_m: Array, half_m: float) -> tuple[float, float]:
     """Depth of a body's middle along a view and its standard deviation, from depths and places across it, shape (n,).
 
-    Fits depth = c - k sqrt(half^2 - aside^2) with a normal prior on k; c is no nearer than the middle of what was seen,
-    as what was not lies behind it.
+    Fits depth = c - k sqrt(half^2 - aside^2) with a normal prior on k. A body of which about as much depth as width was
+    seen is seen through: its middle is that of what was seen.
     """
     chord = np.sqrt(np.maximum(half_m**2 - aside_m**2, 0.0))
     J = np.stack([np.ones_like(chord), -chord], axis=1)
@@ -170,8 +173,10 @@ def middle_depth(depth_m: Array, aside_m: Array, half_m: float) -> tuple[float, 
         H = J.T @ J / (CORRELATED * spread**2) + prior
         found = np.linalg.solve(H, J.T @ depth_m / (CORRELATED * spread**2) + wish)
         spread = max(float(np.std(depth_m - J @ found)), 0.1 * half_m)
-    least = 0.5 * float(np.quantile(depth_m, TAIL) + np.quantile(depth_m, 1.0 - TAIL))
-    return max(float(found[0]), least), math.hypot(math.sqrt(float(np.linalg.inv(H)[0, 0])), UNROUND * half_m)
+    near, far = np.quantile(depth_m, (TAIL, 1.0 - TAIL))
+    through = float(np.clip(((far - near) / (2.0 * half_m) - SEEN_THROUGH[0]) / np.diff(SEEN_THROUGH)[0], 0.0, 1.0))
+    middle = through * 0.5 * float(near + far) + (1.0 - through) * float(found[0])
+    return middle, math.hypot(math.sqrt(float(np.linalg.inv(H)[0, 0])), UNROUND * half_m)
 
 
 def best_known(std_m: Array) -> BoolArray:
