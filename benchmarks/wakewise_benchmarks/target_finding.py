@@ -110,6 +110,7 @@ def planned(world: str, arm: str, seed: int, more: Mapping[str, Any]) -> Planned
         "seed": seed,
         "pilot": "find",
         "find.hold_s": HOLD_S,
+        "find.further_views": 0,
         "perception.latency_s": float(more.get("latency_s", 0.1)),
     }
     settings = {"scenario": fields, "preset": "quick", "known_region": bool(more.get("known_region", False))}

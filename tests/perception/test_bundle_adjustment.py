@@ -64,7 +64,9 @@ def keyframes(
     for k, (X_WC, estimate) in enumerate(zip(true, estimates, strict=False)):
         order = rng.permutation(len(places))
         pixels = pixels_of(places, X_WC, camera) + noise_px * rng.normal(size=(len(places), 2))
-        frames.append(Keyframe(time_s=0.5 * k, X_WC=estimate, std=std, ids=order + FIRST_ID, pixels=pixels[order]))
+        frames.append(
+            Keyframe(time_s=0.5 * k, X_WC=estimate, prior=estimate, std=std, ids=order + FIRST_ID, pixels=pixels[order])
+        )
     return frames
 
 
@@ -225,7 +227,14 @@ def seen_so_often(views: IntArray) -> BundleAdjustment:
     """The adjustment before its first round of features that are seen in so many keyframes each, shape (n,)."""
     ids = np.arange(len(views))
     frames = [
-        Keyframe(time_s=float(k), X_WC=TRUE[0], std=STD, ids=ids[views > k], pixels=np.zeros((int(sum(views > k)), 2)))
+        Keyframe(
+            time_s=float(k),
+            X_WC=TRUE[0],
+            prior=TRUE[0],
+            std=STD,
+            ids=ids[views > k],
+            pixels=np.zeros((int(sum(views > k)), 2)),
+        )
         for k in range(int(views.max()))
     ]
     return begun(frames, (ids, np.tile(MIDDLE, (len(ids), 1))))

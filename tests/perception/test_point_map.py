@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from perception_cases import CAMERA, looking, slopes_of
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
-from wakewise.core.geometry import Pose
+from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.perception.point_map import (
     LEAST_PARALLAX_RAD,
     MOST_OUTLIERS,
@@ -264,3 +264,31 @@ def test_information_fades() -> None:
     way = np.array([0.01, 0.0, 0.0])
     later = mapped(PLACES + way, arc(0.6, 60), WELL, AFTER_S + 300.0)
     np.testing.assert_allclose(later.points_W_m, PLACES + way, atol=2e-4)
+
+
+def test_a_map_in_another_frame_has_its_points_there_and_the_same_misses() -> None:
+    """What is solved from the moved information is the moved point; further rays there give what they gave here."""
+    X_VW = Pose(np.array([0.3, -1.0, 2.0]), quat_from_euler(0.2, -0.3, 1.0))
+    rng = np.random.default_rng(5)
+    places, poses = (
+        rng.uniform([0.6, -0.2, 1.3], [1.0, 0.2, 1.6], (20, 3)),
+        [looking(np.array([0.0, y, 1.0]), np.array([0.8, 0.0, 1.5])) for y in np.linspace(-0.3, 0.3, 8)],
+    )
+    ids = np.arange(20)
+
+    def mapped(known: PointMap, frame: Pose, some: slice) -> PointMap:
+        for k, X_WC in list(enumerate(poses))[some]:
+            slopes = slopes_of(places, X_WC) + 1e-4 * np.random.default_rng(k).normal(size=(20, 2))
+            known = add_rays(known, ids, slopes, frame @ X_WC, float(k), CAMERA.focal_px, 0.8)
+        return known
+
+    here = mapped(empty_map(), Pose(np.zeros(3), quat_from_euler(0.0, 0.0, 0.0)), slice(0, 6))
+    there = here.moved(X_VW)
+    np.testing.assert_allclose(there.points_W_m, X_VW.apply(here.points_W_m), atol=1e-9)
+    on, gone_on = (
+        mapped(here, Pose(np.zeros(3), quat_from_euler(0.0, 0.0, 0.0)), slice(6, 8)),
+        mapped(there, X_VW, slice(6, 8)),
+    )
+    np.testing.assert_allclose(gone_on.points_W_m, X_VW.apply(on.points_W_m), atol=1e-8)
+    np.testing.assert_allclose(gone_on.std_m, on.std_m, rtol=1e-6)
+    np.testing.assert_array_equal(gone_on.mature, on.mature)

@@ -28,7 +28,8 @@ class TargetEstimate:
     `time_s` is the time of the last picture, also of one that showed nothing. `status`: `assumed`, a ball at a stated
     distance; `proposed`, detected and not yet accepted; `tracked`; `lost`, no longer seen and kept where it was.
     `covariance`, shape (3, 3), is that of the centre. `points_W_m`, `weights` and `distance_m`, shapes (n, 3) and (n,),
-    are the protected region as in `wakewise.scene.targets.Region`; `version` grows with each change of it.
+    are the protected region as in `wakewise.scene.targets.Region`; `version` grows with each change of it. Where the
+    surface was mapped, `surface_W_m` and `towards_W`, shapes (m, 3), are its points and directions to the cameras.
     """
 
     time_s: float
@@ -40,10 +41,14 @@ class TargetEstimate:
     weights: Array
     distance_m: Array
     version: int = 0
+    surface_W_m: Array | None = None
+    towards_W: Array | None = None
 
     def __post_init__(self) -> None:
         n = len(self.weights)
         freeze(self, centre_W_m=(3,), covariance=(3, 3), points_W_m=(n, 3), weights=(n,), distance_m=(n,))
+        if self.surface_W_m is not None:
+            freeze(self, surface_W_m=(None, 3), towards_W=(len(self.surface_W_m), 3))
 
     @property
     def centre_std_m(self) -> float:

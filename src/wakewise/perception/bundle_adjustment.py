@@ -38,14 +38,16 @@ POSE, LENS = 6, len(LENS_STD)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Keyframe:
-    """A picture that was kept: time, camera pose X_WC with its standard deviations, and its features.
+    """A picture that was kept: time, camera pose X_WC, the pose by other sensors, and its features.
 
-    `ids`, shape (m,), and `pixels`, shape (m, 2); `std` per axis, m and rad. `picture` and the speed of what it shows,
-    px/s, shape (2,), are for sweeps.
+    `ids`, shape (m,), and `pixels`, shape (m, 2). `prior` is the pose that sensors other than the camera give, and
+    `std` its standard deviations per axis, m and rad. `picture` and the speed of what it shows, px/s, shape (2,), are
+    for sweeps.
     """
 
     time_s: float
     X_WC: Pose
+    prior: Pose
     std: tuple[float, float]
     ids: IntArray
     pixels: Array
@@ -57,7 +59,7 @@ class Keyframe:
 class BundleAdjustment:
     """Keyframes and points under adjustment; `after_round` makes the next.
 
-    `frames` and `camera` are the given ones: the priors. `poses` and `lens`, shape (7,) as `LENS_STD`, are where they
+    `frames` and `camera` are the given ones. `poses` and `lens`, shape (7,) as `LENS_STD`, are where they
     have come to. Observations are sorted by point: `starts`, shape (m + 1,), `frame_of` (n,), `pixels` (n, 2). Points
     have `ids` (m,), places `points_W_m` (m, 3), and the inverse of their covariances, `information` (m, 3, 3);
     `misfit`, shape (m,), is the weighted sum of their squared misses.
@@ -150,8 +152,8 @@ def after_round(before: BundleAdjustment) -> BundleAdjustment:
     off = np.empty(POSE * n + LENS)
     for k, (pose, frame) in enumerate(zip(before.poses, before.frames, strict=True)):
         prior[POSE * k : POSE * k + 3], prior[POSE * k + 3 : POSE * k + POSE] = frame.std[0] ** -2, frame.std[1] ** -2
-        off[POSE * k : POSE * k + 3] = frame.X_WC.p_m - pose.p_m
-        off[POSE * k + 3 : POSE * k + POSE] = rotvec_from_quat(quat_multiply(quat_conjugate(pose.q), frame.X_WC.q))
+        off[POSE * k : POSE * k + 3] = frame.prior.p_m - pose.p_m
+        off[POSE * k + 3 : POSE * k + POSE] = rotvec_from_quat(quat_multiply(quat_conjugate(pose.q), frame.prior.q))
     prior[POSE * n :], off[POSE * n :] = np.array(LENS_STD) ** -2, -before.lens
     step = np.linalg.solve(S + np.diag(prior), g + prior * off)
     turned = step[: POSE * n].reshape(n, POSE)

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from wakewise.core.arrays import IntArray
+from wakewise.core.geometry import Pose
 from wakewise.perception.bundle_adjustment import (
     PIXEL_STD,
     BundleAdjustment,
@@ -24,12 +25,12 @@ PARALLAX_RAD = 0.25
 """Median parallax of the mapped points in the picture from which on the map is initialised."""
 KEYFRAME_M, MOST_KEYFRAMES = 0.025, 100
 """Keyframes are so far apart, and the last ones are kept."""
-NEW_KEYFRAMES = 8
+NEW_KEYFRAMES = 3
 """So many new keyframes, and the map is adjusted again."""
-ADJUSTED_STD = (0.005, 0.005)
-"""Standard deviations of a keyframe's pose that was adjusted before: they hold frame and scale; m and rad."""
-NEW_STD = (0.02, 0.02)
-"""Those of a pose by the map since: it follows the map's errors."""
+LOCAL_KEYFRAMES, LOCAL_ROUNDS = 30, 3
+"""Then the last keyframes are adjusted, in so many rounds: they begin near the solution."""
+LEAST_STD = (0.004, 0.004)
+"""Least standard deviations of a pose by other sensors, m and rad: their errors last from picture to picture."""
 
 
 def with_keyframe(frames: tuple[Keyframe, ...], frame: Keyframe) -> tuple[Keyframe, ...]:
@@ -55,7 +56,7 @@ def adjusted_whole(adjustment: BundleAdjustment) -> BundleAdjustment:
 
 
 def adjusted_map(adjustment: BundleAdjustment, before: PointMap) -> PointMap:
-    """The map with the adjusted points in place of what it had of them; other points stay as they are."""
+    """The map with the adjusted points in place of what it had of them; others move as the last keyframe does."""
     a = adjustment
     origins = np.stack([pose.p_m for pose in a.poses])
     times = np.array([frame.time_s for frame in a.frames])
@@ -87,15 +88,18 @@ def adjusted_map(adjustment: BundleAdjustment, before: PointMap) -> PointMap:
         seen_s=np.maximum.reduceat(times[a.frame_of], a.starts[:-1]),
     )
     fresh = fresh.chosen(fresh.mature | ~np.isin(a.ids, before.ids))
-    return joined(before.chosen(~np.isin(before.ids, fresh.ids)), fresh)
+    return joined(before.chosen(~np.isin(before.ids, fresh.ids)).moved(shift_of(adjustment)), fresh)
+
+
+def shift_of(adjustment: BundleAdjustment) -> Pose:
+    """How the last keyframe was moved, as a transform of W."""
+    return adjustment.poses[-1] @ adjustment.frames[-1].X_WC.inverse()
 
 
 def moved_since(frames: tuple[Keyframe, ...], adjustment: BundleAdjustment) -> tuple[Keyframe, ...]:
     """Keyframes after an adjustment: its own where they are kept, later ones moved as its last one was."""
     own = {frame.time_s: frame for frame in adjustment.adjusted_frames()}
-    last = adjustment.frames[-1].X_WC
-    shift = adjustment.poses[-1] @ last.inverse()
+    shift = shift_of(adjustment)
     return tuple(
-        replace(own[frame.time_s], std=ADJUSTED_STD) if frame.time_s in own else replace(frame, X_WC=shift @ frame.X_WC)
-        for frame in frames
+        own[frame.time_s] if frame.time_s in own else replace(frame, X_WC=shift @ frame.X_WC) for frame in frames
     )

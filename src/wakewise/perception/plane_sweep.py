@@ -43,13 +43,10 @@ DEPTH_PX = 0.3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SweepView:
-    """A picture without distortion and its camera pose X_WC.
-
-    `channels`, shape (h, w, 2): grey levels, and one over their deviation in the patch about each pixel.
-    """
+    """Grey levels of a picture without distortion, shape (h, w), and its camera pose X_WC."""
 
     X_WC: Pose
-    channels: NDArray[np.float32]
+    levels: NDArray[np.float32]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,10 +87,8 @@ def sweep_view(picture: Grey, X_WC: Pose, camera: CalibratedCamera, speed_px_s: 
             (way + (late_s * speed)[:, None]).astype(np.float32)
             for way, speed in zip((across, down), speed_px_s, strict=True)
         )
-    straight = cv2.remap(picture, across, down, cv2.INTER_LINEAR).astype(np.float32)
-    mean = _local_mean(straight)
-    texture = np.sqrt(np.maximum(_local_mean(straight * straight) - mean * mean, 1.0))
-    return SweepView(X_WC=X_WC, channels=np.stack([straight, 1.0 / texture], axis=2))
+    straight = cv2.remap(picture, across, down, cv2.INTER_LINEAR)
+    return SweepView(X_WC=X_WC, levels=straight.astype(np.float32))
 
 
 def begin_sweep(
@@ -114,23 +109,24 @@ def compared(sweep: PlaneSweep, camera: CalibratedCamera) -> PlaneSweep:
     size = (right - left, bottom - top)
     K = np.array([[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]])
     back = np.linalg.inv(K - np.array([[0.0, 0.0, left], [0.0, 0.0, top], [0.0, 0.0, 0.0]]))
-    here, over = np.moveaxis(sweep.reference.channels[top:bottom, left:right], 2, 0).copy()
-    mean = _local_mean(here)
+    here = np.ascontiguousarray(sweep.reference.levels[top:bottom, left:right])
+    mean, texture = _local_mean(here), _texture(here)
     other = sweep.others[len(sweep.scores)]
     X_OR = other.X_WC.inverse() @ sweep.reference.X_WC
     scores = np.empty((DEPTHS, size[1], size[0]), np.float32)
     for score, inverse in zip(scores, sweep.inverse_m, strict=True):
         plane = K @ (X_OR.R + np.outer(X_OR.p_m, [0.0, 0.0, inverse])) @ back
-        seen = cv2.warpPerspective(other.channels, plane, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
-        there = np.ascontiguousarray(seen[:, :, 0])
-        score[:] = (_local_mean(here * there) - mean * _local_mean(there)) * (over * seen[:, :, 1])
+        there = cv2.warpPerspective(other.levels, plane, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+        level = _local_mean(there)
+        score[:] = (_local_mean(here * there) - mean * level) / (texture * _texture(there, level))
     return replace(sweep, scores=(*sweep.scores, scores))
 
 
 def swept_depth(sweep: PlaneSweep, camera: CalibratedCamera) -> SweptDepth:
     """Depths by the pictures that were compared."""
     left, top, right, bottom = sweep.window
-    over, inverse, count = sweep.reference.channels[top:bottom, left:right, 1], sweep.inverse_m, len(sweep.scores)
+    texture = _texture(np.ascontiguousarray(sweep.reference.levels[top:bottom, left:right]))
+    inverse, count = sweep.inverse_m, len(sweep.scores)
     score = np.sum(sweep.scores, axis=0) / count
     if count > MOST_HIDDEN + 1:
         score = (count * score - np.min(sweep.scores, axis=0)) / (count - MOST_HIDDEN)
@@ -142,7 +138,7 @@ def swept_depth(sweep: PlaneSweep, camera: CalibratedCamera) -> SweptDepth:
     depth = 1.0 / (inverse[inner] + offset * (inverse[1] - inverse[0]))
     for k in range(-NEIGHBOURS, NEIGHBOURS + 1):
         np.put_along_axis(score, np.clip(best + k, 0, DEPTHS - 1)[None], -1.0, axis=0)
-    known = (best == inner) & (at > LEAST_SCORE) & (score.max(axis=0) < at - LEAST_LEAD) & (over < 1.0 / LEAST_TEXTURE)
+    known = (best == inner) & (at > LEAST_SCORE) & (score.max(axis=0) < at - LEAST_LEAD) & (texture > LEAST_TEXTURE)
     base = max(float(np.linalg.norm(other.X_WC.p_m - sweep.reference.X_WC.p_m)) for other in sweep.others)
     std = DEPTH_PX * depth**2 / (camera.focal_px * base)
     return SweptDepth(
@@ -161,6 +157,12 @@ def places_of(swept: SweptDepth, camera: CalibratedCamera) -> tuple[Array, Array
     y = (row + swept.window[1] - camera.cy) / camera.fy
     p_C = np.stack([x * z, y * z, z], axis=1)
     return p_C @ swept.X_WC.R.T + swept.X_WC.p_m, swept.std_m[row, column]
+
+
+def _texture(levels: NDArray[np.float32], mean: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+    """Standard deviation in the patch about each pixel, one grey level at least."""
+    middle = _local_mean(levels) if mean is None else mean
+    return np.asarray(np.sqrt(np.maximum(_local_mean(levels * levels) - middle * middle, 1.0)), dtype=np.float32)
 
 
 def _local_mean(values: NDArray[Any]) -> NDArray[np.float32]:

@@ -15,7 +15,7 @@ mature point is an outlier, and a point of many outliers is dropped.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -84,6 +84,20 @@ class PointMap:
             return np.full(len(ids), -1)
         at = np.minimum(np.searchsorted(self.ids, ids), len(self.ids) - 1)
         return np.where(self.ids[at] == ids, at, -1)
+
+    def moved(self, X_VW: Pose) -> PointMap:
+        """The points in another frame V."""
+        R, t = X_VW.R, X_VW.p_m
+        A = R @ self.A @ R.T
+        turned, shift = self.b @ R.T, A @ t
+        return replace(
+            self,
+            A=A,
+            b=turned + shift,
+            e=self.e + 2.0 * turned @ t + shift @ t,
+            points_W_m=X_VW.apply(self.points_W_m),
+            first_W=self.first_W @ R.T,
+        )
 
     def chosen(self, which: BoolArray | IntArray) -> PointMap:
         """Some of the points."""

@@ -106,7 +106,10 @@ def with_sweep(
         denials=np.zeros(len(points), np.int64),
         std_m=std,
     )
-    return _gathered(surface, _gathered(empty_surface(), fresh, one_view=True))
+    both = _gathered(surface, _gathered(empty_surface(), fresh, one_view=True))
+    if len(both) <= MOST_CELLS:
+        return both
+    return both.chosen(np.sort(np.argsort(both.denials - both.views, kind="stable")[:MOST_CELLS]))
 
 
 def sweep_target(
@@ -137,9 +140,10 @@ def _apart(frames: Sequence[Keyframe], centre_W_m: Array) -> list[Keyframe]:
     turned = [turned_about(centre_W_m, frames[-1].X_WC.p_m, frame.X_WC.p_m) for frame in frames[:-1]]
     found = []
     for wished in APART_RAD:
-        fits = [k for k, angle in enumerate(turned) if abs(angle - wished) < SLACK_RAD]
-        if fits and frames[fits[-1]].picture is not None:
-            found.append(frames[fits[-1]])
+        fits = [
+            k for k, angle in enumerate(turned) if abs(angle - wished) < SLACK_RAD and frames[k].picture is not None
+        ]
+        found += [frames[k] for k in fits[-1:]]
     return found
 
 
@@ -205,6 +209,4 @@ def _denied(surface: SurfaceMap, swept: SweptDepth, camera: CalibratedCamera) ->
     seen = np.where(within, swept.depth_m[at], np.nan)
     slack = BEHIND * np.nan_to_num(swept.std_m[at]) + CELL_M
     denials = surface.denials + (seen - z > slack)
-    kept = denials < np.maximum(surface.views, 1) + 1
-    rows = np.flatnonzero(kept)[-MOST_CELLS:]
-    return replace(surface, denials=denials).chosen(rows)
+    return replace(surface, denials=denials).chosen(denials < surface.views)

@@ -29,8 +29,10 @@ from wakewise.perception.common_shift import common_shift
 from wakewise.perception.designation import Designation, assumed_ball, choose_body, same_ball
 from wakewise.perception.feature_tracks import NO_TRACKS, FeatureTracks, Grey, replenish, shows_nothing, track
 from wakewise.perception.map_initialization import (
+    LEAST_STD,
+    LOCAL_KEYFRAMES,
+    LOCAL_ROUNDS,
     NEW_KEYFRAMES,
-    NEW_STD,
     adjusted_map,
     adjusted_whole,
     moved_since,
@@ -135,8 +137,6 @@ class TrackerState:
     proposed_s: float = math.inf
     accepted: bool = False
     keyframes: tuple[Keyframe, ...] = ()
-    adjustment: BundleAdjustment | None = None
-    """Under way: a round in each picture."""
     adjusted_s: float = -math.inf
     """Time of the last keyframe that was adjusted."""
     initialized: bool = False
@@ -189,12 +189,20 @@ class TargetTracker:
         return replace(state, accepted=True)
 
     def step(
-        self, state: TrackerState, picture: Grey, time_s: float, guess: Pose, std: tuple[float, float]
+        self,
+        state: TrackerState,
+        picture: Grey,
+        time_s: float,
+        guess: Pose,
+        std: tuple[float, float],
+        prior: Pose | None = None,
     ) -> tuple[TrackerState, Resection | None]:
         """Take in one picture.
 
         - `picture`, shape (h, w): of the camera's size.
-        - `guess`: camera pose X_WC as the estimator has it; `std`: its standard deviations per axis, m and rad.
+        - `guess`: camera pose X_WC as the estimator has it.
+        - `prior`: the same by other sensors than the camera, `guess` if not given: it holds the map's frame and scale.
+          `std`: its standard deviations per axis, m and rad.
 
         Returns the next state, and the camera's pose by the map; None where the map does not give one.
         """
@@ -245,7 +253,7 @@ class TargetTracker:
             last_s=time_s,
             trouble="" if len(tracks) >= LEAST_MAPPED // 2 else "few features",
         )
-        state = self._adjusted(self._kept(state, X_WC, time_s, (std_m, std_rad)))
+        state = self._adjusted(self._kept(state, X_WC, time_s, prior or guess, std))
         if found is not None:
             state = _swept(state, time_s)
         state = self._followed(state, X_WC, time_s)
@@ -313,14 +321,16 @@ class TargetTracker:
         near = np.linalg.norm(jump) < MOST_JUMP_M and np.linalg.norm(turn) < MOST_JUMP_RAD
         return found if near else None
 
-    def _kept(self, state: TrackerState, X_WC: Pose, time_s: float, std: tuple[float, float]) -> TrackerState:
+    def _kept(
+        self, state: TrackerState, X_WC: Pose, time_s: float, prior: Pose, std: tuple[float, float]
+    ) -> TrackerState:
         """The state with another keyframe, where the camera has moved."""
         tracks = state.tracks
-        std = NEW_STD if state.initialized else std
         seen = Keyframe(
             time_s=time_s,
             X_WC=X_WC,
-            std=std,
+            prior=prior,
+            std=(max(AMPLE * std[0], LEAST_STD[0]), max(AMPLE * std[1], LEAST_STD[1])),
             ids=tracks.ids,
             pixels=tracks.at_middle(state.camera),
             picture=tracks.picture,
@@ -330,7 +340,6 @@ class TargetTracker:
 
     def _adjusted(self, state: TrackerState) -> TrackerState:
         """The state with the map initialised at once, or with one round more of a later adjustment."""
-        adjustment = state.adjustment
         if not state.initialized:
             if not well_crossed(state.points, state.tracks.ids, LEAST_MAPPED):
                 return state
@@ -338,17 +347,16 @@ class TargetTracker:
             if begun is None:
                 return state
             return replace(_applied(state, adjusted_whole(begun), empty_map()), initialized=True)
+        fresh = sum(frame.time_s > state.adjusted_s for frame in state.keyframes)
+        if fresh < NEW_KEYFRAMES:
+            return state
+        recent = state.keyframes[-LOCAL_KEYFRAMES:]
+        adjustment = begin_adjustment(recent, *state.points.known_places(), self.camera, state.lens)
         if adjustment is None:
-            fresh = sum(frame.time_s > state.adjusted_s for frame in state.keyframes)
-            if fresh < NEW_KEYFRAMES:
-                return state
-            adjustment = begin_adjustment(state.keyframes, *state.points.known_places(), self.camera, state.lens)
-            if adjustment is None:
-                return state
-        adjustment = after_round(adjustment)
-        if adjustment.done:
-            return _applied(state, adjustment, state.points)
-        return replace(state, adjustment=adjustment)
+            return state
+        for _ in range(LOCAL_ROUNDS):
+            adjustment = after_round(adjustment)
+        return _applied(state, adjustment, state.points)
 
     def _turned(self, state: TrackerState, tracks: FeatureTracks, X_WC: Pose) -> Array:
         """Angle between the first and the present ray of each feature, shape (n,)."""
@@ -475,7 +483,8 @@ class TargetTracker:
             accepted=accepted,
             seen_s=time_s if state.seen_s == -math.inf else state.seen_s,
         )
-        return self._protected(state, time_s)
+        own = np.asarray(KDTree(kept).query(surface.points_W_m, distance_upper_bound=VOXEL_M)[0]) < np.inf
+        return self._protected(state, time_s, surface.chosen(own))
 
     def _assumed(self, state: TrackerState, X_WC: Pose, time_s: float) -> TrackerState:
         """The state with a ball at the stated distance, or where the ray meets the bed, as target."""
@@ -503,8 +512,8 @@ class TargetTracker:
         state = replace(state, shape=shape, accepted=True, seen_s=time_s)
         return self._protected(state, time_s)
 
-    def _protected(self, state: TrackerState, time_s: float) -> TrackerState:
-        """The state with the region of its shape."""
+    def _protected(self, state: TrackerState, time_s: float, surface: SurfaceMap | None = None) -> TrackerState:
+        """The state with the region of its shape; `surface`: what is mapped of it."""
         assert state.shape is not None
         region = protected_region(state.shape.surface_W_m, state.bed, self.settings.points)
         target = TargetEstimate(
@@ -517,6 +526,8 @@ class TargetTracker:
             weights=region.weights,
             distance_m=region.distance_m,
             version=state.versions,
+            surface_W_m=None if surface is None else surface.points_W_m,
+            towards_W=None if surface is None else surface.towards_W,
         )
         return self._reported(replace(state, target=target, versions=state.versions + 1), time_s)
 
@@ -575,7 +586,6 @@ def _applied(state: TrackerState, adjustment: BundleAdjustment, before: PointMap
         lens=adjustment.lens,
         points=adjusted_map(adjustment, before),
         keyframes=moved_since(state.keyframes, adjustment),
-        adjustment=None,
         adjusted_s=adjustment.frames[-1].time_s,
     )
 

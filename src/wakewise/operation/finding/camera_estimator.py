@@ -45,16 +45,29 @@ OUTLINE_BGR = (0, 200, 255)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class RecentEstimate:
+    """Pose of the vehicle, the same without the map, and angle of the camera's joint at a time."""
+
+    time_s: float
+    X_WB: Pose
+    without_map: Pose
+    tilt_rad: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class CameraEstimatorState:
     """State of the filter and of the tracker.
 
-    `recent` holds (time, X_WB, tilt) of the last estimates; `posed_s` is the time of the last pose by the map.
+    `other` is the filter's state without any pose by the map: it holds the map's frame where the other sensors have it.
+    `recent` holds the last estimates; `posed_s` is the time of the last pose by the map, and `std` are the standard
+    deviations of the filter without the map, m and rad.
     """
 
     filter: FilterState
+    other: FilterState
     tracker: TrackerState
     time_s: float
-    recent: tuple[tuple[float, Pose, float], ...] = ()
+    recent: tuple[RecentEstimate, ...] = ()
     tilt_rad: float = 0.0
     std: tuple[float, float] = (0.02, 0.03)
     posed_s: float = -math.inf
@@ -110,9 +123,9 @@ class CameraEstimator:
     def init(self, start: BodyState) -> CameraEstimatorState:
         """State at the start."""
         self.seen.clear()
-        return CameraEstimatorState(
-            filter=self.inner.init(start), tracker=self.tracker.init(), time_s=0.0, recent=((0.0, start.X_WB, 0.0),)
-        )
+        begun = self.inner.init(start)
+        first = RecentEstimate(time_s=0.0, X_WB=start.X_WB, without_map=start.X_WB, tilt_rad=0.0)
+        return CameraEstimatorState(filter=begun, other=begun, tracker=self.tracker.init(), time_s=0.0, recent=(first,))
 
     def step(
         self, state: CameraEstimatorState, dt_s: float, measurements: tuple[Measurement, ...], thrusts_N: Array
@@ -129,15 +142,19 @@ class CameraEstimator:
             state, pose = self._seen(state, measured, now_s)
             if pose is not None:
                 taken.append(pose)
+        blind = tuple(m for m in taken if m.pose_std is None)
+        other, without_map = self.inner.step(state.other, dt_s, blind, thrusts_N)
         if now_s - state.posed_s < self._unseen_s():
             taken = [m if m.pose_std is not None else without_pose(m) for m in taken]
         filtered, estimate = self.inner.step(state.filter, dt_s, tuple(taken), thrusts_N)
-        spread = estimate.covariance
+        spread = without_map.covariance
+        now = RecentEstimate(time_s=now_s, X_WB=estimate.X_WB, without_map=without_map.X_WB, tilt_rad=state.tilt_rad)
         state = replace(
             state,
             filter=filtered,
+            other=other,
             time_s=now_s,
-            recent=(*(r for r in state.recent if now_s - r[0] <= REMEMBERED_S), (now_s, estimate.X_WB, state.tilt_rad)),
+            recent=(*(r for r in state.recent if now_s - r.time_s <= REMEMBERED_S), now),
             std=state.std if spread is None else (_per_axis(spread[:3, :3]), _per_axis(spread[3:6, 3:6])),
         )
         return state, replace(estimate, target=state.tracker.target)
@@ -162,12 +179,15 @@ class CameraEstimator:
     ) -> tuple[CameraEstimatorState, Measurement | None]:
         """Take in a picture; the pose of the vehicle that it gives."""
         began = time.thread_time()
-        _, X_WB, tilt_rad = min(state.recent, key=lambda r: abs(r[0] - measured.time_s))
-        X_BM = self.vehicle.X_BC_at(tilt_rad) @ Pose(np.array([0.0, 0.0, self.ahead_m]))
+        at = min(state.recent, key=lambda r: abs(r.time_s - measured.time_s))
+        X_WB = at.X_WB
+        X_BM = self.vehicle.X_BC_at(at.tilt_rad) @ Pose(np.array([0.0, 0.0, self.ahead_m]))
         assert measured.image is not None
         state = self._detected(state, measured.image)
         picture = fitted(grey_picture(measured.image), self.tracker.camera)
-        tracker, found = self.tracker.step(state.tracker, picture, measured.time_s, X_WB @ X_BM, state.std)
+        tracker, found = self.tracker.step(
+            state.tracker, picture, measured.time_s, X_WB @ X_BM, state.std, at.without_map @ X_BM
+        )
         self.seen.picture_s.append(time.thread_time() - began)
         self.seen.age_s.append(now_s - measured.time_s)
         self.seen.target = tracker.target

@@ -1,4 +1,4 @@
-"""Mission `find`: look at what is in view from two sides, detect the target, approach it, scan it.
+"""Mission `find`: look at what is in view from two sides, detect the target, approach it, scan it, see what was missed.
 
 The pilot knows where the vehicle starts, and a distance at which something is assumed to be. All its legs are arcs
 about the centre that the camera has found so far, which moves slowly enough for the vehicle to follow.
@@ -15,6 +15,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Goal, TargetEstimate
+from wakewise.operation.finding.missed_parts import PhotographedSurface, ViewChooser, route_through
 from wakewise.operation.scenario.find_settings import FindSettings
 from wakewise.scene.missions import CameraAim, Leg, MissionSettings, Route
 from wakewise.scene.missions.route import open_route, plan_route, rest_to_rest
@@ -24,20 +25,23 @@ FOLLOWS_M_S = 0.03
 LOWEST_RAD = math.radians(5.0)
 
 
+PhaseName = Literal["look", "approach", "hold", "scan", "missed parts", "done"]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Phase:
     """What is flown: legs about the centre, from a time on."""
 
-    name: Literal["look", "approach", "hold", "scan", "done"]
+    name: PhaseName
     route: Route
     since_s: float
 
 
 class FindPilot:
-    """A `Pilot` and `PhotoSchedule` that looks, detects, approaches and scans.
+    """A `Pilot` and `PhotoSchedule` that looks, detects, approaches, scans, and photographs what the scan has missed.
 
     - `start`: camera pose X_WC at the start; `assumed_m`: distance of what it looks at.
-    - `aim`: what aims the camera.
+    - `aim`: what aims the camera; `chooser`: chooses views of what was missed.
     """
 
     def __init__(
@@ -47,8 +51,9 @@ class FindPilot:
         aim: CameraAim,
         mission: MissionSettings,
         find: FindSettings,
+        chooser: ViewChooser | None = None,
     ) -> None:
-        self._aim, self._mission, self._find = aim, mission, find
+        self._aim, self._mission, self._find, self._chooser = aim, mission, find, chooser
         self._start, self._assumed_m = start, assumed_m
         self.begin()
 
@@ -59,6 +64,9 @@ class FindPilot:
         self._last_s = 0.0
         self._phase = _Phase(name="look", route=self._look(), since_s=0.0)
         self.found_s: float | None = None
+        self.photographed: PhotographedSurface | None = None
+        self._camera, self._taken_from, self._further = self._start, list[Pose](), 0
+        self._tilt = 0.0
 
     @property
     def phase(self) -> str:
@@ -71,38 +79,48 @@ class FindPilot:
 
     @property
     def planned(self) -> int:
-        """How many photographs the scan has."""
-        return sum(self._mission.views)
+        """How many photographs the scan has, and those of what it missed."""
+        return sum(self._mission.views) + self._further
 
     def most_s(self) -> float:
         """Longest time that the mission may take."""
         scan = plan_route(self.centre_W_m, self._mission)
-        return self._find.give_up_s + 2.0 * self._phase.route.duration_s + self._find.hold_s + scan.duration_s
+        mission = self._mission
+        view_s = math.pi * mission.standoff_m / mission.speed_m_s + mission.speed_m_s / mission.acceleration_m_s2
+        further_s = self._find.further_views * view_s
+        return (
+            self._find.give_up_s + 2.0 * self._phase.route.duration_s + self._find.hold_s + scan.duration_s + further_s
+        )
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
         """Reference of the present phase about the centre found so far."""
         target = estimate.target
         velocity = self._follow(time_s, target)
         self._advance(time_s, target)
+        self._camera = estimate.X_WB @ self._aim.mount(self._tilt)
         route = replace(self._phase.route, centre_W_m=self.centre_W_m)
         X_WB, nu_B, tilt = route.reference(time_s - self._phase.since_s, self._aim)
-        nu_B = nu_B.copy()
+        nu_B, self._tilt = nu_B.copy(), tilt
         nu_B[:3] += X_WB.R.T @ velocity
         return Goal(X_WB=X_WB, nu_B=nu_B, tilt_rad=tilt, max_tracking_deviation=self._mission.max_tracking_deviation)
 
     def leg_name(self, time_s: float) -> str:
         """What the vehicle is doing."""
-        if self._phase.name != "scan":
+        if self._phase.name not in ("scan", "missed parts"):
             return self._phase.name
         return self._phase.route.leg_name(time_s - self._phase.since_s)
 
     def shutter_s(self, number: int, time_s: float, dt_s: float) -> float | None:
         """When photograph `number` is taken, if in the step that begins at `time_s`; none before the scan."""
-        if self._phase.name != "scan":
+        if self._phase.name not in ("scan", "missed parts"):
             return None
         since_s = self._phase.since_s
-        opens_s = self._phase.route.shutter_s(number, time_s - since_s, dt_s)
-        return None if opens_s is None else opens_s + since_s
+        first = 0 if self._phase.name == "scan" else sum(self._mission.views)
+        opens_s = self._phase.route.shutter_s(number - first, time_s - since_s, dt_s)
+        if opens_s is None:
+            return None
+        self._taken_from.append(self._camera)
+        return opens_s + since_s
 
     def _look(self) -> Route:
         """Settle, then arcs to one side, to the other and back, about what is in view."""
@@ -142,8 +160,8 @@ class FindPilot:
             self._begin("done", open_route(self.centre_W_m, 1.0, "done", self._at(time_s)), time_s)
         elif into_s < phase.route.duration_s:
             return
-        elif phase.name == "scan":
-            self._begin("done", open_route(self.centre_W_m, 1.0, "done", self._at(time_s)), time_s)
+        elif phase.name in ("scan", "missed parts"):
+            self._after_photographs(time_s, target)
         elif phase.name == "look" and target is not None and target.status != "assumed":
             self._begin("approach", self._approach(), time_s)
         elif not known:  # what is proposed is looked at from near, what is not from here again
@@ -154,7 +172,21 @@ class FindPilot:
         else:
             self._begin("scan", self._scan(time_s), time_s)
 
-    def _begin(self, name: Literal["look", "approach", "hold", "scan", "done"], route: Route, time_s: float) -> None:
+    def _after_photographs(self, time_s: float, target: TargetEstimate | None) -> None:
+        """Photograph what the scan has missed, once, or end."""
+        here = self._at(time_s)
+        if target is not None and self._chooser is not None:
+            self.photographed = self._chooser.photographed(target, self._taken_from)
+        if self.photographed is not None and self._chooser is not None and self._phase.name == "scan":
+            places = self._chooser.further(self.photographed, self._camera, self._find.further_views)
+            if places:
+                self._further = len(places)
+                route = route_through(places, here, self.centre_W_m, self._mission)
+                self._begin("missed parts", route, time_s)
+                return
+        self._begin("done", open_route(self.centre_W_m, 1.0, "done", here), time_s)
+
+    def _begin(self, name: PhaseName, route: Route, time_s: float) -> None:
         self._phase = _Phase(name=name, route=route, since_s=time_s)
 
     def _at(self, time_s: float) -> Array:

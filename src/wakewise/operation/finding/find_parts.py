@@ -18,6 +18,7 @@ from wakewise.core.interfaces import BodyState
 from wakewise.operation.finding.camera_estimator import CameraEstimator
 from wakewise.operation.finding.camera_frames import CameraWorld
 from wakewise.operation.finding.find_mission import FindPilot, on_sphere
+from wakewise.operation.finding.missed_parts import ViewChooser
 from wakewise.operation.finding.region_controller import RegionController, region_controller
 from wakewise.operation.parts import Parts
 from wakewise.operation.worlds.makers import make_world
@@ -63,7 +64,14 @@ def find_pilot(parts: Parts) -> FindPilot:
     """`find`: looks, detects, approaches and scans."""
     scenario = parts.scenario
     ahead_m = scenario.perception.assumed_distance_m
-    return FindPilot(start_camera(parts), ahead_m, parts.aim, scenario.mission, scenario.find)
+    chooser = ViewChooser(
+        lens=parts.camera,
+        aim=parts.aim,
+        size_m=parts.vehicle.size_m,
+        bounds=parts.bounds,
+        mission=scenario.mission,
+    )
+    return FindPilot(start_camera(parts), ahead_m, parts.aim, scenario.mission, scenario.find, chooser)
 
 
 def find_controller(parts: Parts) -> RegionController:
@@ -92,6 +100,8 @@ def write_found(parts: Parts, folder: Path) -> None:
             "centre_error_m": float(np.linalg.norm(target.centre_W_m - parts.target.centre_W_m)),
             "status": target.status,
         }
+    if pilot.photographed is not None:
+        told["photographed"] = pilot.photographed.as_dict()
     (folder / FOUND_PICTURE).unlink(missing_ok=True)
     if seen.picture is not None:
         with whole_file(folder / FOUND_PICTURE) as path:

@@ -136,14 +136,14 @@ def patches_of(
     return SurfacePatches(
         points_W_m=points,
         normals=normals,
-        patch=_clustered(points, normals, count, rng),
+        patch=clustered(points, normals, count, rng),
         area_m2=0.5 * float(total[-1]),
         shield_W_m=shield,
         shield_off_m=off_m,
     )
 
 
-def _clustered(points: Array, normals: Array, count: int, rng: np.random.Generator) -> IntArray:
+def clustered(points: Array, normals: Array, count: int, rng: np.random.Generator) -> IntArray:
     """Patch of each sample, shape (n,): neighbours in place and facing, by Lloyd's iteration from a random few."""
     reach = 0.5 * float(np.linalg.norm(np.ptp(points, axis=0)))
     places = np.concatenate([points, NORMAL_SHARE * max(reach, 1e-12) * normals], axis=1)

@@ -1,0 +1,119 @@
+"""What photographs of a found target have missed, and from where to take more, by the surface mapped in flight."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import TargetEstimate
+from wakewise.perception.surface_map import CELL_M
+from wakewise.scene.missions import (
+    CameraAim,
+    Coverage,
+    CoverageGaps,
+    MissionSettings,
+    Route,
+    TankBounds,
+    find_coverage_gaps,
+    reachable_views,
+)
+from wakewise.scene.missions.point_surface import LEAST_POINTS, patches_of_points
+from wakewise.scene.missions.route import rest_to_rest
+from wakewise.scene.missions.visibility import CameraIntrinsics
+
+LAST_S = 0.5
+"""The last shutter closes before the recording ends."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PhotographedSurface:
+    """Coverage of the mapped surface by the photographs so far, and its gaps."""
+
+    coverage: Coverage
+    gaps: CoverageGaps
+
+    def as_dict(self) -> dict[str, float]:
+        """Shares in percent, as found.json has them."""
+        return {
+            "seen_well_pct": 100.0 * self.coverage.share,
+            "unseen_pct": 100.0 * self.gaps.unseen,
+            "poorly_pct": 100.0 * self.gaps.poorly,
+            "seldom_pct": 100.0 * self.gaps.seldom,
+            "photographs": float(self.coverage.photos),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewChooser:
+    """Chooses further views; what it knows of the vehicle and of the water, nothing of the true target.
+
+    `lens`: the camera as the crew knows it; `aim`, `size_m`, shape (3,), `bounds` and `mission`: as of
+    `reachable_views`.
+    """
+
+    lens: CameraIntrinsics
+    aim: CameraAim
+    size_m: Array
+    bounds: TankBounds
+    mission: MissionSettings
+
+    def photographed(self, target: TargetEstimate, taken_from: Sequence[Pose]) -> PhotographedSurface | None:
+        """Coverage by photographs from camera poses X_WC; None if too little of the target is mapped."""
+        surface, towards = target.surface_W_m, target.towards_W
+        if surface is None or towards is None or len(surface) < LEAST_POINTS:
+            return None
+        patches = patches_of_points(surface, towards, CELL_M)
+        views = reachable_views(
+            patches,
+            self.lens,
+            centre_W_m=target.centre_W_m,
+            ranges_m=(self.mission.standoff_m,),
+            aim=self.aim,
+            size_m=self.size_m,
+            bounds=self.bounds,
+            target_W_m=surface,
+            clearance_m=self.mission.clearance_m,
+        )
+        coverage = Coverage.begin(patches, views)
+        for X_WC in taken_from:
+            coverage = coverage.seen(X_WC, self.lens)
+        return PhotographedSurface(coverage=coverage, gaps=find_coverage_gaps(coverage, taken_from, self.lens))
+
+    def further(self, surface: PhotographedSurface, X_WC: Pose, most: int) -> list[Array]:
+        """Azimuth, elevation and range of further views, shape (3,) each, in the order in which they are flown to."""
+        coverage, places = surface.coverage, list[Array]()
+        while len(places) < most and (best := coverage.best_view(X_WC)) is not None:
+            places.append(coverage.views.places[best])
+            X_WC = coverage.views.pose(best)
+            coverage = coverage.seen(X_WC, self.lens)
+        return places
+
+
+def route_through(places: Sequence[Array], here: Array, centre_W_m: Array, mission: MissionSettings) -> Route:
+    """Legs from a place to views one after another, on spheres, with a photograph at the end of each.
+
+    `here` and `places`: azimuth, elevation and range, shape (3,).
+    """
+    legs, starts, opens, clock_s = [], [], [], 0.0
+    for number, place in enumerate(places):
+        end = place.copy()
+        end[0] = here[0] + np.remainder(end[0] - here[0] + np.pi, 2.0 * np.pi) - np.pi
+        leg = rest_to_rest(f"view {number + 1}", here, end, mission.speed_m_s, mission.acceleration_m_s2)
+        legs.append(leg)
+        starts.append(clock_s)
+        clock_s += leg.duration_s
+        opens.append(clock_s)
+        here = end
+    return Route(
+        centre_W_m=centre_W_m,
+        legs=tuple(legs),
+        starts_s=np.array(starts),
+        exposures_s=np.array(opens),
+        exposure_names=(),
+        X_WC_planned=(),
+        duration_s=clock_s + LAST_S,
+    )

@@ -1,0 +1,70 @@
+"""Patches of a surface that is known by points: normals from neighbours, and a small triangle about each that hides."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.scene.missions.visibility import CLEARANCE_M, SEED, SurfacePatches, clustered
+
+NEIGHBOURS = 12
+LEAST_POINTS = 30
+CORNERS = 3
+SAMPLES = 10
+
+
+def normals_of(points_W_m: Array, towards_W: Array) -> Array:
+    """Unit normals, shape (n, 3): of the plane through each point's neighbours, towards where it was seen from.
+
+    `towards_W`, shape (n, 3): directions to the cameras. Least squares by the covariance of the neighbours (H. Hoppe et
+    al. 1992, doi 10.1145/133994.134011).
+    """
+    near = np.asarray(KDTree(points_W_m).query(points_W_m, k=min(NEIGHBOURS, len(points_W_m)))[1])
+    spread = points_W_m[near] - points_W_m[near].mean(axis=1, keepdims=True)
+    normals = np.linalg.eigh(np.einsum("nki,nkj->nij", spread, spread))[1][:, :, 0]
+    away = np.einsum("ni,ni->n", normals, towards_W) < 0.0
+    return np.where(away[:, None], -normals, normals)
+
+
+def patches_of_points(
+    points_W_m: Array, towards_W: Array, spacing_m: float, bed_z_m: float | None = None
+) -> SurfacePatches:
+    """Patches of a surface that is known by points, about so far from each other.
+
+    - `points_W_m`, `towards_W`, shapes (n, 3): the points, and directions to where they were seen from.
+    - `bed_z_m`: as of `patches_of`; what stands less above the bed does not count, but hides.
+
+    Raises InputError if too few points count.
+    """
+    counts = np.ones(len(points_W_m), np.bool_) if bed_z_m is None else points_W_m[:, 2] < bed_z_m - CLEARANCE_M
+    if int(counts.sum()) < LEAST_POINTS:
+        raise InputError(
+            f"coverage: {int(counts.sum())} points of the target are known, at least {LEAST_POINTS} needed"
+        )
+    normals = normals_of(points_W_m, towards_W)
+    own, facing = points_W_m[counts], normals[counts]
+    count = max(1, len(own) // SAMPLES)
+    return SurfacePatches(
+        points_W_m=own,
+        normals=facing,
+        patch=clustered(own, facing, count, np.random.default_rng(SEED)),
+        area_m2=len(own) * spacing_m**2,
+        shield_W_m=_triangles(points_W_m, normals, spacing_m),
+        shield_off_m=spacing_m,
+    )
+
+
+def _triangles(points_W_m: Array, normals: Array, spacing_m: float) -> Array:
+    """A triangle about each point, square to its normal, of the area that the point stands for; shape (n, 3, 3)."""
+    aside = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    one = np.cross(normals, aside)
+    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    other = np.cross(normals, one)
+    radius = spacing_m * math.sqrt(4.0 / (3.0 * math.sqrt(3.0)))
+    angles = 2.0 * math.pi * np.arange(CORNERS) / CORNERS
+    ring = np.cos(angles)[None, :, None] * one[:, None] + np.sin(angles)[None, :, None] * other[:, None]
+    return np.asarray(points_W_m[:, None] + radius * ring)
