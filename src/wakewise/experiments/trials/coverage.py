@@ -20,13 +20,17 @@ from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.operation import Parts, read_scenario
+from wakewise.operation.finding import MISSED_RGB, SEEN_RGB, SURFACE_FILE
 from wakewise.scene.missions import Coverage, patches_of
 from wakewise.scene.missions.coverage import HALF
-from wakewise.scene.missions.visibility import NORMAL_SHARE, REACH_M, CameraIntrinsics
+from wakewise.scene.missions.point_surface import SAMPLES
+from wakewise.scene.missions.visibility import NORMAL_SHARE, REACH_M, SEED, CameraIntrinsics, clustered
 from wakewise.scene.targets import Target
-from wakewise.vision.evaluation import Crop, compare_surface, sample_surface
+from wakewise.vision.evaluation import Crop, compare_surface, sample_surface, umeyama
 from wakewise.vision.reconstruction import read_cloud
 
+MAPPED_M = 0.01
+"""Mapped points farther off the true surface say nothing of it."""
 FROM_MODEL = ("coverage_agreement_pct", "coverage_trivial_pct")
 """Figures of the guide that need a model to be held against."""
 Shot = tuple[Pose, float | None]
@@ -122,6 +126,33 @@ def coverage_figures(parts: Parts, photos: pl.DataFrame, cloud_W_m: Array | None
         return figures
     both = agreement_with(coverage, parts, cloud_W_m)
     return figures | dict(zip(FROM_MODEL, (both.agreement_pct, both.trivial_pct), strict=True))
+
+
+def mapped_figures(parts: Parts, folder: Path, photos: pl.DataFrame, cloud_W_m: Array | None) -> dict[str, float]:
+    """The same figures where the guide had no mesh but the surface that was mapped in flight.
+
+    Mapped points are brought to the truth's frame by the camera's estimated and true places at the photographs.
+    """
+    mapped = read_cloud(folder / SURFACE_FILE)
+    well = mapped.colours[:, 1] < np.mean((SEEN_RGB[1], MISSED_RGB[1]))
+    figures = {"coverage_predicted_pct": 100.0 * float(well.mean())}
+    if cloud_W_m is None:
+        return figures
+    believed = photos.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
+    true = photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy()
+    places = umeyama(believed, true, with_scale=False).apply(mapped.points_m)
+    truth = sample_surface(parts.target.mesh, Crop(bed_z_m=parts.target.bed_z_m), np.random.default_rng(0))
+    away, nearest = KDTree(truth.points_m).query(places)
+    there = (np.asarray(KDTree(cloud_W_m).query(truth.points_m)[0]) < REACH_M)[nearest]
+    patch = clustered(places, mapped.normals, max(1, len(places) // SAMPLES), np.random.default_rng(SEED))
+    judged = np.asarray(away) < MAPPED_M
+    count = int(patch.max()) + 1
+    held = np.bincount(patch[judged], minlength=count)
+    known = held > 0
+    complete = np.bincount(patch[judged], there[judged], count)[known] > HALF * held[known]
+    said = np.bincount(patch[judged], well[judged], count)[known] > HALF * held[known]
+    agreement, share = float(np.mean(complete == said)), float(np.mean(complete))
+    return figures | dict(zip(FROM_MODEL, (100.0 * agreement, 100.0 * max(share, 1.0 - share)), strict=True))
 
 
 def measure_coverage(folder: Path) -> dict[str, Any]:

@@ -25,11 +25,12 @@ from wakewise.core.geometry import matrix_from_quat
 from wakewise.core.jit.precompile import compile_kernels, is_warm
 from wakewise.core.optional_dependencies import need
 from wakewise.core.run_lock import exclusive_run
-from wakewise.experiments.trials.coverage import FROM_MODEL, coverage_figures
+from wakewise.experiments.trials.coverage import FROM_MODEL, coverage_figures, mapped_figures
 from wakewise.experiments.trials.metrics import Figures, MetricsCollector, add_reference_values, comparison
 from wakewise.experiments.trials.stages import ProgressListener, SilentProgress, StageCosts, of_the_computer
 from wakewise.experiments.trials.surface import SurfaceMaker
 from wakewise.operation import BackgroundRenderer, Parts, Scenario, fly_trial, photograph_flight, read_exposures
+from wakewise.operation.finding import SURFACE_FILE
 from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS, parts_of
 from wakewise.operation.teleop.live import collect_flight
@@ -313,7 +314,7 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
                 crop=Crop(bed_z_m=parts.target.bed_z_m),
                 camera_centres_W_m=photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(),
             )
-            gathering.add(coverage_figures(parts, photos, compared.points_W_m))
+            gathering.add(_coverage_figures(parts, folder, photos, compared.points_W_m))
             gathering.add({key: getattr(compared.score, key) for key in (*_SURFACE_FIGURES, "success")})
             gathering.add({"rmse_mean_shape_mm": _rmse_mean_shape_mm(parts, folder, cloud)})
             gathering.add(_size(parts, folder, photos, cloud, distance))
@@ -324,9 +325,16 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     elif failure is not None:
         gathering.missing(("rmse_mean_shape_mm",), f"no model: {failure}")
     if failure is not None:
-        gathering.add({"success": False} | coverage_figures(parts, photos, None))
+        gathering.add({"success": False} | _coverage_figures(parts, folder, photos, None))
         gathering.missing((*_SURFACE_FIGURES, *FROM_MODEL, *_MODEL_FIGURES, *SIZE_FIGURES), f"no model: {failure}")
     return {"figures": gathering.figures, "reasons": gathering.reasons}
+
+
+def _coverage_figures(parts: Parts, folder: Path, photos: pl.DataFrame, cloud_W_m: Array | None) -> dict[str, float]:
+    """Figures of the guide by the surface that it had: the mapped one, or that of the surveyed target."""
+    if (folder / SURFACE_FILE).is_file():
+        return mapped_figures(parts, folder, photos, cloud_W_m)
+    return coverage_figures(parts, photos, cloud_W_m)
 
 
 def _rmse_mean_shape_mm(parts: Parts, folder: Path, cloud: Array) -> float | None:

@@ -10,7 +10,6 @@ import math
 import time
 from dataclasses import dataclass, field, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +20,7 @@ from wakewise.estimation import ErrorStateFilter
 from wakewise.estimation.eskf import FilterState
 from wakewise.estimation.settings import Priors
 from wakewise.operation.finding.camera_frames import without_pose
+from wakewise.operation.finding.found_film import FilmFrames, with_region
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario.calibration_error import calibration_with_error
 from wakewise.perception import CalibratedCamera, PerceptionSettings, TargetTracker, TrackerState, grey_picture
@@ -41,7 +41,6 @@ target and pushes it. With poses at 62 Hz the filter finds its noise too small w
 it does not, lags, and in still water the hover went round a cycle of 6 mm and 4 s."""
 PATIENCE = 3
 """Poses by the map that are rejected in a row before the filter doubts itself: they come at 5 Hz, not at 62."""
-OUTLINE_BGR = (0, 200, 255)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,6 +80,7 @@ class SeenTarget:
     picture: Grey | None = None
     X_WC: Pose | None = None
     shown: TargetEstimate | None = None
+    film: FilmFrames = field(default_factory=FilmFrames)
     picture_s: list[float] = field(default_factory=list)
     age_s: list[float] = field(default_factory=list)
 
@@ -88,21 +88,12 @@ class SeenTarget:
         """Forget an earlier flight."""
         self.target = self.picture = self.X_WC = self.shown = None
         self.picture_s, self.age_s = [], []
+        self.film.clear()
 
     def drawn(self, camera: CalibratedCamera) -> NDArray[np.uint8]:
         """The picture with the protected surface and its middle drawn over it, BGR, shape (h, w, 3)."""
         assert self.picture is not None
-        image = np.repeat(self.picture[:, :, None], 3, axis=2)
-        if self.X_WC is None or self.shown is None:
-            return image
-        on_surface = self.shown.points_W_m[self.shown.distance_m <= 0.0]
-        for u, v in camera.pixels((on_surface - self.X_WC.p_m) @ self.X_WC.R):
-            if np.isfinite(u + v):
-                cv2.circle(image, (round(float(u)), round(float(v))), 3, OUTLINE_BGR, 1, cv2.LINE_AA)
-        u, v = camera.pixels((self.shown.centre_W_m - self.X_WC.p_m)[None] @ self.X_WC.R)[0]
-        if np.isfinite(u + v):
-            cv2.drawMarker(image, (round(float(u)), round(float(v))), OUTLINE_BGR, cv2.MARKER_CROSS, 24, 2, cv2.LINE_AA)
-        return image
+        return with_region(self.picture, camera, self.X_WC, self.shown)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -191,8 +182,9 @@ class CameraEstimator:
         self.seen.picture_s.append(time.thread_time() - began)
         self.seen.age_s.append(now_s - measured.time_s)
         self.seen.target = tracker.target
+        X_WC = X_WB @ X_BM if found is None else found.X_WC
+        self.seen.film.add(picture, tracker.camera, X_WC, tracker.target, measured.time_s)
         if self.seen.picture is None and tracker.target is not None and tracker.target.status == "tracked":
-            X_WC = X_WB @ X_BM if found is None else found.X_WC
             self.seen.picture, self.seen.X_WC, self.seen.shown = picture, X_WC, tracker.target
         state = replace(state, tracker=tracker)
         if found is None:

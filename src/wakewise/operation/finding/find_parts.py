@@ -15,6 +15,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file, write_json
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
+from wakewise.operation.finding import SURFACE_FILE
 from wakewise.operation.finding.camera_estimator import CameraEstimator
 from wakewise.operation.finding.camera_frames import CameraWorld
 from wakewise.operation.finding.find_mission import FindPilot, on_sphere
@@ -24,11 +25,12 @@ from wakewise.operation.parts import Parts
 from wakewise.operation.worlds.makers import make_world
 from wakewise.scene.missions import Route, open_route
 from wakewise.scene.missions.orbit import camera_pose
+from wakewise.vision.reconstruction import write_cloud
 
 START_RANGE_M, START_ELEVATION_DEG = (0.8, 1.1), (20.0, 35.0)
 OFF_AXIS_RAD = math.radians(12.0)
 """The vehicle starts at a range and elevation drawn evenly, and looks past the target by an angle of this deviation."""
-FOUND_FILE, FOUND_PICTURE = "found.json", "found.png"
+FOUND_FILE, FOUND_PICTURE, FOUND_FILM = "found.json", "found.png", "found.webp"
 
 
 def drawn_start(parts: Parts) -> Pose:
@@ -85,7 +87,7 @@ def find_world(parts: Parts) -> CameraWorld:
 
 
 def write_found(parts: Parts, folder: Path) -> None:
-    """Write found.json, what the flight found and when, and found.png, the target over the picture."""
+    """Write what a flight found: found.json, found.png, the target over the picture, its surface, and a film."""
     pilot, estimator = parts.pilot, parts.estimator
     if not isinstance(pilot, FindPilot) or not isinstance(estimator, CameraEstimator):
         return
@@ -100,12 +102,15 @@ def write_found(parts: Parts, folder: Path) -> None:
             "centre_error_m": float(np.linalg.norm(target.centre_W_m - parts.target.centre_W_m)),
             "status": target.status,
         }
+    (folder / SURFACE_FILE).unlink(missing_ok=True)
     if pilot.photographed is not None:
         told["photographed"] = pilot.photographed.as_dict()
+        write_cloud(folder / SURFACE_FILE, pilot.photographed.as_cloud())
     (folder / FOUND_PICTURE).unlink(missing_ok=True)
     if seen.picture is not None:
         with whole_file(folder / FOUND_PICTURE) as path:
             path.write_bytes(cv2.imencode(".png", seen.drawn(estimator.tracker.camera))[1].tobytes())
+    seen.film.write(folder / FOUND_FILM)
     write_json(folder / FOUND_FILE, told)
 
 
@@ -121,7 +126,8 @@ def read_found(folder: Path) -> dict[str, Any] | None:
         told = json.loads(path.read_text(encoding="utf-8"))
         centre = told["centre_W_m"]
         known = centre is None or (np.array(centre, dtype=np.float64).shape == (3,) and float(told["radius_m"]) > 0.0)
-    except (OSError, ValueError, KeyError, TypeError):
+        known &= all(np.isfinite(float(share)) for share in told.get("photographed", {}).values())
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         known = False
     if not known:
         raise InputError(f"{path}: must hold the found target's centre_W_m and radius_m; remove it to fly again")

@@ -10,6 +10,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import TargetEstimate
+from wakewise.operation.finding import MISSED_RGB, SEEN_RGB
 from wakewise.perception.surface_map import CELL_M
 from wakewise.scene.missions import (
     CameraAim,
@@ -21,9 +22,10 @@ from wakewise.scene.missions import (
     find_coverage_gaps,
     reachable_views,
 )
-from wakewise.scene.missions.point_surface import LEAST_POINTS, patches_of_points
+from wakewise.scene.missions.point_surface import LEAST_POINTS, MAPPED_CRITERIA, patches_of_points
 from wakewise.scene.missions.route import rest_to_rest
 from wakewise.scene.missions.visibility import CameraIntrinsics
+from wakewise.vision.reconstruction import OrientedPointCloud
 
 LAST_S = 0.5
 """The last shutter closes before the recording ends."""
@@ -35,6 +37,12 @@ class PhotographedSurface:
 
     coverage: Coverage
     gaps: CoverageGaps
+
+    def as_cloud(self) -> OrientedPointCloud:
+        """The mapped surface, coloured by whether it was seen well."""
+        patches = self.coverage.patches
+        colours = np.where(self.coverage.covered[:, None], SEEN_RGB, MISSED_RGB)
+        return OrientedPointCloud(points_m=patches.points_W_m, normals=patches.normals, colours=colours)
 
     def as_dict(self) -> dict[str, float]:
         """Shares in percent, as found.json has them."""
@@ -77,8 +85,9 @@ class ViewChooser:
             bounds=self.bounds,
             target_W_m=surface,
             clearance_m=self.mission.clearance_m,
+            need=MAPPED_CRITERIA,
         )
-        coverage = Coverage.begin(patches, views)
+        coverage = Coverage.begin(patches, views, MAPPED_CRITERIA)
         for X_WC in taken_from:
             coverage = coverage.seen(X_WC, self.lens)
         return PhotographedSurface(coverage=coverage, gaps=find_coverage_gaps(coverage, taken_from, self.lens))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +29,7 @@ MOST_FILM_BYTES = 2_400_000
 """A larger film stays beside the page, which shows it from there: a page is mailed around."""
 SHOWN = 3
 WIDTH = 560
+LEAST_MISSED_PCT = 0.5
 
 
 def film_html(trial: Trial) -> str:
@@ -52,14 +54,29 @@ def found_html(trial: Trial) -> str:
         return ""
     if told.get("found_s") is None or told.get("centre_W_m") is None:
         return str(template("trial.html").found("", "No target was found.", ""))
-    path = trial.folder / "found.png"
+    film, path = trial.folder / "found.webp", trial.folder / "found.png"
     source = data_uri(path.read_bytes(), "image/png") if path.is_file() else ""
+    if film.is_file() and film.stat().st_size <= MOST_FILM_BYTES:
+        source = data_uri(film.read_bytes(), "image/webp")
     error, std = told.get("centre_error_m"), told.get("centre_std_m")
     words = f"The target was found after {number(told['found_s'])} s."
     more = f"At the end its centre was known to {number(1e3 * std)} mm" if std is not None else ""
     if more and error is not None:
         more += f" by the vehicle's own reckoning, and was {number(1e3 * error)} mm from the true place"
-    return str(template("trial.html").found(source, words, f"{more}." if more else ""))
+    seen = told.get("photographed")
+    words_of_seen = "" if seen is None else f" {_photographed_words(seen)}"
+    return str(template("trial.html").found(source, words, f"{more}.{words_of_seen}" if more else words_of_seen))
+
+
+def _photographed_words(seen: Mapping[str, float]) -> str:
+    """How much of the mapped surface the photographs saw, and why not the rest."""
+    text = f"Photographs saw {number(seen['seen_well_pct'])} % of the mapped surface well"
+    left = [
+        f"{number(seen[key])} % {why}"
+        for key, why in (("unseen_pct", "in none"), ("poorly_pct", "at a slant"), ("seldom_pct", "in too few"))
+        if seen[key] >= LEAST_MISSED_PCT
+    ]
+    return f"{text}; of the rest {', '.join(left)}." if left else f"{text}."
 
 
 def colours_html(trial: Trial) -> str:
