@@ -9,8 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_matrix
 from wakewise.core.interfaces import Progress
+from wakewise.perception import CalibratedCamera
+from wakewise.perception.feature_tracks import fitted, grey_picture
+from wakewise.perception.plane_sweep import begin_sweep, compared, sweep_view, swept_depth
 from wakewise.vision.evaluation.depth_maps import compare_depths, read_depth_views
+from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import (
     CalibrationBoard,
     ReconstructionRequest,
@@ -81,6 +86,46 @@ def fountain_figures(folder: Path, progress: Progress) -> dict[str, float | None
         "focal_pct": 100.0 * abs(model.focal_px / FOUNTAIN_FOCAL_PX - 1.0),
         "cloud_mm": score.accuracy_median_mm,
         "complete_pct": score.completeness_50mm_pct,
+        **sweep_figures(folder),
+    }
+
+
+SWEPT, OTHERS, WINDOW = (3, 5, 7), (-2, -1, 1), (150, 80, 600, 450)
+"""Photographs of the fountain through which planes are swept, the others that are compared, and the part, px of 768."""
+
+
+def sweep_figures(folder: Path) -> dict[str, float]:
+    """Plane sweeps through surveyed photographs against the laser's depths, without what is nearer or farther."""
+    views = read_depth_views(folder / "gt_depth_z_m_768x512.npz", folder / "gt_dense_cameras")
+    paths = sorted((folder / "images_1536x1024").glob("*.jpg"))
+    shares, known = [], []
+    for reference in SWEPT:
+        own = views[reference]
+        height, width = own.depth_m.shape
+        camera = CalibratedCamera(
+            width=width, height=height, fx=own.K[0, 0], fy=own.K[1, 1], cx=own.K[0, 2], cy=own.K[1, 2]
+        )
+        chosen = []
+        for k in (reference, *(reference + step for step in OTHERS)):
+            picture = read_picture(paths[k])
+            if picture is None:
+                raise InputError(f"{paths[k]}: is no picture")
+            X_WC = Pose(views[k].p_WC_m, quat_from_matrix(views[k].R_WC))
+            chosen.append(sweep_view(fitted(grey_picture(picture), camera), X_WC, camera))
+        left, top, right, bottom = WINDOW
+        laser = own.depth_m[top:bottom, left:right]
+        there = laser > 0.0
+        near, far = np.percentile(laser[there], (0.5, 99.5))
+        sweep = begin_sweep(chosen[0], chosen[1:], WINDOW, 0.95 * float(near), 1.05 * float(far))
+        while not sweep.done:
+            sweep = compared(sweep, camera)
+        depth = swept_depth(sweep, camera).depth_m
+        found = there & np.isfinite(depth)
+        shares.append(np.abs(depth[found] / laser[found] - 1.0))
+        known.append(found.sum() / there.sum())
+    return {
+        "sweep_pct": 100.0 * float(np.median(np.concatenate(shares))),
+        "sweep_known_pct": 100.0 * float(np.mean(known)),
     }
 
 
@@ -121,6 +166,10 @@ PARTS = (
                   high=16.0, how="the scan agrees with the cameras to 8 to 16 mm"),
             Asked(key="complete_pct", what="fountain: share of the scan within 50 mm of the model", unit="%", low=50.0,
                   how="half of what any camera sees"),
+            Asked(key="sweep_pct", what="fountain: plane sweep in flight, median error of depth", unit="%", high=1.0,
+                  how="5 mm from half a metre: what is asked of a found target"),
+            Asked(key="sweep_known_pct", what="fountain: pixels to which the sweep gives a depth", unit="%", low=30.0,
+                  how="a third of the pixels maps a surface in cells of several"),
         ),
         compute=fountain_figures,
         slow="minutes",
