@@ -88,6 +88,10 @@ class TableTrials:
         return list(dict.fromkeys(known[0] for known in self._rows.get(method, {})))
 
 
+SIGNED = ("bias_far_pct", "r2_wake", "r2_core")
+"""Figures that may be below 0."""
+
+
 def table_rows(claims: Sequence[PublishedFigure], worlds: Mapping[str, TableTrials]) -> list[Row]:
     """Rows of a table whose trials are flights or scans, world by world; claims without a trial have none there."""
     rows: list[Row] = []
@@ -243,6 +247,8 @@ def _mean(claim: PublishedFigure, trials: TableTrials, target: str | None = None
         return {"ours": None, "low": None, "high": None, "n": 0, "failed": failed, "why": why}
     scaled = claim.scale * np.array(list(values.values()))
     mean, ends = mean_interval(scaled, [known[0] for known in values])
+    if ends is not None and claim.figure not in SIGNED:
+        ends = (max(ends[0], 0.0), ends[1])  # a speed or an error is no less than 0, and so its mean
     return _told(mean, ends, len(values), failed)
 
 
