@@ -248,7 +248,7 @@ def _mean(claim: PublishedFigure, trials: TableTrials, target: str | None = None
     scaled = claim.scale * np.array(list(values.values()))
     mean, ends = mean_interval(scaled, [known[0] for known in values])
     if ends is not None and claim.figure not in SIGNED:
-        ends = (max(ends[0], 0.0), ends[1])  # a speed or an error is no less than 0, and so its mean
+        ends = Interval(max(ends[0], 0.0), ends[1])  # a speed or an error is no less than 0, and so its mean
     return _told(mean, ends, len(values), failed)
 
 
