@@ -1,6 +1,7 @@
 """Finds, maps and tracks the target in the camera's pictures: one picture in, pose and protected region out.
 
     picture -> features tracked -> pose from mapped points -> rays added to the map
+            -> keyframes: map and lens adjusted, planes swept through the target for its surface
             -> bed and bodies on it (every `SHAPE_EVERY_S`) -> the target among them -> protected region
 
 The target is the body that the operator designated by a box, else the one nearest to the middle of the picture. Before
@@ -22,35 +23,28 @@ from scipy.spatial import KDTree
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.core.interfaces import TargetEstimate
-from wakewise.perception.bed_plane import BedPlane, fit_bed, near_bed
-from wakewise.perception.bundle_adjustment import LENS, BundleAdjustment, Keyframe, after_round, begin_adjustment
+from wakewise.perception.bed_plane import fit_bed, near_bed
+from wakewise.perception.bundle_adjustment import LENS, Keyframe, after_round, begin_adjustment
 from wakewise.perception.calibrated_camera import CalibratedCamera
 from wakewise.perception.common_shift import common_shift
 from wakewise.perception.designation import Designation, assumed_ball, choose_body, same_ball
-from wakewise.perception.feature_tracks import NO_TRACKS, FeatureTracks, Grey, replenish, shows_nothing, track
+from wakewise.perception.feature_tracks import FeatureTracks, Grey, replenish, shows_nothing, track
 from wakewise.perception.map_initialization import (
     LEAST_STD,
     LOCAL_KEYFRAMES,
     LOCAL_ROUNDS,
     NEW_KEYFRAMES,
-    adjusted_map,
     adjusted_whole,
-    moved_since,
     well_crossed,
     with_keyframe,
 )
-from wakewise.perception.plane_sweep import PlaneSweep, compared, swept_depth
-from wakewise.perception.point_map import PointMap, add_rays, dropped, empty_map, mapped_rows, ray_directions
+from wakewise.perception.point_map import add_rays, dropped, empty_map, mapped_rows, ray_directions
 from wakewise.perception.resection import Resection, resection
 from wakewise.perception.settings import PerceptionSettings
 from wakewise.perception.surface_map import (
     CELL_M,
-    SWEEP_RAD,
     SurfaceMap,
     empty_surface,
-    sweep_target,
-    turned_about,
-    with_sweep,
 )
 from wakewise.perception.target_shape import (
     VOXEL_M,
@@ -64,6 +58,7 @@ from wakewise.perception.target_shape import (
     shape_of,
     thinned,
 )
+from wakewise.perception.tracker_state import TrackerState, with_adjustment, with_sweep_step
 
 SHAPE_EVERY_S = 0.5
 """How often bed, bodies and region are computed anew."""
@@ -102,45 +97,6 @@ AMPLE = 2.0
 """Factor on the estimator's standard deviations: rays are judged by theirs (`point_map.MOST_MISS`)."""
 POSE_STD = (0.0005, 0.001)
 """Least noise of a measured pose, m and rad: calibration, and what the map's own errors leave."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class TrackerState:
-    """All that the tracker knows. `trouble` says what is wrong with the last picture, empty if nothing is."""
-
-    tracks: FeatureTracks = NO_TRACKS
-    camera: CalibratedCamera
-    """As adjusted so far, by `lens`, shape (7,): `bundle_adjustment.LENS_STD`."""
-    lens: Array
-    points: PointMap
-    bed: BedPlane | None = None
-    surface: SurfaceMap
-    sweep: PlaneSweep | None = None
-    """Under way: one more picture is compared in each picture."""
-    swept_from_W_m: Array | None = None
-    """Where the camera was in the last sweep."""
-    cameras_W_m: Array
-    designation: Designation | None = None
-    shape: TargetShape | None = None
-    members: IntArray
-    shift_W_m: Array
-    target: TargetEstimate | None = None
-    versions: int = 0
-    """Regions so far: a controller takes a region for new by its number, also after another designation."""
-    pictures: int = 0
-    first_s: float | None = None
-    last_s: float = -math.inf
-    tracked_s: float = -math.inf
-    """Time of the picture of `tracks`."""
-    shaped_s: float = -math.inf
-    seen_s: float = -math.inf
-    proposed_s: float = math.inf
-    accepted: bool = False
-    keyframes: tuple[Keyframe, ...] = ()
-    adjusted_s: float = -math.inf
-    """Time of the last keyframe that was adjusted."""
-    initialized: bool = False
-    trouble: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -255,7 +211,7 @@ class TargetTracker:
         )
         state = self._adjusted(self._kept(state, X_WC, time_s, prior or guess, std))
         if found is not None:
-            state = _swept(state, time_s)
+            state = with_sweep_step(state, time_s)
         state = self._followed(state, X_WC, time_s)
         if time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6:
             state = self._reshaped(state, X_WC, time_s)
@@ -339,14 +295,14 @@ class TargetTracker:
         return replace(state, keyframes=with_keyframe(state.keyframes, seen))
 
     def _adjusted(self, state: TrackerState) -> TrackerState:
-        """The state with the map initialised at once, or with one round more of a later adjustment."""
+        """The state with the map initialised, or adjusted over the last keyframes where there are enough new ones."""
         if not state.initialized:
             if not well_crossed(state.points, state.tracks.ids, LEAST_MAPPED):
                 return state
             begun = begin_adjustment(state.keyframes, *state.points.known_places(), self.camera, state.lens)
             if begun is None:
                 return state
-            return replace(_applied(state, adjusted_whole(begun), empty_map()), initialized=True)
+            return replace(with_adjustment(state, adjusted_whole(begun), empty_map()), initialized=True)
         fresh = sum(frame.time_s > state.adjusted_s for frame in state.keyframes)
         if fresh < NEW_KEYFRAMES:
             return state
@@ -356,7 +312,7 @@ class TargetTracker:
             return state
         for _ in range(LOCAL_ROUNDS):
             adjustment = after_round(adjustment)
-        return _applied(state, adjustment, state.points)
+        return with_adjustment(state, adjustment, state.points)
 
     def _turned(self, state: TrackerState, tracks: FeatureTracks, X_WC: Pose) -> Array:
         """Angle between the first and the present ray of each feature, shape (n,)."""
@@ -557,37 +513,6 @@ class TargetTracker:
                 version=state.versions,
             ),
         )
-
-
-def _swept(state: TrackerState, time_s: float) -> TrackerState:
-    """The state with one more picture compared of the sweep under way, or with a sweep begun at a new keyframe."""
-    sweep, shape = state.sweep, state.shape
-    if sweep is None:
-        last = state.keyframes[-1]
-        if shape is None or not shape.seen or last.time_s < time_s:
-            return state
-        before = state.swept_from_W_m
-        if before is not None and turned_about(shape.centre_W_m, before, last.X_WC.p_m) < SWEEP_RAD:
-            return state
-        begun = sweep_target(state.keyframes, shape.centre_W_m, shape.radius_m, state.camera)
-        return state if begun is None else replace(state, sweep=begun, swept_from_W_m=last.X_WC.p_m)
-    sweep = compared(sweep, state.camera)
-    if not sweep.done:
-        return replace(state, sweep=sweep)
-    surface = with_sweep(state.surface, swept_depth(sweep, state.camera), state.camera, state.bed)
-    return replace(state, surface=surface, sweep=None)
-
-
-def _applied(state: TrackerState, adjustment: BundleAdjustment, before: PointMap) -> TrackerState:
-    """The state with the adjusted lens, keyframes and points; `before` holds the points that are kept beside them."""
-    return replace(
-        state,
-        camera=adjustment.adjusted_camera(),
-        lens=adjustment.lens,
-        points=adjusted_map(adjustment, before),
-        keyframes=moved_since(state.keyframes, adjustment),
-        adjusted_s=adjustment.frames[-1].time_s,
-    )
 
 
 def _noted(cameras_W_m: Array, place_W_m: Array) -> Array:
