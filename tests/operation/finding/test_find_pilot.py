@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from wakewise.operation.finding.find_mission import FindPilot
 from wakewise.operation.finding.find_parts import FOUND_PICTURE, found_region, write_found
 from wakewise.operation.finding.region_controller import RegionController
 from wakewise.perception.detector import Detection
+from wakewise.scene.missions.orbit import camera_pose
 
 SCENARIO = Scenario.preset(
     "quick",
@@ -174,6 +177,190 @@ def test_the_mission_goes_from_look_to_scan_and_ends() -> None:
     assert seen == ["look", "approach", "hold", "scan", "done"]
     assert photographs == 8
     assert ranges == pytest.approx([parts.scenario.mission.standoff_m] * len(ranges), abs=0.03)
+
+
+ONE_ORBIT = {"mission.elevations_deg": (30.0,), "mission.views": (24,)}
+SIDE_RAD = math.radians(100.0)
+BALL_M = 0.1
+
+
+def mapped_at(centre_W_m: Array) -> TargetEstimate:
+    """An estimate of a target whose surface was mapped as a ball."""
+    n = round(4.0 * math.pi * BALL_M**2 / 0.005**2)
+    k = np.arange(n) + 0.5
+    down, turn = np.arccos(1.0 - 2.0 * k / n), math.pi * (1.0 + math.sqrt(5.0)) * k
+    out = np.stack([np.cos(turn) * np.sin(down), np.sin(turn) * np.sin(down), np.cos(down)], axis=1)
+    return replace(target_at(centre_W_m), surface_W_m=centre_W_m + BALL_M * out, towards_W=out)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flown:
+    """What a pilot did, and where the camera was at each photograph: azimuth, elevation and range."""
+
+    phases: dict[str, float]  # when each began
+    legs: list[str]
+    places: list[tuple[float, float, float]]
+    opens_s: list[float]
+
+
+def azimuth_of(X_WC: Pose, centre_W_m: Array) -> float:
+    return math.atan2(X_WC.p_m[1] - centre_W_m[1], X_WC.p_m[0] - centre_W_m[0])
+
+
+def flown(parts: Parts, target: TargetEstimate | None, pilot: FindPilot | None = None, dt_s: float = 0.1) -> Flown:
+    """A mission whose goals are followed, but that in its scan the camera stays within 100 degrees of its first place.
+
+    The pilot is that of the parts unless another is given.
+    """
+    pilot = pilot or pilot_of(parts)
+    centre = parts.target.centre_W_m
+    X_WB, first_rad, step = parts.start.X_WB, 0.0, 0
+    known = Flown(phases={}, legs=[], places=[], opens_s=[])
+    while not pilot.done():
+        time_s = step * dt_s
+        goal = pilot.goal(time_s, BodyState(X_WB=X_WB, target=target))
+        X_BC = parts.aim.mount(goal.tilt_rad)
+        X_WB, X_WC = goal.X_WB, goal.X_WB @ X_BC
+        azimuth = azimuth_of(X_WC, centre)
+        up = math.atan2(centre[2] - X_WC.p_m[2], math.hypot(*(X_WC.p_m - centre)[:2]))
+        range_m = float(np.linalg.norm(X_WC.p_m - centre))
+        if pilot.phase == "scan":
+            first_rad = first_rad if "scan" in known.phases else azimuth
+            turned = (azimuth - first_rad + 0.1) % (2.0 * math.pi) - 0.1
+            azimuth = first_rad + turned * SIDE_RAD / (2.0 * math.pi)
+            X_WB = camera_pose(centre, azimuth, up, range_m) @ X_BC.inverse()
+        known.phases.setdefault(pilot.phase, time_s)
+        if pilot.leg_name(time_s) not in known.legs:
+            known.legs.append(pilot.leg_name(time_s))
+        opens_s = pilot.shutter_s(len(known.places), time_s, dt_s)
+        if opens_s is not None:
+            known.places.append((azimuth, up, range_m))
+            known.opens_s.append(opens_s)
+        step += 1
+        assert step < 10_000
+    return known
+
+
+def pilot_of(parts: Parts) -> FindPilot:
+    """The pilot of a mission that finds."""
+    assert isinstance(parts.pilot, FindPilot)
+    return parts.pilot
+
+
+def told_by(pilot: FindPilot) -> dict[str, float] | None:
+    """What the pilot tells of its photographs."""
+    return None if pilot.photographed is None else pilot.photographed.as_dict()
+
+
+def test_what_a_scan_from_one_side_missed_is_photographed() -> None:
+    """After the scan the vehicle flies to views of the other side, photographs once at each, numbered on, and ends."""
+    parts = SCENARIO.replace(**ONE_ORBIT, **{"find.further_views": 5}).parts()
+    pilot = pilot_of(parts)
+    assert pilot.planned == 24
+    mission = flown(parts, mapped_at(parts.target.centre_W_m))
+    assert list(mission.phases) == ["look", "approach", "scan", "missed parts", "done"]
+    assert len(mission.places) == pilot.planned == 24 + 5
+    assert (np.diff(mission.opens_s) >= 0.0).all()
+    assert mission.opens_s[23] < mission.phases["missed parts"] < mission.opens_s[24]
+    assert mission.opens_s[-1] < mission.phases["done"]
+    scanned, further = mission.places[:24], mission.places[24:]
+    middle = 0.5 * (scanned[0][0] + scanned[-1][0])
+    assert abs(math.remainder(further[0][0] - middle, 2.0 * math.pi)) > math.radians(90.0)
+    assert [place[2] for place in further] == pytest.approx([parts.scenario.mission.standoff_m] * 5, abs=0.01)
+
+
+def test_the_legs_to_what_was_missed_have_names() -> None:
+    """On the way to a further view its number is told; the scan before it has the names of its orbits."""
+    parts = SCENARIO.replace(**ONE_ORBIT, **{"find.further_views": 5}).parts()
+    legs = flown(parts, mapped_at(parts.target.centre_W_m)).legs
+    assert legs[:4] == ["look", "approach", "orbit 30 deg", "view 1"]
+    assert legs[-1] == "done"
+    assert set(legs[3:-1]) <= {f"view {number}" for number in range(1, 6)}
+
+
+def test_coverage_is_told_after_the_scan_and_after_the_further_views() -> None:
+    """What is told in the end counts all photographs, and is more than what the scan alone has seen."""
+    told = []
+    for views in (0, 6):
+        parts = SCENARIO.replace(**ONE_ORBIT, **{"find.further_views": views}).parts()
+        pilot = pilot_of(parts)
+        flown(parts, mapped_at(parts.target.centre_W_m))
+        assert pilot.photographed is not None
+        told.append(pilot.photographed.as_dict())
+    assert [shares["photographs"] for shares in told] == [24.0, 30.0]
+    assert told[0]["seen_well_pct"] > 20.0
+    assert told[1]["seen_well_pct"] > told[0]["seen_well_pct"] + 5.0
+    assert told[1]["unseen_pct"] < told[0]["unseen_pct"]
+
+
+def test_with_no_further_views_the_mission_ends_after_the_scan() -> None:
+    """It only tells what was seen."""
+    parts = SCENARIO.replace(**ONE_ORBIT, **{"find.further_views": 0}).parts()
+    pilot = pilot_of(parts)
+    mission = flown(parts, mapped_at(parts.target.centre_W_m))
+    assert list(mission.phases) == ["look", "approach", "scan", "done"]
+    assert len(mission.places) == pilot.planned == 24
+    assert pilot.photographed is not None
+    assert pilot.photographed.coverage.photos == 24
+
+
+def test_without_a_mapped_surface_or_a_chooser_the_mission_ends_after_the_scan() -> None:
+    """What is not known is not told, and nothing is flown to for it."""
+    parts = SCENARIO.replace(**ONE_ORBIT).parts()
+    centre, scenario = parts.target.centre_W_m, parts.scenario
+    pilot = pilot_of(parts)
+    start = parts.start.X_WB @ parts.aim.mount(0.0)
+    alone = FindPilot(start, scenario.perception.assumed_distance_m, parts.aim, scenario.mission, scenario.find)
+    for one, target in ((pilot, target_at(centre)), (alone, mapped_at(centre))):
+        mission = flown(parts, target, one)
+        assert list(mission.phases) == ["look", "approach", "scan", "done"]
+        assert len(mission.places) == one.planned == 24
+        assert one.photographed is None
+
+
+def test_a_pilot_that_begins_anew_has_forgotten_all() -> None:
+    """After `begin` nothing is photographed or planned beyond the scan, and the same mission is flown again."""
+    parts = SCENARIO.replace(**ONE_ORBIT, **{"find.further_views": 3}).parts()
+    pilot, target = pilot_of(parts), mapped_at(parts.target.centre_W_m)
+    most_s = pilot.most_s()
+    first = flown(parts, target)
+    assert pilot.planned == 27
+    before = told_by(pilot)
+    pilot.begin()
+    assert (pilot.phase, pilot.done(), pilot.planned) == ("look", False, 24)
+    assert (told_by(pilot), pilot.found_s) == (None, None)
+    assert pilot.most_s() == most_s
+    assert flown(parts, target) == first
+    assert told_by(pilot) == before is not None
+
+
+def test_no_photograph_is_taken_between_the_scan_and_the_first_further_view() -> None:
+    """The shutter stays shut until the vehicle is where the further view is."""
+    parts = SCENARIO.replace(**ONE_ORBIT, **{"find.further_views": 1}).parts()
+    mission = flown(parts, mapped_at(parts.target.centre_W_m))
+    assert mission.opens_s[24] > mission.phases["missed parts"] + 3.0
+    assert mission.phases["done"] - mission.opens_s[24] == pytest.approx(0.5, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"find.give_up_s": 5.0, "find.further_views": 1},
+        {"find.give_up_s": 5.0, "find.further_views": 40, "find.hold_s": 3.0},
+        {"find.give_up_s": 5.0, "mission.standoff_m": 0.7, "mission.speed_m_s": 0.2},
+        {"find.give_up_s": 5.0, "mission.elevations_deg": (75.0,)},
+    ],
+)
+def test_no_mission_takes_longer_than_it_says_at_most(fields: dict[str, Any]) -> None:
+    """Neither a mission as a whole nor its further views last longer than the pilot allows for at the start."""
+    scenario = SCENARIO.replace(**(ONE_ORBIT | fields))
+    parts, scan_only = scenario.parts(), scenario.replace(**{"find.further_views": 0}).parts()
+    most_s = pilot_of(parts).most_s()
+    for_further_s = most_s - pilot_of(scan_only).most_s()
+    phases = flown(parts, mapped_at(parts.target.centre_W_m)).phases
+    assert phases["done"] <= most_s
+    assert phases["done"] - phases["missed parts"] <= for_further_s
 
 
 def test_without_a_target_the_mission_gives_up() -> None:

@@ -87,7 +87,9 @@ class FindPilot:
         scan = plan_route(self.centre_W_m, self._mission)
         mission = self._mission
         view_s = math.pi * mission.standoff_m / mission.speed_m_s + mission.speed_m_s / mission.acceleration_m_s2
-        further_s = self._find.further_views * view_s
+        further_s = (
+            self._find.further_views * view_s + self._assumed_m / mission.speed_m_s + view_s
+        )  # the approach, too
         return (
             self._find.give_up_s + 2.0 * self._phase.route.duration_s + self._find.hold_s + scan.duration_s + further_s
         )

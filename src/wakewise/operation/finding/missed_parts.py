@@ -98,7 +98,7 @@ class ViewChooser:
         while len(places) < most and (best := coverage.best_view(X_WC)) is not None:
             places.append(coverage.views.places[best])
             X_WC = coverage.views.pose(best)
-            coverage = coverage.seen(X_WC, self.lens)
+            coverage = coverage.seen(X_WC, self.lens).without_view(best)
         return places
 
 

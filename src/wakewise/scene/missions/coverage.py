@@ -113,6 +113,12 @@ class Coverage:
             sharpest=max(self.sharpest, sharpness or 0.0),
         )
 
+    def without_view(self, number: int) -> Coverage:
+        """The same with one place fewer to go to: what is photographed twice from one place gains little."""
+        kept = np.arange(len(self.views.places)) != number
+        views = replace(self.views, places=self.views.places[kept], shows=self.views.shows[kept])
+        return replace(self, views=views, joins=self.joins[kept])
+
     @cached_property
     def score(self) -> Array:
         """How far each patch has come, 0 (never shown) to 1 (all of it seen well), shape (patches,)."""

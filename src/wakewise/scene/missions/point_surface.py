@@ -11,14 +11,16 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.scene.missions.visibility import CLEARANCE_M, SEED, SurfacePatches, VisibilityCriteria, clustered
 
-NEIGHBOURS = 24
-SLACK = 4.0
-"""Points hide what lies so many spacings behind them: they are known to about half a spacing."""
+NEIGHBOURS, DENSITY = 24, 12
+SLACK = 6.0
+"""Points hide what lies half so many spacings behind them: places and normals have errors, and triangles overlap."""
 MAPPED_CRITERIA = VisibilityCriteria(incidence_rad=math.radians(80.0))
 """As for a surface that is known, less strict: normals of mapped points are 10 degrees unsure. Both were chosen on two
 scans, in which they gave 70 and 90 % where the model then had 71 and 90 (docs/research-log/0088)."""
 LEAST_POINTS = 30
 CORNERS = 3
+COVERS = math.sqrt(2.0)
+"""Distance of a triangle's corners in spacings: the circle in it then holds the square, so that no hole is left."""
 SAMPLES = 10
 
 
@@ -57,19 +59,26 @@ def patches_of_points(
         points_W_m=own,
         normals=facing,
         patch=clustered(own, facing, count, np.random.default_rng(SEED)),
-        area_m2=len(own) * spacing_m**2,
+        area_m2=float(_areas_m2(points_W_m)[counts].sum()),
         shield_W_m=_triangles(points_W_m, normals, spacing_m),
         shield_off_m=SLACK * spacing_m,
     )
 
 
+def _areas_m2(points_W_m: Array) -> Array:
+    """Area that each point stands for, from how far its `DENSITY`-th neighbour is, shape (n,)."""
+    k = min(DENSITY, len(points_W_m) - 1)
+    away = np.asarray(KDTree(points_W_m).query(points_W_m, k=k + 1)[0])[:, k]
+    return np.asarray(math.pi * away**2 / (k + 0.5))
+
+
 def _triangles(points_W_m: Array, normals: Array, spacing_m: float) -> Array:
-    """A triangle about each point, square to its normal, of the area that the point stands for; shape (n, 3, 3)."""
+    """A triangle about each point, square to its normal, that covers the square it stands for; shape (n, 3, 3)."""
     aside = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     one = np.cross(normals, aside)
     one /= np.linalg.norm(one, axis=1, keepdims=True)
     other = np.cross(normals, one)
-    radius = spacing_m * math.sqrt(4.0 / (3.0 * math.sqrt(3.0)))
+    radius = COVERS * spacing_m
     angles = 2.0 * math.pi * np.arange(CORNERS) / CORNERS
     ring = np.cos(angles)[None, :, None] * one[:, None] + np.sin(angles)[None, :, None] * other[:, None]
     return np.asarray(points_W_m[:, None] + radius * ring)
