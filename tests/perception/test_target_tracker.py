@@ -37,6 +37,16 @@ def followed(
     return state, errors
 
 
+def back(tracker: TargetTracker, arc: Pictures, state: TrackerState) -> tuple[TrackerState, float]:
+    """The state after the way back along the arc, in which no body was proposed, and the time of the next picture."""
+    time_s = PERIOD_S * len(arc.poses)
+    for picture, X_WC in zip(arc.pictures[-2::-1], arc.poses[-2::-1], strict=True):
+        state, _ = tracker.step(state, picture, time_s, X_WC, STD)
+        assert state.target is None or state.target.status == "assumed"
+        time_s += PERIOD_S
+    return state, time_s
+
+
 @pytest.fixture(scope="module")
 def after(arc: Pictures) -> TrackerState:
     """The state after the arc, with poses 2 mm and 2 mrad off."""
@@ -111,6 +121,37 @@ def test_without_acceptance_a_target_stays_proposed(arc: Pictures) -> None:
     accepted, _ = tracker.step(accepted, arc.pictures[-2], PERIOD_S * len(arc.poses), arc.poses[-2], STD)
     assert accepted.target is not None
     assert accepted.target.status == "tracked"
+
+
+def test_a_refused_body_is_not_proposed_again_until_a_box_takes_it(arc: Pictures) -> None:
+    """The refused coral is dropped and left out in all following pictures; a box on it ends the refusal."""
+    tracker = tracker_of(arc, SETTINGS.model_copy(update={"accept_s": 600.0}))
+    state, _ = followed(tracker, arc)
+    assert state.target is not None
+    assert state.target.status == "proposed"
+    state = tracker.refuse(state)
+    assert (state.shape, state.target, state.sweep, state.accepted) == (None, None, None, False)
+    assert len(state.surface) == len(state.members) == 0
+    state, time_s = back(tracker, arc, state)
+    assert state.target is not None
+    assert state.target.status == "assumed"
+    u, v = arc.camera.pixels(((arc.target.centre_W_m - arc.poses[0].p_m) @ arc.poses[0].R)[None])[0]
+    box = (u - 40, v - 45, u + 40, v + 45)
+    assert len(tracker.designate(state, box, arc.camera.width, accepted=False).refused) == 1
+    state = tracker.designate(state, box, arc.camera.width)
+    assert state.refused == ()
+    for k in range(8):
+        state, _ = tracker.step(state, arc.pictures[k % 2 + 1], time_s + PERIOD_S * k, arc.poses[k % 2 + 1], STD)
+    assert state.target is not None
+    assert state.target.status == "tracked"
+    assert np.linalg.norm(state.target.centre_W_m - arc.target.centre_W_m) < 0.025
+
+
+def test_nothing_is_refused_before_a_body_is_proposed(arc: Pictures) -> None:
+    """An assumed ball is no proposal."""
+    tracker = tracker_of(arc)
+    state, _ = tracker.step(tracker.init(), arc.pictures[0], 0.0, arc.poses[0], STD)
+    assert tracker.refuse(state) is state
 
 
 def test_a_target_out_of_the_picture_is_reported_lost_and_stays_protected(arc: Pictures, after: TrackerState) -> None:

@@ -50,6 +50,14 @@ class Designation:
         return left, top, right, bottom
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RefusedPlace:
+    """A ball, centre of shape (3,), in which the operator refused a proposed body."""
+
+    centre_W_m: Array
+    radius_m: float
+
+
 def choose_body(
     places_W_m: Array,
     groups: Sequence[IntArray],
@@ -58,13 +66,16 @@ def choose_body(
     camera: CalibratedCamera,
     X_WC: Pose,
     least: int,
+    refused: Sequence[RefusedPlace] = (),
 ) -> IntArray | None:
     """The target among bodies; None if none is it.
 
     - `places_W_m`, shape (n, 3), and `groups`: points of the map, and the indices of those of each body.
     - `shape`: of the target until now; it stays the same body.
     - `least`: a designated box must hold as many points of a body.
+    - `refused`: bodies whose middles lie there, or `STAYS_M` beyond, are left out.
     """
+    groups = [group for group in groups if not _was_refused(places_W_m[group].mean(axis=0), refused)]
     if not groups:
         return None
     middles = np.array([places_W_m[group].mean(axis=0) for group in groups])
@@ -82,6 +93,10 @@ def choose_body(
     size = np.array([len(group) for group in groups])
     k = int(np.argmin(np.where(ahead, off_axis + SIZE_WEIGHT * (1.0 - size / size.max()), np.inf)))
     return groups[k] if ahead[k] else None
+
+
+def _was_refused(middle_W_m: Array, refused: Sequence[RefusedPlace]) -> bool:
+    return any(np.linalg.norm(middle_W_m - place.centre_W_m) < place.radius_m + STAYS_M for place in refused)
 
 
 def points_in_box(points_W_m: Array, designation: Designation, camera: CalibratedCamera) -> int:

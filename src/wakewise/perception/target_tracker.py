@@ -27,7 +27,7 @@ from wakewise.perception.bed_plane import fit_bed, near_bed
 from wakewise.perception.bundle_adjustment import LENS, Keyframe, after_round, begin_adjustment
 from wakewise.perception.calibrated_camera import CalibratedCamera
 from wakewise.perception.common_shift import common_shift
-from wakewise.perception.designation import Designation, assumed_ball, choose_body, same_ball
+from wakewise.perception.designation import Designation, RefusedPlace, assumed_ball, choose_body, same_ball
 from wakewise.perception.feature_tracks import FeatureTracks, Grey, replenish, shows_nothing, track
 from wakewise.perception.map_initialization import (
     LEAST_STD,
@@ -124,13 +124,14 @@ class TargetTracker:
     ) -> TrackerState:
         """Take what lies in a box of the next picture, in px of a picture of that width, as the target.
 
-        A box of a detector is not `accepted`: an operator does so, or time.
+        A box of a detector is not `accepted`: an operator does so, or time. An operator's box ends all refusals.
         """
         left, top, right, bottom = box
         ordered = (min(left, right), min(top, bottom), max(left, right), max(top, bottom))
         return replace(
             state,
             designation=Designation(box=ordered, width=width),
+            refused=() if accepted else state.refused,
             shape=None,
             surface=empty_surface(),
             sweep=None,
@@ -143,6 +144,28 @@ class TargetTracker:
     def accept(self, state: TrackerState) -> TrackerState:
         """Accept the proposed target now."""
         return replace(state, accepted=True)
+
+    def refuse(self, state: TrackerState) -> TrackerState:
+        """Drop the proposed target, whose place is not proposed again until the operator designates a box."""
+        shape = state.shape
+        if shape is None or not shape.seen:
+            return state
+        place = RefusedPlace(centre_W_m=shape.centre_W_m, radius_m=shape.radius_m)
+        return replace(
+            state,
+            designation=None,
+            refused=(*state.refused, place),
+            shape=None,
+            surface=empty_surface(),
+            sweep=None,
+            swept_from_W_m=None,
+            members=np.zeros(0, np.int64),
+            shift_W_m=np.zeros(3),
+            target=None,
+            accepted=False,
+            seen_s=-math.inf,
+            proposed_s=math.inf,
+        )
 
     def step(
         self,
@@ -413,7 +436,9 @@ class TargetTracker:
             best_first = np.argsort(std_m, kind="stable")
             few = best_first[thinned(places_W_m[best_first])]
             groups = [few[group] for group in bodies(places_W_m[few], bed)]
-            chosen = choose_body(places_W_m, groups, state.shape, state.designation, state.camera, X_WC, LEAST_SEEN)
+            chosen = choose_body(
+                places_W_m, groups, state.shape, state.designation, state.camera, X_WC, LEAST_SEEN, state.refused
+            )
         if chosen is None:
             box = state.designation
             if box is not None and not state.accepted and time_s - box.since_s > DETECTED_S:

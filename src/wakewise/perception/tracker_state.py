@@ -10,7 +10,7 @@ from wakewise.core.interfaces import TargetEstimate
 from wakewise.perception.bed_plane import BedPlane
 from wakewise.perception.bundle_adjustment import BundleAdjustment, Keyframe
 from wakewise.perception.calibrated_camera import CalibratedCamera
-from wakewise.perception.designation import Designation
+from wakewise.perception.designation import Designation, RefusedPlace
 from wakewise.perception.feature_tracks import NO_TRACKS, FeatureTracks
 from wakewise.perception.map_initialization import adjusted_map, moved_since
 from wakewise.perception.plane_sweep import PlaneSweep, compared, swept_depth
@@ -36,6 +36,8 @@ class TrackerState:
     """Where the camera was in the last sweep."""
     cameras_W_m: Array
     designation: Designation | None = None
+    refused: tuple[RefusedPlace, ...] = ()
+    """Bodies there are not proposed."""
     shape: TargetShape | None = None
     members: IntArray
     shift_W_m: Array

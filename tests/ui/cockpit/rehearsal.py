@@ -52,6 +52,7 @@ class Rehearsal:
         self.flown: list[tuple[float, np.ndarray]] = []
         self._notes: list[StatusMessage] = []
         self.designated: list[tuple[tuple[float, ...] | None, int]] = []
+        self.proposals: list[str] = []
         self._began_s, self._last_s = time.monotonic(), time.monotonic()
         angle, height = np.linspace(0.0, 2.0 * math.pi, 200, endpoint=False) * 7.0, np.linspace(-0.95, 0.95, 200)
         ring = np.sqrt(1.0 - height**2)
@@ -170,6 +171,12 @@ class Rehearsal:
         if box is not None and frame == 0:
             raise InputError("designate: no pictures are drawn")
         self.designated.append((box, frame))
+
+    def propose(self, what: str) -> None:
+        """Keep what was asked; there is nothing to accept before anything was asked for."""
+        if what != "ask" and not self.proposals:
+            raise InputError("proposal: no target is proposed")
+        self.proposals.append(what)
 
     def picture(self) -> CameraPicture:
         image = np.full((270, 480, 3), (120, 90, 30), np.uint8)

@@ -11,12 +11,14 @@ import pytest
 
 from wakewise.operation.teleop.input.controls import ACTIONS
 from wakewise.ui.cockpit.messages import (
+    PROPOSAL,
     ButtonPress,
     Hello,
     InvalidMessage,
     SettingsChange,
     StickMessage,
     TargetDesignation,
+    TargetProposal,
     read_message,
 )
 
@@ -30,6 +32,7 @@ GOOD: list[dict[str, Any]] = [
     {"type": "seen", "frame": 7},
     {"type": "designate", "box": [0.1, 0, 1, 0.5], "frame": 7, "lease": "L"},
     {"type": "designate", "box": "clear", "lease": "L"},
+    {"type": "proposal", "what": "refuse", "lease": "L"},
 ]
 JUNK: list[Any] = [
     None, True, False, 0, -1, 1e308, -1e308, 10**400, -(10**400), 2**53 + 1, "", "x" * 5000, "\x00", "NaN", [], {},
@@ -74,6 +77,9 @@ def test_what_the_protocol_allows_is_read(told: dict[str, Any]) -> None:
         ('{"type": "designate", "box": [0.5, 0, 0.505, 1], "frame": 7, "lease": "L"}', "sides of 0.01 at least"),
         ('{"type": "designate", "box": [0, 0, 1, 1], "lease": "L"}', "frame must be a whole number"),
         ('{"type": "designate", "box": [0, 0, 1, 1], "frame": 7}', "lease must be a text"),
+        ('{"type": "proposal", "lease": "L"}', "what None, allowed ask, accept, refuse"),
+        ('{"type": "proposal", "what": ["accept"], "lease": "L"}', "what a list, allowed ask"),
+        ('{"type": "proposal", "what": "accept"}', "lease must be a text"),
         ('{"type": "seen", "frame": -1}', "frame must be a whole number from 0"),
     ],
 )
@@ -130,6 +136,8 @@ def test_a_hundred_thousand_mangled_messages_raise_nothing() -> None:
             left, top, right, bottom = read.box
             assert 0.0 <= left < right <= 1.0
             assert 0.0 <= top < bottom <= 1.0
+        elif isinstance(read, TargetProposal):
+            assert read.what in PROPOSAL
     assert read_well > 1000
 
 

@@ -132,6 +132,26 @@ def test_the_outline_and_its_line_say_how_it_stands(standin: StandIn, fly: Any) 
     page.until(f"{INKED}([0.6, 0.4])[3] === 0")
 
 
+def test_a_proposal_is_answered_by_buttons_and_keys(standin: StandIn, fly: Any) -> None:
+    """The buttons are there only while a target is proposed; key B asks for a proposal, K accepts, N refuses."""
+    page = fly()
+    page.until(SEEN)
+    page.press("KeyK")
+    page.press("KeyB")
+    until(lambda: len(standin.of("proposal")) == 1, "a request")
+    standin.target = TRACKED | {"status": "proposed"}
+    page.until("!document.getElementById('accept').hidden && !document.getElementById('refuse').hidden")
+    page.press("KeyK")
+    page.press("KeyN")
+    page.click("#accept")
+    page.click("#refuse")
+    until(lambda: len(standin.of("proposal")) == 5, "the answers")
+    assert [m["what"] for m in standin.of("proposal")] == ["ask", "accept", "refuse", "accept", "refuse"]
+    assert all(m["lease"] == standin.lease for m in standin.of("proposal"))
+    standin.target = TRACKED
+    page.until("document.getElementById('accept').hidden && document.getElementById('refuse').hidden")
+
+
 def test_a_thumb_draws_a_box_on_a_phone(standin: StandIn, fly: Any) -> None:
     """The page does not scroll meanwhile, and the button is as high as a thumb needs."""
     page = fly("", 390, 844, phone=True)

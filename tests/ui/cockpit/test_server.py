@@ -308,6 +308,27 @@ def test_only_who_has_the_helm_designates(server: CockpitServer, show: Rehearsal
     asyncio.run(tries())
 
 
+def test_only_who_has_the_helm_answers_a_proposal(server: CockpitServer, show: Rehearsal) -> None:
+    """An answer of anybody else does nothing; one that is refused or cannot be read is told to who gave it."""
+
+    async def tries() -> None:
+        async with page(server, "helm") as one, page(server) as two:
+            await two.say(type="proposal", what="ask", lease="guess")
+            await one.say(type="proposal", what="accept", lease=one.lease)
+            assert "no target is proposed" in (await one.until(lambda told: told["type"] == "note"))["text"]
+            await one.say(type="proposal", what="perhaps", lease=one.lease)
+            note = await one.until(lambda told: told["type"] == "note")
+            assert "not understood: proposal: what 'perhaps', allowed ask, accept, refuse" in note["text"]
+            for what in ("ask", "refuse", "accept"):
+                await one.say(type="proposal", what=what, lease=one.lease)
+            async with asyncio.timeout(2.0):
+                while len(show.proposals) < 3:
+                    await asyncio.sleep(0.005)
+            assert show.proposals == ["ask", "refuse", "accept"]
+
+    asyncio.run(tries())
+
+
 def test_one_picture_is_under_way_until_it_was_seen(server: CockpitServer) -> None:
     """A page that does not acknowledge gets no second one; each has its number and the flight's time."""
 

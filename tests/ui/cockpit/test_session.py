@@ -91,6 +91,8 @@ def test_without_pictures_no_target_is_designated(flown: tuple[CockpitSession, H
     session, hands, _ = flown
     with pytest.raises(InputError, match="no pictures are drawn"):
         session.designate((0.4, 0.4, 0.6, 0.6), 1)
+    with pytest.raises(InputError, match="no pictures are drawn"):
+        session.propose("ask")
     assert hands.state["target"] is None
 
 

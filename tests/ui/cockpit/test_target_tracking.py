@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
+from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.perception import CalibratedCamera, TargetTracker
 from wakewise.scene.missions.orbit import camera_pose
@@ -155,6 +156,45 @@ def forgotten_it_is_the_scenarios(rig: Rig) -> None:
     while rig.regions[-1] is not None:
         assert time.monotonic() < end_s
         time.sleep(0.005)
+
+
+def test_a_proposal_waits_until_it_is_accepted(rig: Rig) -> None:
+    """Without a box the ball on the bed is proposed and protected, and tracked once the pilot accepts it."""
+    rig.tracking.propose()
+    rig.track(lambda told: told["status"] == "assumed")
+    assert rig.tracking.notes(rig.time_s)[0][1].startswith("no target is proposed yet")
+    rig.track(lambda told: told["status"] == "proposed")
+    assert rig.tracking.notes(rig.time_s)[0][1].startswith("a target is proposed")
+    for _ in range(20):
+        assert rig.track(lambda _: True)["status"] == "proposed"
+    rig.tracking.answer(accepted=True)
+    assert rig.track(lambda told: told["status"] == "tracked", most=2)["distance_m"] == pytest.approx(0.7, abs=0.05)
+    assert rig.regions[-1] is not None
+
+
+def test_a_refused_body_is_not_proposed_again_until_a_box_is_drawn(rig: Rig) -> None:
+    """After the answer a ball is protected again; a box on the same body takes it."""
+    rig.tracking.propose()
+    rig.track(lambda told: told["status"] == "proposed")
+    rig.tracking.answer(accepted=False)
+    rig.until(lambda told: told["status"] == "assumed" and told["outline"] is None)
+    for _ in range(20):
+        assert rig.track(lambda _: True)["status"] == "assumed"
+    rig.tracking.designate(BOX, rig.frame)
+    rig.track(lambda told: told["status"] == "tracked")
+
+
+@pytest.mark.parametrize("accepted", [True, False])
+def test_an_answer_without_a_proposal_changes_nothing(rig: Rig, accepted: bool) -> None:
+    """Neither before a target is asked for nor of a box, which is the pilot's own."""
+    with pytest.raises(InputError, match="no target is proposed"):
+        rig.tracking.answer(accepted=accepted)
+    rig.see()
+    rig.tracking.designate(BOX, rig.frame)
+    before = rig.until(lambda told: told["outline"])
+    with pytest.raises(InputError, match="no target is proposed"):
+        rig.tracking.answer(accepted=accepted)
+    assert rig.told() == before
 
 
 def test_the_box_is_taken_in_the_picture_in_which_it_was_drawn(rig: Rig) -> None:

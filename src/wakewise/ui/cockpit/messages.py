@@ -22,6 +22,8 @@ CLEAR = "clear"
 """In place of a box: the designated target is forgotten."""
 LEAST_SIDE = 0.01
 """Least side of a box, in shares of the picture."""
+PROPOSAL = ("ask", "accept", "refuse")
+"""What the holder may do about a proposed target."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,6 +98,14 @@ class TargetDesignation:
 
 
 @dataclass(frozen=True, kw_only=True)
+class TargetProposal:
+    """One of `PROPOSAL`: a target is to be proposed, or the proposed one is accepted or refused."""
+
+    what: str
+    lease: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class InvalidMessage:
     """The fault of a message in one line."""
 
@@ -111,6 +121,7 @@ Message = (
     | SettingsChange
     | PictureAck
     | TargetDesignation
+    | TargetProposal
 )
 
 
@@ -204,6 +215,13 @@ def _designate(told: dict[str, Any]) -> TargetDesignation:
     return TargetDesignation(box=(left, top, right, bottom), frame=_whole(told, "frame"), lease=lease)
 
 
+def _proposal(told: dict[str, Any]) -> TargetProposal:
+    what = told.get("what")
+    if what not in PROPOSAL:
+        raise _InvalidError(f"what {_shown(what)}, allowed {', '.join(PROPOSAL)}")
+    return TargetProposal(what=what, lease=_word(told, "lease"))
+
+
 _READERS: dict[str, Callable[[dict[str, Any]], Message]] = {
     "hello": _hello,
     "helm": _helm,
@@ -213,6 +231,7 @@ _READERS: dict[str, Callable[[dict[str, Any]], Message]] = {
     "desk": _desk,
     "seen": _seen,
     "designate": _designate,
+    "proposal": _proposal,
 }
 
 

@@ -29,6 +29,7 @@ from wakewise.ui.cockpit.messages import (
     SettingsChange,
     StickMessage,
     TargetDesignation,
+    TargetProposal,
     read_message,
 )
 from wakewise.ui.cockpit.view_model import StatusMessage, ViewModel, as_json
@@ -181,6 +182,9 @@ class CockpitServer(WebServer):
             case TargetDesignation():
                 if mailbox.may(client.id, message.lease):
                     self._ask(client, lambda: self.model.designate(message.box, message.frame))
+            case TargetProposal():
+                if mailbox.may(client.id, message.lease):
+                    self._ask(client, lambda: self.model.propose(message.what))
             case ControlRequest(want=True):
                 words = mailbox.ask(client.id, message.force)
                 self._send_ownership(words, always=client)

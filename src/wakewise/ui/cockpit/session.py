@@ -191,13 +191,19 @@ class CockpitSession:
 
     def designate(self, box: tuple[float, float, float, float] | None, frame: int) -> None:
         """Designate a box of a picture as the target; raises InputError where no pictures are drawn."""
-        tracking = self._tracking
-        if tracking is None or self._camera is None:
-            raise InputError("designate: no pictures are drawn, in which a target could be tracked")
+        tracking = self._tracking_for("designate")
         if box is None:
             tracking.forget()
         else:
             tracking.designate(box, frame)
+
+    def propose(self, what: str) -> None:
+        """Ask for a proposed target, accept or refuse it; raises InputError if there is none, or no pictures."""
+        tracking = self._tracking_for("proposal")
+        if what == "ask":
+            tracking.propose()
+        else:
+            tracking.answer(accepted=what == "accept")
 
     def picture(self) -> CameraPicture | None:
         """The camera picture now."""
@@ -288,6 +294,12 @@ class CockpitSession:
         tracker = TargetTracker(camera=camera, settings=PERCEPTION, seed=parts.scenario.seed)
         self._tracking = TargetTracking(tracker, methods.protect, ahead_m)
         self._tracking.start()
+
+    def _tracking_for(self, kind: str) -> TargetTracking:
+        tracking = self._tracking
+        if tracking is None or self._camera is None:
+            raise InputError(f"{kind}: no pictures are drawn, in which a target could be tracked")
+        return tracking
 
     def _end_tracking(self) -> None:
         tracking, self._tracking = self._tracking, None

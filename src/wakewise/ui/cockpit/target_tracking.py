@@ -2,7 +2,8 @@
 
 What lies in the box is mapped and tracked by `wakewise.perception`, with the estimated pose of the camera at the time
 of each picture. The tracker begins with the picture in which the box was drawn. Neither the flight nor the pictures
-wait for it: the newest picture that waits takes the place of an older one.
+wait for it: the newest picture that waits takes the place of an older one. Without a box a target is proposed, which
+the pilot accepts or refuses.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, TargetEstimate
 from wakewise.perception import CalibratedCamera, PerceptionSettings, TargetTracker, TrackerState
@@ -24,8 +26,8 @@ from wakewise.perception.feature_tracks import Grey, fitted
 from wakewise.scene.targets import Region
 from wakewise.ui.cockpit.state import number, rounded
 
-PERCEPTION = PerceptionSettings(width_px=480, rate_hz=5.0)
-"""Live pictures change their width under load; they are tracked in one."""
+PERCEPTION = PerceptionSettings(width_px=480, rate_hz=5.0, accept_s=600.0)
+"""Live pictures change their width under load; they are tracked in one. A proposal waits for the pilot."""
 STALE_S = 2.0
 """A target is lost if no picture was tracked for this time."""
 KEPT = 32
@@ -36,7 +38,8 @@ STD = (0.02, 0.03)
 """Standard deviation of the camera's pose per axis, m and rad, where the estimate states none."""
 _NOTES = {
     "assumed": "target designated; a ball is protected until it was seen from other sides: move sideways",
-    "proposed": "a target is proposed; its region is protected",
+    "asked": "no target is proposed yet; a ball is protected until a body is mapped: move sideways",
+    "proposed": "a target is proposed: accept or refuse it; its region is protected",
     "tracked": "target tracked; its region is protected",
     "lost": "target lost; its last region stays protected",
 }
@@ -60,10 +63,10 @@ class SeenPicture:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Request:
-    """A box in shares of a picture, and that picture if it is still known."""
+    """A box in shares of a picture, and that picture if it is still known; without a box a target is proposed."""
 
-    box: Box
-    first: SeenPicture | None
+    box: Box | None = None
+    first: SeenPicture | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,6 +98,7 @@ class TargetTracking:
         self._recent: deque[SeenPicture] = deque(maxlen=KEPT)
         self._waiting: SeenPicture | None = None
         self._request: _Request | None = None
+        self._accepted: bool | None = None
         self._last: _Tracked | None = None
         self._taken_s = -np.inf
         self._over = False
@@ -129,15 +133,31 @@ class TargetTracking:
         """
         with self._changed:
             first = next((picture for picture in self._recent if picture.frame == frame), None)
-            self._request, self._last, self._waiting = _Request(box=box, first=first), None, None
-            self._taken_s = -np.inf if first is None else first.time_s
-            self._said = None
+            self._begin(_Request(box=box, first=first))
+
+    def propose(self) -> None:
+        """Propose as the target what stands on the bed nearest to the middle of the picture."""
+        with self._changed:
+            self._begin(_Request())
+
+    def _begin(self, request: _Request) -> None:
+        self._request, self._last, self._waiting, self._accepted = request, None, None, None
+        self._taken_s = -np.inf if request.first is None else request.first.time_s
+        self._said = None
+        self._changed.notify()
+
+    def answer(self, *, accepted: bool) -> None:
+        """Accept or refuse the proposed target; raises InputError if none is proposed."""
+        with self._changed:
+            if self._last is None or self._last.target is None or self._last.target.status != "proposed":
+                raise InputError("proposal: no target is proposed that could be accepted or refused")
+            self._accepted = accepted
             self._changed.notify()
 
     def forget(self) -> None:
         """Track nothing any more, and protect the first region again."""
         with self._changed:
-            self._request = self._last = self._waiting = None
+            self._request = self._last = self._waiting = self._accepted = None
             self._changed.notify()
 
     def told(self, now_s: float, X_WC: Pose) -> dict[str, Any] | None:
@@ -174,7 +194,9 @@ class TargetTracking:
             return ()
         if status is None:
             return (("info", "target forgotten; the scenario's own target is protected"),)
-        return (("warn" if status == "lost" else "info", _NOTES[status]),)
+        request = self._request
+        asked = status == "assumed" and request is not None and request.box is None
+        return (("warn" if status == "lost" else "info", _NOTES["asked" if asked else status]),)
 
     def _now(self, now_s: float) -> tuple[str | None, _Tracked | None]:
         """Status, and what is known of the target; both None if none is designated."""
@@ -199,24 +221,41 @@ class TargetTracking:
                 first = request.first if begins and request is not None else None
                 picture = first or self._waiting
                 self._waiting = self._waiting if first is not None else None
+                accepted, self._accepted = self._accepted, None
             if request is None:
                 self._protect(None)
                 continue
             if begins:
                 state, version = self._begun(request), -1
+            if accepted is not None:
+                state = self._answered(request, state, accepted)
             if picture is not None:
                 state, version = self._take(request, state, version, picture)
 
     def _has_work(self, request: _Request | None) -> bool:
         """Whether there is something to do for the thread, which works for this request."""
-        return self._over or self._request is not request or (request is not None and self._waiting is not None)
+        new = self._waiting is not None or self._accepted is not None
+        return self._over or self._request is not request or (request is not None and new)
 
     def _begun(self, request: _Request) -> TrackerState:
         """State before the first picture. The estimator has been at work since the flight began, at time 0."""
+        state = replace(self._tracker.init(), first_s=0.0)
+        if request.box is None:
+            return state
         width, height = self._tracker.camera.width, self._tracker.camera.height
         left, top, right, bottom = request.box
         box = (left * width - 0.5, top * height - 0.5, right * width - 0.5, bottom * height - 0.5)
-        return self._tracker.designate(replace(self._tracker.init(), first_s=0.0), box, width)
+        return self._tracker.designate(state, box, width)
+
+    def _answered(self, request: _Request, state: TrackerState, accepted: bool) -> TrackerState:
+        """The state after the pilot's answer to a proposal; the region stays until the next picture."""
+        if state.target is None or state.target.status != "proposed":
+            return state
+        state = self._tracker.accept(state) if accepted else self._tracker.refuse(state)
+        with self._changed:
+            if self._request is request and self._last is not None:
+                self._last = replace(self._last, target=state.target)
+        return state
 
     def _take(
         self, request: _Request, state: TrackerState, version: int, picture: SeenPicture

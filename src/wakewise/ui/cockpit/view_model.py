@@ -73,6 +73,10 @@ class ViewModel(Protocol):
         """
         ...
 
+    def propose(self, what: str) -> None:
+        """Ask for a proposed target, accept or refuse it; raises InputError if there is none, or no pictures."""
+        ...
+
     def picture(self) -> CameraPicture | None:
         """The camera picture now; called in another thread, where it may wait."""
         ...

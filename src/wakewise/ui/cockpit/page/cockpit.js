@@ -39,7 +39,7 @@ const washes = new Plot($("plot-disturbance"), [{ ink: "--s1" }, { ink: "--s2", 
 const deviations = new Plot($("plot-deviation"), [{ ink: "--s1" }], { unit: "% of the command", least: 10, most: 100 });
 const camera = new Camera({ canvas: $("camera"), empty: $("no-picture"), late: $("late"), link });
 const designation = new Designation({
-  camera, marks: $("marks"), panel: $("designated"), line: $("designated-line"), forget: $("forget"), helm,
+  camera, marks: $("marks"), panel: $("designated"), line: $("designated-line"), forget: $("forget"), accept: $("accept"), refuse: $("refuse"), helm,
   say: (level, text) => notes.add(level, text),
 });
 
@@ -71,7 +71,8 @@ const KEYS = {
   KeyO: () => act("operator"), KeyH: () => act("hold"), KeyM: () => act("scan"), KeyC: () => act("capture"), KeyP: () => act("precise"),
   Minus: () => act("gain_down"), NumpadSubtract: () => act("gain_down"), Equal: () => act("gain_up"), NumpadAdd: () => act("gain_up"),
   BracketLeft: () => desk.nudge(-1), BracketRight: () => desk.nudge(1), KeyX: () => desk.swap(), KeyG: changeHelm, KeyV: nextWash,
-  KeyL: () => theme.next(), KeyT: () => designation.middle(), Escape: () => designation.forget(),
+  KeyL: () => theme.next(), KeyT: () => designation.middle(), KeyB: () => designation.propose(),
+  KeyK: () => designation.answer("accept"), KeyN: () => designation.answer("refuse"), Escape: () => designation.forget(),
 };
 
 function onKey(code, event) {

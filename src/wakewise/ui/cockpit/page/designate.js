@@ -18,14 +18,18 @@ export class Designation {
   #marks;
   #panel;
   #line;
+  #answers;
   #helm;
   #say;
   #from = null;
   #to = null;
   #target = null;
 
-  /** `camera`: a Camera; `marks`: a canvas over its picture; `panel` with `line` and `forget`: what is told of the target. */
-  constructor({ camera, marks, panel, line, forget, helm, say }) {
+  /**
+   * `camera`: a Camera; `marks`: a canvas over its picture; `panel` with `line` and `forget`: what is told of the target;
+   * `accept` and `refuse`: the answers to a proposal.
+   */
+  constructor({ camera, marks, panel, line, forget, accept, refuse, helm, say }) {
     this.#camera = camera;
     this.#marks = marks;
     this.#panel = panel;
@@ -34,6 +38,8 @@ export class Designation {
     this.#say = say;
     this.#listen(camera.canvas);
     forget.addEventListener("click", () => this.forget());
+    this.#answers = { accept, refuse };
+    for (const [what, button] of Object.entries(this.#answers)) button.addEventListener("click", () => this.answer(what));
     helm.addEventListener("change", () => this.cancel());
     new ResizeObserver(() => this.repaint()).observe(marks);
   }
@@ -43,6 +49,7 @@ export class Designation {
     const known = target !== null && typeof target === "object" && Object.hasOwn(INK, words(target.status));
     this.#target = known ? target : null;
     this.#panel.hidden = this.#target === null;
+    for (const button of Object.values(this.#answers)) button.hidden = this.#target?.status !== "proposed";
     if (this.#target) this.#tell(this.#target);
     this.repaint();
   }
@@ -53,6 +60,16 @@ export class Designation {
     if (!this.#target) return false;
     if (!this.#helm.designate("clear")) this.#say("warn", "Take the helm first");
     return true;
+  }
+
+  /** The body nearest to the middle of the picture is to be proposed. */
+  propose() {
+    if (this.#view()) this.#ask("ask");
+  }
+
+  /** "accept" or "refuse" a proposed target. */
+  answer(what) {
+    if (this.#target?.status === "proposed") this.#ask(what);
   }
 
   /** What lies in the middle of the picture. */
@@ -133,6 +150,10 @@ export class Designation {
   #send(box) {
     if (box[2] - box[0] < LEAST_SIDE || box[3] - box[1] < LEAST_SIDE) this.#say("warn", "That box is too small for a target");
     else if (!this.#helm.designate(box, this.#camera.frame)) this.#say("warn", "Take the helm first");
+  }
+
+  #ask(what) {
+    if (!this.#helm.propose(what)) this.#say("warn", "Take the helm first");
   }
 
   #tell(target) {

@@ -67,6 +67,11 @@ export class Helm extends EventTarget {
     return this.mine && this.#link.send({ type: "designate", box, frame, lease: this.lease });
   }
 
+  /** About a proposed target: "ask", "accept" or "refuse". */
+  propose(what) {
+    return this.mine && this.#link.send({ type: "proposal", what, lease: this.lease });
+  }
+
   /** Hold the place. Whoever is not at the helm asks for it to do so: an emergency is no time for two buttons. */
   stop() {
     if (this.press("hold")) return;

@@ -15,6 +15,7 @@ export const HELP = [
   ["O H M", "operate, hold, scan"], ["C", "capture a photo"], ["G", "take the helm, or give it back"], ["P", "precise sticks"],
   ["− +", "gain down, up"], ["[ ]", "gentler, more obedient (w_track)"], ["X", "direct or wake-aware"], ["V", "wash: predicted, true, difference"],
   ["T", "target: what lies in the middle of the picture"], ["Esc", "forget the designated target"],
+  ["B", "propose a target: what stands on the bed nearest to the middle"], ["K N", "accept, refuse the proposed target"],
   ["L", "colours light, dark, as the system"], ["?", "this page"],
 ];
 
