@@ -16,6 +16,7 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import TargetEstimate
 from wakewise.perception import CalibratedCamera
 from wakewise.perception.feature_tracks import Grey
+from wakewise.vision.image_decoding import decode_picture
 
 Image = NDArray[np.uint8]
 STATUS_BGR = {
@@ -96,6 +97,6 @@ def _pixels(points_W_m: NDArray[np.float64], camera: CalibratedCamera, X_WC: Pos
 
 
 def _decoded(frame: bytes) -> Image:
-    image = cv2.imdecode(np.frombuffer(frame, np.uint8), cv2.IMREAD_COLOR)
+    image = decode_picture(frame, "a frame of the film")
     assert image is not None
     return np.asarray(image, dtype=np.uint8)
