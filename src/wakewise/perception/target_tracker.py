@@ -129,16 +129,10 @@ class TargetTracker:
         left, top, right, bottom = box
         ordered = (min(left, right), min(top, bottom), max(left, right), max(top, bottom))
         return replace(
-            state,
+            _without_target(state),
             designation=Designation(box=ordered, width=width),
             refused=() if accepted else state.refused,
-            shape=None,
-            surface=empty_surface(),
-            sweep=None,
-            swept_from_W_m=None,
-            target=None,
             accepted=accepted,
-            proposed_s=math.inf,
         )
 
     def accept(self, state: TrackerState) -> TrackerState:
@@ -152,19 +146,13 @@ class TargetTracker:
             return state
         place = RefusedPlace(centre_W_m=shape.centre_W_m, radius_m=shape.radius_m)
         return replace(
-            state,
+            _without_target(state),
             designation=None,
             refused=(*state.refused, place),
-            shape=None,
-            surface=empty_surface(),
-            sweep=None,
-            swept_from_W_m=None,
             members=np.zeros(0, np.int64),
             shift_W_m=np.zeros(3),
-            target=None,
             accepted=False,
             seen_s=-math.inf,
-            proposed_s=math.inf,
         )
 
     def step(
@@ -538,6 +526,19 @@ class TargetTracker:
                 version=state.versions,
             ),
         )
+
+
+def _without_target(state: TrackerState) -> TrackerState:
+    """The state with what was mapped of a target forgotten."""
+    return replace(
+        state,
+        shape=None,
+        surface=empty_surface(),
+        sweep=None,
+        swept_from_W_m=None,
+        target=None,
+        proposed_s=math.inf,
+    )
 
 
 def _noted(cameras_W_m: Array, place_W_m: Array) -> Array:

@@ -145,14 +145,20 @@ def mapped_figures(parts: Parts, folder: Path, photos: pl.DataFrame, cloud_W_m: 
     away, nearest = KDTree(truth.points_m).query(places)
     there = (np.asarray(KDTree(cloud_W_m).query(truth.points_m)[0]) < REACH_M)[nearest]
     patch = clustered(places, mapped.normals, max(1, len(places) // SAMPLES), np.random.default_rng(SEED))
-    judged = np.asarray(away) < MAPPED_M
-    count = int(patch.max()) + 1
+    judged, count = np.asarray(away) < MAPPED_M, int(patch.max()) + 1
     held = np.bincount(patch[judged], minlength=count)
-    known = held > 0
-    complete = np.bincount(patch[judged], there[judged], count)[known] > HALF * held[known]
-    said = np.bincount(patch[judged], well[judged], count)[known] > HALF * held[known]
-    agreement, share = float(np.mean(complete == said)), float(np.mean(complete))
-    return figures | dict(zip(FROM_MODEL, (100.0 * agreement, 100.0 * max(share, 1.0 - share)), strict=True))
+    share, said = (
+        np.where(held > 0, np.bincount(patch[judged], which[judged], count) / np.maximum(held, 1), -1.0)
+        for which in (there, well)
+    )
+    both = CoverageAgreement(
+        complete_share=share,
+        complete=share > HALF,
+        well=said > HALF,
+        predicted_pct=figures["coverage_predicted_pct"],
+        completeness_pct=100.0 * float(there[judged].mean()),
+    )
+    return figures | dict(zip(FROM_MODEL, (both.agreement_pct, both.trivial_pct), strict=True))
 
 
 def measure_coverage(folder: Path) -> dict[str, Any]:

@@ -51,8 +51,8 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "f_score": ("%", "harmonic mean of precision and recall at 3 mm (Tanks and Temples), 0 to 100", "more"),
     **{key: (*SURFACE_DEFINITIONS[key], better) for key, better in _SURFACE_BETTER.items()},
     "coverage_predicted_pct": ("%", "completeness_pct as the coverage guide expects it before leaving: share of the "
-                               "target, as it was surveyed, that photographs saw well from where they were estimated",
-                               "more"),
+                               "target, as it was surveyed or mapped in flight, that photographs saw well from where "
+                               "they were estimated", "more"),
     "coverage_sure_pct": ("%", "the same with a photograph to spare: the lower end of what is expected", "more"),
     "coverage_agreement_pct": ("%", "share of the target's patches, of about 1 cm, of which the guide said rightly "
                                "whether most of it is within 3 mm of the model", "more"),

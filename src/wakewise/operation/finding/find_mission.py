@@ -87,12 +87,9 @@ class FindPilot:
         scan = plan_route(self.centre_W_m, self._mission)
         mission = self._mission
         view_s = math.pi * mission.standoff_m / mission.speed_m_s + mission.speed_m_s / mission.acceleration_m_s2
-        further_s = (
-            self._find.further_views * view_s + self._assumed_m / mission.speed_m_s + view_s
-        )  # the approach, too
-        return (
-            self._find.give_up_s + 2.0 * self._phase.route.duration_s + self._find.hold_s + scan.duration_s + further_s
-        )
+        approach_s = self._assumed_m / mission.speed_m_s + view_s
+        before_s = self._find.give_up_s + 2.0 * self._phase.route.duration_s + approach_s + self._find.hold_s
+        return before_s + scan.duration_s + self._find.further_views * view_s
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
         """Reference of the present phase about the centre found so far."""
@@ -176,10 +173,10 @@ class FindPilot:
 
     def _after_photographs(self, time_s: float, target: TargetEstimate | None) -> None:
         """Photograph what the scan has missed, once, or end."""
-        here = self._at(time_s)
+        here, goes_on = self._at(time_s), self._phase.name == "scan"
         if target is not None and self._chooser is not None:
-            self.photographed = self._chooser.photographed(target, self._taken_from)
-        if self.photographed is not None and self._chooser is not None and self._phase.name == "scan":
+            self.photographed = self._chooser.photographed(target, self._taken_from, with_views=goes_on)
+        if self.photographed is not None and self._chooser is not None and goes_on:
             places = self._chooser.further(self.photographed, self._camera, self._find.further_views)
             if places:
                 self._further = len(places)

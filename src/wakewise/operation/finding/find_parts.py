@@ -102,7 +102,8 @@ def write_found(parts: Parts, folder: Path) -> None:
             "centre_error_m": float(np.linalg.norm(target.centre_W_m - parts.target.centre_W_m)),
             "status": target.status,
         }
-    (folder / SURFACE_FILE).unlink(missing_ok=True)
+    for name in (SURFACE_FILE, FOUND_FILM):
+        (folder / name).unlink(missing_ok=True)
     if pilot.photographed is not None:
         told["photographed"] = pilot.photographed.as_dict()
         write_cloud(folder / SURFACE_FILE, pilot.photographed.as_cloud())

@@ -14,10 +14,12 @@ from wakewise.operation.finding import MISSED_RGB, SEEN_RGB
 from wakewise.perception.surface_map import CELL_M
 from wakewise.scene.missions import (
     CameraAim,
+    CandidateViews,
     Coverage,
     CoverageGaps,
     MissionSettings,
     Route,
+    SurfacePatches,
     TankBounds,
     find_coverage_gaps,
     reachable_views,
@@ -69,13 +71,27 @@ class ViewChooser:
     bounds: TankBounds
     mission: MissionSettings
 
-    def photographed(self, target: TargetEstimate, taken_from: Sequence[Pose]) -> PhotographedSurface | None:
-        """Coverage by photographs from camera poses X_WC; None if too little of the target is mapped."""
+    def photographed(
+        self, target: TargetEstimate, taken_from: Sequence[Pose], *, with_views: bool = True
+    ) -> PhotographedSurface | None:
+        """Coverage by photographs from camera poses X_WC; None if too little of the target is mapped.
+
+        `with_views` looks for places of further views, too, which takes most of the time.
+        """
         surface, towards = target.surface_W_m, target.towards_W
         if surface is None or towards is None or len(surface) < LEAST_POINTS:
             return None
         patches = patches_of_points(surface, towards, CELL_M)
-        views = reachable_views(
+        views = self._views(patches, target) if with_views else None
+        coverage = Coverage.begin(patches, views, MAPPED_CRITERIA)
+        for X_WC in taken_from:
+            coverage = coverage.seen(X_WC, self.lens)
+        return PhotographedSurface(coverage=coverage, gaps=find_coverage_gaps(coverage, taken_from, self.lens))
+
+    def _views(self, patches: SurfacePatches, target: TargetEstimate) -> CandidateViews:
+        """Places at the standoff from which the vehicle can photograph the target."""
+        assert target.surface_W_m is not None
+        return reachable_views(
             patches,
             self.lens,
             centre_W_m=target.centre_W_m,
@@ -83,14 +99,10 @@ class ViewChooser:
             aim=self.aim,
             size_m=self.size_m,
             bounds=self.bounds,
-            target_W_m=surface,
+            target_W_m=target.surface_W_m,
             clearance_m=self.mission.clearance_m,
             need=MAPPED_CRITERIA,
         )
-        coverage = Coverage.begin(patches, views, MAPPED_CRITERIA)
-        for X_WC in taken_from:
-            coverage = coverage.seen(X_WC, self.lens)
-        return PhotographedSurface(coverage=coverage, gaps=find_coverage_gaps(coverage, taken_from, self.lens))
 
     def further(self, surface: PhotographedSurface, X_WC: Pose, most: int) -> list[Array]:
         """Azimuth, elevation and range of further views, shape (3,) each, in the order in which they are flown to."""
