@@ -56,6 +56,28 @@ def test_what_holds_a_load_is_turned_back_where_the_vehicle_is_turned_from_its_p
     np.testing.assert_allclose(VEHICLE.allocation_matrix @ command.thrusts_N, command.wrench_B, atol=1e-6)
 
 
+def rolls_planned(controller, moments_Nm):
+    """Roll moment of each plan's first thrusts, from rest, for the load's roll moment at each plan, in Nm."""
+    state, found = controller.init(), []
+    for moment_Nm in moments_Nm:
+        for _ in range(5):
+            load = np.array([0.0, 0.0, 0.0, moment_Nm, 0.0, 0.0])
+            state, _ = controller.step(state, 0.02, BodyState(X_WB=PLACE, load_B=load), Goal(X_WB=PLACE))
+        found.append(float((VEHICLE.allocation_matrix @ state.plan.commands_N[0])[3]))
+    return np.array(found)
+
+
+def test_a_load_moment_that_changes_from_plan_to_plan_is_not_answered_by_thrusts_and_a_steady_one_is(controller):
+    """Half a newton metre to and fro at the planner's rate, as thrusters off their model look to the estimator, moves
+    the planned roll moment by less than half of itself; where it stays it is held in full.
+    """
+    to_and_fro = rolls_planned(controller, 0.5 * (-1.0) ** np.arange(20))[10:]
+    steady = rolls_planned(controller, np.full(30, 0.5))[-5:]
+    calm = rolls_planned(controller, np.zeros(30))[-5:]
+    assert np.ptp(to_and_fro) < 0.5
+    np.testing.assert_allclose(steady.mean() - calm.mean(), -0.5, atol=0.1)
+
+
 def test_a_goal_that_speeds_up_is_followed_without_lag(controller):
     """Asked for 0.1 m/s at 0.1 m/s2 the plan, once it has seen the change, expects to be as fast as the goal."""
     state, velocity, place = controller.init(), 0.0, PLACE.p_m.copy()

@@ -11,6 +11,11 @@ so thrusters whose jets hit the target are spared here, too. The load that the e
 thrusts hold against it at the planned attitude. Where the vehicle is turned from that, the correction turns the force
 back: 22 N of current at 6 deg push 2 N aside (docs/research-log/0080). The PID's integral makes up for what is left.
 
+Load moment. The estimate of the load answers the plan's own thrusts within a tenth of a second, since the thrusters
+differ a little from their model. A plan that takes it up as it stands opposes that answer, and the next plan opposes
+this one: near the limits the roll grew to 75 deg (docs/research-log/0090). So the plan holds against its average over
+`LOAD_MOMENT_S`.
+
 Tracking weights. Weights alone do not bound how far a plan leaves its reference: that depends on how heavy the vehicle
 is and how near. Above a target and 5 N heavy, a plan with the paper's w_track = 5 left four fifths of the way undone
 and saved a tenth of the wash. So where a goal states a limit (`Goal.max_tracking_deviation`), the weights are scaled
@@ -44,6 +49,8 @@ from wakewise.wake.disturbance import Superposition
 
 DEVIATION_S = 0.5
 """Part of a plan over which its deviation is measured; much of it is flown."""
+LOAD_MOMENT_S = 0.5
+"""Time constant of the average of the load's moment: five plans, and shorter than the vehicle's own motion in roll."""
 SLOWEST_M_S = 0.02
 """Mean speed below which a reference counts as this fast: a plan that holds still may move by millimetres."""
 LARGEST_SCALE = 100.0
@@ -86,6 +93,7 @@ class MpcStage(MotionStage):
     def step(self, state: PipelineState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PipelineState, Demand]:
         """Decide the wrench for the next `dt_s` seconds."""
         change_B = self._change(state, dt_s, goal)
+        state = replace(state, load_moment_mean_B_Nm=averaged(state.load_moment_mean_B_Nm, estimate.load_B[3:], dt_s))
         if state.plan is None or state.plan_age_s >= PLAN_EVERY_S - 1e-6:
             state = self._replan(state, estimate, goal, change_B)
         if state.plan is None or state.correction_gain is None:
@@ -149,7 +157,7 @@ class MpcStage(MotionStage):
                 command_N=before,
                 reference=reference,
                 force_W_N=force_W,
-                moment_B_Nm=estimate.load_B[3:],
+                moment_B_Nm=estimate.load_B[3:] if state.load_moment_mean_B_Nm is None else state.load_moment_mean_B_Nm,
                 tracking_weight_scale=goal.tracking_weight_scale * state.tracking_scale,
             )
 
@@ -225,6 +233,13 @@ class MpcStage(MotionStage):
             return replace(held, plan_trouble=state.plan_trouble), replace(demand, trouble=words)
         state = replace(state, pid=pid, plan=None)
         return state, Demand(wrench_B=wrench, trouble=state.plan_trouble, allocator=self.backup)
+
+
+def averaged(mean: Array | None, value: Array, dt_s: float) -> Array:
+    """First-order low-pass of time constant `LOAD_MOMENT_S`, any shape; begins at the value, and anew after a NaN."""
+    if mean is None or not np.isfinite(mean).all():
+        return value
+    return np.asarray(value + np.exp(-dt_s / LOAD_MOMENT_S) * (mean - value))
 
 
 def correction_gain(model: PlanModel, plan: Horizon) -> Array:

@@ -78,6 +78,8 @@ class PipelineState:
     """What the thrusters gave at the plan's start, by the planned commands alone."""
     plan_force_W_N: Array | None = None
     """The load's force that the plan holds against."""
+    load_moment_mean_B_Nm: Array | None = None
+    """The load's moment, averaged, that the next plan holds against."""
     correction_gain: Array | None = None
     """Thrusts per unit of a correcting wrench, shape (n, 6)."""
     tracking_scale: float = 1.0
