@@ -152,6 +152,27 @@ def test_a_proposal_is_answered_by_buttons_and_keys(standin: StandIn, fly: Any) 
     page.until("document.getElementById('accept').hidden && document.getElementById('refuse').hidden")
 
 
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (844, 390)])
+def test_a_thumb_asks_for_a_proposal_on_a_phone(standin: StandIn, fly: Any, width: int, height: int) -> None:
+    """The button is as high as a thumb needs and nothing lies over it; it is there while there is no target."""
+    page = fly("", width, height, phone=True)
+    page.until(SEEN)
+    page.until("!document.getElementById('propose').hidden")
+    x, y, high, on_top = page.js(
+        "(() => { const b = document.getElementById('propose').getBoundingClientRect();"
+        " const x = b.x + b.width / 2, y = b.y + b.height / 2;"
+        " return [x, y, b.height, document.elementFromPoint(x, y).id]; })()"
+    )
+    assert high >= 44
+    assert on_top == "propose"
+    page.touch("touchStart", [(x, y)])
+    page.touch("touchEnd", [])
+    until(lambda: len(standin.of("proposal")) == 1, "a request")
+    assert standin.of("proposal")[0]["what"] == "ask"
+    standin.target = TRACKED
+    page.until("document.getElementById('propose').hidden")
+
+
 def test_a_thumb_draws_a_box_on_a_phone(standin: StandIn, fly: Any) -> None:
     """The page does not scroll meanwhile, and the button is as high as a thumb needs."""
     page = fly("", 390, 844, phone=True)

@@ -39,7 +39,7 @@ const washes = new Plot($("plot-disturbance"), [{ ink: "--s1" }, { ink: "--s2", 
 const deviations = new Plot($("plot-deviation"), [{ ink: "--s1" }], { unit: "% of the command", least: 10, most: 100 });
 const camera = new Camera({ canvas: $("camera"), empty: $("no-picture"), late: $("late"), link });
 const designation = new Designation({
-  camera, marks: $("marks"), panel: $("designated"), line: $("designated-line"), forget: $("forget"), accept: $("accept"), refuse: $("refuse"), helm,
+  camera, marks: $("marks"), panel: $("designated"), line: $("designated-line"), forget: $("forget"), propose: $("propose"), accept: $("accept"), refuse: $("refuse"), helm,
   say: (level, text) => notes.add(level, text),
 });
 

@@ -18,6 +18,7 @@ export class Designation {
   #marks;
   #panel;
   #line;
+  #proposes;
   #answers;
   #helm;
   #say;
@@ -27,9 +28,9 @@ export class Designation {
 
   /**
    * `camera`: a Camera; `marks`: a canvas over its picture; `panel` with `line` and `forget`: what is told of the target;
-   * `accept` and `refuse`: the answers to a proposal.
+   * `propose` asks for a proposal while there is no target; `accept` and `refuse`: the answers to it.
    */
-  constructor({ camera, marks, panel, line, forget, accept, refuse, helm, say }) {
+  constructor({ camera, marks, panel, line, forget, propose, accept, refuse, helm, say }) {
     this.#camera = camera;
     this.#marks = marks;
     this.#panel = panel;
@@ -38,6 +39,8 @@ export class Designation {
     this.#say = say;
     this.#listen(camera.canvas);
     forget.addEventListener("click", () => this.forget());
+    this.#proposes = propose;
+    propose.addEventListener("click", () => this.propose());
     this.#answers = { accept, refuse };
     for (const [what, button] of Object.entries(this.#answers)) button.addEventListener("click", () => this.answer(what));
     helm.addEventListener("change", () => this.cancel());
@@ -49,6 +52,7 @@ export class Designation {
     const known = target !== null && typeof target === "object" && Object.hasOwn(INK, words(target.status));
     this.#target = known ? target : null;
     this.#panel.hidden = this.#target === null;
+    this.#proposes.hidden = this.#target !== null || this.#camera.frame === null;
     for (const button of Object.values(this.#answers)) button.hidden = this.#target?.status !== "proposed";
     if (this.#target) this.#tell(this.#target);
     this.repaint();
