@@ -12,7 +12,7 @@ from wakewise.core.interfaces import Controller, WakeModel
 from wakewise.core.plugins import find, offered
 from wakewise.operation.scenario.settings import FLOWS, PILOTS, Scenario
 from wakewise.robot.vehicles import Vehicle
-from wakewise.scene.targets import Region, coral_kinds
+from wakewise.scene.targets import Region, procedural_kinds
 from wakewise.wake.models import OWN_MODELS, RIVALS
 
 OURS = frozenset({"wakewise", "wakewise_ardusub", "wakewise_benchmarks", "wakewise_nerf", "wakewise_paper"})
@@ -40,8 +40,9 @@ def external_parts(scenario: Scenario, given: Mapping[str, Any]) -> dict[str, st
         "wake": ("wake model", scenario.control.wake.model, (*OWN_MODELS, *RIVALS)),
         "world": ("world", scenario.flow_name, FLOWS),
         "pilot": ("pilot", scenario.pilot, PILOTS),
-        "target": ("target", scenario.target.kind, coral_kinds()),
+        "target": ("target", scenario.target.kind, procedural_kinds()),
         "current": ("current", scenario.tank.current.file or "", ("",)),
+        "detector": ("detector", scenario.perception.detector or "", ("",)),
     }
     for part, (kind, name, builtin) in named.items():
         is_file = Path(name).expanduser().exists()

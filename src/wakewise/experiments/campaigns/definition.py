@@ -31,7 +31,7 @@ from wakewise.experiments.campaigns.store import open_store, read_store
 from wakewise.experiments.campaigns.task import FLIES, PHOTOGRAPHS, Task, function_named, source_version
 from wakewise.experiments.trials.dataset.checksums import sha256_of
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
-from wakewise.scene.targets import coral_kinds
+from wakewise.scene.targets import procedural_kinds
 
 
 def external_parts(scenario: Scenario) -> dict[str, str]:
@@ -46,6 +46,7 @@ def external_parts(scenario: Scenario) -> dict[str, str]:
         ("vehicle", scenario.vehicle),
         ("target", scenario.target.kind),
         ("control_log", scenario.control_log or ""),
+        ("detector", scenario.perception.detector or ""),
     ):
         path = Path(named).expanduser()
         if named and path.is_file():
@@ -56,6 +57,7 @@ def external_parts(scenario: Scenario) -> dict[str, str]:
         ("flow", scenario.flow or ""),
         ("pilot", scenario.pilot),
         ("wake", scenario.control.wake.model),
+        ("detector", scenario.perception.detector or ""),
     ):
         if ":" in named:
             found[f"{name} source"] = module_digest(named.partition(":")[0])
@@ -313,7 +315,7 @@ def _trial(campaign: Campaign, cell: _Cell, scenario: Scenario, outside: dict[st
 
 def example() -> str:
     """A campaign file to begin with."""
-    return _EXAMPLE.format(presets=" or ".join(PRESETS), corals=", ".join(coral_kinds()))
+    return _EXAMPLE.format(presets=" or ".join(PRESETS), corals=", ".join(procedural_kinds()))
 
 
 _EXAMPLE = """\

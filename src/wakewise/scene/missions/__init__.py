@@ -5,6 +5,7 @@
 - `aim.py`: camera aim by pitch, tilt joint or both. `clearance.py`: collisions and tilts that the joint cannot follow.
 - `coverage.py`: coverage of the target by photographs and its gaps; `visibility.py`: what one photograph shows well;
   `reachability.py`: next views that the hull can reach.
+- `transects.py`: lines over a patch at one height, and orbits round parts of it; `part_choice.py`: which parts.
 """
 
 from wakewise.scene.missions.aim import CameraAim, aim_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +32,8 @@ class Leg:
 
     On circles the camera's speed is exactly as timed; on climbs, which slant across the sphere, within a few percent.
     `start` and `end` hold azimuth_rad, elevation_rad, range_m, shape (3,). `length_m` is that of the camera's path.
+    `centre_W_m`, shape (3,): what it circles at its start, None for the route's centre; over the leg that moves by
+    `shift_W_m`, shape (3,). With range 0 the centre is the camera's own place: a transect.
     """
 
     name: str
@@ -41,9 +43,11 @@ class Leg:
     duration_s: float
     speed_m_s: float
     acceleration_m_s2: float
+    centre_W_m: Array | None = None
+    shift_W_m: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
-        freeze(self, start=(3,), end=(3,))
+        freeze(self, start=(3,), end=(3,), shift_W_m=(3,))
 
     def progress(self, time_s: float) -> tuple[float, float]:
         """Fraction of the leg done and its rate of change in 1/s: speed up, cruise, slow down."""
@@ -73,12 +77,22 @@ class Leg:
         return s / v + 0.5 * v / a
 
 
-def rest_to_rest(name: str, start: Array, end: Array, speed_m_s: float, acceleration_m_s2: float) -> Leg:
-    """Time a leg with trapezoidal speed; short legs never reach the full speed."""
+def rest_to_rest(
+    name: str,
+    start: Array,
+    end: Array,
+    speed_m_s: float,
+    acceleration_m_s2: float,
+    centre_W_m: Array | None = None,
+    shift_W_m: Array | None = None,
+) -> Leg:
+    """Time a leg with trapezoidal speed; short legs never reach the full speed. Centre and shift as `Leg` has them."""
     # The path is a straight line in spherical coordinates; its length by fine chords.
+    shift = np.zeros(3) if shift_W_m is None else shift_W_m
     fractions = np.linspace(0.0, 1.0, 257)[:, None]
     az, el, rng = np.moveaxis((1 - fractions) * start + fractions * end, -1, 0)
     points = np.stack([rng * np.cos(el) * np.cos(az), rng * np.cos(el) * np.sin(az), -rng * np.sin(el)], axis=-1)
+    points += fractions * shift
     length_m = float(np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     peak = min(speed_m_s, float(np.sqrt(acceleration_m_s2 * length_m)))
     duration_s = length_m / peak + peak / acceleration_m_s2 if length_m > 0 else 0.0
@@ -90,6 +104,8 @@ def rest_to_rest(name: str, start: Array, end: Array, speed_m_s: float, accelera
         duration_s=duration_s,
         speed_m_s=peak,
         acceleration_m_s2=acceleration_m_s2,
+        centre_W_m=centre_W_m,
+        shift_W_m=shift,
     )
 
 
@@ -132,9 +148,11 @@ class Route:
 
     def camera(self, time_s: float) -> tuple[Pose, Array, Array]:
         """Wished camera pose X_WC, its velocity and its angular velocity in W (shape (3,) each)."""
-        place, rate = (numbers.tolist() for numbers in self.on_sphere(time_s))
-        v_W, omega_W = camera_twist(*place, *rate)
-        return camera_pose(self.centre_W_m, *place), v_W, omega_W
+        leg, fraction, speed = self._progress(time_s)
+        place = ((1 - fraction) * leg.start + fraction * leg.end).tolist()
+        v_W, omega_W = camera_twist(*place, *(speed * (leg.end - leg.start)).tolist())
+        centre = self.centre_W_m if leg.centre_W_m is None else leg.centre_W_m
+        return camera_pose(centre + fraction * leg.shift_W_m, *place), v_W + speed * leg.shift_W_m, omega_W
 
     def tilt(self, time_s: float, aim: CameraAim | Pose) -> tuple[float, float]:
         """Wished angle of the camera's joint and its rate; zeros where it is not aimed with."""
@@ -171,9 +189,13 @@ class Route:
 
     def on_sphere(self, time_s: float) -> tuple[Array, Array]:
         """Azimuth, elevation and range of the camera, and their rates, shape (3,) each."""
-        leg = self.legs[i := self.leg_at(time_s)]
-        fraction, rate = leg.progress(time_s - self._starts[i])
+        leg, fraction, rate = self._progress(time_s)
         return (1 - fraction) * leg.start + fraction * leg.end, rate * (leg.end - leg.start)
+
+    def _progress(self, time_s: float) -> tuple[Leg, float, float]:
+        """Leg under way, how much of it is done, and how fast that grows, 1/s."""
+        leg = self.legs[i := self.leg_at(time_s)]
+        return leg, *leg.progress(time_s - self._starts[i])
 
 
 def plan_route(centre_W_m: Array, settings: MissionSettings, current_W_m_s: Array | None = None) -> Route:

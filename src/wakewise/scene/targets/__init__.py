@@ -3,6 +3,7 @@
 - `target.py`: a target by name, and a mesh on its bed. `mesh.py`: triangle meshes and their files.
 - `region.py`: weighted sample points of the region (quadrature of the disturbance).
 - `corals.py`: procedural corals and soft targets, from signed distance fields (`fields.py`).
+- `reef.py`: a procedural patch of reef, 2 x 2 m, from a height map.
 - `fragility.py`: delicate features, found from the mesh or marked by a person.
 - `elasticity.py`: bending of soft targets and their materials.
 - `distance.py`: exact distance to a mesh; `rays.py`: first face on a ray.
@@ -14,7 +15,14 @@ from wakewise.scene.targets.elasticity import TISSUES, BendingModes, TissuePrope
 from wakewise.scene.targets.fragility import Fragility, FragilityMarks, find_fragility, read_marks, read_vertex_scores
 from wakewise.scene.targets.mesh import Mesh, load_mesh, read_mesh, write_mesh
 from wakewise.scene.targets.region import DenseQuadrature, Region, region_measure, sample_region, sampling_error_pct
-from wakewise.scene.targets.target import Target, find_mesh, find_target, is_mesh_file, place_on_bed
+from wakewise.scene.targets.target import (
+    Target,
+    find_mesh,
+    find_target,
+    is_mesh_file,
+    place_on_bed,
+    procedural_kinds,
+)
 
 __all__ = [
     "TISSUES",
@@ -35,6 +43,7 @@ __all__ = [
     "is_mesh_file",
     "load_mesh",
     "place_on_bed",
+    "procedural_kinds",
     "read_marks",
     "read_mesh",
     "read_vertex_scores",

@@ -16,6 +16,7 @@ from wakewise.core.plugins import find, offered
 from wakewise.core.settings import guess, seed_number
 from wakewise.scene.targets.corals import coral, coral_kinds
 from wakewise.scene.targets.mesh import Mesh, load_mesh
+from wakewise.scene.targets.reef import REEF, reef_patch
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,22 +97,27 @@ def find_mesh(kind: str | Path, seed: int = 0, size_m: float | None = None) -> t
     if not is_mesh_file(kind):
         if size_m is not None:
             raise InputError(f"target '{kind}': size_m {size_m:g} scales a mesh file, this one has its own size")
-        if kind in coral_kinds():
-            return kind, coral(kind, individual)
+        if kind in procedural_kinds():
+            return kind, reef_patch(individual) if kind == REEF else coral(kind, individual)
         maker: MeshMaker = find("target", kind, {}).maker
         return kind.rpartition(":")[2], maker(individual)
     if not path.exists() and path.name == kind and not path.suffix:
-        known = [*coral_kinds(), *offered("target")]
+        known = [*procedural_kinds(), *offered("target")]
         raise InputError(
             f"target '{kind}': unknown, {guess(kind, known)}allowed are {', '.join(known)}, or a mesh file"
         )
     return path.stem, load_mesh(path, size_m)
 
 
+def procedural_kinds() -> list[str]:
+    """Kinds that are made and not read from a file: corals, and a patch of reef."""
+    return [*coral_kinds(), REEF]
+
+
 def is_mesh_file(kind: str | Path) -> bool:
     """Whether a target's name is taken as that of a mesh file, not of a procedural target or one from outside."""
     kind, path = _place(kind)
-    if kind in coral_kinds():
+    if kind in procedural_kinds():
         return False
     return path.exists() or not (kind in offered("target") or ":" in kind)
 
