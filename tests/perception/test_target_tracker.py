@@ -250,3 +250,22 @@ def test_what_is_not_mapped_stays_out_of_the_map_after_it_ends(arc: Pictures, af
     assert (live | after.points.mature).all()
     assert int(after.points.mature.sum()) > 100
     assert replace(after, trouble="x").points is after.points
+
+
+def test_features_are_sought_closely_about_what_stands_above_the_bed_before_a_target_is_known(
+    arc: Pictures, after: TrackerState
+) -> None:
+    """Once there is a bed, a picture without a target gives half as many features again near the coral."""
+    tracker = tracker_of(arc)
+    blank = replace(
+        after, shape=None, target=None, designation=None, tracks=after.tracks.kept(np.zeros(len(after.tracks), bool))
+    )
+    counts = []
+    for before in (replace(blank, bed=None), blank):
+        picture, X_WC = arc.pictures[-2], arc.poses[-2]
+        state, _ = tracker.step(before, picture, after.last_s + PERIOD_S, X_WC, STD)
+        p_C = X_WC.inverse().apply(arc.target.centre_W_m)
+        middle = arc.camera.pixels(p_C[None])[0]
+        near = np.linalg.norm(state.tracks.pixels - middle, axis=1) < arc.camera.focal_px * arc.target.radius_m / p_C[2]
+        counts.append(int(near.sum()))
+    assert counts[1] > 1.5 * counts[0] > 0, counts

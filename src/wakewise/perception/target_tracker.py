@@ -17,7 +17,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
@@ -47,6 +49,8 @@ from wakewise.perception.surface_map import (
     empty_surface,
 )
 from wakewise.perception.target_shape import (
+    ABOVE_BED_M,
+    TALLEST_M,
     VOXEL_M,
     TargetShape,
     averaged,
@@ -91,6 +95,9 @@ DETECTED_S = 5.0
 """A detector's box in which no body is mapped for so long is dropped, and the detector asked again."""
 BED_REACH_M = 0.35
 """The bed under a target is that of the points within this of it."""
+ABOUT_M, LEAST_AWAY_M = 0.06, 0.05
+"""Before there is a target, features are sought closely within this of what stands above the bed, if it is so far away
+at least."""
 STRONG = 0.1
 """Cornerness over the best of strong corners."""
 AMPLE = 2.0
@@ -222,7 +229,7 @@ class TargetTracker:
         )
         state = self._adjusted(self._kept(state, X_WC, time_s, prior or guess, std))
         if found is not None:
-            state = with_sweep_step(state, time_s)
+            state = with_sweep_step(state, time_s, self.settings.protect == "view")
         state = self._followed(state, X_WC, time_s)
         if time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6:
             state = self._reshaped(state, X_WC, time_s)
@@ -341,6 +348,9 @@ class TargetTracker:
         if box is None:  # strong corners anywhere: what stands on the bed has more of them than sand
             tracks = replenish(tracks, picture, self.settings.features, apart)
             most = self.settings.features + self.settings.target_features
+            stands = self._above_bed(state, picture.shape, X_WC)
+            if stands is not None:
+                tracks = replenish(tracks, picture, most, max(apart / 3.0, 3.0), stands)
             return replenish(tracks, picture, most, apart / 2.5, quality=STRONG)
         left, top, right, bottom = box
         u, v = tracks.pixels.T
@@ -350,6 +360,23 @@ class TargetTracker:
         tracks = replenish(tracks, picture, self.settings.features + inside, apart, window)
         most = len(tracks) + self.settings.target_features - inside
         return replenish(tracks, picture, most, max(apart / 3.0, 3.0), 255 - window)
+
+    def _above_bed(self, state: TrackerState, size: tuple[int, ...], X_WC: Pose) -> NDArray[np.uint8] | None:
+        """Mask, shape `size`, of the picture about mapped points that stand above the bed; None if there are none."""
+        if state.bed is None:
+            return None
+        places = state.points.points_W_m[state.points.mature]
+        height = state.bed.height_m(places)
+        p_C = (places[(height > ABOVE_BED_M) & (height < TALLEST_M)] - X_WC.p_m) @ X_WC.R
+        p_C = p_C[p_C[:, 2] > LEAST_AWAY_M]
+        pixels = state.camera.pixels(p_C)
+        seen = state.camera.inside(pixels)
+        if not seen.any():
+            return None
+        mask = np.zeros(size, np.uint8)
+        for (u, v), away_m in zip(np.round(pixels[seen]).astype(int), p_C[seen, 2], strict=True):
+            cv2.circle(mask, (int(u), int(v)), round(ABOUT_M * self.camera.focal_px / away_m), 255, -1)
+        return mask
 
     def _window(self, state: TrackerState, X_WC: Pose) -> tuple[int, int, int, int] | None:
         """Box of the picture where the target is expected: its own, or the designated one; None if nowhere."""
@@ -479,7 +506,7 @@ class TargetTracker:
             centre_W_m=middle, covariance=1e-4 * np.eye(3), radius_m=radius, surface_W_m=seen, seen=len(seen)
         )
         state = replace(state, shape=shape, accepted=True, seen_s=time_s)
-        return self._protected(state, time_s)
+        return self._protected(state, time_s, state.surface.chosen(state.surface.confirmed))
 
     def _protected(self, state: TrackerState, time_s: float, surface: SurfaceMap | None = None) -> TrackerState:
         """The state with the region of its shape; `surface`: what is mapped of it."""
