@@ -78,6 +78,20 @@ def test_a_controller_from_outside_is_flown_anew_when_it_changes(
     assert first.task.key == again.task.key != changed.task.key
 
 
+def test_a_trial_with_another_detector_has_another_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bytes of a model file are in it, and the source of a module; so is that there is one."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    model, module = tmp_path / "find.onnx", tmp_path / "my_campaign_detector.py"
+    for file, name in ((model, "find.onnx"), (module, "my_campaign_detector:make")):
+        file.write_text("make = None\n")
+        keys = [_planned(methods=["dp"], scenario={"perception.detector": said}, seeds=1)[0].task.key for said in (None, name, name)]
+        file.write_text("make = None  # changed\n")
+        (changed,) = _planned(methods=["dp"], scenario={"perception.detector": name}, seeds=1)
+        assert keys[1] == keys[2]
+        assert len({*keys, changed.task.key}) == 3
+
+
 def test_the_example_is_a_campaign(tmp_path: Path) -> None:
     """As it is printed."""
     path = tmp_path / "campaign.yaml"
