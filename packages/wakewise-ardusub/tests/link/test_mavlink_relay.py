@@ -132,6 +132,20 @@ def test_sticks_go_on_let_go_while_the_companion_drives(relayed):
     assert heard[-1] == sticks
 
 
+def test_the_companions_answers_reach_the_ground_station(relayed):
+    """What answers a command goes to both sides; thrusts go to the vehicle alone."""
+    ground, vehicle, mediator, _, _ = relayed
+    ground.send(b"here")
+    assert vehicle.recv(65535) == b"here"
+    mav = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=191)
+    thrusts = bytes(mav.set_actuator_control_target_encode(1, 0, 1, 1, [0.0] * 8).pack(mav))
+    answer = bytes(mav.command_ack_encode(2005, 0, 0, 0, 255, 190).pack(mav))
+    for data in (thrusts, answer):
+        mediator.send(data)
+        assert vehicle.recv(65535) == data
+    assert ground.recv(65535) == answer
+
+
 def test_it_says_nothing_of_its_own(relayed):
     """With nothing to forward nothing is sent: a ground station that is lost is lost to the autopilot, too."""
     _, vehicle, _, _, _ = relayed

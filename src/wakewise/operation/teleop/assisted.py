@@ -171,6 +171,12 @@ class AssistedPilot:
             tracking_weight_scale=scale, max_tracking_deviation=deviation_limit(PAPER_W_TRACK * scale)
         )
 
+    def retarget(self, parts: Parts) -> None:
+        """Go by another target and its mission, which is not begun; the motion goes on from its present state."""
+        other = assisted_pilot(parts, self.source, self.desk)
+        self.target_W_m, self.keep_off = other.target_W_m, other.keep_off
+        self.mission, self._scan = other.mission, ScanState()
+
     @property
     def leg(self) -> str:
         """What is flown now, as the record calls it."""

@@ -30,6 +30,10 @@ class RegionMethods(Mapping[str, Pipeline]):
         """Make the pipelines of another region; None: those of the first one again."""
         self._made = self._own if region is None else self._make(region)
 
+    def adopt(self, made: Mapping[str, Pipeline]) -> None:
+        """Take pipelines that were made elsewhere, such as among other obstacles, of the same names."""
+        self._made = dict(made)
+
     def __getitem__(self, name: str) -> Pipeline:
         return self._made[name]
 

@@ -46,7 +46,7 @@ def ardusub(
     ] = "udpin:127.0.0.1:14560",
     vehicle: Annotated[str, typer.Option(help="Library name or vehicle YAML file.")] = DEFAULT_VEHICLE,
     method: Annotated[
-        str, typer.Option(help="How thrusts are chosen, such as wake-aware, instant or dp.")
+        str, typer.Option(help="How thrusts are chosen, such as wake-aware, allocation-only or dp.")
     ] = "wake-aware",
     system: Annotated[
         int, typer.Option(min=1, max=255, help="The vehicle's MAVLink system id, which its companion shares.")
@@ -70,6 +70,23 @@ def ardusub(
         typer.Option(
             help="CSV with x_m, y_m, z_m from the middle of the vehicle as the session begins (forward, right, down) "
             "and weight: what to spare instead of a ball."
+        ),
+    ] = None,
+    box: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LEFT,TOP,RIGHT,BOTTOM",
+            help="The target's box in the camera's picture as the session begins, in shares of its width and height. "
+            "A ground station may send another (MAV_CMD_CAMERA_TRACK_RECTANGLE).",
+        ),
+    ] = None,
+    distance: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M",
+            min=0.1,
+            max=20.0,
+            help="From the camera to a target in a box, where no rangefinder (DISTANCE_SENSOR) tells it.",
         ),
     ] = None,
     relay: Annotated[
@@ -145,11 +162,13 @@ def ardusub(
     if motor_test:
         test_vehicle_motors(connection, vehicle, system, motors, motor_results, json=json)
         return
+    import math
     import secrets
 
     from wakewise.operation import load_scenario, parse_overrides
     from wakewise_ardusub.link.connection import parse_connection
     from wakewise_ardusub.link.engagement_fsm import EngagementLimits
+    from wakewise_ardusub.link.tracking_commands import checked_box
     from wakewise_ardusub.link.transports import MavlinkCodec
     from wakewise_ardusub.session.cameras import parse_camera
     from wakewise_ardusub.session.link_join import SEA
@@ -169,6 +188,7 @@ def ardusub(
     }
     made_camera = None if camera is None else parse_camera(camera)
     spare = _spare(vehicle, target, ahead, points)
+    boxed = None if box is None else checked_box(_numbers(box, "--box", "LEFT,TOP,RIGHT,BOTTOM", 4))
     stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime())
     folder = out or Path("runs") / f"sea-{Path(vehicle).stem}-{stamp}"
     if folder.exists() and not folder.is_dir():
@@ -185,6 +205,8 @@ def ardusub(
             session=secrets.randbelow(2**31) + 1,
             gate_options=gate_options,
             camera=made_camera,
+            box=boxed,
+            distance_m=math.nan if distance is None else distance,
         )
         finish(session)
         why = "ended"

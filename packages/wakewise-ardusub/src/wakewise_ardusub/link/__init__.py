@@ -7,6 +7,7 @@
 - `parameters.py`: read, set and parse parameters; functions of the sticks' buttons.
 - `motor_interface.py`: thrusts to actuator values, servo outputs to thrusts.
 - `message_state.py`: vehicle state from messages. `telemetry_adapter.py`: messages to `Measurement`s.
+- `tracking_commands.py`: a target designated in the picture: commands of the camera protocol and their answers.
 - `engagement_fsm.py`: state machine that permits thrusts. `output_gate.py`: sends thrusts while it permits them.
 - `vehicle_survey.py`: facts for `checks.py` (go or no-go). `motor_test.py`: test of each motor by an operator.
 - `session_log.py`: journal of a session.

@@ -36,6 +36,8 @@ _PITCH_ROLL = slice(14, 18)
 _WHOLE, _FIRST = 30, 11
 """Bytes of MANUAL_CONTROL's payload with all of its extensions, and without."""
 _KEPT = 20_000
+_TO_GROUND = frozenset({77, 253, 275})
+"""COMMAND_ACK, STATUSTEXT and CAMERA_TRACKING_IMAGE_STATUS of the companion: for ground stations, too."""
 
 
 def neutralize_sticks(data: bytes) -> bytes:
@@ -126,9 +128,12 @@ class MavlinkRelay:
         self._thread.join(timeout=2.0)
 
     def send(self, data: bytes) -> None:
-        """Send the companion's own to the vehicle."""
+        """Send the companion's own to the vehicle, and its answers to the ground stations."""
         if self._vehicle_at is not None:
             self._put(self._vehicle, data, self._vehicle_at)
+        if any(isinstance(part, MavlinkPacket) and part.number in _TO_GROUND for part in packets(data)):
+            for station in list(self._stations):
+                self._put(self._ground, data, station)
 
     def latency_s(self, share: float = 0.99) -> float:
         """Within what time this share of the last datagrams was forwarded, from when they were read; 0 before any."""

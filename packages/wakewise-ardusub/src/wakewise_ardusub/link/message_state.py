@@ -94,6 +94,8 @@ class LinkState:
         Of the autopilot, as last said.
     ground : mapping
         System ids of ground stations and when each was last heard.
+    ranges : mapping
+        Distances in m of rangefinders by MAV_SENSOR_ORIENTATION, each with the time at which it came.
     sent_us : tuple of int
         `time_usec` of the thrusts last sent by this program, by which its own echo is told from a rival's.
     photographs : int
@@ -124,6 +126,7 @@ class LinkState:
     named: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
     parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     ground: Mapping[int, float] = field(default_factory=lambda: MappingProxyType({}))
+    ranges: Mapping[int, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
     components: frozenset[int] = frozenset()
     sent_us: tuple[int, ...] = ()
     duplicate: str = ""
@@ -162,7 +165,7 @@ WANTED = frozenset({
     "HEARTBEAT", "ATTITUDE", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "VISION_POSITION_ESTIMATE", "ODOMETRY",
     "VFR_HUD", "SYS_STATUS", "SERVO_OUTPUT_RAW", "MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE", "NAMED_VALUE_FLOAT",
     "SET_ACTUATOR_CONTROL_TARGET", "SET_MODE", "COMMAND_LONG", "STATUSTEXT", "RAW_IMU", "PARAM_VALUE",
-    "COMMAND_ACK", "CAMERA_IMAGE_CAPTURED",
+    "COMMAND_ACK", "CAMERA_IMAGE_CAPTURED", "DISTANCE_SENSOR",
 })  # fmt: skip
 """Messages that are looked into, here or in `measuring.py`."""
 
@@ -183,6 +186,8 @@ def _taken(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
     ours = said.system == known.system
     if ours and said.name in ("COMMAND_ACK", "CAMERA_IMAGE_CAPTURED"):
         return _photographed(known, said, now_s)
+    if ours and said.name == "DISTANCE_SENSOR":
+        return _ranged(known, said, now_s)
     if ours and said.component == protocol.COMPANION_COMPONENT:
         return _from_companion(known, said, now_s)
     if ours and said.component == protocol.AUTOPILOT_COMPONENT:
@@ -214,6 +219,16 @@ def _photographed(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkS
     agreed = result in (_DONE, _IN_PROGRESS)
     words = f"{who} takes photographs" if agreed else f"{who} takes none: {_ANSWERS.get(result, f'result {result}')}"
     return replace(known, camera=words, camera_s=now_s)
+
+
+def _ranged(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
+    """A distance of a rangefinder, which says it in cm; one outside what it can measure is none."""
+    least, most, distance, turn = (
+        int(said.fields[name]) for name in ("min_distance", "max_distance", "current_distance", "orientation")
+    )
+    if not max(least, 1) <= distance <= most:
+        return known
+    return replace(known, ranges=MappingProxyType({**known.ranges, turn: (0.01 * distance, now_s)}))
 
 
 def _from_companion(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:

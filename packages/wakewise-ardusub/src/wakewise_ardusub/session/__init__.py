@@ -7,5 +7,6 @@ requested; thrusts of another engagement are not sent (`wakewise_ardusub.link.ou
 
 - `session.py`: from a connection to a flight; the protected region. Read this first.
 - `link_join.py`: plant, pilot, controller and estimator on the link; wash figures; the warm-up.
+- `boxed_target.py`: the target that is designated by a box in the picture.
 - `cameras.py`: cameras of the session.
 """

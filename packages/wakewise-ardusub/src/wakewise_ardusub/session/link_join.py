@@ -32,9 +32,10 @@ from wakewise.core.interfaces import BodyState, Command, Controller, Estimator, 
 from wakewise.operation.loop import Step
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario
-from wakewise.operation.teleop.assisted import AssistedPilot, assisted
+from wakewise.operation.teleop.assisted import AssistedPilot, assisted, assisted_pilot, switched_controller
 from wakewise.operation.teleop.input.controls import CENTRED, Controls
 from wakewise.operation.teleop.operator_state import OperatorSettings, OperatorState
+from wakewise.operation.teleop.region_methods import RegionMethods, region_methods
 from wakewise.planning import Surroundings, check_start, state_of
 from wakewise.scene.missions import Coverage, patches_of
 from wakewise.scene.targets import Region, Target
@@ -118,10 +119,15 @@ class MessageReceiver(Protocol):
 
 
 class LinkThread:
-    """Runs until it is stopped; what breaks it is kept in `fault`, after the warden has let go."""
+    """Runs until it is stopped; what breaks it is kept in `fault`, after the warden has let go.
 
-    def __init__(self, connection: MessageReceiver, gate: OutputGate) -> None:
-        self._connection, self._gate = connection, gate
+    `heard` is called with each message after the gate has taken it; must be quick.
+    """
+
+    def __init__(
+        self, connection: MessageReceiver, gate: OutputGate, heard: Callable[[MavlinkMessage], object] | None = None
+    ) -> None:
+        self._connection, self._gate, self._heard = connection, gate, heard
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self.fault: BaseException | None = None
@@ -147,6 +153,8 @@ class LinkThread:
                     gate.noise(noise)
                 for k, message in enumerate(said):
                     gate.take(message)
+                    if self._heard is not None:
+                        self._heard(message)
                     if k % MOST_AT_ONCE == 0 and gate.clock() >= due_s:
                         gate.tick()
                         due_s = gate.clock() + TICK_S
@@ -305,12 +313,13 @@ class WashFigures:
         self._due_s = step.time_s + FIGURES_S
         engaged = self.turn.entry is not None
         thrusts = step.command.thrusts_N if engaged else self.flown_N()
-        gram = self._view.gram(step.estimate.X_WB)
+        view = self._view
+        gram = view.gram(step.estimate.X_WB)
         if not np.isfinite(gram).all():
             return
         found = {DISTURBANCE_NAME: disturbance_of(gram, thrusts)}
         least = min_norm_allocation(self._layout, self._layout.B @ thrusts, gram).disturbance or 0.0
-        weight = self._view.total_weight
+        weight = view.total_weight
         self.speeds_m_s = (math.sqrt(found[DISTURBANCE_NAME] / weight), math.sqrt(max(least, 0.0) / weight))
         if engaged and least > weight * STILL_M_S**2:
             found[SAVED_NAME] = 100.0 * (1.0 - found[DISTURBANCE_NAME] / least)
@@ -321,6 +330,14 @@ class WashFigures:
     def photographed(self, X_WC: Pose) -> None:
         """A photograph was taken from here; what it has seen is reckoned beside the flight."""
         self._beside.submit(self._see, X_WC)
+
+    def retarget(self, parts: Parts) -> None:
+        """Reckon them of another target from now on; nothing of it was photographed."""
+        self._beside.submit(self._retarget, parts)
+
+    def _retarget(self, parts: Parts) -> None:
+        self.parts, self._coverage, self._covered_pct = parts, None, None
+        self._view = InfluenceModel.of(parts.vehicle, parts.region, parts.wake)
 
     def _see(self, X_WC: Pose) -> None:
         target, before = self.parts.target, self._coverage
@@ -361,7 +378,35 @@ class VehicleFlight:
     bare: Parts
     figures: WashFigures
     desk: OperatorState
+    methods: RegionMethods
     turn: FlightOwnership = field(default_factory=FlightOwnership)
+
+    def retarget(self, parts: Parts, estimate: BodyState) -> None:
+        """Fly by the target, region and surroundings of these parts from the next step on.
+
+        The fence stays about the first target. Takes longer than a step: not to be called in a thread that flies.
+
+        Raises
+        ------
+        InputError
+            If the vehicle stands where no plan can be good, or what it flies cannot be made; nothing is changed then.
+        """
+        check_start(parts.vehicle, parts.region, state_of(estimate), parts.surroundings, what="here")
+        pilot = self.parts.pilot
+        assert isinstance(pilot, EngagedPilot)  # see `join_vehicle`
+        made = region_methods(parts)
+        pilot.inner.retarget(parts)
+        self.methods.adopt(made)
+        self.figures.retarget(parts)
+
+
+def surroundings_of_target(target: Target, surface: Array) -> Surroundings:
+    """What is solid: the water's surface as planes, shape (k, 4), and a target's ball."""
+    return Surroundings(
+        planes=surface,
+        spheres=np.array([[*target.centre_W_m, target.radius_m]]),
+        names=(*("the water surface",) * len(surface), "the target"),
+    )
 
 
 def join_vehicle(
@@ -406,11 +451,7 @@ def join_vehicle(
     turn, known = FlightOwnership(), gate.known
     place_z = float(start.X_WB.p_m[2])
     surface = np.array([[0.0, 0.0, 1.0, place_z - known.depth_m]]) if math.isfinite(known.depth_m) else np.zeros((0, 4))
-    around = Surroundings(
-        planes=surface,
-        spheres=np.array([[*target.centre_W_m, target.radius_m]]),
-        names=(*("the water surface",) * len(surface), "the target"),
-    )
+    around = surroundings_of_target(target, surface)
 
     def plant() -> ArduSubPlant:
         return ArduSubPlant(gate=gate, clock=clock(), wait=wait, entry=lambda: turn.entry)
@@ -422,10 +463,12 @@ def join_vehicle(
     if gate.target_W_m is None:
         gate.target_W_m = target.centre_W_m
     desk = OperatorState(OperatorSettings(mode="operator"))
-    flown = assisted(parts, GroundStationInput(gate=gate), desk, OperatorSettings(mode="operator"))
-    inner = flown.pilot
-    if not isinstance(inner, AssistedPilot):
+    if parts.finds:
         raise InputError("pilot: only hands fly at sea")
+    inner = assisted_pilot(parts, GroundStationInput(gate=gate), desk, OperatorSettings(mode="operator"))
+    flown = parts.replace(pilot=inner)
+    methods = region_methods(flown)
+    flown = flown.replace(controller=switched_controller(flown, lambda: inner.state.method, methods))
     beside = EngagedPilot(inner=inner, gate=gate, turn=turn, photographed=photographed)
     rests = EngagedController(inner=flown.controller, turn=turn, thrusters=len(parts.vehicle.thrusters))
     told = ServoEstimator(inner=flown.estimator, turn=turn, flown_N=flown_N)
@@ -435,6 +478,7 @@ def join_vehicle(
         bare=parts,
         figures=WashFigures(parts=parts, gate=gate, turn=turn, flown_N=flown_N),
         desk=desk,
+        methods=methods,
         turn=turn,
     )
 

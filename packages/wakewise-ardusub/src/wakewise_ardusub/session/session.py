@@ -22,19 +22,29 @@ from scipy.spatial import ConvexHull
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.geometry import Pose, euler_from_quat, matrix_from_quat, quat_from_euler
-from wakewise.core.interfaces import BodyState
+from wakewise.core.interfaces import BodyState, TruthProvider
 from wakewise.core.jit.precompile import compile_kernels
 from wakewise.operation.flying import FLIGHT_JOBS
+from wakewise.operation.loop import Step
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.teleop.live import LiveFlight
 from wakewise.robot.importers import any_vehicle
 from wakewise.scene.targets import Mesh, Region, Target
-from wakewise_ardusub.link.message_state import attitude_of
+from wakewise_ardusub.link.message_state import MavlinkMessage, attitude_of
 from wakewise_ardusub.link.motor_interface import VehicleMotors
 from wakewise_ardusub.link.output_gate import OutputGate, Send
 from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
+from wakewise_ardusub.link.tracking_commands import Box
+from wakewise_ardusub.session.boxed_target import BoxDesignation, BoxedTarget, Follow, TryLaterError
 from wakewise_ardusub.session.cameras import MakeCamera, note_view
-from wakewise_ardusub.session.link_join import LinkThread, MessageReceiver, VehicleFlight, join_vehicle, run_warm_up
+from wakewise_ardusub.session.link_join import (
+    LinkThread,
+    MessageReceiver,
+    VehicleFlight,
+    join_vehicle,
+    run_warm_up,
+    surroundings_of_target,
+)
 
 BALL_M = 0.25
 
@@ -127,6 +137,10 @@ class VehicleSession:
         What else the warden takes: limits, buttons, listen_only.
     camera : callable, optional
         Makes what takes the photographs; without it they are noted and not taken.
+    box : tuple of float, optional
+        Designates the target in the picture as the flight begins: left, top, right, bottom, see `boxed_target`.
+    distance_m : float
+        Of a target designated by a box where no rangefinder tells it.
     """
 
     scenario: Scenario
@@ -137,6 +151,8 @@ class VehicleSession:
     session: int
     gate_options: dict[str, Any] = field(default_factory=dict)
     camera: MakeCamera | None = None
+    box: Box | None = None
+    distance_m: float = math.nan
     fault: BaseException | None = None
     preparing: str = "not begun"
     live: LiveFlight | None = None
@@ -153,7 +169,8 @@ class VehicleSession:
             send=self.send, drive=self.drive, journal=self.journal, session=self.session, **self.gate_options
         )
         self._camera = None if self.camera is None else self.camera(self.gate, self.folder, self.journal)
-        self._link = LinkThread(self.receiving, self.gate)
+        self.boxes: BoxDesignation | None = None
+        self._link = LinkThread(self.receiving, self.gate, self._heard)
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="session", daemon=True)
 
@@ -175,6 +192,8 @@ class VehicleSession:
             self._thread.join(None if flies else LEFT_S)
         if self._camera is not None:
             self._camera.close()
+        if self.boxes is not None:
+            self.boxes.close()
         self.fault = self.fault or self._link.fault
         known, gate = self.gate.known, self.gate
         self.journal.write(
@@ -217,6 +236,8 @@ class VehicleSession:
             parts.append(margins)
         if self._camera is not None and known.camera:
             parts.append(known.camera)
+        if self.boxes is not None and self.boxes.target is not None:
+            parts.append(self.boxes.target.words)
         live = self.live
         if live is None or live.preparing is not None:
             parts.append(self.preparing if live is None else f"begins: {live.preparing}")
@@ -230,7 +251,7 @@ class VehicleSession:
             if sea is None:
                 return
             self.sea = sea
-            self.live = live = LiveFlight(sea.parts, folder=self.folder, watch=sea.figures, checked=False)
+            self.live = live = LiveFlight(sea.parts, folder=self.folder, watch=self._watch, checked=False)
             if self._over.is_set():
                 return
             live.run()
@@ -289,11 +310,55 @@ class VehicleSession:
         if took_s > period_s:
             raise StageError(
                 f"method {self.scenario.method}: a step takes {1e3 * took_s:.0f} ms on this computer, the control "
-                f"period is {1e3 * period_s:.0f} ms; end what else runs here, or take a lighter method, such as instant"
+                f"period is {1e3 * period_s:.0f} ms; end what else runs here, or take a lighter method, such as dp"
             )
+        boxes = BoxDesignation(
+            gate, sea.bare.camera, self._seen_from, self._follower(sea), self.distance_m, self._noted
+        )
+        if self.box is not None:
+            here = self._here()
+            boxes.designate(self.box, (here, here.X_WB @ self.vehicle.X_BC))
+            self._noted(0, boxes.target.words if boxes.target is not None else "")
+        self.boxes = boxes
         # The vehicle may have moved while parts were made: an estimator that begins where it was takes the step to
         # where it is for a load, and the controller would push against that.
         return replace(sea, parts=sea.parts.replace(start=self._here()))
+
+    def _heard(self, message: MavlinkMessage) -> None:
+        """A message came: a command to track is answered once there is a flight."""
+        if self.boxes is not None:
+            self.boxes.take(message)
+
+    def _watch(self, step: Step, witness: TruthProvider | None) -> None:
+        """What is reckoned and told at each step."""
+        if self.sea is not None and self.boxes is not None:
+            self.sea.figures(step, witness)
+            self.boxes.told(step.estimate.X_WB @ self.vehicle.X_BC_at(step.tilt_rad))
+
+    def _seen_from(self) -> tuple[BodyState, Pose] | None:
+        """The estimate at the last step and the camera's pose there; None while nobody flies."""
+        step = None if self.live is None else self.live.latest
+        return None if step is None else (step.estimate, step.estimate.X_WB @ self.vehicle.X_BC_at(step.tilt_rad))
+
+    def _noted(self, result: int, words: str) -> None:
+        self.journal.write("box", result=result, words=words)
+
+    def _follower(self, sea: VehicleFlight) -> Follow:
+        """Has the flight go by a target of a box, or by its first one."""
+
+        def follow(found: BoxedTarget | None) -> None:
+            here = self._seen_from()
+            estimate = self._here() if here is None else here[0]
+            if sea.desk.state.mode == "scan":
+                raise TryLaterError("box: the mission flies, hold first")
+            parts = sea.bare
+            if found is not None:
+                target = ball(found.centre_W_m, found.radius_m)
+                around = surroundings_of_target(target, parts.surroundings.planes)
+                parts = parts.replace(target=target, region=found.region, surroundings=around)
+            sea.retarget(parts, estimate)
+
+        return follow
 
     def _here(self) -> BodyState:
         """Where the vehicle is now, as heard; a position was heard."""

@@ -1,0 +1,271 @@
+"""A target designated by a box: its frustum, its distance, and what flies by it, over real bytes on loopback."""
+
+from __future__ import annotations
+
+import math
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_euler
+from wakewise.operation.scenario import Scenario
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.vision.imaging import PinholeCamera
+from wakewise_ardusub.link.connection import parse_connection
+from wakewise_ardusub.link.engagement_fsm import EngagementLimits
+from wakewise_ardusub.link.session_log import read_journal
+from wakewise_ardusub.link.transports import MavlinkCodec, open_transport
+from wakewise_ardusub.physics.physics import PulseTable
+from wakewise_ardusub.physics.surface import FreeWater
+from wakewise_ardusub.session.boxed_target import DISTANCE_STD, box_of, boxed_target, target_distance
+from wakewise_ardusub.session.link_join import SEA
+from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession
+from wakewise_ardusub.sitl.inprocess_session import (
+    MavlinkSender,
+    ScriptedGroundStation,
+    route_messages,
+    shipped_script,
+)
+from wakewise_ardusub.sitl.own_parameters import own_parameters
+from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics, UdpEndpoint, run
+
+CAMERA = PinholeCamera(width=960, height=720, fov_rad=math.radians(80.0))
+VEHICLE = load_vehicle("bluerov2-heavy")
+AT = Pose(np.array([3.0, -2.0, 5.0]), quat_from_euler(0.0, 0.0, 0.7))
+X_WC = AT @ VEHICLE.X_BC
+LEVEL = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+AHEAD, DOWN_AHEAD = np.array([1.0, 0.0, 0.0]), np.array([math.sqrt(0.5), 0.0, math.sqrt(0.5)])
+ACCEPTED, TEMPORARILY_REJECTED, DENIED = 0, 1, 2
+PATIENT = EngagementLimits(pose_s=1.0, telemetry_s=1.0, operator_s=1.0, thrusts_s=1.0, standstill_s=1.0)
+"""For a computer that has other work."""
+
+
+def test_the_frustum_lies_along_the_boxs_rays():
+    """Its points fall into the box, from a fifth nearer to a fifth farther than the distance, in the world's frame."""
+    box = (0.3, 0.4, 0.5, 0.7)
+    found = boxed_target(box, CAMERA, X_WC, lambda way: (1.5, "stated"))
+    p_C = X_WC.inverse().apply(found.region.points_W_m)
+    shares = CAMERA.project(p_C) / (CAMERA.width, CAMERA.height)
+    assert (shares > [0.3, 0.4]).all()
+    assert (shares < [0.5, 0.7]).all()
+    middle = p_C[[4, 13, 22]]
+    assert np.linalg.norm(middle, axis=1) == pytest.approx(1.5 * np.array([0.8, 1.0, 1.2]))
+    assert found.region.weights.sum() == pytest.approx(15.0)
+    away = np.linalg.norm(found.region.points_W_m - found.centre_W_m, axis=1)
+    assert away.max() <= found.radius_m + 1e-12
+    assert found.words == f"target by a box, 1.50 m off (+-{DISTANCE_STD * 1.5:.2f}, stated)"
+
+
+def test_where_a_target_is_in_the_picture():
+    """In the box that it was drawn in, seen from there; nowhere in the picture of a camera that looks away."""
+    found = boxed_target((0.3, 0.4, 0.5, 0.7), CAMERA, X_WC, lambda way: (1.5, "stated"))
+    assert box_of(found, CAMERA, X_WC) == pytest.approx((0.32, 0.43, 0.48, 0.67))
+    away = Pose(AT.p_m, quat_from_euler(0.0, 0.0, 0.7 + math.pi)) @ VEHICLE.X_BC
+    aside = Pose(AT.p_m, quat_from_euler(0.0, 0.0, 0.7 + 1.2)) @ VEHICLE.X_BC
+    for other in (away, aside):
+        assert all(map(math.isnan, box_of(found, CAMERA, other)))
+
+
+def test_a_distance_is_measured_before_it_is_stated():
+    """Ahead by the rangefinder in whose beam the ray lies, else where the ray meets the bed, else as stated."""
+    ranges = {0: (1.2, 10.0), 25: (0.8, 10.0)}
+    here, camera = LEVEL, np.array([0.2, 0.0, 0.0])
+    assert target_distance(AHEAD, here, camera, ranges, 11.0, 3.0) == (1.2, "rangefinder")
+    found, said = target_distance(DOWN_AHEAD, here, camera, ranges, 11.0, 3.0)
+    assert (found, said) == (pytest.approx(0.8 * math.sqrt(2.0)), "altitude")
+    assert target_distance(AHEAD, here, camera, {25: (0.8, 10.0)}, 11.0, 3.0) == (3.0, "stated")
+    assert target_distance(AHEAD, here, camera, ranges, 12.5, 3.0) == (3.0, "stated")
+    level = np.array([1.0, 0.0, 0.01])
+    assert target_distance(level / np.linalg.norm(level), here, camera, {25: (0.8, 10.0)}, 11.0, 3.0)[1] == "stated"
+    for stated, words in ((math.nan, "no distance: no rangefinder, no --distance"), (50.0, "must be 0.1 to 20 m")):
+        with pytest.raises(InputError, match=words):
+            target_distance(AHEAD, here, camera, {}, 11.0, stated)
+
+
+class Sea:
+    """The stand-in autopilot in a thread of its own, on a UDP port of this computer, with a pilot ashore."""
+
+    def __init__(self, port: int) -> None:
+        values = own_parameters(len(VEHICLE.thrusters))
+        self.autopilot = SimulatedAutopilot(values, loop_hz=50.0, scripts=shipped_script())
+        self._link = UdpEndpoint("127.0.0.1", port, out=True)
+        behind = InProcessPhysics(body=FreeWater(VEHICLE), table=PulseTable.of(VEHICLE, values))
+        carry = route_messages(self.autopilot, [self._link])
+        self._pilot = ScriptedGroundStation(self.autopilot, carry)
+        self._station = MavlinkSender(carry, 255, 190, "station")
+        self._sonar = MavlinkSender(carry, 1, 194, "sonar")
+        self._parser, self.heard = mavlink.MAVLink(None), list[object]()
+        self._parser.robust_parsing = True
+        self._orders: list[Callable[[], None]] = []
+        self.altitude_m = math.nan
+        hear = self.autopilot.hear
+
+        def overhear(data: bytes, name: str) -> None:
+            if name not in ("station", "sonar", "pilot ashore"):
+                self.heard += self._parser.parse_buffer(data) or []
+            hear(data, name)
+
+        self.autopilot.hear = overhear
+        self._ended = threading.Event()
+        self._thread = threading.Thread(
+            target=run,
+            args=(self.autopilot, behind, [self._link], lambda: not self._ended.is_set()),
+            kwargs={"turn": self._turn},
+        )
+        self._thread.start()
+
+    def _turn(self) -> None:
+        self._pilot.turn()
+        while self._orders:
+            self._orders.pop(0)()
+        if math.isfinite(self.altitude_m):
+            said = mavlink.MAVLink_distance_sensor_message(0, 20, 3000, round(100 * self.altitude_m), 4, 0, 25, 0)
+            self._sonar.send(said)
+
+    def order(self, command: int, *numbers: float) -> int:
+        """Send a command to the companion; the result of its answer."""
+        before = len(self.acks(command))
+        padded = [*numbers, *[0.0] * (7 - len(numbers))]
+        self._orders.append(
+            lambda: self._station.send(mavlink.MAVLink_command_long_message(1, 191, command, 0, *padded))
+        )
+        until(lambda: len(self.acks(command)) > before, "an answer", 10.0)
+        return self.acks(command)[-1].result
+
+    def of(self, name: str) -> list:
+        """Messages of the companion."""
+        return [one for one in list(self.heard) if one.get_type() == name and one.get_srcComponent() == 191]
+
+    def acks(self, command: int) -> list:
+        return [one for one in self.of("COMMAND_ACK") if one.command == command]
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join(10.0)
+        self._link.close()
+
+
+def until(true: Callable[[], object], what: str, patience_s: float = 90.0) -> None:
+    end_s = time.monotonic() + patience_s
+    while not true():
+        assert time.monotonic() < end_s, f"waited {patience_s:g} s for {what}"
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+@pytest.fixture
+def sea(port) -> Iterator[Sea]:
+    made = Sea(port)
+    yield made
+    made.close()
+
+
+def session_at(port: int, folder, **more) -> tuple[VehicleSession, Callable[[], None]]:
+    """A session that listens at a port of this computer, and what closes it."""
+    transport = open_transport(parse_connection(f"udpin:127.0.0.1:{port}"))
+    codec = MavlinkCodec(transport, 1)
+    scenario = Scenario(vehicle="bluerov2-heavy", method="allocation-only").replace(**SEA)
+    session = VehicleSession(
+        scenario=scenario,
+        receiving=codec,
+        send=codec.send,
+        folder=folder,
+        spare=ProtectedRegion(ahead_m=1.0),
+        session=1,
+        gate_options={"limits": PATIENT},
+        **more,
+    )
+    session.start()
+
+    def close() -> None:
+        session.stop("over")
+        transport.close()
+
+    return session, close
+
+
+def test_a_ground_station_designates_a_target_by_a_box_while_the_link_drives(sea, port, tmp_path):
+    """A box at the bed is protected, watched, kept off and told of, and the engagement goes on through it.
+
+    Boxes that are none, or without a distance, are denied in one line and change nothing; to stop tracking
+    brings the first target back.
+    """
+    session, close = session_at(port, tmp_path / "sea")
+    try:
+        until(lambda: session.boxes is not None and session._seen_from() is not None, "a flight")
+        until(lambda: session.gate.engagement.state == "ready", "all to be well")
+        assert session.gate.press() == "engaged"
+        joined, pilot = session.sea, session.sea.parts.pilot.inner
+        first, at_first = dict(joined.methods), pilot.target_W_m
+        for box in ((0.4, 0.6, math.nan, 0.8), (0.4, 0.6, 1.3, 0.8), (0.5, 0.6, 0.5, 0.8), (0.4, 0.6, 0.6, 0.8)):
+            assert sea.order(2005, *box) == DENIED
+            assert dict(joined.methods) == first
+        said = [one.text for one in sea.of("STATUSTEXT")]
+        assert said[-1] == "no distance: no rangefinder, no --distance"
+        assert "outside the picture" in said[1]
+        sea.altitude_m = 1.0
+        until(lambda: 25 in session.gate.known.ranges, "an altitude", 10.0)
+        here = session._seen_from()
+        assert here is not None
+        assert sea.order(2005, 0.4, 0.6, 0.6, 0.8) == ACCEPTED
+        found = session.boxes.target
+        assert found.distance_from == "altitude"
+        ray = here[1].R @ np.array([0.0, 0.2 * session.sea.bare.camera.height / session.sea.bare.camera.focal_px, 1.0])
+        assert (found.centre_W_m - here[1].p_m) @ ray > 0.98 * np.linalg.norm(ray) * np.linalg.norm(
+            found.centre_W_m - here[1].p_m
+        )
+        assert found.centre_W_m[2] == pytest.approx(here[0].X_WB.p_m[2] + 1.0, abs=0.1)
+        assert all(joined.methods[name] is not made for name, made in first.items())
+        assert pilot.target_W_m == pytest.approx(found.centre_W_m)
+        assert pilot.keep_off.around.spheres[0, :3] == pytest.approx(found.centre_W_m)
+        until(lambda: joined.figures.parts.target.centre_W_m == pytest.approx(found.centre_W_m), "figures of it", 10.0)
+        until(lambda: len(sea.of("CAMERA_TRACKING_IMAGE_STATUS")) >= 2, "its place in the picture", 10.0)
+        shown = sea.of("CAMERA_TRACKING_IMAGE_STATUS")[0]
+        assert (shown.rec_top_x, shown.rec_bottom_x) == pytest.approx((0.42, 0.58), abs=0.05)
+        sea.altitude_m = math.nan
+        assert sea.order(2005, 0.4, 0.6, 0.6, 5.0) == DENIED
+        assert session.boxes.target is found
+        assert session.gate.entry is not None, session.gate.engagement.why
+        assert "target by a box" in session.line()
+        joined.desk.set(mode="scan")
+        assert sea.order(2005, 0.3, 0.6, 0.6, 0.8) == TEMPORARILY_REJECTED
+        joined.desk.set(mode="hold")
+        assert session.boxes.target is found
+        assert sea.order(2010) == ACCEPTED
+        assert session.boxes.target is None
+        assert pilot.target_W_m == pytest.approx(at_first)
+        assert session.gate.entry is not None, session.gate.engagement.why
+    finally:
+        close()
+    assert session.fault is None
+    told = [(line["result"], line["words"]) for line in read_journal(tmp_path / "sea" / "journal.jsonl")[0]
+            if line["event"] == "box"]  # fmt: skip
+    assert [result for result, _ in told] == [DENIED] * 4 + [ACCEPTED, DENIED, TEMPORARILY_REJECTED, ACCEPTED]
+
+
+@pytest.mark.parametrize(("distance_m", "fault"), [(1.2, None), (math.nan, "no distance")])
+def test_a_box_may_be_given_as_the_session_begins(sea, port, tmp_path, distance_m, fault):
+    """At the stated distance from where the vehicle is then; without one the session ends in one line."""
+    session, close = session_at(port, tmp_path / "sea", box=(0.4, 0.4, 0.6, 0.6), distance_m=distance_m)
+    try:
+        until(lambda: session.boxes is not None or not session.running, "the box")
+        if fault is None:
+            centre = session.boxes.target.centre_W_m
+            assert np.linalg.norm(centre - session._here().X_WB.p_m) == pytest.approx(1.2, abs=0.35)
+            assert session.sea is None or session.sea.parts.pilot.inner.target_W_m == pytest.approx(centre)
+    finally:
+        close()
+    assert session.fault is None if fault is None else fault in str(session.fault)
