@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
@@ -33,6 +34,9 @@ BEHIND = 3.0
 """A depth contradicts what lies before it by more than this many standard deviations and a cell."""
 CONFIRMED = 2
 """Sweeps in which a cell was seen, from which on it is taken for surface."""
+VIEW_CELL_M, VIEW_PX, VIEW_EVERY = 0.02, 320, 2
+"""Cells of all that is in view, the width of the pictures that are swept for them, and which pixels count: each second
+one."""
 MOST_CELLS = 20000
 APART_RAD, SLACK_RAD = tuple(math.radians(angle) for angle in (5.0, 10.0, 15.0)), math.radians(2.0)
 """Angles at the target between the reference of a sweep and the other pictures, and by how much they may differ."""
@@ -43,6 +47,8 @@ AROUND, NEARER, FARTHER = 1.4, 1.3, 1.5
 """Window and depths of a sweep, in radii of the target: from its middle aside, and along the view."""
 LEAST_RADIUS_M, LEAST_WINDOW_PX = 0.06, 24
 LEAST_DEPTH_M = 0.05
+VIEW_DEPTHS, VIEW_TAIL = (0.75, 1.3), 0.05
+"""Depths of a sweep of all that is in view, over the nearest and the farthest mapped ones, this share left out."""
 ABOVE_BED_M = 0.01
 """Points that are less high above the bed are of it."""
 
@@ -87,14 +93,24 @@ def empty_surface() -> SurfaceMap:
 
 
 def with_sweep(
-    surface: SurfaceMap, swept: SweptDepth, camera: CalibratedCamera, bed: BedPlane | None = None
+    surface: SurfaceMap,
+    swept: SweptDepth,
+    camera: CalibratedCamera,
+    bed: BedPlane | None = None,
+    cell_m: float = CELL_M,
+    every: int = 1,
 ) -> SurfaceMap:
-    """The surface with the points of one sweep, without those of the bed."""
-    points, std = places_of(swept, camera)
+    """The surface with the points of one sweep, without those of the bed, if given; of each `every`-th row and column.
+
+    `cell_m`: size of a cell, the same at each call for a surface.
+    """
+    known = np.full_like(swept.depth_m, np.nan)
+    known[::every, ::every] = swept.depth_m[::every, ::every]
+    points, std = places_of(replace(swept, depth_m=known), camera)
     if bed is not None:
         stands = bed.height_m(points) > ABOVE_BED_M
         points, std = points[stands], std[stands]
-    surface = _denied(surface, swept, camera)
+    surface = _denied(surface, swept, camera, cell_m)
     if not len(points):
         return surface
     towards = swept.X_WC.p_m - points
@@ -106,7 +122,7 @@ def with_sweep(
         denials=np.zeros(len(points), np.int64),
         std_m=std,
     )
-    both = _gathered(surface, _gathered(empty_surface(), fresh, one_view=True))
+    both = _gathered(surface, _gathered(empty_surface(), fresh, cell_m, one_view=True), cell_m)
     if len(both) <= MOST_CELLS:
         return both
     return both.chosen(np.sort(np.argsort(both.denials - both.views, kind="stable")[:MOST_CELLS]))
@@ -126,6 +142,32 @@ def sweep_target(
     near = max(depth - NEARER * reach, LEAST_DEPTH_M)
     views = [_view(frame, camera) for frame in (last, *others)]
     return begin_sweep(views[0], views[1:], window, near, depth + FARTHER * reach)
+
+
+def view_camera(camera: CalibratedCamera) -> CalibratedCamera:
+    """The camera of the smaller pictures in which all that is in view is swept."""
+    return camera.scaled(min(VIEW_PX, camera.width))
+
+
+def sweep_in_view(frames: Sequence[Keyframe], seen_W_m: Array, small: CalibratedCamera) -> PlaneSweep | None:
+    """Sweep, not yet made, through all of the last keyframe; None if too few others show it from other places.
+
+    `seen_W_m`, shape (n, 3): mapped points in view; `small`: `view_camera` of the keyframes' camera.
+    """
+    last, others = frames[-1], _apart(frames, seen_W_m.mean(axis=0))
+    if len(others) < LEAST_OTHERS:
+        return None
+    depths = (seen_W_m - last.X_WC.p_m) @ last.X_WC.R[:, 2]
+    near, far = np.quantile(depths, (VIEW_TAIL, 1.0 - VIEW_TAIL)) * VIEW_DEPTHS
+    if near < LEAST_DEPTH_M:
+        return None
+    size, views = (small.width, small.height), []
+    for frame in (last, *others):
+        assert frame.picture is not None
+        share = small.width / frame.picture.shape[1]
+        reduced = np.asarray(cv2.resize(frame.picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        views.append(sweep_view(reduced, frame.X_WC, small, share * frame.speed_px_s))
+    return begin_sweep(views[0], views[1:], (0, 0, *size), float(near), float(far))
 
 
 def turned_about(centre_W_m: Array, one_W_m: Array, other_W_m: Array) -> float:
@@ -166,12 +208,12 @@ def _window(X_WC: Pose, centre_W_m: Array, radius_m: float, camera: CalibratedCa
     return left, top, right, bottom
 
 
-def _gathered(surface: SurfaceMap, fresh: SurfaceMap, *, one_view: bool = False) -> SurfaceMap:
+def _gathered(surface: SurfaceMap, fresh: SurfaceMap, cell_m: float, *, one_view: bool = False) -> SurfaceMap:
     """Both, a row for each cell; with `one_view` the rows of a cell count as one view."""
     both = {
         name: np.concatenate([getattr(surface, name), getattr(fresh, name)]) for name in SurfaceMap.__dataclass_fields__
     }
-    cells = np.floor(both["points_W_m"] / CELL_M).astype(np.int64)
+    cells = np.floor(both["points_W_m"] / cell_m).astype(np.int64)
     cell = np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1)
     n = 1 + int(cell.max(initial=0))
 
@@ -195,7 +237,7 @@ def _gathered(surface: SurfaceMap, fresh: SurfaceMap, *, one_view: bool = False)
     )
 
 
-def _denied(surface: SurfaceMap, swept: SweptDepth, camera: CalibratedCamera) -> SurfaceMap:
+def _denied(surface: SurfaceMap, swept: SweptDepth, camera: CalibratedCamera, cell_m: float) -> SurfaceMap:
     """The surface with the cells counted that lie before what a sweep has seen, without those that are so too often."""
     if not len(surface):
         return surface
@@ -207,6 +249,6 @@ def _denied(surface: SurfaceMap, swept: SweptDepth, camera: CalibratedCamera) ->
     within = (p_C[:, 2] > 1e-3) & (column >= 0) & (column < right - left) & (row >= 0) & (row < bottom - top)
     at = np.where(within, row, 0), np.where(within, column, 0)
     seen = np.where(within, swept.depth_m[at], np.nan)
-    slack = BEHIND * np.nan_to_num(swept.std_m[at]) + CELL_M
+    slack = BEHIND * np.nan_to_num(swept.std_m[at]) + cell_m
     denials = surface.denials + (seen - z > slack)
     return replace(surface, denials=denials).chosen(denials < surface.views)

@@ -15,7 +15,17 @@ from wakewise.perception.feature_tracks import NO_TRACKS, FeatureTracks
 from wakewise.perception.map_initialization import adjusted_map, moved_since
 from wakewise.perception.plane_sweep import PlaneSweep, compared, swept_depth
 from wakewise.perception.point_map import PointMap
-from wakewise.perception.surface_map import SWEEP_RAD, SurfaceMap, sweep_target, turned_about, with_sweep
+from wakewise.perception.surface_map import (
+    SWEEP_RAD,
+    VIEW_CELL_M,
+    VIEW_EVERY,
+    SurfaceMap,
+    sweep_in_view,
+    sweep_target,
+    turned_about,
+    view_camera,
+    with_sweep,
+)
 from wakewise.perception.target_shape import TargetShape
 
 
@@ -60,9 +70,13 @@ class TrackerState:
     trouble: str = ""
 
 
-def with_sweep_step(state: TrackerState, time_s: float) -> TrackerState:
-    """The state with one more picture compared of the sweep under way, or with a sweep begun at a new keyframe."""
+def with_sweep_step(state: TrackerState, time_s: float, in_view: bool = False) -> TrackerState:
+    """The state with one more picture compared of the sweep under way, or with a sweep begun at a new keyframe.
+
+    `in_view`: all that is in view is swept, in larger cells, and not the target alone.
+    """
     sweep, shape = state.sweep, state.shape
+    camera = view_camera(state.camera) if in_view else state.camera
     if sweep is None:
         last = state.keyframes[-1]
         if shape is None or not shape.seen or last.time_s < time_s:
@@ -70,12 +84,19 @@ def with_sweep_step(state: TrackerState, time_s: float) -> TrackerState:
         before = state.swept_from_W_m
         if before is not None and turned_about(shape.centre_W_m, before, last.X_WC.p_m) < SWEEP_RAD:
             return state
-        begun = sweep_target(state.keyframes, shape.centre_W_m, shape.radius_m, state.camera)
+        if in_view:
+            begun = sweep_in_view(state.keyframes, shape.surface_W_m, camera)
+        else:
+            begun = sweep_target(state.keyframes, shape.centre_W_m, shape.radius_m, camera)
         return state if begun is None else replace(state, sweep=begun, swept_from_W_m=last.X_WC.p_m)
-    sweep = compared(sweep, state.camera)
+    sweep = compared(sweep, camera)
     if not sweep.done:
         return replace(state, sweep=sweep)
-    surface = with_sweep(state.surface, swept_depth(sweep, state.camera), state.camera, state.bed)
+    swept = swept_depth(sweep, camera)
+    if in_view:
+        surface = with_sweep(state.surface, swept, camera, None, VIEW_CELL_M, VIEW_EVERY)
+    else:
+        surface = with_sweep(state.surface, swept, camera, state.bed)
     return replace(state, surface=surface, sweep=None)
 
 
