@@ -352,7 +352,7 @@ def fly_trial(
         if pilot.found_s is None:
             raise StageError("find: no target was found, so nothing was photographed")
         if made != pilot.planned:
-            raise StageError(f"find: the target was found, but {made} of {pilot.planned} exposures were made")
+            raise StageError(f"{parts.scenario.pilot}: {made} of {pilot.planned} exposures were made")
     elif made != planned:
         raise StageError(f"{made} of {planned} exposures were made")
     flight.write(folder)

@@ -214,8 +214,8 @@ class Parts:
 
     @property
     def finds(self) -> bool:
-        """Whether the pilot looks for the target: then estimator, controller and pilot are not told its place."""
-        return self.scenario.pilot == "find" and "pilot" not in self.given
+        """Whether the pilot goes by the camera: then nothing that flies is told the target's place."""
+        return self.scenario.pilot in ("find", "survey") and "pilot" not in self.given
 
     @ReplaceablePart
     def route(self) -> Route:

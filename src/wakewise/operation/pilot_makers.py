@@ -61,9 +61,17 @@ def finding_pilot(parts: Parts) -> Pilot:
     return find_pilot(parts)
 
 
+def surveying_pilot(parts: Parts) -> Pilot:
+    """`survey`: transects over a patch of the bed, then orbits round parts of it."""
+    from wakewise.operation.finding.find_parts import survey_pilot
+
+    return survey_pilot(parts)
+
+
 PILOTS: dict[str, Callable[[Parts], Pilot]] = {
     "route": route_pilot,
     "find": finding_pilot,
+    "survey": surveying_pilot,
     "human": human_pilot,
     "assisted": assisted_human_pilot,
     "operator": operator_pilot,

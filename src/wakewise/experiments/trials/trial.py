@@ -37,7 +37,7 @@ from wakewise.operation.teleop.live import collect_flight
 from wakewise.operation.teleop.replay import replay_input
 from wakewise.operation.trial_folder import BY_HAND, check_place, resolved_scenario, write_or_check_scenario, write_plan
 from wakewise.scene.missions import SETTLING
-from wakewise.scene.targets import Mesh, MeshDistance, coral_kinds
+from wakewise.scene.targets import Mesh, MeshDistance, procedural_kinds
 from wakewise.vision.evaluation import SWAY_FIGURES, Crop, compare_surface, evaluate_surface, flight_figures
 from wakewise.vision.evaluation.alignment import umeyama
 from wakewise.vision.evaluation.cloud_to_surface import MeshArrays
@@ -131,7 +131,7 @@ def run_trial(
     _ = parts.external_parts  # a name that leads nowhere is refused before a kernel is compiled or a folder made
     if not is_warm(JOBS):
         _ = parts.vehicle  # a file that cannot be used is refused before minutes of compiling
-        if scenario.target.kind not in coral_kinds():
+        if scenario.target.kind not in procedural_kinds():
             _ = parts.target
         with watch.stage("compile") as progress:
             compile_kernels(JOBS, progress)
@@ -259,6 +259,8 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
         return
     surveyed = parts.surveyed_target
     centre_W_m, radius_m = found_region(folder) or (surveyed.centre_W_m, surveyed.radius_m)
+    # A patch is photographed from within the ball round it: its depths are those of what each photograph shows.
+    region = None if parts.scenario.pilot == "survey" else (centre_W_m, REGION_SHARE * radius_m)
     rotations = matrix_from_quat(photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy())
     try:
         model = reconstruct(
@@ -269,7 +271,7 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
             lens=read_lens(folder),
             reference_positions=dict(zip(names, centres, strict=True)),
             reference_rotations=dict(zip(names, rotations, strict=True)),
-            region=(centre_W_m, REGION_SHARE * radius_m),
+            region=region,
             progress=progress,
         )
         summary: dict[str, Any] = model.summary()

@@ -1,4 +1,4 @@
-"""Parts of a flight by the pilot `find`, which is told neither the target's mesh nor its place."""
+"""Parts of a flight by the pilots `find` and `survey`, which are told neither the target's mesh nor its place."""
 
 from __future__ import annotations
 
@@ -21,8 +21,10 @@ from wakewise.operation.finding.camera_frames import CameraWorld
 from wakewise.operation.finding.find_mission import FindPilot, on_sphere
 from wakewise.operation.finding.missed_parts import ViewChooser
 from wakewise.operation.finding.region_controller import RegionController, region_controller
+from wakewise.operation.finding.survey_mission import SurveyPilot, waiting_route
 from wakewise.operation.parts import Parts
 from wakewise.operation.worlds.makers import make_world
+from wakewise.perception.surface_map import CELL_M, VIEW_CELL_M
 from wakewise.scene.missions import Route, open_route
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise.vision.reconstruction import write_cloud
@@ -44,18 +46,27 @@ def drawn_start(parts: Parts) -> Pose:
 
 def start_camera(parts: Parts) -> Pose:
     """Camera pose X_WC at the start: the drawn one, or that of a start that was given."""
-    return parts.start.X_WB @ parts.aim.mount(0.0) if "start" in parts.given else drawn_start(parts)
+    if "start" in parts.given:
+        return parts.start.X_WB @ parts.aim.mount(0.0)
+    return parts.route.camera(0.0)[0] if parts.scenario.pilot == "survey" else drawn_start(parts)
 
 
 def find_start(parts: Parts) -> BodyState:
     """Start of the vehicle."""
+    if parts.scenario.pilot == "survey":
+        return BodyState(X_WB=parts.route.body(0.0, parts.aim).X_WB)
     X_WC = drawn_start(parts)
     tilt, _ = parts.aim.tilt(math.asin(-float(X_WC.R[2, 2])))
     return BodyState(X_WB=X_WC @ parts.aim.mount(tilt).inverse())
 
 
 def find_route(parts: Parts) -> Route:
-    """The start's place for as long as the mission may last: nothing else of its path is known beforehand."""
+    """The start's place for as long as the mission may last: nothing else of its path is known beforehand.
+
+    Of a survey the transects are.
+    """
+    if parts.scenario.pilot == "survey":
+        return waiting_route(survey_pilot(parts))
     X_WC = start_camera(parts)
     centre = X_WC.p_m + parts.scenario.perception.assumed_distance_m * X_WC.R[:, 2]
     here = on_sphere(X_WC.p_m - centre)
@@ -66,14 +77,25 @@ def find_pilot(parts: Parts) -> FindPilot:
     """`find`: looks, detects, approaches and scans."""
     scenario = parts.scenario
     ahead_m = scenario.perception.assumed_distance_m
-    chooser = ViewChooser(
+    chooser = _chooser(parts, CELL_M)
+    return FindPilot(start_camera(parts), ahead_m, parts.aim, scenario.mission, scenario.find, chooser)
+
+
+def survey_pilot(parts: Parts) -> SurveyPilot:
+    """`survey`: transects over a patch, then orbits round parts of it."""
+    scenario, bed_z_m = parts.scenario, float(parts.bounds.high_W_m[2])
+    return SurveyPilot(bed_z_m, parts.aim, scenario.mission, scenario.survey, _chooser(parts, VIEW_CELL_M))
+
+
+def _chooser(parts: Parts, cell_m: float) -> ViewChooser:
+    return ViewChooser(
         lens=parts.camera,
         aim=parts.aim,
         size_m=parts.vehicle.size_m,
         bounds=parts.bounds,
-        mission=scenario.mission,
+        mission=parts.scenario.mission,
+        cell_m=cell_m,
     )
-    return FindPilot(start_camera(parts), ahead_m, parts.aim, scenario.mission, scenario.find, chooser)
 
 
 def find_controller(parts: Parts) -> RegionController:
@@ -89,11 +111,16 @@ def find_world(parts: Parts) -> CameraWorld:
 def write_found(parts: Parts, folder: Path) -> None:
     """Write what a flight found: found.json, found.png, the target over the picture, its surface, and a film."""
     pilot, estimator = parts.pilot, parts.estimator
-    if not isinstance(pilot, FindPilot) or not isinstance(estimator, CameraEstimator):
+    if not isinstance(pilot, FindPilot | SurveyPilot) or not isinstance(estimator, CameraEstimator):
         return
     told: dict[str, Any] = {"found_s": pilot.found_s, "centre_W_m": None, "radius_m": None, "centre_std_m": None}
     seen = estimator.seen
-    if seen.target is not None and pilot.found_s is not None:
+    if isinstance(pilot, SurveyPilot):
+        told |= {
+            "orbits": [[*orbit.centre_W_m.tolist(), math.degrees(orbit.elevation_rad)] for orbit in pilot.parts],
+            "replanned_ms": pilot.replanned_ms,
+        }
+    elif seen.target is not None and pilot.found_s is not None:
         target = seen.target
         told |= {
             "centre_W_m": target.centre_W_m.tolist(),

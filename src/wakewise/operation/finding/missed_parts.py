@@ -70,6 +70,7 @@ class ViewChooser:
     size_m: Array
     bounds: TankBounds
     mission: MissionSettings
+    cell_m: float = CELL_M
 
     def photographed(
         self, target: TargetEstimate, taken_from: Sequence[Pose], *, with_views: bool = True
@@ -81,7 +82,7 @@ class ViewChooser:
         surface, towards = target.surface_W_m, target.towards_W
         if surface is None or towards is None or len(surface) < LEAST_POINTS:
             return None
-        patches = patches_of_points(surface, towards, CELL_M)
+        patches = patches_of_points(surface, towards, self.cell_m)
         views = self._views(patches, target) if with_views else None
         coverage = Coverage.begin(patches, views, MAPPED_CRITERIA)
         for X_WC in taken_from:

@@ -1,8 +1,10 @@
-"""Settings of the pilot `find`."""
+"""Settings of the pilots `find` and `survey`."""
 
 from __future__ import annotations
 
-from pydantic import Field
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
 
 from wakewise.core.settings import Settings
 
@@ -17,3 +19,30 @@ class FindSettings(Settings):
     further_views: int = Field(
         8, ge=0, le=200, description="most photographs of what the scan has missed, by the mapped surface"
     )
+
+
+Side = Annotated[float, Field(ge=0.5, le=20.0)]
+
+
+class SurveySettings(Settings):
+    """How the pilot `survey` scans a patch of the bed: transects at one height, then orbits round parts of it."""
+
+    size_m: tuple[Side, Side] = Field((2.0, 2.0), description="the patch, north and east, about the world's origin")
+    height_m: float = Field(0.8, ge=0.3, le=10.0, description="height of the camera over the bed on transects")
+    look_deg: float = Field(60.0, ge=30.0, le=80.0, description="angle of the camera below the horizon on transects")
+    spacing_m: float = Field(0.5, ge=0.1, le=5.0, description="distance between transects")
+    photo_every_m: float = Field(0.2, ge=0.05, le=2.0, description="distance between photographs on transects")
+    orbits: Literal["chosen", "none", "everywhere"] = Field(
+        "chosen",
+        description="parts that get an orbit: chosen by coverage and relief, none, or all parts of the patch side by "
+        "side",
+    )
+    least_orbits: int = Field(3, ge=1, le=20, description="so many orbits at least, where parts are chosen")
+    most_orbits: int = Field(6, ge=1, le=20, description="and at most")
+    orbit_views: int = Field(12, ge=4, le=60, description="photographs on an orbit")
+
+    @model_validator(mode="after")
+    def _least_is_not_most(self) -> Self:
+        if self.least_orbits > self.most_orbits:
+            raise ValueError(f"least_orbits {self.least_orbits}, most_orbits {self.most_orbits}: at most as many")
+        return self

@@ -21,7 +21,7 @@ from wakewise.simulation.tank.settings import SILTS
 from wakewise.vision.imaging import ImagingSettings
 from wakewise.vision.imaging.settings import CAMERAS
 
-PRESETS = ("quick", "standard")
+PRESETS = ("quick", "standard", "reef")
 
 Tree = dict[str, Any]
 """Plain values by field name; a group of fields is a tree."""

@@ -21,14 +21,14 @@ from wakewise.core.plugins import names
 from wakewise.core.settings import Seed, Settings, describe_faults, guess
 from wakewise.estimation import FilterSettings
 from wakewise.operation.scenario.calibration_error import CalibrationErrorSettings
-from wakewise.operation.scenario.find_settings import FindSettings
+from wakewise.operation.scenario.find_settings import FindSettings, SurveySettings
 from wakewise.operation.scenario.layers import merge_layers, merged, nested, read_tree, replace_fields, with_kinds
 from wakewise.operation.scenario.randomization import FieldDistribution, sample_fields
 from wakewise.operation.worlds.library import load_world, own_file, world_names
 from wakewise.perception.settings import PerceptionSettings
 from wakewise.robot.vehicles.ballast import BallastBlock
 from wakewise.scene.missions import MissionSettings
-from wakewise.scene.targets import TISSUES, TissueProperties, coral_kinds, is_mesh_file
+from wakewise.scene.targets import TISSUES, TissueProperties, is_mesh_file, procedural_kinds
 from wakewise.simulation.tank import TankSettings
 from wakewise.vision.imaging import ImagingSettings
 from wakewise.vision.reconstruction import ReconstructionSettings
@@ -38,7 +38,7 @@ if TYPE_CHECKING:  # of the shorthand `Scenario.parts` alone: parts are built fr
 
 FLOWS = ("tank", "paper", "lattice", "lattice-jets")
 """Our own water models (see `wakewise.operation.worlds.makers`)."""
-PILOTS = ("route", "find", "human", "assisted", "operator")
+PILOTS = ("route", "find", "survey", "human", "assisted", "operator")
 """Our own sources of goals (see `wakewise.operation.pilot_makers`)."""
 
 
@@ -60,11 +60,11 @@ class UnanchoredSettings(Settings):
 class TargetSettings(Settings):
     """The target: a procedural coral by name, or a mesh file."""
 
-    kind: str = Field("branching", description=f"one of {', '.join(coral_kinds())}, or the path of a mesh file")
+    kind: str = Field("branching", description=f"one of {', '.join(procedural_kinds())}, or the path of a mesh file")
     size_m: float | None = Field(
         None, ge=0.02, le=2.0, description="scale the largest extent of a mesh file to this; not of a procedural one"
     )
-    seed: Seed = Field(0, description="which individual of a procedural coral")
+    seed: Seed = Field(0, description="which individual of a procedural one")
     points: int = Field(300, ge=20, le=10000, description="sample points that stand for the target's water in D")
     fragility_gain: float = Field(
         0.0, ge=0.0, le=100.0, description="points on thin or sharp places weigh 1 + this; 0 is the paper's weighting"
@@ -145,14 +145,15 @@ class Scenario(Settings):
     )
     pilot: str = Field(
         "route",
-        description="source of the goals: route; find, which is told neither the target's shape nor its place; human, "
-        "assisted, operator, package.module:make",
+        description="source of the goals: route; find, which is told neither the target's shape nor its place; survey, "
+        "which scans a patch of the bed by transects and orbits; human, assisted, operator, package.module:make",
     )
     control_log: str | None = Field(None, description="inputs of the pilot `operator`: controls.parquet, .csv, .yaml")
     target: TargetSettings = TargetSettings()
     calibration_error: CalibrationErrorSettings = CalibrationErrorSettings()
     mission: MissionSettings = MissionSettings()
     find: FindSettings = FindSettings()
+    survey: SurveySettings = SurveySettings()
     perception: PerceptionSettings = PerceptionSettings()
     control: ControlSettings = ControlSettings()
     estimation: FilterSettings = FilterSettings()
@@ -176,8 +177,12 @@ class Scenario(Settings):
     def _find_can_be_flown(self) -> Self:
         if self.pilot == "find" and self.perception.protect == "view":
             raise ValueError("perception.protect: view has no target to scan, take target with pilot find")
-        if self.pilot == "find" and self.mission.order != "plain":
-            raise ValueError("mission.order: current needs the target's place beforehand, take plain with pilot find")
+        if self.pilot in ("find", "survey") and self.mission.order != "plain":
+            raise ValueError(
+                f"mission.order: current needs the target's place beforehand, take plain with pilot {self.pilot}"
+            )
+        if self.pilot == "survey" and self.perception.protect != "view":
+            raise ValueError("perception.protect: target, take view with pilot survey, which has no single target")
         return self
 
     @field_validator("name")

@@ -283,10 +283,12 @@ def assisted(parts: Parts, source: ControlSource, desk: OperatorState, begin: Op
     Parts
         `pilot` and `controller` replaced; the body's attitude is the pilot's, so the method does not lean it.
 
-    Raises InputError of a scenario whose pilot is `find`, which flies by itself.
+    Raises InputError of a scenario whose pilot is `find` or `survey`, which fly by themselves.
     """
     if parts.finds:
-        raise InputError("pilot: find flies by itself, take wakewise scan, or pilot route to fly by hand")
+        raise InputError(
+            f"pilot: {parts.scenario.pilot} flies by itself, take wakewise scan, or pilot route to fly by hand"
+        )
     pilot = assisted_pilot(parts, source, desk, begin)
     flown = parts.replace(pilot=pilot)
     return flown.replace(controller=switched_controller(flown, lambda: pilot.state.method))

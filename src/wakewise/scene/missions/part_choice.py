@@ -1,8 +1,9 @@
 """Which parts of a mapped patch need a closer look: those seen poorly, and those whose relief hides surface.
 
 The patch is divided into cells in plan. A cell's need is the area in it that is not seen well, and half of the area by
-which the surface exceeds the plan there: what stands steep was mapped in parts only. Parts are discs, chosen one after
-the other by the need that they hold (greedy maximum coverage: G. L. Nemhauser et al. 1978, doi 10.1007/BF01588971).
+which it exceeds that of a slope of 48 degrees: what stands steeper was mapped in parts only. Parts are discs, chosen
+one after the other by the need that they hold (greedy maximum coverage: G. L. Nemhauser et al. 1978, doi
+10.1007/BF01588971).
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from wakewise.core.arrays import Array, BoolArray, freeze
 CELL_M = 0.05
 STEEPEST = 3.0
 """Area of the surface over that in plan, at most: 70 degrees. What is steeper is most often a wrong height."""
-RELIEF_SHARE = 0.5
-LEAST_SHARE = 0.04
+RELIEF_SHARE, STEEP = 0.5, 1.5
+LEAST_SHARE = 0.02
 """A part is not worth an orbit for less of the patch's need, once there are as many as asked for."""
 AROUND = 1.5
 """Heights of a part are those within so many of its radii."""
@@ -53,7 +54,7 @@ def need_of(points_W_m: Array, covered: BoolArray, middle_m: Array, size_m: Arra
     height = _filled(np.where(count > 0, height / np.maximum(count, 1), np.nan))
     slope = (maximum_filter(height, 3) - minimum_filter(height, 3)) / (2.0 * CELL_M)
     area = np.minimum(np.sqrt(1.0 + slope**2), STEEPEST)
-    need = CELL_M**2 * (area * poorly + RELIEF_SHARE * (area - 1.0))
+    need = CELL_M**2 * (area * poorly + RELIEF_SHARE * np.maximum(area - STEEP, 0.0))
     return PatchNeed(need_m2=need, origin_m=low + 0.5 * CELL_M)
 
 

@@ -7,7 +7,7 @@ north and south, so that each slope is seen from two sides.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise, permutations
 
@@ -22,6 +22,10 @@ LAST_S = 0.5
 """The last shutter closes before the recording ends."""
 TURN_M = 0.3
 """A leg takes at least the time of this much way for each radian that the camera turns."""
+OVER_M = 0.15
+"""Lines go on for so much longer than until their camera's axis meets the patch's end."""
+CLEAR_AT = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
+"""Shares of a direct way at which the hull must be clear."""
 MOST_ORDERED = 7
 """Up to so many parts all orders are tried, of more the nearest is next."""
 
@@ -52,7 +56,8 @@ class PatchTransects:
             sign = 1.0 if number % 2 == 0 else -1.0
             east = float(self.middle_m[1] + self.size_m[1] * ((number + 0.5) / count - 0.5))
             reach, north = 0.5 * float(self.size_m[0]), float(self.middle_m[0])
-            ends = [np.array([north + sign * (s * reach - self.ahead_m), east, self.depth_m]) for s in (-1.0, 1.0)]
+            marks = (-reach - self.ahead_m, reach - self.ahead_m + OVER_M)
+            ends = [np.array([north + sign * mark, east, self.depth_m]) for mark in marks]
             lines.append((ends[0], ends[1], 0.0 if sign > 0.0 else math.pi))
         return lines
 
@@ -73,8 +78,8 @@ class RouteBuilder:
     exposures: list[float] = field(default_factory=list)
     planned: list[Pose] = field(default_factory=list)
 
-    def go(self, name: str, centre_W_m: Array, place: Array, photos: int = 0, *, first: bool = True) -> None:
-        """A leg to another centre and place, with photographs evenly along it, the last at its end."""
+    def go(self, name: str, centre_W_m: Array, place: Array, photos: int = 0) -> None:
+        """A leg to another centre and place, with photographs evenly along it, the first at its begin."""
         end = place.copy()
         shift = centre_W_m - self.centre_W_m
         speed, acceleration = self.mission.speed_m_s, self.mission.acceleration_m_s2
@@ -86,12 +91,16 @@ class RouteBuilder:
             leg = rest_to_rest(name, self.place, end, *slow, self.centre_W_m, shift)
         self.legs.append(leg)
         self.starts.append(self.clock_s)
-        for share in np.linspace(0.0, 1.0, photos)[0 if first else 1 :]:
+        for share in np.linspace(0.0, 1.0, photos):
             self.exposures.append(self.clock_s + leg.time_at(float(share)))
-            at = (1.0 - share) * leg.start + share * leg.end
-            self.planned.append(camera_pose(self.centre_W_m + share * shift, *at.tolist()))
+            self.planned.append(self.between(centre_W_m, end, float(share)))
         self.clock_s += leg.duration_s
         self.centre_W_m, self.place = centre_W_m, end
+
+    def between(self, centre_W_m: Array, place: Array, share: float) -> Pose:
+        """Camera pose X_WC at a share of a leg to another centre and place."""
+        at = (1.0 - share) * self.place + share * place
+        return camera_pose((1.0 - share) * self.centre_W_m + share * centre_W_m, *at.tolist())
 
     def turned(self, azimuth_rad: float) -> float:
         """The same azimuth within half a turn of the present one."""
@@ -140,26 +149,35 @@ class PartOrbit:
 
 
 def orbits_route(
-    orbits: Sequence[PartOrbit], centre_W_m: Array, place: Array, over_z_m: float, mission: MissionSettings, first: int
+    orbits: Sequence[PartOrbit],
+    centre_W_m: Array,
+    place: Array,
+    over_z_m: float,
+    mission: MissionSettings,
+    first: int,
+    clear: Callable[[Pose], bool],
 ) -> Route:
-    """Orbits one after another; from one to the next the camera goes over the relief, at depth `over_z_m`.
+    """Orbits one after another, each begun where the camera comes to it.
 
+    The way from one to the next is direct where it is `clear`, else over everything, at the camera's depth `over_z_m`.
     `centre_W_m`, `place`: where the camera is, as of `RouteBuilder`; `first`: number of the first photograph.
     """
     built = RouteBuilder(mission=mission, centre_W_m=centre_W_m, place=place)
     for number, orbit in enumerate(orbits):
-        here = _camera(built)
+        here = camera_pose(built.centre_W_m, *built.place.tolist()).p_m
         away = here[:2] - orbit.centre_W_m[:2]
         azimuth = built.turned(math.atan2(away[1], away[0]))
         begin = np.array([azimuth, orbit.elevation_rad, orbit.range_m])
-        if number:
-            built.go(f"rise from part {number}", np.array([*here[:2], over_z_m]), built.place * [1.0, 1.0, 0.0])
-        level = orbit.range_m * math.cos(orbit.elevation_rad)
-        over = orbit.centre_W_m[:2] + level * np.array([math.cos(azimuth), math.sin(azimuth)])
-        built.go(f"to part {number + 1}", np.array([*over, over_z_m]), begin * [1.0, 1.0, 0.0])
-        built.go(f"down to part {number + 1}", orbit.centre_W_m, begin)
-        step = 2.0 * math.pi / orbit.views
-        end = np.array([azimuth + 2.0 * math.pi - step, *begin[1:]])
+        there = camera_pose(orbit.centre_W_m, *begin.tolist()).p_m
+        # From here on the camera itself is the centre, so that ways between orbits are straight.
+        built.centre_W_m, built.place = here, built.place * [1.0, 1.0, 0.0]
+        begin[2] = 0.0
+        if not all(clear(built.between(there, begin, share)) for share in CLEAR_AT):
+            built.go(f"rise to part {number + 1}", np.array([*here[:2], over_z_m]), built.place)
+            built.go(f"over to part {number + 1}", np.array([*there[:2], over_z_m]), begin)
+        built.go(f"to part {number + 1}", there, begin)
+        built.centre_W_m, built.place = orbit.centre_W_m, np.array([azimuth, orbit.elevation_rad, orbit.range_m])
+        end = built.place + 2.0 * math.pi * (1.0 - 1.0 / orbit.views) * np.array([1.0, 0.0, 0.0])
         built.go(f"orbit {number + 1}", orbit.centre_W_m, end, orbit.views)
     return built.route(first)
 
@@ -178,8 +196,3 @@ def ordered(orbits: Sequence[PartOrbit], here_W_m: Array) -> list[PartOrbit]:
         tour.append(left.pop(nearest))
         at = tour[-1].centre_W_m[:2]
     return tour
-
-
-def _camera(built: RouteBuilder) -> Array:
-    """Where the camera is, shape (3,)."""
-    return camera_pose(built.centre_W_m, *built.place.tolist()).p_m

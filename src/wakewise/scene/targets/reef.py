@@ -50,8 +50,8 @@ def reef_patch(seed: int = 0) -> Mesh:
     return height_map_mesh(np.maximum(height, 0.02), CELL_M)
 
 
-def height_map_mesh(height_m: Array, cell_m: float) -> Mesh:
-    """Mesh of a height map, shape (n, k), z up and centred, that falls to below its bed at z = 0 over `EDGE_M`.
+def height_map_mesh(height_m: Array, cell_m: float, edge_m: float = EDGE_M) -> Mesh:
+    """Mesh of a height map, shape (n, k), z up and centred, that falls to below its bed at z = 0 over its edge.
 
     Raises InputError if the map is no grid of finite numbers of two rows and columns at least.
     """
@@ -61,7 +61,7 @@ def height_map_mesh(height_m: Array, cell_m: float) -> Mesh:
     rows, columns = z.shape
     i, j = np.arange(rows), np.arange(columns)
     inside = np.minimum.outer(np.minimum(i, rows - 1 - i), np.minimum(j, columns - 1 - j)) * cell_m
-    share = np.clip(inside / EDGE_M, 0.0, 1.0)
+    share = np.clip(inside / edge_m, 0.0, 1.0)
     z = (z + BURIED_M) * share * share * (3.0 - 2.0 * share) - BURIED_M
     X, Y = np.meshgrid((i - 0.5 * (rows - 1)) * cell_m, (j - 0.5 * (columns - 1)) * cell_m, indexing="ij")
     number = np.arange(rows * columns).reshape(rows, columns)

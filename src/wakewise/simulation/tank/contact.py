@@ -6,6 +6,7 @@ import math
 from itertools import product
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array
 from wakewise.core.jit.njit import njit
@@ -30,6 +31,7 @@ class CollisionGeometry:
         self._size = size_m
         self.corners_B_m: Array = self._half * np.array(list(product((-1.0, 1.0), repeat=3)))
         self._target = np.ascontiguousarray(target_W_m, dtype=np.float64)
+        self._tree = KDTree(self._target)
         self._middle = self._target.mean(axis=0)
         self._radius = float(np.linalg.norm(self._target - self._middle, axis=1).max())
         ball = float(np.linalg.norm(self._half)) + 2 * _TOUCH_M
@@ -78,7 +80,8 @@ class CollisionGeometry:
         gap = np.maximum(np.abs((self._middle - p_W_m) @ R_WB) - self._half, 0.0)
         if float(gap @ gap) > (self._radius + margin_m) ** 2:
             return _NONE
-        points = (self._target - p_W_m) @ R_WB
+        near = self._tree.query_ball_point(p_W_m, float(np.linalg.norm(self._half)) + 2.0 * margin_m)
+        points = (self._target[np.sort(near).astype(np.int64)] - p_W_m) @ R_WB
         inside: Array = points[np.all(np.abs(points) < self._half + margin_m, axis=1)]
         return inside
 

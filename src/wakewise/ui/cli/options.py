@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 ScenarioFile = Annotated[
     Path | None, typer.Argument(help="Scenario YAML file; any part of a scenario.", show_default=False)
 ]
-Preset = Annotated[str, typer.Option("--preset", help="quick (minutes on two cores) or standard.")]
+Preset = Annotated[
+    str, typer.Option("--preset", help="quick (minutes on two cores), standard, or reef, a patch in two levels.")
+]
 Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the results; runs/NAME-TARGET-METHOD-SEED if not given.")
 ]
