@@ -13,7 +13,8 @@ from wakewise.ui.cli.main import app
 
 ROOT = Path(__file__).parents[1]
 PAGES = ["README.md", "CONTRIBUTING.md"]
-PAGES += [f"docs/{name}.md" for name in ("README", "python", "extending", "worlds", "reproduce", "campaigns")]
+PAGES += [f"docs/{name}.md" for name in ("README", "howto", "limits", "python", "extending", "worlds")]
+PAGES += [f"docs/{name}.md" for name in ("reproduce", "campaigns")]
 PAGES += ["docs/vehicle-file.md"]
 
 
@@ -80,12 +81,27 @@ def test_the_environment_is_activated_before_the_first_command():
     assert text.index("make setup") < text.index(". .venv/bin/activate") < text.index("\nwakewise ")
 
 
-def test_the_python_of_the_readme_is_the_example():
+def test_the_readme_is_short():
+    """It is read in a minute: at most 6 kB."""
+    assert (ROOT / "README.md").stat().st_size <= 6000
+
+
+def test_the_python_of_the_readme_runs(capsys):
+    """Pasted, it flies and prints a line for each method; the flights are cut to a second."""
+    (shown,) = blocks("README.md", "python")
+    exec(shown.replace("(method=method))", "(method=method), duration_s=1.0)"), {})
+    (told,) = blocks("README.md", "text")
+    assert [line.split(":")[0] for line in capsys.readouterr().out.splitlines()] == [
+        line.split(":")[0] for line in told.splitlines()
+    ]
+
+
+def test_the_python_of_the_page_of_tasks_is_the_example():
     """Word for word, but for the argument that says how long."""
     example = (ROOT / "examples" / "own_controller.py").read_text(encoding="utf-8")
     shown = example.partition('"""\n\n')[2].replace("import sys\n\n", "")
     shown = shown.replace(", duration_s=float(sys.argv[1]) if sys.argv[1:] else None", "")
-    assert blocks("README.md", "python")[0] == shown
+    assert blocks("docs/howto.md", "python")[0] == shown
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -192,17 +208,19 @@ def test_the_page_of_validation_says_what_the_tank_gets_wrong():
     assert [line for line in ABSENT if f"\n- {line}\n" not in text] == []
 
 
-def test_the_readme_counts_the_laws_and_leads_to_them():
+def test_readme_and_limits_count_the_laws_and_lead_to_them():
     """How many laws are measured and how many are missed is the tank's own count; three are named, all are linked."""
     from wakewise.simulation.tank.validation_limits import limits_table
 
     laws = limits_table()
     missed = sum(row["met"] == "no" for row in laws)
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"against {len(laws)} laws; {missed} are missed" in readme
+    text = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
     section = text.split("## What the tank gets wrong")[1].split("\n## ")[0]
     assert f"against {len(laws)} laws" in " ".join(section.split()) and f"; {missed} are missed" in section
     assert section.count("\n- ") == len(table("docs/validation.md", "| error | size | consequence |")) == 3
-    assert "(docs/validation.md)" in section
+    assert "(validation.md)" in section
 
 
 def test_the_page_of_worlds_lists_those_that_there_are():
