@@ -42,7 +42,7 @@ AT = Pose(np.array([3.0, -2.0, 5.0]), quat_from_euler(0.0, 0.0, 0.7))
 X_WC = AT @ VEHICLE.X_BC
 LEVEL = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 AHEAD, DOWN_AHEAD = np.array([1.0, 0.0, 0.0]), np.array([math.sqrt(0.5), 0.0, math.sqrt(0.5)])
-ACCEPTED, TEMPORARILY_REJECTED, DENIED = 0, 1, 2
+ACCEPTED, DENIED = 0, 2
 PATIENT = EngagementLimits(pose_s=1.0, telemetry_s=1.0, operator_s=1.0, thrusts_s=1.0, standstill_s=1.0)
 """For a computer that has other work."""
 
@@ -241,7 +241,7 @@ def test_a_ground_station_designates_a_target_by_a_box_while_the_link_drives(sea
         assert session.gate.entry is not None, session.gate.engagement.why
         assert "target by a box" in session.line()
         joined.desk.set(mode="scan")
-        assert sea.order(2005, 0.3, 0.6, 0.6, 0.8) == TEMPORARILY_REJECTED
+        assert sea.order(2005, 0.3, 0.6, 0.6, 0.8) == DENIED
         joined.desk.set(mode="hold")
         assert session.boxes.target is found
         assert sea.order(2010) == ACCEPTED
@@ -253,7 +253,31 @@ def test_a_ground_station_designates_a_target_by_a_box_while_the_link_drives(sea
     assert session.fault is None
     told = [(line["result"], line["words"]) for line in read_journal(tmp_path / "sea" / "journal.jsonl")[0]
             if line["event"] == "box"]  # fmt: skip
-    assert [result for result, _ in told] == [DENIED] * 4 + [ACCEPTED, DENIED, TEMPORARILY_REJECTED, ACCEPTED]
+    assert [result for result, _ in told] == [DENIED] * 4 + [ACCEPTED, DENIED, DENIED, ACCEPTED]
+
+
+def test_the_fence_stays_about_the_first_target(sea, port, tmp_path):
+    """A message cannot widen where the companion drives: distances are judged to the target that was typed."""
+    session, close = session_at(port, tmp_path / "sea", box=(0.4, 0.4, 0.6, 0.6), distance_m=4.0)
+    try:
+        until(lambda: session._seen_from() is not None, "a flight")
+        assert session.boxes.target.distance_m == 4.0
+        assert session.gate.facts().distance_m == pytest.approx(1.0 + 0.5 * VEHICLE.size_m[0], abs=0.3)
+    finally:
+        close()
+
+
+def test_a_box_that_reaches_into_the_hull_is_denied(sea, port, tmp_path):
+    """What is 0.15 m before the camera lies where no plan could be good: one line, and the first target stays."""
+    session, close = session_at(port, tmp_path / "sea", distance_m=0.15)
+    try:
+        until(lambda: session._seen_from() is not None, "a flight")
+        assert sea.order(2005, 0.1, 0.1, 0.9, 0.9) == DENIED
+        assert sea.of("STATUSTEXT")[-1].text.startswith("here: ")
+        assert session.boxes.target is None
+        assert session.sea.parts.pilot.inner.target_W_m == pytest.approx(session.sea.bare.target.centre_W_m)
+    finally:
+        close()
 
 
 @pytest.mark.parametrize(("distance_m", "fault"), [(1.2, None), (math.nan, "no distance")])

@@ -55,10 +55,6 @@ WEIGHT = 15.0
 STATUS_S = 0.5
 
 
-class TryLaterError(InputError):
-    """A designation that is refused for now, and may be sent again later."""
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoxedTarget:
     """Middle, shape (3,), and radius of the ball round a frustum, its points, and the distance of its middle."""
@@ -243,8 +239,6 @@ class BoxDesignation:
                 self.designate(box, here)
             self._last = command
             self._answer(command, ACCEPTED, "target as at first" if self.target is None else self.target.words)
-        except TryLaterError as fault:
-            self._answer(command, TEMPORARILY_REJECTED, str(fault))
         except InputError as fault:
             self._answer(command, DENIED, str(fault))
         except Exception as fault:  # the flight goes on with the last target

@@ -35,7 +35,7 @@ from wakewise_ardusub.link.motor_interface import VehicleMotors
 from wakewise_ardusub.link.output_gate import OutputGate, Send
 from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
 from wakewise_ardusub.link.tracking_commands import Box
-from wakewise_ardusub.session.boxed_target import BoxDesignation, BoxedTarget, Follow, TryLaterError
+from wakewise_ardusub.session.boxed_target import BoxDesignation, BoxedTarget, Follow
 from wakewise_ardusub.session.cameras import MakeCamera, note_view
 from wakewise_ardusub.session.link_join import (
     LinkThread,
@@ -350,7 +350,7 @@ class VehicleSession:
             here = self._seen_from()
             estimate = self._here() if here is None else here[0]
             if sea.desk.state.mode == "scan":
-                raise TryLaterError("box: the mission flies, hold first")
+                raise InputError("box: the mission flies, hold first")
             parts = sea.bare
             if found is not None:
                 target = ball(found.centre_W_m, found.radius_m)
