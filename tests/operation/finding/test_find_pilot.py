@@ -448,6 +448,32 @@ def test_a_detectors_box_is_proposed_and_not_accepted(flight: Flight) -> None:
     assert getattr(flight.parts.estimator, "detector", "missing") is None
 
 
+@pytest.mark.parametrize("answer", [True, False])
+def test_an_operator_accepts_or_refuses_what_is_proposed(answer: bool) -> None:
+    """Nothing is accepted by time; what is accepted is tracked, what is refused is not asked of again."""
+    parts = Parts(SCENARIO).replace(**{"perception.accept_s": 600.0})
+    asked: list[TargetEstimate] = []
+
+    def ask(target: TargetEstimate) -> bool | None:
+        asked.append(target)
+        return answer if len(asked) == 3 else None
+
+    estimator, pilot = parts.estimator, parts.pilot
+    assert isinstance(estimator, CameraEstimator)
+    assert isinstance(pilot, FindPilot)
+    fly(parts.replace(estimator=replace(estimator, answer=ask)), duration_s=10.0)
+    assert len(asked) >= 3
+    assert {target.status for target in asked} == {"proposed"}
+    if answer:
+        assert len(asked) == 3
+        assert estimator.seen.target is not None
+        assert estimator.seen.target.status == "tracked"
+    else:
+        refused = asked[2]
+        away = [float(np.linalg.norm(later.centre_W_m - refused.centre_W_m)) for later in asked[3:]]
+        assert all(metres > 0.03 for metres in away)
+
+
 def test_a_flight_that_is_over_can_be_flown_again() -> None:
     """The pilot of the same parts begins anew, also after a mission that ended."""
     parts = SCENARIO.replace(**{"find.give_up_s": 5.0, "perception.rate_hz": 0.5}).parts()

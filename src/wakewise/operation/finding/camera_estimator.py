@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -101,7 +102,8 @@ class CameraEstimator:
     """`wakewise.core.interfaces.Estimator` of a filter and a tracker.
 
     `ahead_m` is how far the calibrated camera's projection centre lies before the lens's. `seen` collects what a report
-    shows, the thread time of each picture and the time from a picture to its use.
+    shows, the thread time of each picture and the time from a picture to its use. `answer`, the operator's, is asked
+    at each picture while a target is proposed: True accepts it, False refuses it, None leaves it proposed.
     """
 
     vehicle: Vehicle
@@ -109,6 +111,7 @@ class CameraEstimator:
     tracker: TargetTracker
     ahead_m: float = 0.0
     detector: Detector | None = None
+    answer: Callable[[TargetEstimate], bool | None] | None = None
     seen: SeenTarget = field(default_factory=SeenTarget)
 
     def init(self, start: BodyState) -> CameraEstimatorState:
@@ -179,6 +182,10 @@ class CameraEstimator:
         tracker, found = self.tracker.step(
             state.tracker, picture, measured.time_s, X_WB @ X_BM, state.std, at.without_map @ X_BM
         )
+        if self.answer is not None and tracker.target is not None and tracker.target.status == "proposed":
+            said = self.answer(tracker.target)
+            if said is not None:
+                tracker = self.tracker.accept(tracker) if said else self.tracker.refuse(tracker)
         self.seen.picture_s.append(time.thread_time() - began)
         self.seen.age_s.append(now_s - measured.time_s)
         self.seen.target = tracker.target
