@@ -39,7 +39,7 @@ class SurveySettings(Settings):
     )
     least_orbits: int = Field(3, ge=1, le=20, description="so many orbits at least, where parts are chosen")
     most_orbits: int = Field(6, ge=1, le=20, description="and at most")
-    orbit_views: int = Field(12, ge=4, le=60, description="photographs on an orbit")
+    orbit_views: int = Field(18, ge=4, le=60, description="photographs on an orbit")
 
     @model_validator(mode="after")
     def _least_is_not_most(self) -> Self:

@@ -71,13 +71,21 @@ def check_clearance(
         gaps = gaps_of(route.body(float(time_s), aim).X_WB, size_m, bounds, target_W_m)
         what, gap = min(gaps.items(), key=lambda item: item[1])
         if gap < clearance_m:
-            leg = route.legs[route.leg_at(float(time_s))].name
-            field, advice = {
-                "the floor": ("mission.elevations_deg", "raise the lowest elevation or lengthen mission.standoff_m"),
-                "the water surface": ("mission.standoff_m", "shorten it, or lower the highest elevation"),
-                "a wall": ("mission.standoff_m", "shorten it or use a wider tank.size_m"),
-                "the target": ("mission.standoff_m", "lengthen it"),
-            }[what]
+            under_way = route.legs[route.leg_at(float(time_s))]
+            leg, across = under_way.name, under_way.start[2] == 0.0  # a transect
+            field, advice = (
+                ("survey.height_m", "fly the transects at another height")
+                if across
+                else {
+                    "the floor": (
+                        "mission.elevations_deg",
+                        "raise the lowest elevation or lengthen mission.standoff_m",
+                    ),
+                    "the water surface": ("mission.standoff_m", "shorten it, or lower the highest elevation"),
+                    "a wall": ("mission.standoff_m", "shorten it or use a wider tank.size_m"),
+                    "the target": ("mission.standoff_m", "lengthen it"),
+                }[what]
+            )
             raise InputError(
                 f"{field}: on leg '{leg}' the hull comes within {gap:.3f} m of {what}, "
                 f"allowed is {clearance_m:g} m or more (mission.clearance_m): {advice}"
