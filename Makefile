@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 # Every process of a scan or a test reads hundreds of modules: their bytecode is kept, whatever the shell says.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup scan test test-all coverage check bench results docs lock clean
+.PHONY: help setup scan test test-all coverage check bench results figures docs lock clean
 
 help:
 	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs, cockpit, ros, gamepad and links (LGPL), dask, detector, tools for tests"
@@ -18,6 +18,7 @@ help:
 	@echo "make check   the same without the tests"
 	@echo "make bench   speed and quality, side by side with a peer"
 	@echo "make results BUDGET=2h   the paper's tables beside ours, from as many trials as fit; writes docs/results"
+	@echo "make figures  the README's animation, from two flights; a minute or two"
 	@echo "make docs    regenerate docs/commands.md from the commands' own help"
 	@echo "make lock    resolve requirements.lock anew (needs uv, which setup installs)"
 
@@ -77,6 +78,9 @@ BUDGET ?= 2h
 NOTE ?=
 results: setup
 	$(BIN)/python tools/write_results.py --budget "$(BUDGET)" --note "$(NOTE)"
+
+figures: setup
+	$(BIN)/python tools/figures.py
 
 docs: setup
 	$(BIN)/python tools/write_docs.py
