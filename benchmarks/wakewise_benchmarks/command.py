@@ -29,7 +29,7 @@ def show_traps(result: dict[str, Any]) -> None:
     typer.echo(f"  right {result['right']}, said {result['said']}, silently wrong {result['silent_wrongs']}")
 
 
-_SEEDS = {"front": 8, "gentle": 3, "models": 1000, "operator": 3}
+_SEEDS = {"front": 8, "gentle": 3, "models": 1000, "operator": 3, "reef": 3}
 """Seeds of a bench that flies, if not given; 10 of the others."""
 _SHOWN = {
     "adversarial-photos": f"{__name__}:show_traps",
@@ -37,6 +37,7 @@ _SHOWN = {
     "gentle": "wakewise_paper.cli.bench_wash:show_gentle",
     "models": "wakewise_paper.cli.bench_models:show_models",
     "operator": "wakewise_paper.cli.bench_operator:show_operator",
+    "reef": "wakewise_benchmarks.reef:show_reef",
     "target": "wakewise_benchmarks.target_finding:show_target",
     "truth": "wakewise_benchmarks.truth:show_truth",
     "worlds": "wakewise_paper.cli.bench_worlds:show_worlds",
@@ -56,6 +57,7 @@ _LASTS = {
     "gentle": "hours",
     "models": "hours",
     "operator": "hours",
+    "reef": "an hour",
     "target": "hours",
     "worlds": "hours",
 }
@@ -73,7 +75,7 @@ def bench(
         int | None,
         typer.Option(
             help="front, gentle, models, operator, target, worlds: flights per method; 8, 3, what the cases say, 3, 10 "
-            "and 10.",
+            "and 10; reef: patches, 3.",
             min=1,
             max=1000,
         ),
@@ -81,7 +83,9 @@ def bench(
     methods: Annotated[
         str,
         typer.Option(
-            help="front, gentle, models, worlds: methods, with commas between; all if not given.", show_default=False
+            help="front, gentle, models, worlds: methods, with commas between; reef: surveys of which models are made; "
+            "all if not given.",
+            show_default=False,
         ),
     ] = "",
     scenarios: Annotated[
@@ -107,7 +111,10 @@ def bench(
         str, typer.Option(help="operator: weights, with commas between; 1,2,5,10,20 if not given.", show_default=False)
     ] = "",
     models: Annotated[
-        int, typer.Option(help="worlds: seeds for which a whole scan is made and its model judged.", min=0, max=1000)
+        int,
+        typer.Option(
+            help="worlds: seeds for which a whole scan is made and its model judged; reef: patches.", min=0, max=1000
+        ),
     ] = 1,
     judge: Annotated[
         int, typer.Option(help="worlds: seeds flown in the lattice as well, minutes of a core each.", min=0, max=1000)

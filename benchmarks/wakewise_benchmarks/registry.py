@@ -33,6 +33,7 @@ BENCHES = {
     "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
     "operator": "an operator's velocity obeyed and the target's water spared, by w_track, where users have the trouble",
     "target": "the target found, mapped and tracked by the camera: how soon, how well, what it is worth",
+    "reef": "a patch of reef in two levels, beside a lawnmower and orbits round everything: path and completeness",
     "truth": "figures held against data that nobody in this project made: measured, asked, reached, met",
     "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
     "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",
