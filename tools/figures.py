@@ -1,7 +1,7 @@
-"""Write the README's animation: one flight with `dp` and with `wake-aware`, seen from above, water coloured by its wash.
+"""Write the README's animation: a flight with `dp` and one with `wake-aware`, from above, water coloured by its wash.
 
 Both fly the preset `quick`, seed 1, in the same simulated water. The colour is the true speed that the thrusters add to
-the water, in the level plane through the target's middle; the vehicle flies above it. Bars are the thrusts that the vehicle gives.
+the water, in the level plane through the target's middle; the vehicle flies above it. Bars are the thrusts given.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from wakewise.operation.loop import Step
 OUT = Path(__file__).parents[1] / "docs" / "images" / "wash.webp"
 FROM_S, TO_S, EVERY_S = 17.0, 83.0, 1.0
 """The orbits, without the approach, shown at seven times their speed."""
-FRAMES_HZ = 7.0
+FRAMES_HZ = 7
 HALF_M, CELLS = 1.0, 64
 MOST_CM_S = 20.0
 BACKGROUND, INK = "#0b1d2a", "#f2f2f2"
