@@ -28,10 +28,13 @@ from wakewise.perception.surface_map import (
     CELL_M,
     LEAST_DEPTH_M,
     LEAST_RADIUS_M,
+    VIEW_PX,
     SurfaceMap,
     empty_surface,
+    sweep_in_view,
     sweep_target,
     turned_about,
+    view_camera,
     with_sweep,
 )
 
@@ -460,3 +463,29 @@ def test_all_orders_of_seeing_and_missing_a_place_leave_it_the_same_views() -> N
         surface = surface_of(*order)
         near = abs(surface.points_W_m[:, 0] - NEAR_M) < 1e-9
         assert surface.views[near].tolist() == [2]
+
+
+def test_all_in_view_is_swept_in_smaller_pictures() -> None:
+    """The whole picture is the window, depths go beyond the mapped ones; without pictures from aside there is none."""
+    camera = CalibratedCamera(width=640, height=480, fx=400.0, fy=400.0, cx=320.0, cy=240.0)
+    small = view_camera(camera)
+    frames = [replace(frame, picture=np.full((480, 640), 7, np.uint8)) for frame in reversed(ARC)]
+    mapped = CENTRE + np.array([[0.0, 0.1, 0.1], [0.1, -0.1, 0.0], [-0.1, 0.0, -0.1]])
+    sweep = sweep_in_view(frames, mapped, small)
+    assert sweep is not None
+    assert sweep.window == (0, 0, VIEW_PX, 240)
+    assert len(sweep.others) == 3
+    depths = (mapped - frames[-1].X_WC.p_m) @ frames[-1].X_WC.R[:, 2]
+    assert 1.0 / sweep.inverse_m.max() < depths.min()
+    assert 1.0 / sweep.inverse_m.min() > depths.max()
+    assert sweep_in_view(frames[-2:], mapped, small) is None
+    assert sweep_in_view(frames, mapped - [0.8, 0.0, 0.0], small) is None  # what is mapped lies behind the camera
+
+
+def test_larger_cells_hold_each_second_pixel() -> None:
+    """Points of a wall that fall into one cell become one, and those between rows and columns are left out."""
+    once = with_sweep(empty_surface(), wall(1), CAMERA, None, 0.02, 2)
+    whole = with_sweep(empty_surface(), wall(1), CAMERA, None, 0.02)
+    fine = with_sweep(empty_surface(), wall(1), CAMERA)
+    assert 0 < len(once) <= len(whole) < len(fine)
+    assert len(np.unique(np.floor(whole.points_W_m / 0.02), axis=0)) == len(whole)

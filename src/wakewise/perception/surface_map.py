@@ -164,9 +164,9 @@ def sweep_in_view(frames: Sequence[Keyframe], seen_W_m: Array, small: Calibrated
     size, views = (small.width, small.height), []
     for frame in (last, *others):
         assert frame.picture is not None
-        share = small.width / frame.picture.shape[1]
+        speed = None if frame.speed_px_s is None else small.width / frame.picture.shape[1] * frame.speed_px_s
         reduced = np.asarray(cv2.resize(frame.picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-        views.append(sweep_view(reduced, frame.X_WC, small, share * frame.speed_px_s))
+        views.append(sweep_view(reduced, frame.X_WC, small, speed))
     return begin_sweep(views[0], views[1:], (0, 0, *size), float(near), float(far))
 
 
