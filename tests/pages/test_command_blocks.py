@@ -123,6 +123,8 @@ RULES: list[Run | Start | Elsewhere | Never] = [
         r"wakewise bench operator.*", "packages/wakewise-paper/tests/operator_study/test_operator_bench.py", "operator"
     ),
     Elsewhere(r"wakewise scan --set pilot=find.*", "tests/operation/finding/test_find_pilot.py", 'pilot="find"'),
+    Elsewhere(r"wakewise scan --preset reef.*", "tests/operation/finding/test_survey_pilot.py", 'preset("reef"'),
+    Elsewhere(r"wakewise bench reef.*", "benchmarks/tests/test_reef_bench.py", "patch_figures"),
     Elsewhere(r"wakewise bench target.*", "benchmarks/tests/test_target_bench.py", "figures_of"),
     Elsewhere(r"wakewise bench truth.*", "benchmarks/tests/test_truth_bench.py", '"truth"'),
     Elsewhere(r"wakewise bench worlds.*", "packages/wakewise-paper/tests/world_study/test_worlds_bench.py", "worlds"),
