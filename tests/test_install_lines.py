@@ -17,7 +17,7 @@ PROJECTS = {
     for path in (ROOT / "pyproject.toml", *ROOT.glob("packages/*/pyproject.toml"))
 }
 """Extras of each project by its folder in the clone."""
-OTHERS = {"pyserial", "asyncssh", "numpy", "scipy", "numba", "pydantic", "pyyaml"}
+OTHERS = {"pyserial", "asyncssh", "numpy", "scipy", "numba", "pydantic", "pyyaml", "pre-commit"}
 """Packages of others that a page tells to install, by their names in Python's index."""
 INSTALL = re.compile(r"\bpip3? install\b[ \t]*([^`\n]*)")
 FOLDER = "|".join(re.escape(folder) for folder in PROJECTS)

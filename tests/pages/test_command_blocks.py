@@ -77,7 +77,13 @@ class Never:
 
 RULES: list[Run | Start | Elsewhere | Never] = [
     # Before anything can be run.
-    Never(r"make (setup|check|test|test-all|docs)", "this test runs in what `make setup` made, as part of `make test`"),
+    Never(
+        r"make (setup|check|test|test-all|docs|coverage)",
+        "this test runs in what `make setup` made, as part of `make test`",
+    ),
+    Never(
+        r"pip install pre-commit|pre-commit install", "changes a clone's hooks; its checks are those of `make check`"
+    ),
     Never(r"\. \.venv/bin/activate", "this test runs in the environment already"),
     Never(r"pip install .*", "installs packages; tests/test_core.py and the lock file's test judge what is installed"),
     # Flights, photographs, models.

@@ -2,14 +2,18 @@
 
 Body frame B is FRD. A positive thrust pushes the vehicle along the thruster's axis and sends the jet the other way.
 
-Start reading in `vehicle.py` (the record, with `hydrodynamics.py`) and `library.py` with `library_data/` (one file
-per cited source; `vehicle_file.py` and `draft.py` read them, `library.py` writes them; `draft.py` and
-`completion.py` say what one lacks and estimate it after another vehicle). `dynamics.py` has the equations of motion and
-the steps (`fossen.py` the readable matrices, `kernels.py`, `semi_implicit.py`, `semi_implicit.py` the compiled steps,
-`jacobians.py` their derivatives, `batch.py` many vehicles at once), `check.py` and `mixing.py` rank, null space and
-wrong signs in shipped matrices, `describe.py` and `describe.py` all of it in words, `perturbation.py` the vehicle
-that the tank flies, `perturbation.py` its drag as other sources have it, `vehicle.py` the joint of its camera,
-`ballast.py` floats and lead on it. Thrusters are a room below, files of other projects the room `importers`.
+Start reading in `vehicle.py`, the record of a vehicle.
+
+| concern | modules |
+|---|---|
+| parameter files | `library.py`, `library_data/` (one file per cited source), `vehicle_file.py`, `draft.py`, `completion.py` |
+| equations of motion | `dynamics.py`; `fossen.py` as readable matrices, `kernels.py` and `semi_implicit.py` compiled |
+| derivatives, many vehicles at once | `jacobians.py`, `batch.py` |
+| rank, null space, wrong signs | `check.py`, `mixing.py`; in words: `describe.py` |
+| the vehicle that the tank flies | `perturbation.py` |
+| floats and lead | `ballast.py` |
+
+Thrusters are in `wakewise.robot.thrusters`, readers of other projects' files in `wakewise.robot.importers`.
 """
 
 from wakewise.robot.vehicles.batch import pack_bodies, step_batch
