@@ -38,8 +38,8 @@ MIDDLE_M = np.zeros(2)
 RELIEF = 0.2
 """Share of the transects' height at which they look, and orbits where nothing is mapped."""
 PART_RADIUS_M = 0.3
-THINNED_M, AROUND_M = 0.05, 0.1
-"""Spacing of the points by which parts are chosen, and how far about the patch they lie."""
+THINNED_M, AROUND_M, GRID = 0.05, 0.1, 96
+"""Spacing of the points by which parts are chosen, how far about the patch they lie, and cells of depth pictures."""
 SETTLE_S = 3.0
 """Hover before the first transect."""
 
@@ -78,6 +78,12 @@ class OrbitPlanner:
         clear = partial(self._clear, solid_W_m=solid)
         return orbits, orbits_route(orbits, end_W_m, last.end, over_z_m, mission, first, clear)
 
+    def load_kernels(self, X_WC: Pose) -> None:
+        """Have what counts coverage compiled or loaded, which takes a second, before the flight."""
+        points = X_WC.p_m + X_WC.R[:, 2] + np.random.default_rng(0).uniform(-0.2, 0.2, (2 * LEAST_POINTS, 3))
+        patches = patches_of_points(points, np.tile(-X_WC.R[:, 2], (len(points), 1)), THINNED_M)
+        Coverage.begin(patches, None, MAPPED_CRITERIA).seen(X_WC, self.views.lens).seen(X_WC, self.views.lens)
+
     def _coverage(self, target: TargetEstimate | None, taken_from: Sequence[Pose]) -> Coverage | None:
         """Coverage of the mapped patch and a little around it, thinned to `THINNED_M`."""
         if target is None or target.surface_W_m is None or target.towards_W is None:
@@ -88,7 +94,7 @@ class OrbitPlanner:
         if len(kept) < LEAST_POINTS:
             return None
         patches = patches_of_points(target.surface_W_m[kept], target.towards_W[kept], THINNED_M)
-        coverage = Coverage.begin(patches, None, MAPPED_CRITERIA)
+        coverage = Coverage.begin(patches, None, replace(MAPPED_CRITERIA, grid=GRID))
         for X_WC in taken_from:
             coverage = coverage.seen(X_WC, self.views.lens)
         return coverage
@@ -129,6 +135,7 @@ class SurveyPilot:
         self._aim, self._mission, self._survey, self.chooser = aim, mission, survey, chooser
         self._planner = OrbitPlanner(survey=survey, bed_z_m=bed_z_m, views=chooser)
         self.transects = transect_route(transects_of(survey, bed_z_m), mission, SETTLE_S)
+        self._planner.load_kernels(self.transects.X_WC_planned[0])
         self.begin()
 
     def begin(self) -> None:

@@ -215,6 +215,7 @@ class VisibilityCriteria:
     # by. COLMAP's patch-match asks for the same 3 degrees (`filter_min_triangulation_angle`).
     apart_rad: tuple[float, float] = (math.radians(3.0), math.radians(35.0))
     margin: float = 0.01  # share of the picture's width at its edges in which nothing counts
+    grid: int = GRID  # cells of the depth picture; fewer are quicker, and enough where samples are far apart
     sharp: float = 0.5  # least sharpness of a photograph that counts, as a share of the sharpest photographs' so far
 
     def __post_init__(self) -> None:
@@ -238,7 +239,7 @@ def well_visible(patches: SurfacePatches, X_WC: Pose, lens: CameraIntrinsics, ne
         [math.cos(need.incidence_rad), f * need.pixel_m, LEAST_AHEAD * abs(ahead), 0.5 * patches.shield_off_m]
     )
     return np.asarray(
-        _shown(patches.points_W_m, patches.normals, patches.shield_W_m, X_WC.p_m, R, numbers, limits, GRID)
+        _shown(patches.points_W_m, patches.normals, patches.shield_W_m, X_WC.p_m, R, numbers, limits, need.grid)
     )
 
 
