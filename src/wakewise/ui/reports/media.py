@@ -52,7 +52,8 @@ def found_html(trial: Trial) -> str:
         return ""
     if told is None:
         return ""
-    if told.get("found_s") is None or told.get("centre_W_m") is None:
+    orbits = told.get("orbits")  # of a survey, which has no single target
+    if orbits is None and (told.get("found_s") is None or told.get("centre_W_m") is None):
         return str(template("trial.html").found("", "No target was found.", ""))
     film, path = trial.folder / "found.webp", trial.folder / "found.png"
     source = data_uri(path.read_bytes(), "image/png") if path.is_file() else ""
@@ -60,6 +61,8 @@ def found_html(trial: Trial) -> str:
         source = data_uri(film.read_bytes(), "image/webp")
     error, std = told.get("centre_error_m"), told.get("centre_std_m")
     words = f"The target was found after {number(told['found_s'])} s."
+    if orbits is not None:
+        words = f"Transects were flown over the patch, then close orbits round {len(orbits)} parts of it."
     more = f"At the end its centre was known to {number(1e3 * std)} mm" if std is not None else ""
     if more and error is not None:
         more += f" by the vehicle's own reckoning, and was {number(1e3 * error)} mm from the true place"
