@@ -471,15 +471,16 @@ def test_all_in_view_is_swept_in_smaller_pictures() -> None:
     small = view_camera(camera)
     frames = [replace(frame, picture=np.full((480, 640), 7, np.uint8)) for frame in reversed(ARC)]
     mapped = CENTRE + np.array([[0.0, 0.1, 0.1], [0.1, -0.1, 0.0], [-0.1, 0.0, -0.1]])
-    sweep = sweep_in_view(frames, mapped, small)
+    sweep = sweep_in_view(frames, mapped, small, 1.5)
     assert sweep is not None
     assert sweep.window == (0, 0, VIEW_PX, 240)
     assert len(sweep.others) == 3
     depths = (mapped - frames[-1].X_WC.p_m) @ frames[-1].X_WC.R[:, 2]
     assert 1.0 / sweep.inverse_m.max() < depths.min()
     assert 1.0 / sweep.inverse_m.min() > depths.max()
-    assert sweep_in_view(frames[-2:], mapped, small) is None
-    assert sweep_in_view(frames, mapped - [0.8, 0.0, 0.0], small) is None  # what is mapped lies behind the camera
+    assert sweep_in_view(frames[-2:], mapped, small, 1.5) is None
+    assert sweep_in_view(frames, mapped, small, 0.3) is None
+    assert sweep_in_view(frames, mapped - [0.8, 0.0, 0.0], small, 1.5) is None  # what is mapped lies behind the camera
 
 
 def test_larger_cells_hold_each_second_pixel() -> None:

@@ -229,7 +229,8 @@ class TargetTracker:
         )
         state = self._adjusted(self._kept(state, X_WC, time_s, prior or guess, std))
         if found is not None:
-            state = with_sweep_step(state, time_s, self.settings.protect == "view")
+            in_view = self.settings.protect == "view"
+            state = with_sweep_step(state, time_s, self.settings.view_distance_m if in_view else None)
         state = self._followed(state, X_WC, time_s)
         if time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6:
             state = self._reshaped(state, X_WC, time_s)

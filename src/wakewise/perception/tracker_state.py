@@ -16,6 +16,7 @@ from wakewise.perception.map_initialization import adjusted_map, moved_since
 from wakewise.perception.plane_sweep import PlaneSweep, compared, swept_depth
 from wakewise.perception.point_map import PointMap
 from wakewise.perception.surface_map import (
+    MOST_VIEW_CELLS,
     SWEEP_RAD,
     VIEW_CELL_M,
     VIEW_EVERY,
@@ -70,13 +71,13 @@ class TrackerState:
     trouble: str = ""
 
 
-def with_sweep_step(state: TrackerState, time_s: float, in_view: bool = False) -> TrackerState:
+def with_sweep_step(state: TrackerState, time_s: float, view_m: float | None = None) -> TrackerState:
     """The state with one more picture compared of the sweep under way, or with a sweep begun at a new keyframe.
 
-    `in_view`: all that is in view is swept, in larger cells, and not the target alone.
+    `view_m`: all that is in view up to this depth is swept, in larger cells, and not the target alone.
     """
     sweep, shape = state.sweep, state.shape
-    camera = view_camera(state.camera) if in_view else state.camera
+    camera = state.camera if view_m is None else view_camera(state.camera)
     if sweep is None:
         last = state.keyframes[-1]
         if shape is None or not shape.seen or last.time_s < time_s:
@@ -84,8 +85,8 @@ def with_sweep_step(state: TrackerState, time_s: float, in_view: bool = False) -
         before = state.swept_from_W_m
         if before is not None and turned_about(shape.centre_W_m, before, last.X_WC.p_m) < SWEEP_RAD:
             return state
-        if in_view:
-            begun = sweep_in_view(state.keyframes, shape.surface_W_m, camera)
+        if view_m is not None:
+            begun = sweep_in_view(state.keyframes, shape.surface_W_m, camera, view_m)
         else:
             begun = sweep_target(state.keyframes, shape.centre_W_m, shape.radius_m, camera)
         return state if begun is None else replace(state, sweep=begun, swept_from_W_m=last.X_WC.p_m)
@@ -93,8 +94,8 @@ def with_sweep_step(state: TrackerState, time_s: float, in_view: bool = False) -
     if not sweep.done:
         return replace(state, sweep=sweep)
     swept = swept_depth(sweep, camera)
-    if in_view:
-        surface = with_sweep(state.surface, swept, camera, None, VIEW_CELL_M, VIEW_EVERY)
+    if view_m is not None:
+        surface = with_sweep(state.surface, swept, camera, None, VIEW_CELL_M, VIEW_EVERY, MOST_VIEW_CELLS)
     else:
         surface = with_sweep(state.surface, swept, camera, state.bed)
     return replace(state, surface=surface, sweep=None)
