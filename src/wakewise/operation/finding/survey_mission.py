@@ -35,6 +35,8 @@ CHECKED = 8
 MARGIN_M = 0.05
 """By which the mapped surface may lie nearer than it was mapped, besides the mission's clearance."""
 MIDDLE_M = np.zeros(2)
+LOOK_DEG = 60.0
+"""Angle of the camera below the horizon on transects."""
 RELIEF = 0.2
 """Share of the transects' height at which they look, and orbits where nothing is mapped."""
 PART_RADIUS_M = 0.3
@@ -226,7 +228,7 @@ def _some(points_W_m: Array) -> Array:
 
 def transects_of(survey: SurveySettings, bed_z_m: float) -> PatchTransects:
     """The survey's lines over a bed at this depth."""
-    look = math.radians(survey.look_deg)
+    look = math.radians(LOOK_DEG)
     return PatchTransects(
         middle_m=MIDDLE_M,
         size_m=np.array(survey.size_m),

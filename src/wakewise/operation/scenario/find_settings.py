@@ -29,7 +29,6 @@ class SurveySettings(Settings):
 
     size_m: tuple[Side, Side] = Field((2.0, 2.0), description="the patch, north and east, about the world's origin")
     height_m: float = Field(0.8, ge=0.3, le=10.0, description="height of the camera over the bed on transects")
-    look_deg: float = Field(60.0, ge=30.0, le=80.0, description="angle of the camera below the horizon on transects")
     spacing_m: float = Field(0.5, ge=0.1, le=5.0, description="distance between transects")
     photo_every_m: float = Field(0.2, ge=0.05, le=2.0, description="distance between photographs on transects")
     orbits: Literal["chosen", "none", "everywhere"] = Field(
