@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.errors import InputError, StageError
@@ -109,6 +110,10 @@ def _near(similarity: Similarity, points_B: Array, points_A: Array) -> BoolArray
     return np.asarray(error <= max(_CHI3_999 * float(np.median(error)) / _CHI3_MEDIAN, floor))
 
 
+SPACED = 500
+"""Samples of the truth by which their spacing is judged."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IcpRefinement:
     """Result of ICP. `displacement_mm`: mean displacement of the points, large after a bad initial alignment.
@@ -148,7 +153,8 @@ def refine_icp(
     10(3), 1992, doi 10.1016/0262-8856(92)90066-C. Scale is left alone: a model of the wrong size must stay wrong.
 
     `cloud_m` has shape (n, 3). `surface_m`, `normals`, shape (k, 3): samples of the true surface and their unit
-    normals. `distances_m`: largest distance of a match in each round. `limit_m`: largest mean displacement that counts
+    normals. `distances_m`: largest distance of a match in each round; more where samples lie farther apart than half of
+    the last. `limit_m`: largest mean displacement that counts
     as a refinement. `least_matched_pct`: share of the cloud that must lie within the last distance in the end. Raises
     StageError if too few points match or the cloud would move farther than `limit_m`: the alignment before it was
     wrong, or this is no model of that surface.
@@ -156,6 +162,10 @@ def refine_icp(
     need("registration (ICP)", "photos", only=("small_gicp",))
     import small_gicp
 
+    some = np.asarray(surface_m)[:: max(1, len(surface_m) // SPACED)]
+    spacing_m = float(np.median(KDTree(surface_m).query(some, k=2)[0][:, 1]))
+    wider = max(1.0, 2.0 * spacing_m / distances_m[-1])
+    distances_m = tuple(wider * distance for distance in distances_m)
     target = small_gicp.PointCloud(np.asarray(surface_m, dtype=np.float64))
     # Estimating makes room for normals; the true ones then take their place.
     small_gicp.estimate_normals(target, num_neighbors=10, num_threads=2)
