@@ -163,7 +163,7 @@ def refine_icp(
     import small_gicp
 
     some = np.asarray(surface_m)[:: max(1, len(surface_m) // SPACED)]
-    spacing_m = float(np.median(KDTree(surface_m).query(some, k=2)[0][:, 1]))
+    spacing_m = float(np.median(np.asarray(KDTree(surface_m).query(some, k=2)[0])[:, 1]))
     wider = max(1.0, 2.0 * spacing_m / distances_m[-1])
     distances_m = tuple(wider * distance for distance in distances_m)
     target = small_gicp.PointCloud(np.asarray(surface_m, dtype=np.float64))
