@@ -85,7 +85,10 @@ def test_a_trial_with_another_detector_has_another_key(tmp_path: Path, monkeypat
     model, module = tmp_path / "find.onnx", tmp_path / "my_campaign_detector.py"
     for file, name in ((model, "find.onnx"), (module, "my_campaign_detector:make")):
         file.write_text("make = None\n")
-        keys = [_planned(methods=["dp"], scenario={"perception.detector": said}, seeds=1)[0].task.key for said in (None, name, name)]
+        keys = [
+            _planned(methods=["dp"], scenario={"perception.detector": said}, seeds=1)[0].task.key
+            for said in (None, name, name)
+        ]
         file.write_text("make = None  # changed\n")
         (changed,) = _planned(methods=["dp"], scenario={"perception.detector": name}, seeds=1)
         assert keys[1] == keys[2]

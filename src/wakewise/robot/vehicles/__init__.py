@@ -6,7 +6,7 @@ Start reading in `vehicle.py`, the record of a vehicle.
 
 | concern | modules |
 |---|---|
-| parameter files | `library.py`, `library_data/` (one file per cited source), `vehicle_file.py`, `draft.py`, `completion.py` |
+| parameter files | `library.py`, `library_data/` (a file per source), `vehicle_file.py`, `draft.py`, `completion.py` |
 | equations of motion | `dynamics.py`; `fossen.py` as readable matrices, `kernels.py` and `semi_implicit.py` compiled |
 | derivatives, many vehicles at once | `jacobians.py`, `batch.py` |
 | rank, null space, wrong signs | `check.py`, `mixing.py`; in words: `describe.py` |
