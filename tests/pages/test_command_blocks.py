@@ -102,6 +102,8 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Elsewhere(r"wakewise reconstruct \w+/ .*--fixes .*", "tests/vision/reconstruction/test_scale_by_fixes.py", "fixes"),
     Never(r"wakewise reconstruct runs/sea-.*", "needs the photographs of a real dive; PHOTOS stand for them above"),
     Run(r"wakewise evaluate .*", slow=True, shows="rmse_mm"),
+    Run(r"wakewise measure runs/metres.*", slow=True, shows="volume_cm3"),
+    Elsewhere(r"wakewise compare-models runs/spring .*", "tests/ui/cli/test_measure_commands.py", '"compare-models"'),
     Run(r"wakewise calibrate BOARD_PHOTOS .*", shows="focal"),
     Run(r"wakewise colour PHOTOS"),
     Run(r"wakewise photo-robustness", also=("--levels", "silt=0", "--out", "runs/degraded", *BRIEF), slow=True),

@@ -1,0 +1,209 @@
+"""Size of a colony or of a box of a mesh: lengths, areas, volume and rugosity above the bed.
+
+Length and width are Feret diameters of the outline seen from above (W. H. Walton, Nature 162, 1948, doi
+10.1038/162329b0). Rugosity is the surface index of A. L. Dahl, Ecology 54(2), 1973, doi 10.2307/1934335. A volume is
+the flux of (0, 0, height) through the surface (Gauss), which needs no closed mesh.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.distance import pdist, squareform
+
+from wakewise.core.arrays import Array, BoolArray
+from wakewise.core.errors import InputError
+from wakewise.core.jit.njit import njit
+from wakewise.scene.targets import Mesh
+from wakewise.vision.evaluation.bed_and_colony import (
+    BedFit,
+    bed_clearance_m,
+    colony_faces,
+    cut_above,
+    fit_bed,
+    in_box,
+)
+
+# key: (unit, power of the scale, definition)
+DEFINITIONS: dict[str, tuple[str, int, str]] = {
+    "length_mm": ("mm", 1, "greatest extent seen from above (maximum Feret diameter)"),
+    "width_mm": ("mm", 1, "extent across the length, seen from above"),
+    "height_mm": ("mm", 1, "highest point above the plane of the bed"),
+    "extent_mm": ("mm", 1, "greatest distance between any two points"),
+    "planar_area_cm2": ("cm2", 2, "area of the outline seen from above (projected area)"),
+    "surface_area_cm2": ("cm2", 2, "area of the surface above the bed"),
+    "volume_cm3": ("cm3", 3, "volume between surface and bed plane"),
+    "rugosity": ("", 0, "surface area over planar area (Dahl 1973)"),
+}
+CELLS = 1500
+"""Cells of the raster of an outline along its longer side."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ColonySize:
+    """Figures of `DEFINITIONS`, in the units of their names."""
+
+    length_mm: float
+    width_mm: float
+    height_mm: float
+    extent_mm: float
+    planar_area_cm2: float
+    surface_area_cm2: float
+    volume_cm3: float
+    rugosity: float
+
+    def values(self) -> dict[str, float]:
+        """Figures by key."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuringRule:
+    """What of a model is measured: its colony, or all in a `box` (two corners, m), or the colony in the box.
+
+    `bed`: its plane where it is known; `eyes_m`, shape (k, 3): cameras, which are above the bed.
+    """
+
+    box: tuple[Array, Array] | None = None
+    colony: bool = True
+    bed: BedFit | None = None
+    eyes_m: Array | None = None
+
+
+def measure(mesh: Mesh, rule: MeasuringRule, rng: np.random.Generator) -> tuple[ColonySize, BedFit, Mesh]:
+    """Size of a colony or a box of a mesh in metres, the bed it is above, and the surface that counted.
+
+    The foot of a colony is not told from the bed's roughness: what lies below the clearance (`bed_clearance_m`) is
+    extrapolated from sections at one, two and three times the clearance. In a box without `colony` all counts, bed
+    included, and what lies below the plane counts against the volume. Raises InputError if there is no bed, no colony,
+    or nothing in the box.
+    """
+    bed = rule.bed or fit_bed(mesh, rng, rule.eyes_m)
+    part = mesh if rule.box is None else in_box(mesh, *rule.box)
+    if not rule.colony:
+        along = feret_direction(bed.to_plane(part.vertices_m)[:, :2])
+        return _size([_section(part, bed, along)], 0.0), bed, part
+    cut_m = bed_clearance_m(part, bed)
+    middle = None if rule.box is None else 0.5 * (np.asarray(rule.box[0]) + np.asarray(rule.box[1]))
+    colony = Mesh(part.vertices_m, part.faces[colony_faces(part, bed, cut_m, middle)])
+    cuts = [cut_above(colony, bed.axes[2], bed.origin_m + k * cut_m * bed.axes[2]) for k in (1, 2, 3)]
+    if cuts[0] is None:
+        raise InputError(f"colony: nothing stands more than {1e3 * cut_m:.1f} mm above the bed")
+    along = feret_direction(bed.to_plane(cuts[0].vertices_m)[:, :2])
+    sections = [_section(cut, bed, along) for cut in cuts if cut is not None]
+    return _size(sections, cut_m if len(sections) == 3 else 0.0), bed, cuts[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Section:
+    """Sums over the surface above a level, m: `foot` is the area of its cross-section there, seen from above."""
+
+    area: float
+    planar: float
+    foot: float
+    volume: float
+    length: float
+    width: float
+    height: float
+    extent: float
+
+
+def _section(mesh: Mesh, bed: BedFit, along: Array) -> _Section:
+    """Sums; width is the extent across a direction of the bed plane, shape (2,)."""
+    corners = bed.to_plane(mesh.vertices_m)[mesh.faces]
+    vectors = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # An outside that is the inside everywhere only turns the signs.
+    sign = 1.0 if vectors[:, 2].sum() >= 0.0 else -1.0
+    points = corners.reshape(-1, 3)
+    hull = _hull(points[:, :2])
+    return _Section(
+        area=float(np.linalg.norm(vectors, axis=1).sum()),
+        planar=outline_area(corners[:, :, :2]),
+        foot=sign * float(vectors[:, 2].sum()),
+        volume=sign * float((corners[:, :, 2].mean(axis=1) * vectors[:, 2]).sum()),
+        length=float(pdist(hull).max()),
+        width=float(np.ptp(hull @ np.array([-along[1], along[0]]))),
+        height=float(points[:, 2].max()),
+        extent=float(pdist(_hull(points)).max()),
+    )
+
+
+def _size(sections: list[_Section], cut_m: float) -> ColonySize:
+    """Figures down to the bed plane from one section, or from three at equal steps.
+
+    Areas follow a parabola through the three; lengths grow with the root of the outline's area, as those of alike
+    outlines do, since a parabola would blow up the noise of their single end points fourfold.
+    """
+    one = sections[0]
+    found = {key: getattr(one, key) for key in ("length", "width", "extent", "area", "planar", "volume")}
+    if cut_m > 0.0:
+        two, three = sections[1:]
+        keys = ("area", "planar", "foot")
+        down = {key: 3.0 * (getattr(one, key) - getattr(two, key)) + getattr(three, key) for key in keys}
+        wider = float(np.sqrt(max(down["planar"] / one.planar, 0.0)))
+        down |= {key: wider * getattr(one, key) for key in ("length", "width", "extent")}
+        # The integral of the cross-section from the bed to the cut, less the column that the section has counted.
+        below = cut_m * ((5.0 * down["foot"] + 8.0 * one.foot - two.foot) / 12.0 - one.foot)
+        found = down | {"volume": one.volume + below}
+    return ColonySize(
+        length_mm=1e3 * found["length"],
+        width_mm=1e3 * found["width"],
+        height_mm=1e3 * one.height,
+        extent_mm=1e3 * found["extent"],
+        planar_area_cm2=1e4 * found["planar"],
+        surface_area_cm2=1e4 * found["area"],
+        volume_cm3=1e6 * found["volume"],
+        rugosity=found["area"] / found["planar"],
+    )
+
+
+def _hull(points: Array) -> Array:
+    """Corners of the convex hull, or all points where they span none."""
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:
+        return np.unique(points, axis=0)[:2000]
+
+
+def feret_direction(points: Array) -> Array:
+    """Unit direction of the maximum Feret diameter of points in a plane, shape (n, 2) to (2,)."""
+    hull = _hull(points)
+    apart = squareform(pdist(hull))
+    i, j = np.unravel_index(int(np.argmax(apart)), apart.shape)
+    return np.asarray((hull[j] - hull[i]) / max(float(apart[i, j]), 1e-300))
+
+
+def outline_area(triangles: Array) -> float:
+    """Area that triangles in a plane, shape (m, 3, 2), cover together, by the cells whose middle lies in one."""
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    cell = float((high - low).max()) / CELLS
+    if cell <= 0.0:
+        return 0.0
+    columns, rows = np.ceil((high - low) / cell).astype(np.int64) + 1
+    return float(_covered((triangles - low) / cell, int(columns), int(rows)).sum()) * cell**2
+
+
+@njit
+def _covered(triangles: Array, columns: int, rows: int) -> BoolArray:
+    """Cells, shape (rows, columns), whose middle lies in a triangle of either orientation."""
+    out = np.zeros((rows, columns), np.bool_)
+    for k in range(len(triangles)):
+        ax, ay = triangles[k, 0, 0], triangles[k, 0, 1]
+        bx, by = triangles[k, 1, 0] - ax, triangles[k, 1, 1] - ay
+        cx, cy = triangles[k, 2, 0] - ax, triangles[k, 2, 1] - ay
+        twice = bx * cy - by * cx
+        if twice == 0.0:
+            continue
+        left = max(int(np.floor(ax + min(0.0, bx, cx))), 0)
+        right = min(int(np.ceil(ax + max(0.0, bx, cx))), columns - 1)
+        bottom = max(int(np.floor(ay + min(0.0, by, cy))), 0)
+        top = min(int(np.ceil(ay + max(0.0, by, cy))), rows - 1)
+        for v in range(bottom, top + 1):
+            for u in range(left, right + 1):
+                x, y = u + 0.5 - ax, v + 0.5 - ay
+                s, t = (x * cy - y * cx) / twice, (bx * y - by * x) / twice
+                if s >= 0.0 and t >= 0.0 and s + t <= 1.0:
+                    out[v, u] = True
+    return out

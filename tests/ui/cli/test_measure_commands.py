@@ -1,0 +1,131 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from wakewise.ui.cli.main import run
+
+
+def colony(path: Path, scale: float = 1.0, seed: int = 0, grown: float = 0.0) -> Path:
+    """A bumpy dome of 60 mm on a bed of 200 mm."""
+    x = np.linspace(-0.1, 0.1, 121)
+    X, Y = np.meshgrid(x, x, indexing="ij")
+    r = np.hypot(X, Y)
+    bumps = 0.004 * np.sin(150.0 * X + 0.5) * np.sin(130.0 * Y) + grown
+    Z = np.where(r < 0.06, np.sqrt(np.maximum(0.06**2 - r**2, 0.0)) * (1.0 + 10.0 * bumps), 0.0)
+    Z = Z + np.random.default_rng(seed).normal(0.0, 1e-4, Z.shape)
+    i = np.arange(121 * 121).reshape(121, 121)
+    quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
+    vertices = scale * np.stack([X, Y, Z], axis=-1).reshape(-1, 3)
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    trimesh.Trimesh(vertices, faces, process=False).export(path)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["ply", "stl", "obj", "glb"])
+def test_a_bare_mesh_of_any_format_is_measured_without_intervals(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """STL repeats vertices, which joins no pieces by itself; each interval is null, and why is said."""
+    path, out = colony(tmp_path / f"colony.{kind}"), tmp_path / "colony.json"
+    assert run(["measure", str(path), "--json", "--out", str(out)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found == json.loads(out.read_text())
+    assert found["length_mm"] == pytest.approx(120.0, rel=0.02)
+    assert found["length_mm_low"] is None and "photographs" in found["why"]["length_mm_low"]
+    assert found["units"]["volume_cm3"] == "cm3" and found["definitions"].keys() == found["units"].keys()
+
+
+def test_the_unit_of_a_mesh_can_be_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A mesh in millimetres has its size with --unit-m 0.001."""
+    assert run(["measure", str(colony(tmp_path / "mm.ply", 1000.0)), "--unit-m", "0.001", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["length_mm"] == pytest.approx(120.0, rel=0.02)
+
+
+def folder(path: Path, **figures: object) -> Path:
+    path.mkdir()
+    (path / "reconstruction.json").write_text(json.dumps(figures))
+    return path
+
+
+def bad_inputs(base: Path) -> dict[str, tuple[list[str], str]]:
+    """Words of the command, and what the line says."""
+    good = str(colony(base / "good.ply"))
+    points = base / "points.ply"
+    trimesh.PointCloud(np.random.default_rng(0).normal(size=(50, 3))).export(points)
+    ball = base / "ball.ply"
+    trimesh.creation.icosphere(3, 0.05).export(ball)
+    (base / "empty").mkdir()
+    unscaled = folder(base / "unscaled", scale=None)
+    colony(unscaled / "mesh.ply")
+    broken = base / "broken.ply"
+    broken.write_bytes((base / "good.ply").read_bytes()[:4000])
+    nan = base / "nan.ply"
+    data = bytearray((base / "good.ply").read_bytes())
+    start = data.index(b"end_header\n") + 11
+    data[start : start + 4] = np.float32(np.nan).tobytes()
+    nan.write_bytes(bytes(data))
+    return {
+        "none": (["measure", str(base / "missing.ply")], "no such file"),
+        "points": (["measure", str(points)], "without faces"),
+        "folder": (["measure", str(base / "empty")], "reconstruction.json"),
+        "no mesh": (["measure", str(folder(base / "bare", scale=1.0))], "no mesh"),
+        "no scale": (["measure", str(unscaled)], "no scale"),
+        "no bed": (["measure", str(ball)], "bed"),
+        "box": (["measure", good, "--box", "5", "5", "5", "6", "6", "6"], "--box"),
+        "nan box": (["measure", good, "--box", "nan", "0", "0", "1", "1", "1"], "--box"),
+        "nan": (["measure", str(nan)], "NaN"),
+        "cut": (["measure", str(broken)], "cut short"),
+        "unit": (["measure", good, "--unit-m", "-1"], "--unit-m"),
+        "direction": (["measure", good, "--bed", "0", "0", "0", "0"], "--bed"),
+        "scale": (["compare-models", good, str(colony(base / "inches.ply", 39.37))], "different scale"),
+        "picture": (["compare-models", good, good, "--out", str(base / "a.jpg")], ".png"),
+        "second": (["compare-models", good, str(points)], "without faces"),
+    }
+
+
+NAMES = (
+    "none", "points", "folder", "no mesh", "no scale", "no bed", "box", "nan box", "nan", "cut", "unit", "direction",
+    "scale", "picture", "second",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_cannot_be_measured_is_refused_in_one_line(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 2, one line that says what is wrong, and no file."""
+    words, says = bad_inputs(tmp_path)[name]
+    before = sorted(tmp_path.rglob("*"))
+    out = [] if "--out" in words else ["--out", str(tmp_path / "out.png")]
+    assert run([*words, *out]) == 2
+    heard = capsys.readouterr()
+    lines = [line for line in heard.err.splitlines() if line.startswith("wakewise")]
+    assert len(lines) == 1 and says in lines[0], heard.err
+    assert heard.out == "" and sorted(tmp_path.rglob("*")) == before
+
+
+def test_growth_is_shown_in_a_picture_and_told_in_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The PNG is a picture of some size, the JSON beside it is that of --json, and the verdict says growth."""
+    first, second = colony(tmp_path / "a.ply"), colony(tmp_path / "b.ply", seed=1, grown=0.012)
+    out = tmp_path / "change.png"
+    assert run(["compare-models", str(first), str(second), "--out", str(out), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found == json.loads(out.with_suffix(".json").read_text())
+    assert found["verdict"].startswith("grown by"), found["verdict"]
+    assert found["change_mm_low"] < found["change_mm"] < found["change_mm_high"]
+    from PIL import Image
+
+    with Image.open(out) as picture:
+        assert picture.format == "PNG" and min(picture.size) > 500
+
+
+def test_the_same_model_twice_has_not_changed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The table ends with the verdict, and says that bare meshes do not know their scale."""
+    path = str(colony(tmp_path / "a.ply"))
+    assert run(["compare-models", path, path]) == 0
+    shown = capsys.readouterr().out
+    assert "verdict: no change can be told" in shown and "scale of" in shown
