@@ -26,8 +26,8 @@ COUNT, MARGIN, GROWN = 30_000, 0.6, 0.15
 """Places on the first model; what is looked at about its colony, and how far it may have grown, in lengths of it."""
 DISC_SPACINGS = 5.0
 """Diameter of a disc, in spacings of the places."""
-LEAST_DISCS = 3.0
-"""Least area of a change that is claimed, in discs."""
+LEAST_DISCS, LEAST_SHARE = 3.0, 0.02
+"""Least area of a change that is claimed, in discs and as a share of the colony."""
 LEAST_EDGES = 1.5
 """Smallest change that is ever claimed, in edges of the coarser mesh: finer shape is that of the smoothing."""
 MOST_SCALE_PCT = 20.0
@@ -219,8 +219,8 @@ def _judge(
     def least(one: Distances) -> Array:
         return np.maximum(familywise * doubt(one), floor_m)
 
-    grown = _told(new, colony & (new.change_m > least(new)), disc_m)
-    lost = _told(old, before & (old.change_m < -least(old)), disc_m)
+    grown = _told(new, colony & (new.change_m > least(new)), disc_m, LEAST_SHARE * float(colony.sum()))
+    lost = _told(old, before & (old.change_m < -least(old)), disc_m, LEAST_SHARE * float(before.sum()))
     grown_before = before & (old.change_m > least(old)) & grown.any()
     lost_after = colony & (new.change_m < -least(new)) & lost.any()
 
@@ -282,8 +282,8 @@ def _detail(side: Distances, on: BoolArray, disc_m: float) -> Array:
     return np.array([change[row] - change[rows].mean() for row, rows in zip(some, near, strict=True)])
 
 
-def _told(side: Distances, beyond: BoolArray, disc_m: float) -> BoolArray:
-    """Places beyond their level, most of whose neighbours are, too, in patches of three discs or more; shape (n,)."""
+def _told(side: Distances, beyond: BoolArray, disc_m: float, fewest: float) -> BoolArray:
+    """Places beyond their level, most of whose neighbours are, too, in patches of three discs and the fewest places."""
     rows = np.flatnonzero(beyond)
     if not len(rows):
         return beyond
@@ -294,7 +294,7 @@ def _told(side: Distances, beyond: BoolArray, disc_m: float) -> BoolArray:
     rows = rows[mine >= 0.5 * whole]
     out = np.zeros(len(beyond), dtype=np.bool_)
     for patch in _patches(side.surface.points_m, rows, disc_m):
-        if len(patch) * side.surface.cell_m2 >= LEAST_DISCS * 0.25 * np.pi * disc_m**2:
+        if len(patch) >= max(fewest, LEAST_DISCS * 0.25 * np.pi * disc_m**2 / side.surface.cell_m2):
             out[patch] = True
     return out
 
