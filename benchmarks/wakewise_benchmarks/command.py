@@ -57,7 +57,7 @@ _LASTS = {
     "gentle": "hours",
     "models": "hours",
     "operator": "hours",
-    "reef": "an hour",
+    "reef": "hours",
     "target": "hours",
     "worlds": "hours",
 }
