@@ -4,7 +4,8 @@
 buoyancy; a thruster gives the share of its disk's height that is below. Limits: no waves, no splash, and drag and added
 mass of the whole hull.
 
-`FreeWater`: a vehicle in still water without walls (Fossen's equations in NumPy), for quick tests.
+`FreeWater`: a vehicle in water without walls, still or with a uniform current (Fossen's equations in NumPy), for quick
+tests.
 
 `LoweringBody`: holds the vehicle at the surface while the autopilot starts, then lowers it to its start. ArduSub takes
 the pressure at its start as that of the surface; started under water it would read a depth of 0 there.
@@ -13,6 +14,7 @@ the pressure at its start as that of the surface; started under water it would r
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,14 +87,21 @@ _GRAVITY_W_M_S2 = np.array([0.0, 0.0, GRAVITY_M_S2])
 class FreeWater:
     """Implements `Body`; steps of semi-implicit Euler, velocity first.
 
+    A uniform current carries the frame in which the water is still: the equations are those of the velocity through the
+    water.
+
     Parameters
     ----------
     vehicle : Vehicle
     start : BodyState, optional
         At rest 2 m deep, level and heading north, if not given.
+    current : callable, optional
+        Time in s to the water's velocity in W, m/s, shape (3,); still water if not given.
     """
 
-    def __init__(self, vehicle: Vehicle, start: BodyState | None = None) -> None:
+    def __init__(
+        self, vehicle: Vehicle, start: BodyState | None = None, current: Callable[[float], Array] | None = None
+    ) -> None:
         begin = start or BodyState(X_WB=Pose(np.array([0.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0, 0.0])))
         self._vehicle = vehicle
         self._p, self._q, self._nu = begin.X_WB.p_m.copy(), begin.X_WB.q.copy(), begin.nu_B.copy()
@@ -100,6 +109,9 @@ class FreeWater:
         self._time_s = 0.0
         self._inverse = np.linalg.inv(fossen.mass_matrix(vehicle))
         self._mass = fossen.mass_matrix(vehicle)
+        self._current = current
+        self._carried_W_m_s = np.zeros(3) if current is None else current(0.0)
+        self._nu[:3] -= matrix_from_quat(self._q).T @ self._carried_W_m_s
 
     @property
     def thrusts_N(self) -> Array:
@@ -112,7 +124,7 @@ class FreeWater:
         wanted = saturate(thrusts_N, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
         self._motors_N = thruster_lag(self._motors_N, wanted, vehicle.time_constants_s, dt_s)
         R_WB, nu = matrix_from_quat(self._q), self._nu
-        v_before_W = R_WB @ nu[:3]
+        v_before_W = R_WB @ nu[:3] + self._carried_W_m_s
         load = (
             vehicle.allocation_matrix @ self._motors_N
             - fossen.coriolis_matrix(self._mass, nu) @ nu
@@ -123,12 +135,15 @@ class FreeWater:
         turn = quat_multiply(self._q, np.concatenate([[1.0], 0.5 * dt_s * self._nu[3:]]))
         self._q = turn / np.linalg.norm(turn)
         R_WB = matrix_from_quat(self._q)
-        v_W = R_WB @ self._nu[:3]
+        v_W = R_WB @ self._nu[:3] + self._carried_W_m_s
         self._p = self._p + dt_s * v_W
+        self._time_s += dt_s
+        if self._current is not None:
+            self._carried_W_m_s = self._current(self._time_s)
         if self._p[2] < 0.0:
             self._p[2], v_W[2] = 0.0, max(float(v_W[2]), 0.0)
-            self._nu[:3] = R_WB.T @ v_W
-        self._time_s += dt_s
+        if self._p[2] <= 0.0 or self._current is not None:
+            self._nu[:3] = R_WB.T @ (v_W - self._carried_W_m_s)
         return PhysicsState(
             time_s=self._time_s,
             omega_B_rad_s=self._nu[3:],

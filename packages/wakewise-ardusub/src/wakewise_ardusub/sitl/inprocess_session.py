@@ -31,10 +31,11 @@ from wakewise_ardusub.link.protocol import (
     THRUST_GROUP,
 )
 from wakewise_ardusub.link.script import script_text
-from wakewise_ardusub.physics.physics import PulseTable
+from wakewise_ardusub.physics.physics import PulseTable, SimulatedBody
 from wakewise_ardusub.physics.surface import FreeWater
 from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+from wakewise_ardusub.sitl.sea_sensors import SeaSensors
+from wakewise_ardusub.sitl.simulated_autopilot import FIRMWARE, SimulatedAutopilot
 from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics, UdpEndpoint, run
 
 STATION, STATION_COMPONENT = 255, 190
@@ -88,6 +89,12 @@ class InProcessSession:
         Parameters in place of the stand-in's own.
     scripts : mapping, optional
         In place of the one that is shipped.
+    body : SimulatedBody, optional
+        In place of the vehicle in still water.
+    sensors : SeaSensors, optional
+        As of `SimulatedAutopilot`.
+    firmware : tuple of three int
+        As of `SimulatedAutopilot`.
     """
 
     vehicle: Vehicle
@@ -101,12 +108,18 @@ class InProcessSession:
     thrusts: tuple[float, ...] = THRUSTS
     moments: list[LoopRecord] = field(default_factory=list)
     said: list[Any] = field(default_factory=list)
+    body: SimulatedBody | None = None
+    sensors: SeaSensors | None = None
+    firmware: tuple[int, int, int] = FIRMWARE
 
     def __post_init__(self) -> None:
         values = own_parameters(len(self.vehicle.thrusters)) | dict(self.values)
         scripts = shipped_script() if self.scripts is None else self.scripts
-        self.autopilot = SimulatedAutopilot(values, loop_hz=self.loop_hz, scripts=scripts)
-        self._behind = InProcessPhysics(body=FreeWater(self.vehicle), table=PulseTable.of(self.vehicle, values))
+        self.autopilot = SimulatedAutopilot(
+            values, loop_hz=self.loop_hz, scripts=scripts, sensors=self.sensors, firmware=self.firmware
+        )
+        body = FreeWater(self.vehicle) if self.body is None else self.body
+        self._behind = InProcessPhysics(body=body, table=PulseTable.of(self.vehicle, values))
         self.station = MavlinkSender(self.carry, STATION, STATION_COMPONENT, "station")
         self.companion = MavlinkSender(self.carry, self.autopilot.system, COMPANION_COMPONENT, "companion")
         self.listeners: dict[str, Callable[[bytes], None]] = {}

@@ -1,8 +1,8 @@
 """MAVLink messages of the simulated autopilot: handlers of received messages, builders and rates of sent ones.
 
 Messages without a handler are ignored. Sent messages come from the true motion: there is no noise, no estimator and no
-magnetometer. Only the depth is that of the sensor, whose zero may have been set under water
-(`SimulatedAutopilot.depth_m`).
+magnetometer, unless `SeaSensors` gives position and velocity their errors. Only the depth is that of the sensor, whose
+zero may have been set under water (`SimulatedAutopilot.depth_m`).
 """
 
 from __future__ import annotations
@@ -42,6 +42,8 @@ RATES_HZ: dict[int, float] = {
     mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE2: 2.0,
     mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 2.0,
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 3.0,
+    mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: 3.0,
 }
 """How often each is told before anybody asks for another rate: about as often as by ArduSub's stream parameters."""
 FASTEST_HZ = 200.0
@@ -92,8 +94,40 @@ def _attitude_quaternion(board: SimulatedAutopilot) -> Any:
 
 
 def _local_position(board: SimulatedAutopilot) -> Any:
-    north, east, _ = board.motion.p_WB_m
-    return mavlink.MAVLink_local_position_ned_message(board.boot_ms, north, east, board.depth_m, *board.motion.v_W_m_s)
+    north, east, _ = board.estimated.p_WB_m
+    return mavlink.MAVLink_local_position_ned_message(
+        board.boot_ms, north, east, board.depth_m, *board.estimated.v_W_m_s
+    )
+
+
+def _ekf_status(board: SimulatedAutopilot) -> Any:
+    """Flags alone: attitude and depth always, horizontal position while the Doppler log lasts."""
+    flags = mavlink.EKF_ATTITUDE | mavlink.EKF_VELOCITY_VERT | mavlink.EKF_POS_VERT_ABS
+    flags |= mavlink.EKF_CONST_POS_MODE if board.place_lost else mavlink.EKF_VELOCITY_HORIZ | mavlink.EKF_POS_HORIZ_REL
+    return mavlink.MAVLink_ekf_status_report_message(flags, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _distance(board: SimulatedAutopilot) -> Any | None:
+    """The rangefinder that looks down; nothing without one and in a drop-out."""
+    told = None if board.sensors is None else board.sensors.distance_cm(board.motion.time_s)
+    if told is None or board.sensors is None:
+        return None
+    least, most = (round(100.0 * bound) for bound in (board.sensors.errors.least_m, board.sensors.errors.most_m))
+    return mavlink.MAVLink_distance_sensor_message(
+        board.boot_ms, least, most, max(told, 0), 0, 0, mavlink.MAV_SENSOR_ROTATION_PITCH_270, 255
+    )
+
+
+def _position_target(board: SimulatedAutopilot) -> Any | None:
+    """The target that is followed; nothing in modes without one."""
+    target = board.target
+    if target is None or target.place_W_m is None:
+        return None
+    north, east, down = target.place_W_m
+    return mavlink.MAVLink_position_target_local_ned_message(
+        board.boot_ms, mavlink.MAV_FRAME_LOCAL_NED, 0, north, east, down - board.zero_depth_m,
+        *target.velocity_W_m_s, *target.acceleration_W_m_s2, target.heading_rad or 0.0, target.turn_rad_s or 0.0,
+    )  # fmt: skip
 
 
 def _global_position(board: SimulatedAutopilot) -> Any:
@@ -172,6 +206,9 @@ BUILDERS: dict[int, Callable[[SimulatedAutopilot], Any]] = {
     mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE2: _pressure_of_water,
     mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: _servo_output,
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: _system_time,
+    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf_status,
+    mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: _distance,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: _position_target,
 }
 """What can be told, by message id."""
 
@@ -280,6 +317,10 @@ def _manual_control(board: SimulatedAutopilot, message: Any) -> None:
     board.joystick.take(board, message.buttons)
 
 
+def _guided_target(board: SimulatedAutopilot, message: Any) -> None:
+    board.take_target(message)
+
+
 def _set_mode(board: SimulatedAutopilot, message: Any) -> None:
     board.set_mode(message.custom_mode)
 
@@ -343,6 +384,11 @@ def _arm(board: SimulatedAutopilot, numbers: list[float]) -> int:
     return int(ACCEPTED if fine or numbers[1] == FORCED else FAILED)
 
 
+def _photograph(board: SimulatedAutopilot, _numbers: list[float]) -> int:
+    board.photographs += 1
+    return int(ACCEPTED)
+
+
 def _mode(board: SimulatedAutopilot, numbers: list[float]) -> int:
     if not math.isfinite(numbers[1]):
         return int(DENIED)
@@ -359,7 +405,10 @@ def _request(board: SimulatedAutopilot, numbers: list[float]) -> int:
     build = BUILDERS.get(round(numbers[0])) if math.isfinite(numbers[0]) else None
     if build is None:
         return int(FAILED)
-    board.send(build(board))
+    told = build(board)
+    if told is None:
+        return int(FAILED)
+    board.send(told)
     return int(ACCEPTED)
 
 
@@ -389,6 +438,8 @@ def _scripting(board: SimulatedAutopilot, numbers: list[float]) -> int:
 _COMMANDS: dict[int, Callable[[SimulatedAutopilot, list[float]], int]] = {
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
     mavlink.MAV_CMD_DO_SET_MODE: _mode,
+    mavlink.MAV_CMD_DO_DIGICAM_CONTROL: _photograph,
+    mavlink.MAV_CMD_IMAGE_START_CAPTURE: _photograph,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _interval,
     mavlink.MAV_CMD_REQUEST_MESSAGE: _request,
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _capabilities,
@@ -401,6 +452,7 @@ _DOES: dict[str, Callable[[SimulatedAutopilot, Any], None]] = {
     "HEARTBEAT": _heartbeat,
     "MANUAL_CONTROL": _manual_control,
     "SET_MODE": _set_mode,
+    "SET_POSITION_TARGET_LOCAL_NED": _guided_target,
     "PARAM_REQUEST_LIST": _param_list,
     "PARAM_REQUEST_READ": _param_read,
     "PARAM_SET": _param_set,

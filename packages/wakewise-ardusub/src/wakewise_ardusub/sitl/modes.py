@@ -8,7 +8,8 @@ the yaw stick is neutral: the angle's error times ATC_ANG_*_P is a rate, its err
 ALT_HOLD also holds the depth while the throttle is neutral: the depth's error times PSC_POSZ_P is a velocity, its error
 times PSC_VELZ_P an acceleration, and a PI of the remaining error the throttle. The controllers run on while a script
 overrides the outputs, so their integrals act when the override ends, unless the mode was entered anew: then depth and
-heading are those of that moment, and the integral gives the throttle of the mode before, as in ArduSub.
+heading are those of that moment, and the integral gives the throttle of the mode before, as in ArduSub. GUIDED follows
+targets (`guided.py`); of the sticks yaw alone acts. POSHOLD also holds the place while forward and lateral are neutral.
 
 **Buttons.** BTNn_FUNCTION and, while a shift button is held, BTNn_SFUNCTION: arming, disarming, modes and shift. Mount,
 lights, gain, trim, input hold, relays and servos are not simulated.
@@ -39,8 +40,9 @@ from wakewise_ardusub.link.parameters import (
     SHIFT,
     parameters_of,
 )
-from wakewise_ardusub.link.protocol import ALT_HOLD, FULL_US, MANUAL, MIDDLE_US, STABILIZE
+from wakewise_ardusub.link.protocol import ALT_HOLD, FULL_US, MANUAL, MIDDLE_US, POSHOLD, STABILIZE
 from wakewise_ardusub.physics.datagrams import PhysicsState
+from wakewise_ardusub.sitl.guided import YAW_SLEW_RAD_S, GuidedTarget, hold_here, horizontal_demands
 from wakewise_ardusub.sitl.own_parameters import FRAME_VECTORED, ParameterTable
 
 if TYPE_CHECKING:
@@ -84,8 +86,11 @@ def _share(value: int) -> float:
     return max(-1.0, min(1.0, value / STICK_FULL))
 
 
-MODES = {MANUAL: "MANUAL", STABILIZE: "STABILIZE", ALT_HOLD: "ALT_HOLD"}
+GUIDED = 4
+MODES = {MANUAL: "MANUAL", STABILIZE: "STABILIZE", ALT_HOLD: "ALT_HOLD", GUIDED: "GUIDED", POSHOLD: "POSHOLD"}
 """Modes that the stand-in flies."""
+NEEDS_PLACE = (GUIDED, POSHOLD)
+"""Modes that are refused without a position."""
 YAW_RATE_RAD_S = math.radians(200.0)
 """Yaw rate of a full stick at ACRO_YAW_P's own value."""
 CENTRED = 0.05
@@ -106,10 +111,16 @@ class ModeControllers:
     depth_m: float | None = None
     climb_sum: float = 0.0
     throttle: float = 0.0
+    target: GuidedTarget | None = None
+    velocity_sum: Array = field(default_factory=lambda: np.zeros(2))
 
     def entered(self, mode: int) -> ModeControllers:
-        """Afresh in a mode; ALT_HOLD goes on with the throttle of before."""
-        return ModeControllers(throttle=self.throttle, climb_sum=-self.throttle if mode == ALT_HOLD else 0.0)
+        """Afresh in a mode; modes that hold a depth go on with the throttle of before, those that hold a place with
+        what pushed against the current.
+        """
+        carried = -self.throttle if mode in (ALT_HOLD, *NEEDS_PLACE) else 0.0
+        pushed = self.velocity_sum if mode in NEEDS_PLACE else np.zeros(2)
+        return ModeControllers(throttle=self.throttle, climb_sum=carried, velocity_sum=pushed)
 
 
 def apply_mode(
@@ -123,12 +134,54 @@ def apply_mode(
     """Demands on the mixer in a mode, and the loops after it."""
     if mode == MANUAL:
         return ModeControllers(throttle=loops.throttle), demands
+    if mode in NEEDS_PLACE:
+        return _place(mode, loops, demands, motion, parameters, dt_s)
     loops, turns = _attitude(loops, demands, motion, parameters, dt_s)
     after = replace(demands, roll=turns[0], pitch=turns[1], yaw=turns[2])
     if mode == ALT_HOLD:
         loops, throttle = _depth(loops, demands.throttle, motion, parameters, dt_s)
         after = replace(after, throttle=throttle)
     return replace(loops, throttle=after.throttle), after
+
+
+def _place(
+    mode: int,
+    loops: ModeControllers,
+    demands: PilotDemands,
+    motion: PhysicsState,
+    parameters: ParameterTable,
+    dt_s: float,
+) -> tuple[ModeControllers, PilotDemands]:
+    """GUIDED follows its target, POSHOLD the place where it was entered or the sticks were let go."""
+    target = loops.target
+    steered = mode == POSHOLD and max(abs(demands.forward), abs(demands.lateral)) > CENTRED
+    if target is None or steered:
+        target = hold_here(motion, motion.time_s)
+    target = target.advanced(motion.time_s, dt_s)
+    heading = loops.heading_rad
+    if mode == GUIDED and heading is not None:
+        most = YAW_SLEW_RAD_S * dt_s
+        if target.heading_rad is not None:
+            heading += max(-most, min(most, _wrapped(target.heading_rad - heading)))
+        elif target.turn_rad_s is not None:
+            heading += target.turn_rad_s * dt_s
+    loops, turns = _attitude(replace(loops, heading_rad=heading), demands, motion, parameters, dt_s)
+    total, forward, lateral = horizontal_demands(target, loops.velocity_sum, motion, parameters, dt_s)
+    if mode == POSHOLD and abs(demands.throttle) > 1e-3 * parameters.value("THR_DZ", otherwise=100.0):
+        loops, throttle = _depth(loops, demands.throttle, motion, parameters, dt_s)
+    else:
+        held = loops.depth_m if mode == POSHOLD else None if target.place_W_m is None else float(target.place_W_m[2])
+        sought = replace(loops, depth_m=held)
+        loops, throttle = _depth(sought, 0.0, motion, parameters, dt_s, float(target.velocity_W_m_s[2]))
+    after = PilotDemands(
+        roll=turns[0],
+        pitch=turns[1],
+        yaw=turns[2],
+        throttle=throttle,
+        forward=demands.forward if steered else forward,
+        lateral=demands.lateral if steered else lateral,
+    )
+    return replace(loops, target=target, velocity_sum=total, throttle=throttle), after
 
 
 def _attitude(
@@ -153,13 +206,18 @@ def _attitude(
 
 
 def _depth(
-    loops: ModeControllers, throttle: float, motion: PhysicsState, parameters: ParameterTable, dt_s: float
+    loops: ModeControllers,
+    throttle: float,
+    motion: PhysicsState,
+    parameters: ParameterTable,
+    dt_s: float,
+    sinks_m_s: float = 0.0,
 ) -> tuple[ModeControllers, float]:
     depth, down = float(motion.p_WB_m[2]), float(motion.v_W_m_s[2])
     dead = 1e-3 * parameters.value("THR_DZ", otherwise=100.0)
     steered = abs(throttle) > dead
     held = depth if steered or loops.depth_m is None else loops.depth_m
-    wished = parameters.value("PSC_POSZ_P", otherwise=3.0) * (held - depth)
+    wished = sinks_m_s + parameters.value("PSC_POSZ_P", otherwise=3.0) * (held - depth)
     if steered:
         wished = -throttle * parameters.value("PILOT_SPEED_UP", otherwise=50.0) / _CM
     # Gains of the last loop count per mille of the throttle's half range for cm/s2.

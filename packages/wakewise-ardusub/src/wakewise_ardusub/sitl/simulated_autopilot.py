@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -19,9 +20,12 @@ from wakewise.core.errors import InputError
 from wakewise_ardusub.link.protocol import ALT_HOLD, AUTOPILOT_COMPONENT, DEFAULT_SYSTEM, MANUAL, MIDDLE_US
 from wakewise_ardusub.physics.datagrams import PhysicsState
 from wakewise_ardusub.sitl.files import MavftpServer
+from wakewise_ardusub.sitl.guided import GuidedTarget, read_target
 from wakewise_ardusub.sitl.mavlink_messages import BUILDERS, MessageSchedule, handle_message, parameter
 from wakewise_ardusub.sitl.modes import (
+    GUIDED,
     MODES,
+    NEEDS_PLACE,
     ButtonHandler,
     ModeControllers,
     PilotDemands,
@@ -33,6 +37,7 @@ from wakewise_ardusub.sitl.modes import (
 )
 from wakewise_ardusub.sitl.own_parameters import ParameterTable, own_parameters
 from wakewise_ardusub.sitl.scripting import LuaScript
+from wakewise_ardusub.sitl.sea_sensors import SeaSensors
 from wakewise_ardusub.sitl.servos import OUTPUTS, MotorTest, ServoOutputs, find_channel
 
 Action = Literal["none", "warn", "disarm", "hold depth", "surface"]
@@ -59,6 +64,8 @@ FIRMWARE = (4, 5, 3)
 """Release that it says it is: the one that BlueOS 1.4 brings."""
 HOME_DEG = (33.810313, -118.393867)
 """Latitude and longitude of the origin: where ArduPilot's simulated submarine starts."""
+PLACE_LASTS_S = 7.0
+"""How long the filter's position outlasts the Doppler log."""
 LOOPS_HZ = (50.0, 1000.0)
 _LISTED_PER_LOOP = 10
 _MOST_WAITING = 4000
@@ -95,6 +102,8 @@ class SimulatedAutopilot:
     zero_depth_m : float or None
         Where the depth sensor was calibrated; None does that at each start, wherever it is, as ArduSub does. Either
         way whatever is shallower later on is its new zero.
+    sensors : SeaSensors, optional
+        Rangefinder above a bed and the errors of position and velocity; none, and the truth, if not given.
 
     Raises
     ------
@@ -118,6 +127,7 @@ class SimulatedAutopilot:
     _sticks_s: float | None
     _told: dict[str, Action]
     _zeroed: bool
+    _log_s: float
 
     def __init__(
         self,
@@ -128,6 +138,7 @@ class SimulatedAutopilot:
         scripts: Mapping[str, str] | None = None,
         home_deg: tuple[float, float] = HOME_DEG,
         zero_depth_m: float | None = 0.0,
+        sensors: SeaSensors | None = None,
     ) -> None:
         if not LOOPS_HZ[0] <= loop_hz <= LOOPS_HZ[1]:
             raise InputError(f"stand-in: {loop_hz:g} loops a second, {LOOPS_HZ[0]:g} to {LOOPS_HZ[1]:g} are allowed")
@@ -140,12 +151,15 @@ class SimulatedAutopilot:
         self._mav = mavlink.MAVLink(None, srcSystem=self.system, srcComponent=self.component)
         self._parsers: dict[str, Any] = {}
         self._out: list[bytes] = []
-        self.bad_data = 0
-        """Stretches of bytes that were no packet."""
+        self.bad_data = self.photographs = 0
+        """Stretches of bytes that were no packet; photographs that were asked for."""
         self.pulses_us: tuple[int, ...] = (0,) * OUTPUTS
         """What the outputs carry now."""
         self.motion = _AT_REST
         """What physics said last."""
+        self.sensors = sensors
+        self.estimated = _AT_REST
+        """What position, velocity and attitude are by its own sensors."""
         self.texts: deque[str] = deque(maxlen=200)
         """What was last said in words."""
         self._began_s = 0.0
@@ -185,6 +199,11 @@ class SimulatedAutopilot:
         return float(self.motion.p_WB_m[2]) - self.zero_depth_m
 
     @property
+    def place_lost(self) -> bool:
+        """Whether its filter has no horizontal position."""
+        return self.now_s - self._log_s > PLACE_LASTS_S
+
+    @property
     def overridden(self) -> bool:
         """Whether a script drives an output now."""
         return any(self._servos.overridden)
@@ -222,12 +241,18 @@ class SimulatedAutopilot:
     def step(self, motion: PhysicsState) -> tuple[int, ...]:
         """One loop: the pulses of its outputs, 16 of them, after physics told how the vehicle moves."""
         dt_s = max(motion.time_s - self.motion.time_s, 0.0)
-        self.motion = motion
+        self.motion = self.estimated = motion
+        if self.sensors is not None:
+            self.estimated = self.sensors.estimate(motion)
+        if self.sensors is None or not self.sensors.lost(motion.time_s):
+            self._log_s = self.now_s
         self._calibrate(float(motion.p_WB_m[2]))
         self._watch()
         for script in self._scripts:
             script.step()
-        self._loops, demands = apply_mode(self.mode, self._loops, self._demands, motion, self.parameters, dt_s or 1e-3)
+        self._loops, demands = apply_mode(
+            self.mode, self._loops, self._demands, self.estimated, self.parameters, dt_s or 1e-3
+        )
         motors: list[int] | None = None
         if self.motor_test.over(self.now_s):
             self.send_text(_INFO, "Motor test timed out!")
@@ -241,7 +266,9 @@ class SimulatedAutopilot:
             self._loops = ModeControllers()
         self.pulses_us = self._servos.step(motors, self.parameters)
         for message in self.timetable.due(self.now_s):
-            self.send(BUILDERS[message](self))
+            told = BUILDERS[message](self)
+            if told is not None:
+                self.send(told)
         for _ in range(min(_LISTED_PER_LOOP, len(self._to_list))):
             self.send(parameter(self, self._to_list.popleft()))
         return self.pulses_us
@@ -265,6 +292,7 @@ class SimulatedAutopilot:
         self.motor_test = MotorTest(len(factors_of(self.parameters)))
         self.timetable, self.joystick = MessageSchedule(), ButtonHandler()
         self._zeroed = False
+        self._log_s = 0.0
         self._station_s = None
         self._sticks_s = None
         self._to_list = deque()
@@ -315,9 +343,25 @@ class SimulatedAutopilot:
         if mode not in MODES:
             self.send_text(_WARNING, f"Mode change failed: no mode {mode} here")
             return False
+        if mode in NEEDS_PLACE and self.place_lost:
+            self.send_text(_WARNING, f"Mode change failed: {MODES[mode]} requires position")
+            return False
         if mode != self.mode:
             self.mode, self._loops = mode, self._loops.entered(mode)
         return True
+
+    def take_target(self, message: Any) -> None:
+        """SET_POSITION_TARGET_LOCAL_NED: followed in GUIDED, without effect in any other mode."""
+        if self.mode != GUIDED:
+            return
+        target = read_target(message, self.estimated, self.zero_depth_m, self.motion.time_s, self.firmware)
+        if target is not None:
+            self._loops = replace(self._loops, target=target)
+
+    @property
+    def target(self) -> GuidedTarget | None:
+        """What GUIDED and POSHOLD follow now."""
+        return self._loops.target
 
     def set_parameter(self, name: str, value: float) -> bool:
         """Set a parameter as PARAM_SET does."""

@@ -1,0 +1,569 @@
+"""Session of a survey: from the pilot's consent by GUIDED targets at 10 Hz to the firmware's own hold.
+
+States: *waiting* (something is missing), *ready*, *asked* (GUIDED is requested), *settling* (holds its place until it
+is at rest; the current is estimated), *flying*, *paused*, *holding* (no target is sent any more, a hold mode is
+requested), *ended*.
+
+Consent is `consent` (a key press), or that the pilot sets GUIDED while the session is ready. It never arms. Any fault
+of `survey_safety.fault_of` ends it. Afterwards nothing moves without consent anew, which resumes where it ended. Pure
+parts are in the other modules; here are clock, messages and order. Nothing waits: a loop calls `take` and `tick`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.robot.vehicles import Vehicle
+from wakewise_ardusub.link.message_state import (
+    DIGICAM_CONTROL,
+    GROUND_STATION_S,
+    IMAGE_START_CAPTURE,
+    REMEMBERED_S,
+    LinkState,
+    MavlinkMessage,
+    tilt_of,
+    update_link_state,
+)
+from wakewise_ardusub.link.motor_interface import VehicleMotors
+from wakewise_ardusub.link.protocol import (
+    AGAIN_S,
+    AUTOPILOT_COMPONENT,
+    HEARTBEAT_PERIOD_S,
+    MOST_PARAMETERS,
+    SET_MESSAGE_INTERVAL,
+    parameter_request,
+)
+from wakewise_ardusub.link.session_log import SessionLog
+from wakewise_ardusub.survey.bed_following import BedTrack, DepthShaper
+from wakewise_ardusub.survey.hold_current import current_of_hold
+from wakewise_ardusub.survey.survey_plan import (
+    PlanProgress,
+    SurveyPace,
+    SurveyPlan,
+    advance,
+    plan_survey,
+    resumed,
+    target_of,
+    time_left_s,
+    warning_of,
+)
+from wakewise_ardusub.survey.survey_safety import GUIDED, SurveyFacts, SurveyLimits, fault_of, hold_mode, missing
+
+State = Literal["waiting", "ready", "asked", "settling", "flying", "paused", "holding", "ended"]
+ENGAGED = ("asked", "settling", "flying", "paused")
+PERIOD_S = 0.1
+ASK_S, ASKS_FOR_S = 0.2, 2.0
+LOOKS_DOWN = 25
+"""MAV_SENSOR_ROTATION_PITCH_270."""
+LEAD_S = 0.2
+"""How far ahead the bed is looked for: the time in which a target becomes motion."""
+REACHED_M = 0.05
+VELOCITY_GAIN, PLACE_GAIN_PER_S, MOST_CORRECTION_M_S = 2.0, 1.0, 0.1
+"""Correction of the velocity target by what is measured. The firmware's default gains (PSC_VELXY_*) need 20 s to push
+through the dead zone of the thrusters."""
+STILL_M, STILL_M_S, REST_S = 0.05, 0.012, 3.0
+"""A vehicle nearer than this to its place, and slower, for so long, is at rest."""
+SET_MODE, REQUEST_MESSAGE, AUTOPILOT_VERSION = 176, 512, 148
+ACCELERATION_FROM = 4 << 24 | 8 << 16
+"""Release of ArduSub from which GUIDED takes an acceleration (ardupilot 33609), as `flight_sw_version`."""
+_RATES_HZ = {0: 5.0, 30: 20.0, 32: 20.0, 33: 2.0, 36: 5.0, 74: 5.0, 132: 10.0, 193: 5.0}
+_MASK, _NO_ACCELERATION = 0x800, 0x1C0
+_HORIZONTAL, _CONSTANT = 0x08 | 0x10, 0x80
+_ONBOARD, _NO_AUTOPILOT, _ACTIVE = 18, 8, 4
+
+MakeLines = Callable[[Array, float, Array, "GeoAnchor | None"], list[Array]]
+"""Lines, shape (2, 2) each, from place (2,), heading, current (2,) and anchor; raises InputError without any."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GeoAnchor:
+    """Latitude and longitude (deg) of a place, shape (2,), of the autopilot's local frame."""
+
+    latitude_deg: float
+    longitude_deg: float
+    north_m: float
+    east_m: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransectOptions:
+    """Pace, limits, the rangefinder's delay (s), shortest and longest settling (s), a current (2,) that is given.
+
+    Photographs: `camera` is the command, mavlink or digicam; `every_m` the metres between two, 0 for none.
+    """
+
+    pace: SurveyPace = field(default_factory=SurveyPace)
+    limits: SurveyLimits = field(default_factory=SurveyLimits)
+    delay_s: float = 0.3
+    settle_s: tuple[float, float] = (8.0, 40.0)
+    current_W_m_s: tuple[float, float] | None = None
+    camera: str = ""
+    every_m: float = 0.0
+
+
+class TransectSession:
+    """A survey of one vehicle.
+
+    Parameters
+    ----------
+    send : callable
+        Sends a message by the name of pymavlink's encoder and its fields, as the vehicle's companion.
+    lines : callable
+        Makes the lines once place, heading and current are known.
+    vehicle : Vehicle
+        Whose drag gives the current.
+    options : TransectOptions
+    clock : callable
+        Seconds that never go back.
+    journal : SessionLog, optional
+    system, session : int
+        The vehicle's id, and the number that own heartbeats carry.
+    """
+
+    def __init__(
+        self,
+        *,
+        send: Callable[[str, Mapping[str, Any]], None],
+        lines: MakeLines,
+        vehicle: Vehicle,
+        options: TransectOptions,
+        clock: Callable[[], float],
+        journal: SessionLog | None = None,
+        system: int = 1,
+        session: int = 1,
+    ) -> None:
+        self._send, self._lines, self.options, self._clock = send, lines, options, clock
+        self._vehicle, self._motors, self._journal = vehicle, VehicleMotors(vehicle), journal
+        self.known = LinkState(system=system, session=session)
+        self.state: State = "waiting"
+        self.why = self.warning = ""
+        self.plan: SurveyPlan | None = None
+        self.at: PlanProgress | None = None
+        self.track = BedTrack()
+        self.current_W_m_s: Array | None = None
+        self.photographs = self.interruptions = self.unsent = 0
+        self.rows: list[tuple[float, ...]] = []
+        """Each turn on a line: time, speed along it, speed asked for, altitude, place across, place along (m, m/s)."""
+        self._depth: DepthShaper | None = None
+        self._reached = False
+        self._place: tuple[Array, Array] | None = None
+        self._came = dict.fromkeys(("position", "doppler", "range", "turn", "beat", "asked", "mode", "told"), -math.inf)
+        self._history: deque[tuple[float, float, float]] = deque(maxlen=200)
+        self._placed, self._takes_acceleration, self._facts = True, False, SurveyFacts(armed=None, mode=None)
+        self._since_s, self._hold_mode, self._hold = clock(), GUIDED, np.zeros(3)
+        self._pulses: list[Array] = []
+        self._settled_s = -math.inf
+        self._anchor: GeoAnchor | None = None
+        self._mode_before: int | None = None
+
+    # What comes in.
+
+    def take(self, said: MavlinkMessage) -> None:
+        """A message of anybody on the link."""
+        now_s = self._clock()
+        self.known = update_link_state(self.known, said, now_s)
+        if said.system != self.known.system:
+            return
+        if said.name == "VISION_POSITION_DELTA":  # what a Doppler log's driver sends, whatever its component
+            self._came["doppler"] = now_s
+        elif said.name == "DISTANCE_SENSOR":
+            self._ranged(now_s)
+        elif said.component == AUTOPILOT_COMPONENT:
+            try:
+                self._from_autopilot(said.name, said.fields, now_s)
+            except (KeyError, TypeError, ValueError):
+                self.known = self.known.noise()
+
+    def _from_autopilot(self, name: str, get: Mapping[str, Any], now_s: float) -> None:
+        if name == "LOCAL_POSITION_NED":
+            numbers = np.array([float(get[key]) for key in ("x", "y", "z", "vx", "vy", "vz")])
+            if not np.isfinite(numbers).all():
+                raise ValueError
+            self._place, self._came["position"] = (numbers[:3], numbers[3:]), now_s
+            self._history.append((now_s, float(numbers[2]), math.cos(tilt_of(self.known))))
+        elif name == "EKF_STATUS_REPORT":
+            flags = int(get["flags"])
+            self._placed = bool(flags & _HORIZONTAL) and not flags & _CONSTANT
+        elif name == "AUTOPILOT_VERSION":
+            self._takes_acceleration = int(get["flight_sw_version"]) >= ACCELERATION_FROM
+        elif name == "GLOBAL_POSITION_INT" and self._place is not None:
+            (north, east, _), _ = self._place
+            lat, lon = 1e-7 * float(get["lat"]), 1e-7 * float(get["lon"])
+            self._anchor = None
+            if lat or lon:
+                self._anchor = GeoAnchor(latitude_deg=lat, longitude_deg=lon, north_m=north, east_m=east)
+
+    def _ranged(self, now_s: float) -> None:
+        """Bed depth of a distance: the vehicle's depth as it was measured, and the distance times the tilt's cosine."""
+        distance, came_s = self.known.ranges.get(LOOKS_DOWN, (math.nan, -math.inf))
+        at_s = now_s - self.options.delay_s
+        before = [one for one in self._history if one[0] <= at_s]
+        if came_s != now_s or not before:
+            return
+        _, depth, upright = before[-1]
+        after = self.track.take(at_s, depth + distance * upright)
+        if after.taken != self.track.taken:
+            self._came["range"] = now_s
+        self.track = after
+
+    # What people do.
+
+    def consent(self) -> str:
+        """The operator's consent: asks for GUIDED and begins, or goes on after a pause; what it does, in words."""
+        now_s = self._clock()
+        if self.state == "paused":
+            self._turn("flying", "resumed")
+            return "goes on"
+        self._judge(now_s)
+        if self.state != "ready":
+            return f"not begun: {self.why or self.state}"
+        if self.known.mode == GUIDED:
+            self._settle(now_s)
+            return "begun"
+        self._turn("asked", "GUIDED requested")
+        self._request(GUIDED, now_s)
+        return "GUIDED requested"
+
+    def pause(self) -> str:
+        """Brake by the plan's bound and hold the place until `consent`."""
+        if self.state != "flying":
+            return f"not paused: {self.state}"
+        self._turn("paused", "paused by the operator")
+        return "pauses"
+
+    def abort(self, why: str) -> None:
+        """End it in the firmware's own hold."""
+        if self.state in ENGAGED:
+            self._let_go(why, self._clock())
+        elif self.state != "holding":
+            self._turn("ended", why)
+
+    @property
+    def finished(self) -> bool:
+        """Whether all lines were flown."""
+        return self.plan is not None and self.at is not None and self.at.leg >= len(self.plan.legs)
+
+    # What time does.
+
+    def tick(self) -> None:
+        """Judge, and send what is due; to be called at 20 Hz or more."""
+        now_s = self._clock()
+        self._beat(now_s)
+        self._judge(now_s)
+        self._came["turn"] = now_s
+        entered = self.known.mode == GUIDED and self._mode_before not in (None, GUIDED)
+        if entered and self.state in ("ready", "asked"):
+            self._settle(now_s)
+        self._mode_before = self.known.mode
+        if self.state == "asked" and now_s - self._since_s > ASKS_FOR_S:
+            self._turn("waiting", "GUIDED was refused")
+        elif self.state == "holding":
+            self._hold_on(now_s)
+        if self.state in ENGAGED[1:] and now_s - self._came["told"] >= PERIOD_S - 1e-3:
+            dt_s = min(now_s - self._came["told"], 2.0 * PERIOD_S)
+            self._came["told"] = now_s
+            self._stream(now_s, dt_s)
+
+    def facts(self, now_s: float) -> SurveyFacts:
+        """What is known now, as it is judged."""
+        known, came = self.known, self._came
+        engaged = self.state in ENGAGED
+        overtaken = engaged and known.takeover_s > self._since_s and self.state != "asked"
+        place = None if self._place is None else self._place[0]
+        bed = self.track.bed(now_s)
+        ground_s = max(known.ground.values(), default=-math.inf)
+        sticks = known.sticks
+        return SurveyFacts(
+            armed=known.armed,
+            mode=GUIDED if self.state == "asked" else known.mode,
+            mode_name=known.mode_name,
+            telemetry_s=now_s - max(known.attitude_s, came["position"]),
+            position_s=now_s - came["position"],
+            doppler_s=math.nan if came["doppler"] < 0.0 else now_s - came["doppler"],
+            placed=self._placed,
+            sticks_s=math.inf if sticks is None else now_s - sticks.came_s,
+            station_s=now_s - ground_s if math.isfinite(ground_s) and now_s - ground_s < GROUND_STATION_S else math.inf,
+            stick=0.0 if sticks is None else float(np.nanmax(np.abs(np.append(sticks.axes, 0.0)))),
+            range_s=now_s - came["range"],
+            altitude_m=math.nan if bed is None or place is None else bed[0] - float(place[2]),
+            depth_m=math.nan if place is None else float(place[2]),
+            off_m=self._off_m(place),
+            takeover=known.takeover if overtaken else "",
+            rival=known.duplicate if now_s - known.duplicate_s < REMEMBERED_S else "",
+            turn_s=now_s - came["turn"] if engaged else 0.0,
+        )
+
+    def _off_m(self, place: Array | None) -> float:
+        if place is None or self.state not in ENGAGED[1:]:
+            return 0.0
+        if self.plan is None or self.at is None or self.state == "settling":
+            return float(math.dist(place[:2], self._hold[:2]))
+        return float(math.dist(place[:2], target_of(self.plan, self.at)[0]))
+
+    def _judge(self, now_s: float) -> None:
+        facts = self._facts = self.facts(now_s)
+        if self.state in ENGAGED:
+            fault = fault_of(facts, self.options.limits, self.options.pace.altitude_m if self._reached else 0.0)
+            if fault:
+                self._let_go(fault, now_s)
+        elif self.state in ("waiting", "ready"):
+            lacks = missing(facts, self.options.limits) or self._no_water(facts)
+            if lacks and (self.state == "ready" or lacks != self.why):
+                self._turn("waiting", lacks)
+            elif not lacks and self.state == "waiting":
+                self._turn("ready", "")
+
+    def _no_water(self, facts: SurveyFacts) -> str:
+        wished = facts.depth_m + facts.altitude_m - self.options.pace.altitude_m
+        if not wished < self.options.limits.least_depth_m:
+            return ""
+        return (
+            f"the bed is {facts.depth_m + facts.altitude_m:.1f} m deep: {self.options.pace.altitude_m:g} m above it"
+            " is the surface"
+        )
+
+    def _settle(self, now_s: float) -> None:
+        if self._place is None:
+            return
+        place = self._place[0].copy()
+        self._hold, self._pulses, self._reached = place, [], False
+        self._depth = DepthShaper(depth_m=float(place[2]))
+        self._came["told"], self._settled_s = -math.inf, now_s
+        self._turn("settling", "")
+
+    def _begin(self, now_s: float) -> None:
+        """The plan, from the current that the hold tells; or the rest of the plan of before."""
+        heading, place = self.known.attitude[2], self._hold[:2]
+        if self.plan is not None and self.at is not None and not self.finished:
+            self.plan, self.at = resumed(self.plan, self.at, place)
+            self.at = replace(self.at, heading_rad=heading)
+        else:
+            given = self.options.current_W_m_s
+            self.current_W_m_s = np.array(given) if given is not None else self._felt(heading)
+            current = np.zeros(2) if self.current_W_m_s is None else self.current_W_m_s
+            try:
+                lines = self._lines(place, heading, current, self._anchor)
+                plan = plan_survey(lines, place, self.options.pace, current)
+                away = max(float(np.hypot(*(point - place))) for line in lines for point in line)
+                if away > self.options.limits.fence_m:
+                    raise InputError(f"survey: {away:.0f} m from here, --fence is {self.options.limits.fence_m:g} m")
+            except InputError as fault:
+                self._let_go(str(fault), now_s)
+                return
+            self.plan, self.at = plan, PlanProgress(heading_rad=heading)
+            words = "unknown" if self.current_W_m_s is None else f"{np.round(current, 3).tolist()} m/s"
+            self._write(
+                "plan", legs=len(plan.legs), line_m=plan.line_m, current=words, warning=warning_of(plan, current)
+            )
+        self._turn("flying", "")
+
+    def _moves(self) -> bool:
+        """Whether the vehicle is not at rest where it is to hold."""
+        if self._place is None:
+            return True
+        p, v = self._place
+        return math.dist(p[:2], self._hold[:2]) > STILL_M or math.hypot(*v[:2]) > STILL_M_S
+
+    def _felt(self, heading: float) -> Array | None:
+        if len(self._pulses) < 5:
+            return None
+        return current_of_hold(self._vehicle, np.mean(self._pulses, axis=0), heading)
+
+    def _stream(self, now_s: float, dt_s: float) -> None:
+        """One target, and a photograph where one is due."""
+        if self._depth is None:
+            return
+        if self.state == "settling":
+            self._settled_s = now_s if self._moves() else self._settled_s
+            thrusts = self._motors.flown_N(self.known.parameters, self.known.servo_us, self.known.battery_V)
+            if thrusts.any():
+                self._pulses = [*self._pulses[-29:], thrusts]
+            least, most = self.options.settle_s
+            if now_s - self._since_s >= most or now_s - max(self._settled_s + REST_S, self._since_s + least) >= 0.0:
+                self._begin(now_s)
+        place, velocity, acceleration = self._hold[:2], np.zeros(2), np.zeros(2)
+        heading = self.known.attitude[2] if self.at is None else self.at.heading_rad
+        if self.state in ("flying", "paused") and self.plan is not None and self.at is not None:
+            bed = self.track.bed(now_s + LEAD_S)
+            if bed is None or self._facts.range_s > 0.5 * self.options.limits.range_s:
+                self._depth = self._depth.resting(dt_s)
+            else:
+                wished = max(bed[0] - self.options.pace.altitude_m, self.options.limits.least_depth_m)
+                self._depth = self._depth.towards(wished, bed[1], dt_s)
+            self._reached |= abs(self._facts.altitude_m - self.options.pace.altitude_m) < REACHED_M
+            self.at = advance(self.plan, self.at, dt_s, go=self.state == "flying" and self._reached)
+            place, velocity, acceleration = target_of(self.plan, self.at)
+            heading = self.at.heading_rad
+            self._noted(now_s, place)
+            self._photograph()
+        self._tell(place, velocity, acceleration, heading)
+        if self.finished and self.state == "flying":
+            self._let_go("finished", now_s)
+
+    def _tell(self, place: Array, velocity: Array, acceleration: Array, heading: float) -> None:
+        depth = self._depth
+        if depth is None or self.state not in ENGAGED:
+            return
+        numbers = [*place, depth.depth_m, *velocity, depth.speed_m_s, *acceleration, depth.acceleration_m_s2, heading]
+        if not np.isfinite(numbers).all():
+            self._let_go("a target that is not a number", self._clock())
+            return
+        numbers[3:6] = self._corrected(np.array(numbers[:3]), np.array(numbers[3:6]))
+        names = ("x", "y", "z", "vx", "vy", "vz", "afx", "afy", "afz", "yaw")
+        fields: dict[str, Any] = dict(zip(names, map(float, numbers), strict=True))
+        mask = _MASK if self._takes_acceleration else _MASK | _NO_ACCELERATION
+        fields |= {"time_boot_ms": 0, "coordinate_frame": 1, "type_mask": mask, "yaw_rate": 0.0}
+        self._post("set_position_target_local_ned", fields | self._aim())
+
+    def _corrected(self, place: Array, velocity: Array) -> Array:
+        """The velocity target, shape (3,), with the bounded correction by place and velocity errors."""
+        if self._place is None:
+            return velocity
+        p, v = self._place
+        more = VELOCITY_GAIN * (velocity - v) + PLACE_GAIN_PER_S * (place - p)
+        return velocity + more * min(1.0, MOST_CORRECTION_M_S / max(float(np.linalg.norm(more)), 1e-9))
+
+    def _noted(self, now_s: float, place: Array) -> None:
+        plan, at = self.plan, self.at
+        if plan is None or at is None or at.leg >= len(plan.legs) or self._place is None:
+            return
+        leg = plan.legs[at.leg]
+        if not leg.line or not self._reached:
+            return
+        way, (p, v) = leg.direction, self._place
+        off = p[:2] - place
+        across = float(way[0] * off[1] - way[1] * off[0])
+        row = (now_s, float(v[:2] @ way), at.speed_m_s, self._facts.altitude_m, across, float(off @ way))
+        self.rows.append(row)
+        if len(self.rows) % 10 == 1:
+            self._write("line", leg=at.leg, flown_m=at.flown_m, place=p, altitude_m=row[3], across_m=across)
+
+    def _photograph(self) -> None:
+        every, at, plan = self.options.every_m, self.at, self.plan
+        if every <= 0.0 or at is None or plan is None or self.state != "flying" or not self._reached:
+            return
+        on_line = at.leg < len(plan.legs) and plan.legs[at.leg].line
+        if not on_line or at.flown_m < self.photographs * every:
+            return
+        self.photographs += 1
+        digicam = self.options.camera == "digicam"
+        numbers = (0, 0, 0, 0, 1, self.photographs, 0) if digicam else (0, 0, 1, self.photographs, 0, 0, 0)
+        self._command(DIGICAM_CONTROL if digicam else IMAGE_START_CAPTURE, *map(float, numbers), component=0)
+        place = None if self._place is None else self._place[0]
+        self._write("photograph", number=self.photographs, flown_m=at.flown_m, place=place)
+
+    # How it ends.
+
+    def _let_go(self, why: str, now_s: float) -> None:
+        self.interruptions += why != "finished"
+        self._hold_mode = hold_mode(self._facts, self.options.limits)
+        guided = self.known.mode == GUIDED or self.state == "asked"
+        self._turn("holding" if guided else "ended", why)
+        if guided:
+            self._request(self._hold_mode, now_s)
+        elif not self.finished:
+            self._turn("waiting", why)
+
+    def _hold_on(self, now_s: float) -> None:
+        """Ask until the mode has changed; what POSHOLD refuses, ALT_HOLD may give."""
+        if self.known.mode != GUIDED and self.known.heartbeat_s > self._since_s:
+            why, done = self.why, self.finished
+            self._turn("ended" if done or why.startswith("Ctrl-C") else "waiting", why)
+        elif now_s - self._since_s > ASKS_FOR_S:
+            self._turn("ended", f"{self.why}; the autopilot did not answer, its own time-out stops the vehicle")
+        elif now_s - self._came["mode"] >= ASK_S:
+            self._request(self._hold_mode if now_s - self._since_s < 2.0 * ASK_S else 2, now_s)
+
+    # What goes out.
+
+    def _turn(self, state: State, why: str) -> None:
+        if (state, why) != (self.state, self.why):
+            self._write("state", state=state, why=why)
+        self.state, self.why, self._since_s = state, why, self._clock()
+
+    def _request(self, mode: int, now_s: float) -> None:
+        self._came["mode"] = now_s
+        self._command(SET_MODE, 1.0, float(mode))
+
+    def _beat(self, now_s: float) -> None:
+        if now_s - self._came["beat"] >= HEARTBEAT_PERIOD_S:
+            self._came["beat"] = now_s
+            fields = {"type": _ONBOARD, "autopilot": _NO_AUTOPILOT, "base_mode": 0, "system_status": _ACTIVE}
+            self._post("heartbeat", {**fields, "custom_mode": self.known.session})
+        if now_s - self._came["asked"] < AGAIN_S or self.state in ENGAGED[1:]:
+            return
+        self._came["asked"] = now_s
+        for number, rate_hz in _RATES_HZ.items():
+            self._command(SET_MESSAGE_INTERVAL, float(number), 1e6 / rate_hz)
+        self._command(REQUEST_MESSAGE, float(AUTOPILOT_VERSION))
+        unknown = [name for name in self._motors.needs if name not in self.known.parameters]
+        for name in unknown[: 2 * MOST_PARAMETERS]:
+            self._post("param_request_read", parameter_request(self.known.system, name))
+
+    def _command(self, number: int, *params: float, component: int = AUTOPILOT_COMPONENT) -> None:
+        filled = (*params, *[0.0] * (7 - len(params)))
+        fields = {"command": number, "confirmation": 0, **{f"param{i + 1}": value for i, value in enumerate(filled)}}
+        self._post("command_long", {**fields, "target_system": self.known.system, "target_component": component})
+
+    def _aim(self) -> dict[str, int]:
+        return {"target_system": self.known.system, "target_component": AUTOPILOT_COMPONENT}
+
+    def _post(self, name: str, fields: Mapping[str, Any]) -> None:
+        try:
+            self._send(name, fields)
+        except OSError:  # the link's silence is what is judged
+            self.unsent += 1
+
+    def _write(self, event: str, **told: Any) -> None:
+        if self._journal is not None:
+            self._journal.write(event, **told)
+
+    # What it came to.
+
+    def time_left_s(self) -> float:
+        """Seconds to the end of the last line; NaN before there is a plan."""
+        return math.nan if self.plan is None or self.at is None else time_left_s(self.plan, self.at)
+
+    def line(self) -> str:
+        """One line of how it stands."""
+        if self.state in ("flying", "paused") and self.plan is not None and self.at is not None:
+            left = self.time_left_s()
+            waits = "" if self._reached else ", on the way to its altitude"
+            return (
+                f"{self.state}  {self.at.flown_m:.1f} of {self.plan.line_m:.1f} m, {left / 60.0:.1f} min left, "
+                f"{self._facts.altitude_m:.2f} m above the bed, {self.photographs} photographs{waits}"
+            )
+        return f"{self.state}  {self.why}"
+
+    def figures(self) -> dict[str, Any]:
+        """Figures by the autopilot's own position and rangefinder, of cruise on lines; None where nothing was flown."""
+        rows = np.array(self.rows).reshape(-1, 6)
+        cruise = rows[rows[:, 2] >= self.options.pace.speed_m_s - 1e-6]
+        off_m = rows[:, 3] - self.options.pace.altitude_m
+        return {
+            "finished": self.finished,
+            "state": self.state,
+            "why": self.why,
+            "flown_m": 0.0 if self.at is None else self.at.flown_m,
+            "planned_m": None if self.plan is None else self.plan.line_m,
+            "current_m_s": None if self.current_W_m_s is None else self.current_W_m_s.tolist(),
+            "speed_error_rms_m_s": _rms(cruise[:, 1] - cruise[:, 2]),
+            "altitude_error_rms_m": _rms(off_m),
+            "altitude_error_p95_m": float(np.percentile(np.abs(off_m), 95)) if off_m.size else None,
+            "cross_track_max_m": float(np.abs(rows[:, 4]).max()) if len(rows) else None,
+            "photographs": self.photographs,
+            "interruptions": self.interruptions,
+            "outliers": self.track.outliers,
+        }
+
+
+def _rms(values: Array) -> float | None:
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else None
