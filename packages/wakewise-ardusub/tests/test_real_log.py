@@ -24,7 +24,7 @@ def test_the_real_log_comes_in_whole() -> None:
     assert (log.cut_short, log.system, log.jumps) == (False, 1, ())
     assert {name: len(series.time_s) for name, series in log.series.items()} == {
         "attitude": 6210, "depth VFR_HUD": 3117, "depth AHRS2": 6210, "armed": 314, "mode": 314, "servo": 627,
-        "pressure 1": 627, "pressure 2": 627, "voltage": 898, "sticks": 7463,
+        "pressure 1": 627, "pressure 2": 627, "voltage": 898, "sticks": 7463, "altitude": 919,
     }  # fmt: skip
     assert log.duration_s == pytest.approx(316.438, abs=1e-3)
     rows = tabulate(log).rows

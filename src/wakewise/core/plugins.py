@@ -29,6 +29,7 @@ GROUPS = {
     "world": "wakewise.worlds",
     "current": "wakewise.currents",
     "detector": "wakewise.detectors",
+    "dive log": "wakewise.dive_logs",
 }
 """Entry point group of each kind of part."""
 

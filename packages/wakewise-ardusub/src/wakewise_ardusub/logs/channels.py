@@ -2,8 +2,10 @@
 
 Channels in SI, NED and FRD: `sticks` (forward, right, down, turn in [-1, 1]), `servo` (16 pulses in us), `attitude`
 (roll, pitch, yaw in rad), `position` (north, east, down from the autopilot's origin, m), `armed`, `mode` (its number),
-`voltage`; each source of depth separately: `depth VFR_HUD`, `depth AHRS2`, `depth CTUN`, `depth BARO` (m), `pressure 1`
-to `pressure 3` (Pa).
+`voltage`; `odometry` (position of another estimator), `dvl step` (way since the last one, forward, right, down, m),
+`global` (latitude, longitude in deg), `altitude` (rangefinder above the bed, m), `calendar` (s since 1970);
+each source of depth separately: `depth VFR_HUD`, `depth AHRS2`, `depth CTUN`, `depth BARO` (m), `pressure 1` to
+`pressure 3` (Pa).
 
 `LogClock` makes one clock of a log whose clock may jump, because computers without a battery set theirs by the network.
 `VehicleIdentity` is the vehicle's type by its heartbeats, its firmware's name, or parameters that only one firmware
@@ -218,6 +220,11 @@ _ALLOWED = {
     "servo": (500.0, 2500.0),
     "attitude": (-2.0 * math.pi, 2.0 * math.pi),
     "position": (-1e5, 1e5),
+    "odometry": (-1e5, 1e5),
+    "dvl": (-100.0, 100.0),
+    "global": (-180.0, 180.0),
+    "altitude": (0.01, 500.0),
+    "calendar": (1e9, 4e9),
     "armed": (0.0, 1.0),
     "mode": (0.0, 255.0),
     "voltage": (0.5, 100.0),

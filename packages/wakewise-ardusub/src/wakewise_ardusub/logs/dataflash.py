@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wakewise_ardusub.logs.channels import SERVOS, LogCollector, SystemRecords, firmware_of
+from wakewise_ardusub.logs.mavlink import DOWNWARD
 
 HEAD = b"\xa3\x95"
 _FMT_TYPE, _FMT_LENGTH = 128, 89
@@ -32,8 +33,12 @@ _CODES: dict[str, tuple[str, float | None]] = {
 }  # fmt: skip
 _WANTED = frozenset(
     {"ATT", "RCOU", "RCIN", "CTUN", "BARO", "BAT", "MODE", "ARM", "EV", "PARM", "XKF1", "MSG", "VER", "BAR2"}
+    | {"VISO", "RFND", "GPS"}
 )
 _ARMED_EVENT, _DISARMED_EVENT = 10, 11
+_GOOD = 4
+_EPOCH_S, _LEAP_S = 315_964_800.0, 18.0
+"""Begin of GPS time (1980-01-06), and how far it is ahead of UTC since 2017."""
 _MIDDLE_US, _HALF_US = 1500.0, 400.0
 
 
@@ -154,6 +159,18 @@ def _keep(system_records: SystemRecords, name: str, time_s: float, fields: dict[
             # The estimator's first core; the autopilot may change over to another, which MAVLink's position follows.
             if fields.get("C", 0) == 0:
                 system_records.put("position", time_s, (fields[k] for k in ("PN", "PE", "PD")))
+        case "VISO":
+            system_records.put("dvl step", time_s, (fields[k] for k in ("PosDX", "PosDY", "PosDZ")))
+        case "RFND":
+            # A status of 4 is a distance within the sensor's range.
+            if fields.get("Stat", _GOOD) == _GOOD and fields.get("Orient", DOWNWARD) == DOWNWARD:
+                system_records.put("altitude", time_s, (fields["Dist"],))
+        case "GPS":
+            if fields["GWk"]:
+                since_1980_s = 604_800.0 * fields["GWk"] + 1e-3 * fields["GMS"]
+                system_records.put("calendar", time_s, (_EPOCH_S + since_1980_s - _LEAP_S,))
+            if fields["Lat"] or fields["Lng"]:
+                system_records.put("global", time_s, (fields["Lat"], fields["Lng"]))
         case "BAT":
             if fields.get("Inst", fields.get("Instance", fields.get("I", 0))) == 0:
                 system_records.put("voltage", time_s, (fields["Volt"],))

@@ -31,7 +31,11 @@ from wakewise_ardusub.logs.channels import NO_AUTOPILOT, SERVOS, LogCollector, e
 WANTED = frozenset({
     "MANUAL_CONTROL", "SERVO_OUTPUT_RAW", "ATTITUDE", "VFR_HUD", "AHRS2", "SCALED_PRESSURE", "SCALED_PRESSURE2",
     "SCALED_PRESSURE3", "HEARTBEAT", "SYS_STATUS", "PARAM_VALUE", "LOCAL_POSITION_NED",
+    "ODOMETRY", "VISION_POSITION_DELTA", "GLOBAL_POSITION_INT", "DISTANCE_SENSOR", "RANGEFINDER",
 })  # fmt: skip
+DOWNWARD = 25
+"""MAV_SENSOR_ROTATION_PITCH_270: a rangefinder that looks down."""
+_FROM_COMPANIONS = frozenset({"ODOMETRY", "VISION_POSITION_DELTA", "DISTANCE_SENSOR"})
 AUTOPILOT = 1
 """Component id of a vehicle's autopilot; cameras, sonars and companions have others."""
 _ARMED = 128
@@ -96,10 +100,10 @@ def record_message(
             "sticks", time_s, (x / 1e3, y / 1e3, (500.0 - z) / 500.0, r / 1e3)
         )
         return
-    if component != AUTOPILOT or name not in WANTED:
+    if (component != AUTOPILOT and name not in _FROM_COMPANIONS) or name not in WANTED:
         collector.clock.at(stamp_s)
         return
-    boot = fields.get("time_boot_ms")
+    boot = fields.get("time_boot_ms") if component == AUTOPILOT else None
     time_s = collector.clock.at(stamp_s, None if boot is None else 1e-3 * _number(boot))
     system_records = collector.records_of(system)
     if name == "SERVO_OUTPUT_RAW":
@@ -109,6 +113,18 @@ def record_message(
         system_records.put("attitude", time_s, (_number(fields[k]) for k in ("roll", "pitch", "yaw")))
     elif name == "LOCAL_POSITION_NED":
         system_records.put("position", time_s, (_number(fields[k]) for k in ("x", "y", "z")))
+    elif name == "ODOMETRY":
+        system_records.put("odometry", time_s, (_number(fields[k]) for k in ("x", "y", "z")))
+    elif name == "VISION_POSITION_DELTA":
+        system_records.put("dvl step", time_s, (_number(v) for v in fields["position_delta"]))
+    elif name == "GLOBAL_POSITION_INT":
+        if fields["lat"] or fields["lon"]:
+            system_records.put("global", time_s, (1e-7 * _number(fields[k]) for k in ("lat", "lon")))
+    elif name == "DISTANCE_SENSOR":
+        if enumerated("MAV_SENSOR_ORIENTATION", fields["orientation"]) == DOWNWARD:
+            system_records.put("altitude", time_s, (0.01 * _number(fields["current_distance"]),))
+    elif name == "RANGEFINDER":
+        system_records.put("altitude", time_s, (_number(fields["distance"]),))
     elif name == "VFR_HUD":
         system_records.put("depth VFR_HUD", time_s, (-_number(fields["alt"]),))
     elif name == "AHRS2":

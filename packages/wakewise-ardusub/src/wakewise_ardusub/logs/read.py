@@ -70,6 +70,11 @@ def read_log(path: Path, *, any_vehicle: bool = False) -> VehicleLog:
                     kind, collector = "dataflash", read_dataflash(data)
                 elif holds_packets(data):
                     kind, collector = "tlog", read_tlog(data)
+                elif _is_ground_station_table(bytes(data[:4096])):
+                    raise InputError(
+                        f"{path}: QGroundControl's telemetry table (CSV), which holds no motor outputs; the .tlog of "
+                        "the same dive, in QGroundControl's folder Telemetry, or the autopilot's .BIN has them"
+                    )
                 else:
                     raise InputError(f"{path}: not one record found, expected {FORMATS}")
     except (OSError, ValueError) as fault:
@@ -84,6 +89,12 @@ def read_log(path: Path, *, any_vehicle: bool = False) -> VehicleLog:
         return log if not log.identity.is_other else _generic(log)
     _require_ardusub(log)
     return log
+
+
+def _is_ground_station_table(begin: bytes) -> bool:
+    """Whether a file begins with the header of QGroundControl's CSV telemetry."""
+    header = [name.strip().strip('"') for name in begin.split(b"\n")[0].decode("utf-8-sig", "replace").split(",")]
+    return header[0] == "Timestamp" and {"roll", "pitch", "heading"} <= set(header)
 
 
 def _folder(path: Path) -> str:

@@ -56,7 +56,7 @@ def tabulate(log: VehicleLog, rate_hz: float = RATE_HZ) -> LogTable:
     columns |= {f"stick_{name}": sticks[:, i] for i, name in enumerate(STICKS)}
     servo = _held(log, "servo", time_s, SERVOS)
     columns |= {f"servo_{i + 1}_us": servo[:, i] for i in range(SERVOS)}
-    depth, source = _depth(log)
+    depth, source = depth_series(log)
     columns["depth_m"] = _straight(depth, time_s, 1)[:, 0]
     attitude = log.series.get("attitude")
     if attitude is not None:
@@ -124,7 +124,7 @@ def _wound(angle: Array) -> Array:
     return np.asarray(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi)
 
 
-def _depth(log: VehicleLog) -> tuple[ChannelSeries | None, str | None]:
+def depth_series(log: VehicleLog) -> tuple[ChannelSeries | None, str | None]:
     """Depth of the first source that ever changes, else of the first there is."""
     found: list[tuple[str, ChannelSeries]] = [
         (name.removeprefix("depth "), log.series[name]) for name in _STATED if name in log.series

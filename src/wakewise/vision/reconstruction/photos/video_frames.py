@@ -105,7 +105,7 @@ class _FrameStatistics:
 
 
 def _take(film: Path, folder: Path, progress: Progress) -> VideoFrames:
-    with _opened(film) as reader:
+    with opened_film(film) as reader:
         facts = {
             "width": int(reader.get(cv2.CAP_PROP_FRAME_WIDTH)),
             "height": int(reader.get(cv2.CAP_PROP_FRAME_HEIGHT)),
@@ -127,7 +127,7 @@ def _take(film: Path, folder: Path, progress: Progress) -> VideoFrames:
         )
     numbers = analysed.numbers[chosen]
     with whole_folder(folder) as temporary:
-        _write(film, temporary, {int(n) for n in numbers}, progress, frames)
+        write_frames(film, temporary, {int(n) for n in numbers}, progress, frames)
     pace = np.gradient(analysed.way, analysed.numbers / rate) if len(analysed.way) > 1 else np.zeros(1)
     motion = float(np.median(pace[chosen])) * max(facts.values())
     return VideoFrames(
@@ -231,8 +231,9 @@ def _blurred(analysed: _FrameStatistics, rate: float) -> Any:
     return np.asarray(analysed.sharpness < BLURRED_SHARE * np.array(usual))
 
 
-def _write(film: Path, folder: Path, numbers: set[int], progress: Progress, frames: int) -> None:
-    with _opened(film) as reader:
+def write_frames(film: Path, folder: Path, numbers: set[int], progress: Progress, frames: int) -> None:
+    """Write frames of these numbers as JPEG files `frame_NUMBER.jpg`; `frames`: how many the film has, for progress."""
+    with opened_film(film) as reader:
         frame = written = 0
         while reader.grab() and written < len(numbers):
             if frame in numbers:
@@ -247,7 +248,7 @@ def _write(film: Path, folder: Path, numbers: set[int], progress: Progress, fram
 
 
 @contextmanager
-def _opened(film: Path) -> Iterator[cv2.VideoCapture]:
+def opened_film(film: Path) -> Iterator[cv2.VideoCapture]:
     """A film to read, quietly.
 
     Raises InputError if it is none, or in a code that OpenCV's FFmpeg does not read.
