@@ -98,6 +98,7 @@ def test_records_of_other_fields_are_counted_by_name(tmp_path: Path) -> None:
         ("a.bag", b"#ROSBAG V2.0\n" + bytes(100), "a ROS 1 bag"),
         ("a.ulg", b"ULog\x01\x12\x35" + bytes(100), "PX4"),
         ("a.tlog.gz", b"\x1f\x8b" + bytes(100), "unpack it first"),
+        ("a.csv", b"Timestamp,roll,pitch,heading,rollRate\n2022-08-15 10:16:17.386,1,2,3,4\n", "no motor outputs"),
     ],
 )
 def test_what_people_have_beside_logs_is_named(tmp_path: Path, name: str, data: bytes, said: str) -> None:

@@ -88,11 +88,17 @@ def write_table(path: Path, made: Dive, moved_s: float = 0.0) -> Path:
 
 
 def write_photos(
-    folder: Path, made: Dive, offset_s: float, seed: int = 0, every_s: float = 1.0, exif: bool = True
+    folder: Path,
+    made: Dive,
+    offset_s: float,
+    seed: int = 0,
+    every_s: float = 1.0,
+    exif: bool = True,
+    parts: bool = True,
 ) -> list[float]:
     """Photographs at nearly even times, one in five blurred, two dark, by a clock that is `offset_s` behind the log's.
 
-    True times in the log of those written.
+    Without `exif` nothing says when; without `parts` the clock counts whole seconds. True times in the log.
     """
     rng = np.random.default_rng(seed)
     folder.mkdir(parents=True)
@@ -112,6 +118,7 @@ def write_photos(
             taken = datetime.fromtimestamp(START_S + float(time_s) - offset_s, tz=UTC)
             more = tags.get_ifd(0x8769)
             more[0x9003] = taken.strftime("%Y:%m:%d %H:%M:%S")
-            more[0x9291] = f"{taken.microsecond // 1000:03d}"
+            if parts:
+                more[0x9291] = f"{taken.microsecond // 1000:03d}"
         image.save(folder / f"P{k:04d}.jpg", quality=92, exif=tags)
     return [float(t) for t in times]

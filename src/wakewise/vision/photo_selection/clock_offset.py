@@ -29,9 +29,9 @@ GRID_S, COARSE_S, FINE_S = 0.05, 0.25, 0.01
 LONGEST_PAIR_S = 10.0
 LEAST_PAIRS, LEAST_SHARE = 10, 0.5
 """Measured motions that must lie in the log: at least so many, and so large a share."""
-LEAST_CORRELATION, HIGHEST_SECOND, LEAST_EVIDENCE = 0.4, 0.7, 6.0
-"""An offset is ambiguous if no quantity correlates so much, the second peak's log-likelihood is a larger share of the
-best one's, or it is not less by so much."""
+LEAST_CORRELATION, LEAST_SHIFT, HIGHEST_SECOND, LEAST_EVIDENCE = 0.4, 0.3, 0.7, 6.0
+"""An offset is ambiguous if no quantity correlates so much, or the shift alone so much, the second peak's
+log-likelihood is a larger share of the best one's, or it is not less by so much."""
 _BLOCKS, _COARSE_PAIRS, _CELLS = 8, 800, 400_000
 _QUANTITIES = ("shift", "rotation", "scale")
 
@@ -133,7 +133,7 @@ def find_offset(
             f"photos: the motion from one to the next is seen {int(good.sum())} times (they must overlap, at most "
             f"{LONGEST_PAIR_S:g} s apart); {LEAST_PAIRS} are needed to find the clock's offset; state it with --offset"
         )
-    pairs = _Pairs(first_s[good], last_s[good], _clipped(motion[good]))
+    pairs = _Pairs(first_s[good], last_s[good], _clipped(halfway(motion[good])))
     low, high = predicted.first_s - float(time_s[-1]), predicted.last_s - float(time_s[0])
     if window_s is not None:
         low, high = max(low, window_s[0]), min(high, window_s[1])
@@ -163,15 +163,18 @@ def find_offset(
         second_offset_s=None if second is None else float(offsets[second]),
         second_share=share,
         focal_widths=_residuals(predicted, pairs, best)[2],
-        ambiguous=_doubt(max(told.values()), share, evidence),
+        ambiguous=_doubt(told, share, evidence),
     )
 
 
-def _doubt(correlation: float, share: float, evidence: float) -> str | None:
-    if correlation < LEAST_CORRELATION:
-        return f"the motion in the photos is not that of the log (correlation {correlation:.2f} at best)"
+def _doubt(correlation: dict[str, float], share: float, evidence: float) -> str | None:
+    best = max(correlation.values())
+    if best < LEAST_CORRELATION:
+        return f"the motion in the photos is not that of the log (correlation {best:.2f} at best)"
     if share > HIGHEST_SECOND:
         return f"another offset fits nearly as well ({100 * share:.0f} % of the best one's log-likelihood)"
+    if correlation["shift"] < LEAST_SHIFT:
+        return f"the photos turn as the log says, and do not shift as it says (correlation {correlation['shift']:.2f})"
     return "too little motion was seen to tell offsets apart" if evidence < LEAST_EVIDENCE else None
 
 
@@ -183,6 +186,17 @@ class _Pairs:
 
     def part(self, which: Any) -> _Pairs:
         return _Pairs(self.first_s[which], self.last_s[which], self.motion[which])
+
+
+def halfway(motion: Array) -> Array:
+    """Motions, shape (k, 4), with the shift in the camera's axes half way between two pictures, along the arc.
+
+    At constant rates a picture that turns by the angle a shifts by exp(i a / 2) sin(a / 2) / (a / 2) times the integral
+    of the rate of its shift.
+    """
+    half = 0.5 * motion[:, 2]
+    shift = (motion[:, 0] + 1j * motion[:, 1]) * np.exp(-1j * half) / np.sinc(half / np.pi)
+    return np.column_stack([shift.real, shift.imag, motion[:, 2:]])
 
 
 def _clipped(motion: Array) -> Array:
