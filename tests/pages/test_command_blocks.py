@@ -101,6 +101,12 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Elsewhere(r"wakewise reconstruct photos/ .*--bar .*", "tests/vision/reconstruction/test_scale_stage.py", "bars"),
     Elsewhere(r"wakewise reconstruct \w+/ .*--fixes .*", "tests/vision/reconstruction/test_scale_by_fixes.py", "fixes"),
     Never(r"wakewise reconstruct runs/sea-.*", "needs the photographs of a real dive; PHOTOS stand for them above"),
+    Elsewhere(r"wakewise photos pick .*", "tests/vision/photo_selection/test_photo_pick.py", '"photos", "pick"'),
+    Elsewhere(
+        r"wakewise reconstruct runs/picked-PHOTOS.*",
+        "tests/vision/photo_selection/test_photo_pick.py",
+        "read_reference_cameras",
+    ),
     Run(r"wakewise evaluate .*", slow=True, shows="rmse_mm"),
     Run(r"wakewise measure runs/metres.*", slow=True, shows="volume_cm3"),
     Elsewhere(r"wakewise compare-models runs/spring .*", "tests/ui/cli/test_measure_commands.py", '"compare-models"'),

@@ -27,11 +27,12 @@ class Dive:
 
     track: DiveTrack
     bed: NDArray[np.uint8]
+    tilt_deg: float = 90.0
 
     def picture(self, time_s: float) -> NDArray[np.uint8]:
         """Photograph at a time of the log."""
         poses = poses_at(self.track, np.array([time_s]))
-        R_WC = matrix_from_quat(poses.q_WB[0]) @ mounted_camera(np.zeros(3), 90.0).R
+        R_WC = matrix_from_quat(poses.q_WB[0]) @ mounted_camera(np.zeros(3), self.tilt_deg).R
         K = np.array([[FOCAL_PX, 0, WIDTH / 2], [0, FOCAL_PX, HEIGHT / 2], [0, 0, 1]])
         size = TILE_M / TILE_PX
         # Columns of the tile go east, rows north, at depth 0.

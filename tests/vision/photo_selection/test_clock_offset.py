@@ -119,6 +119,37 @@ def test_the_measured_motion_is_the_shift_turn_and_scale_of_the_pictures(tmp_pat
     assert motion == pytest.approx([0.1, 0.0, np.radians(3.0), np.log(1.05)], abs=0.004)
 
 
+def test_pictures_of_different_places_have_no_motion(tmp_path: Path) -> None:
+    """A mirrored picture is no shifted one, and neither is noise."""
+    import cv2
+
+    picture = dive(0).picture(5.0)
+    noise = np.random.default_rng(0).integers(0, 255, picture.shape, dtype=np.uint8)
+    for k, image in enumerate((picture, picture[:, ::-1], noise)):
+        cv2.imwrite(str(tmp_path / f"{k}.png"), image)
+    statistics, _ = photo_statistics([tmp_path / f"{k}.png" for k in range(3)])
+    assert np.isnan(statistics.motion).all()
+
+
+@pytest.mark.parametrize("stated_deg", [30.0, 50.0])
+def test_a_camera_that_looks_ahead_and_down_tells_the_offset_too(tmp_path: Path, stated_deg: float) -> None:
+    """A camera tilted by 50 deg: error at most 0.1 s, also where the tilt is stated 20 deg wrong."""
+    made = replace(dive(301), tilt_deg=50.0)
+    write_photos(tmp_path / "photos", made, 3.7)
+    request = PickRequest(X_BC=mounted_camera(np.zeros(3), stated_deg))
+    offset = pick_photos(tmp_path / "photos", made.track, request).figures["offset"]
+    assert offset["offset_s"] == pytest.approx(3.7, abs=0.1)
+
+
+def test_a_photograph_every_three_seconds_by_a_clock_of_whole_seconds_is_enough(tmp_path: Path) -> None:
+    """Half of the photographs overlap; error at most 0.1 s over five minutes."""
+    made = dive(101, 300.0)
+    true_s = write_photos(tmp_path / "photos", made, 60.0, every_s=3.0, parts=False)
+    found = pick_photos(tmp_path / "photos", made.track, PickRequest())
+    assert found.figures["offset"]["pairs"] < len(true_s) * 0.7
+    assert found.figures["offset"]["offset_s"] == pytest.approx(60.0, abs=0.1)
+
+
 def test_a_log_at_few_hertz_without_altitude_still_tells_the_offset(tmp_path: Path) -> None:
     """Poses at 4 Hz, no rangefinder, a camera turned a quarter about its axis: error at most 0.15 s."""
     made, true_s = dive(6), 40.0

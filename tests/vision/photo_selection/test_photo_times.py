@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import io
 
+import numpy as np
 import pytest
 from PIL import Image
 
-from wakewise.vision.photo_selection.photo_times import PhotoTime, exif_time, name_time, spread
+from wakewise.vision.photo_selection.photo_times import PhotoTime, evened, exif_time, name_time, spread
 
 
 def _jpeg(**tags: str) -> bytes:
@@ -56,3 +57,16 @@ def test_photographs_of_one_second_are_spread_over_it() -> None:
     """Three photographs stamped alike by a clock of whole seconds are a third of a second apart."""
     photos = [PhotoTime(name=str(k), time_s=7.0, source="EXIF", calendar=True, step_s=1.0) for k in range(3)]
     assert [photo.time_s for photo in spread(photos)] == pytest.approx([7.0, 7.0 + 1 / 3, 7.0 + 2 / 3])
+
+
+def test_whole_seconds_of_an_even_interval_are_evened_out() -> None:
+    """Times cut to whole seconds of a camera that fires every 2.37 s come back within 0.1 s; uneven ones stay."""
+    true_s = 1000.4 + 2.37 * np.arange(60)
+    cut = [
+        PhotoTime(name=f"{k:02}", time_s=float(np.floor(t)), source="EXIF", calendar=True, step_s=1.0)
+        for k, t in enumerate(true_s)
+    ]
+    assert [photo.time_s for photo in evened(cut)] == pytest.approx(true_s, abs=0.1)
+    assert evened(cut)[0].step_s < 0.2
+    gap = cut[:30] + cut[40:]
+    assert evened(gap) == gap

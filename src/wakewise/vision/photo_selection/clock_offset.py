@@ -32,6 +32,8 @@ LEAST_PAIRS, LEAST_SHARE = 10, 0.5
 LEAST_CORRELATION, LEAST_SHIFT, HIGHEST_SECOND, LEAST_EVIDENCE = 0.4, 0.3, 0.7, 6.0
 """An offset is ambiguous if no quantity correlates so much, or the shift alone so much, the second peak's
 log-likelihood is a larger share of the best one's, or it is not less by so much."""
+LEAST_SIGMA_S = 0.02
+"""The standard deviation is not below this, to which the model of the motion was found to be good."""
 _BLOCKS, _COARSE_PAIRS, _CELLS = 8, 800, 400_000
 _QUANTITIES = ("shift", "rotation", "scale")
 
@@ -293,10 +295,10 @@ def _outside_peak(score: Array, at: int) -> BoolArray:
 
 
 def _jackknife(predicted: PredictedMotion, pairs: _Pairs, offset_s: float) -> float:
-    """Standard deviation of the offset in s, from blocks of pairs left out in turn; at least half a fine step."""
+    """Standard deviation of the offset in s, from blocks of pairs left out in turn; at least `LEAST_SIGMA_S`."""
     blocks = np.array_split(np.arange(len(pairs.first_s)), _BLOCKS)
     found = np.array([
         _refined(predicted, pairs.part(np.setdiff1d(np.arange(len(pairs.first_s)), block)), offset_s, 2 * COARSE_S)
         for block in blocks
     ])  # fmt: skip
-    return max(math.sqrt((_BLOCKS - 1) * float(np.mean((found - found.mean()) ** 2))), 0.5 * FINE_S)
+    return max(math.sqrt((_BLOCKS - 1) * float(np.mean((found - found.mean()) ** 2))), LEAST_SIGMA_S)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
+
+import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.vision.reconstruction.photos.photo_folder import UNREADABLE
@@ -21,6 +24,8 @@ _IN_NAME = re.compile(
 )
 LEAST_SHARE = 0.9
 """Share of the photographs that must have a time from one source, for it to be the source."""
+
+LEAST_EVEN = 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +100,7 @@ def photo_times(folder: Path, files: Sequence[Path], interval_s: float | None) -
                 if one is not None
             ]
             missing = [name for name, one in zip(names, found, strict=True) if one is None]
-            return spread(sorted(told, key=lambda photo: (photo.time_s, photo.name))), missing
+            return evened(spread(sorted(told, key=lambda photo: (photo.time_s, photo.name)))), missing
     raise InputError(
         f"{folder}: neither EXIF (DateTimeOriginal) nor the names say when its {len(files)} photos were taken; "
         "--interval S states the time from one to the next"
@@ -110,5 +115,25 @@ def spread(photos: list[PhotoTime]) -> list[PhotoTime]:
     for photo in photos:
         part = done[photo.time_s] / many[photo.time_s] * photo.step_s
         done[photo.time_s] += 1
-        out.append(photo if part == 0.0 else PhotoTime(**{**vars(photo), "time_s": photo.time_s + part}))
+        out.append(replace(photo, time_s=photo.time_s + part))
     return out
+
+
+def evened(photos: list[PhotoTime]) -> list[PhotoTime]:
+    """Photographs of an even interval by a clock of whole seconds, on the straight line through their times.
+
+    Others are returned as they are: those that are fewer than `LEAST_EVEN`, or stray from the line by a second.
+    """
+    if len(photos) < LEAST_EVEN or min(photo.step_s for photo in photos) < 1.0:
+        return photos
+    number, first_s = np.arange(len(photos)), photos[0].time_s
+    time_s = np.array([photo.time_s - first_s for photo in photos])
+    slope, begin = np.polyfit(number, time_s, 1)
+    line = begin + slope * number
+    if slope <= 0.0 or np.abs(time_s - line).max() >= 1.0:
+        return photos
+    # Whole seconds are cut off, half of one in the mean.
+    step_s = float(np.std(time_s - line)) * math.sqrt(12.0 / len(photos))
+    return [
+        replace(photo, time_s=first_s + 0.5 + float(at), step_s=step_s) for photo, at in zip(photos, line, strict=True)
+    ]

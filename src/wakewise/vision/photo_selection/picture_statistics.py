@@ -29,7 +29,9 @@ FRAMES_PER_S = 4.0
 """Frames a second of a film that are looked at."""
 DARK_GREY, UNIFORM_GREY = 12.0, 4.0
 """Mean and standard deviation of grey levels (of 255) below which a picture is dark or uniform."""
-_FEATURES, _RATIO, _LEAST_INLIERS, _RANSAC_PX = 800, 0.8, 12, 3.0
+_FEATURES, _RATIO, _LEAST_INLIERS = 800, 0.8, 12
+_TOLERANCE_PX, _SCALE_RANGE = 8.0, 0.8
+"""Relief moves features off a similarity by so much in a reduced picture; a greater log scale is a false match."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,8 +145,14 @@ def _matched(before: _Picture, after: _Picture) -> Array:
     (at_before, tell_before), (at_after, tell_after) = before.features or ((), None), after.features or ((), None)
     if tell_before is None or tell_after is None or min(len(at_before), len(at_after)) < _LEAST_INLIERS:
         return np.full(4, np.nan)
-    pairs = cv2.BFMatcher(cv2.NORM_L2).knnMatch(tell_before, tell_after, k=2)
-    good = [two[0] for two in pairs if len(two) == 2 and two[0].distance < _RATIO * two[1].distance]
+    matcher = cv2.BFMatcher(cv2.NORM_L2)
+    pairs = matcher.knnMatch(tell_before, tell_after, k=2)
+    back = {match.queryIdx: match.trainIdx for match in matcher.match(tell_after, tell_before)}
+    good = [
+        two[0]
+        for two in pairs
+        if len(two) == 2 and two[0].distance < _RATIO * two[1].distance and back.get(two[0].trainIdx) == two[0].queryIdx
+    ]
     first = np.array([at_before[match.queryIdx].pt for match in good], dtype=np.float32).reshape(-1, 2)
     last = np.array([at_after[match.trainIdx].pt for match in good], dtype=np.float32).reshape(-1, 2)
     return _similarity(first, last, before.small.shape)
@@ -164,10 +172,12 @@ def _similarity(first: Any, last: Any, shape: tuple[int, ...]) -> Array:
     """Shift of the middle in widths, rotation and log scale of matched points, shapes (k, 2); NaN where unsure."""
     if len(first) < _LEAST_INLIERS:
         return np.full(4, np.nan)
-    matrix, inside = cv2.estimateAffinePartial2D(first, last, method=cv2.RANSAC, ransacReprojThreshold=_RANSAC_PX)
+    matrix, inside = cv2.estimateAffinePartial2D(first, last, method=cv2.RANSAC, ransacReprojThreshold=_TOLERANCE_PX)
     if matrix is None or int(inside.sum()) < _LEAST_INLIERS:
         return np.full(4, np.nan)
     middle = 0.5 * np.array(shape[1::-1], dtype=np.float64)
     shift = (matrix[:, :2] @ middle + matrix[:, 2] - middle) / shape[1]
     scale, turn = np.hypot(matrix[0, 0], matrix[1, 0]), np.arctan2(matrix[1, 0], matrix[0, 0])
+    if not abs(np.log(max(float(scale), 1e-9))) <= _SCALE_RANGE:
+        return np.full(4, np.nan)
     return np.array([*shift, turn, np.log(scale)])
