@@ -38,6 +38,7 @@ _SHOWN = {
     "models": "wakewise_paper.cli.bench_models:show_models",
     "operator": "wakewise_paper.cli.bench_operator:show_operator",
     "reef": "wakewise_benchmarks.reef:show_reef",
+    "survey": "wakewise_benchmarks.survey:show_survey",
     "target": "wakewise_benchmarks.target_finding:show_target",
     "truth": "wakewise_benchmarks.truth:show_truth",
     "worlds": "wakewise_paper.cli.bench_worlds:show_worlds",
@@ -58,6 +59,7 @@ _LASTS = {
     "models": "hours",
     "operator": "hours",
     "reef": "hours",
+    "survey": "an hour",
     "target": "hours",
     "worlds": "hours",
 }
@@ -75,7 +77,7 @@ def bench(
         int | None,
         typer.Option(
             help="front, gentle, models, operator, target, worlds: flights per method; 8, 3, what the cases say, 3, 10 "
-            "and 10; reef: patches, 3.",
+            "and 10; reef: patches, 3; survey: flights over each relief, 10.",
             min=1,
             max=1000,
         ),

@@ -34,6 +34,7 @@ BENCHES = {
     "operator": "an operator's velocity obeyed and the target's water spared, by w_track, where users have the trouble",
     "target": "the target found, mapped and tracked by the camera: how soon, how well, what it is worth",
     "reef": "a patch of reef in two levels, beside a lawnmower and orbits round everything: path and completeness",
+    "survey": "slow lines above a bed on the simulated autopilot: speed, altitude, place, and what every loss leads to",
     "truth": "figures held against data that nobody in this project made: measured, asked, reached, met",
     "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
     "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",

@@ -17,8 +17,10 @@ from wakewise.ui.cli.console import ProgressBars, format_value, print_json, stat
 from wakewise.ui.cli.options import Json, Preset, ScenarioFile, Sets, Vehicle, World, overrides
 
 if TYPE_CHECKING:
+    from wakewise.core.arrays import Array
     from wakewise.robot.vehicles import Vehicle as AnyVehicle
     from wakewise_ardusub.physics import PhysicsFigures
+    from wakewise_ardusub.sitl.sea_sensors import SeaSensors
     from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
     from wakewise_ardusub.sitl.udp_endpoints import PhysicsBackend
     from wakewise_ardusub.sitl_plant import DepthMonitor
@@ -152,6 +154,17 @@ def sitl_autopilot(
             "--pilot", help="With a pilot of its own, who arms, switches the script on and lets the sticks go."
         ),
     ] = False,
+    relief: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SHAPE",
+            help="A bed 5 m deep with a rangefinder above it, without --physics: flat, trapezoid or sawtooth.",
+        ),
+    ] = None,
+    current: Annotated[
+        float, typer.Option(metavar="M/S", min=0.0, max=0.5, help="Speed of a drawn current, with --relief.")
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, help="Of relief, current and errors of sensors, with --relief.")] = 0,
     loop: Annotated[float, typer.Option(metavar="HZ", help="Loops a second.")] = 100.0,
     seconds: Seconds = None,
     json: Json = False,
@@ -165,6 +178,7 @@ def sitl_autopilot(
 
     need("wakewise link sitl-autopilot", "links", only=("pymavlink", "lupa"))
     from wakewise.robot.importers import any_vehicle
+    from wakewise_ardusub.link.protocol import ALT_HOLD
     from wakewise_ardusub.sitl.inprocess_session import ScriptedGroundStation, route_messages
     from wakewise_ardusub.sitl.own_parameters import own_parameters, read_params
     from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
@@ -172,13 +186,26 @@ def sitl_autopilot(
 
     if script is not None and no_script:
         raise InputError("--script and --no-script: one or the other")
+    if relief is None and current:
+        raise InputError("--current: goes with --relief")
+    if relief is not None and physics is not None:
+        raise InputError("--relief, --physics: the bed is of the stand-in's own water, give one")
+    sea = None if relief is None else _sea(relief, current, seed)
     chosen = any_vehicle(vehicle)
     values = own_parameters(len(chosen.thrusters)) | ({} if params is None else read_params(params))
     scripts = {} if no_script else _scripts(script)
     # Water of its own has no surface to start at: there it was carried down, switched on, to where it is.
     zero_m = 0.0 if physics is None else None
-    made = SimulatedAutopilot(values | {"SCHED_LOOP_RATE": loop}, loop_hz=loop, scripts=scripts, zero_depth_m=zero_m)
-    behind = _embedded(chosen, values) if physics is None else UdpPhysics(*_address("--physics", physics))
+    made = SimulatedAutopilot(
+        values | {"SCHED_LOOP_RATE": loop},
+        loop_hz=loop,
+        scripts=scripts,
+        zero_depth_m=zero_m,
+        sensors=None if sea is None else sea[0],
+    )
+    if sea is not None:
+        made.set_mode(ALT_HOLD)  # in MANUAL the current would carry it away, and its weight down
+    behind = _embedded(chosen, values, sea) if physics is None else UdpPhysics(*_address("--physics", physics))
     outs = out or [_STATION, _COMPANION, _WATCH]
     links = [UdpEndpoint(*_address("--out", each), out=True) for each in outs]
     typer.echo(f"simulated ArduSub, system {made.system}: MAVLink to {', '.join(outs)}", err=True)
@@ -208,11 +235,36 @@ def _scripts(file: Path | None) -> dict[str, str]:
         raise InputError(f"--script {file}: {fault.strerror}") from None
 
 
-def _embedded(vehicle: AnyVehicle, values: dict[str, float]) -> PhysicsBackend:
+_Sea = tuple["SeaSensors", "Callable[[float], Array]"]
+
+
+def _sea(name: str, speed_m_s: float, seed: int) -> _Sea:
+    """Sensors above a drawn bed, and a drawn current."""
+    import numpy as np
+
+    from wakewise.core.errors import InputError
+    from wakewise_ardusub.sitl.sea_sensors import SHAPES, Relief, SeaSensors, SensorErrors, drawn_current
+
+    shape = next((known for known in SHAPES if known == name), None)
+    if shape is None:
+        raise InputError(f"--relief {name!r}: must be {', '.join(SHAPES)}")
+    rng = np.random.default_rng(seed)
+    return SeaSensors(Relief.drawn(shape, rng), SensorErrors(), rng), drawn_current(rng, speed_m_s)
+
+
+def _embedded(vehicle: AnyVehicle, values: dict[str, float], sea: _Sea | None) -> PhysicsBackend:
+    import numpy as np
+
+    from wakewise.core.geometry import Pose
+    from wakewise.core.interfaces import BodyState
     from wakewise_ardusub.physics import FreeWater, PulseTable
     from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics
 
-    return InProcessPhysics(body=FreeWater(vehicle), table=PulseTable.of(vehicle, values))
+    body = FreeWater(vehicle)
+    if sea is not None:
+        start = Pose(np.array([0.0, 0.0, 3.4]), np.array([1.0, 0.0, 0.0, 0.0]))
+        body = FreeWater(vehicle, BodyState(X_WB=start), sea[1])
+    return InProcessPhysics(body=body, table=PulseTable.of(vehicle, values))
 
 
 def _address(option: str, text: str) -> tuple[str, int]:

@@ -165,9 +165,10 @@ WANTED = frozenset({
     "HEARTBEAT", "ATTITUDE", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "VISION_POSITION_ESTIMATE", "ODOMETRY",
     "VFR_HUD", "SYS_STATUS", "SERVO_OUTPUT_RAW", "MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE", "NAMED_VALUE_FLOAT",
     "SET_ACTUATOR_CONTROL_TARGET", "SET_MODE", "COMMAND_LONG", "STATUSTEXT", "RAW_IMU", "PARAM_VALUE",
-    "COMMAND_ACK", "CAMERA_IMAGE_CAPTURED", "DISTANCE_SENSOR",
+    "COMMAND_ACK", "CAMERA_IMAGE_CAPTURED", "DISTANCE_SENSOR", "EKF_STATUS_REPORT", "AUTOPILOT_VERSION",
+    "GLOBAL_POSITION_INT",
 })  # fmt: skip
-"""Messages that are looked into, here or in `measuring.py`."""
+"""Messages that are looked into, here, in `measuring.py` or by a survey."""
 
 
 def update_link_state(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:

@@ -22,6 +22,7 @@ from wakewise.core.geometry import euler_from_quat
 from wakewise_ardusub.physics.datagrams import PhysicsState
 
 Shape = Literal["flat", "trapezoid", "sawtooth"]
+SHAPES: tuple[Shape, ...] = ("flat", "trapezoid", "sawtooth")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +44,7 @@ class Relief:
     def __post_init__(self) -> None:
         numbers = (self.depth_m, self.height_m, self.period_m, self.slope, self.along_rad, self.phase)
         fits = self.slope > 0.0 and 2.0 * self.height_m / max(self.slope, 1e-9) < self.period_m
-        if self.shape not in ("flat", "trapezoid", "sawtooth") or not all(map(math.isfinite, numbers)) or not fits:
+        if self.shape not in SHAPES or not all(map(math.isfinite, numbers)) or not fits:
             raise InputError(f"bed {self.shape}: faces of slope {self.slope:g} must fit into {self.period_m:g} m")
 
     @classmethod

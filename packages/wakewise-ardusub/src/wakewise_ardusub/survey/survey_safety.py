@@ -68,6 +68,8 @@ def missing(facts: SurveyFacts, limits: SurveyLimits) -> str:
         return "nothing is heard from the autopilot"
     if facts.position_s > limits.position_s or not facts.placed:
         return "no position (LOCAL_POSITION_NED); GUIDED needs a DVL or another positioning system"
+    if facts.doppler_s > limits.doppler_s:
+        return "no velocity of the Doppler log (DVL)"
     if facts.range_s > limits.range_s:
         return "no rangefinder that looks down (DISTANCE_SENSOR, orientation 25); an altitude needs one"
     if facts.sticks_s > limits.sticks_s:

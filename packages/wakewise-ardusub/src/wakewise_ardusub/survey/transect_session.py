@@ -55,18 +55,30 @@ from wakewise_ardusub.survey.survey_plan import (
     time_left_s,
     warning_of,
 )
-from wakewise_ardusub.survey.survey_safety import GUIDED, SurveyFacts, SurveyLimits, fault_of, hold_mode, missing
+from wakewise_ardusub.survey.survey_safety import (
+    ALT_HOLD,
+    GUIDED,
+    SurveyFacts,
+    SurveyLimits,
+    fault_of,
+    hold_mode,
+    missing,
+)
 
 State = Literal["waiting", "ready", "asked", "settling", "flying", "paused", "holding", "ended"]
 ENGAGED = ("asked", "settling", "flying", "paused")
 PERIOD_S = 0.1
 ASK_S, ASKS_FOR_S = 0.2, 2.0
+READY_S = 1.0
+"""GUIDED set sooner than this after the session is ready is no consent: the pilot could not know that it was."""
+GIVES_WAY_S = 0.5
+"""How long an order of the pilot is given to act before a hold is asked for."""
 LOOKS_DOWN = 25
 """MAV_SENSOR_ROTATION_PITCH_270."""
 LEAD_S = 0.2
 """How far ahead the bed is looked for: the time in which a target becomes motion."""
 REACHED_M = 0.05
-VELOCITY_GAIN, PLACE_GAIN_PER_S, MOST_CORRECTION_M_S = 2.0, 1.0, 0.1
+VELOCITY_GAIN, PLACE_GAIN_PER_S, MOST_CORRECTION_M_S = 3.0, 5.0, 0.25
 """Correction of the velocity target by what is measured. The firmware's default gains (PSC_VELXY_*) need 20 s to push
 through the dead zone of the thrusters."""
 STILL_M, STILL_M_S, REST_S = 0.05, 0.012, 3.0
@@ -144,7 +156,8 @@ class TransectSession:
         self._vehicle, self._motors, self._journal = vehicle, VehicleMotors(vehicle), journal
         self.known = LinkState(system=system, session=session)
         self.state: State = "waiting"
-        self.why = self.warning = ""
+        self.why = self.warning = self.ended_by = self.refused = ""
+        """Why it is in its state; what the current does; the fault that ended it last; what is wrong with the lines."""
         self.plan: SurveyPlan | None = None
         self.at: PlanProgress | None = None
         self.track = BedTrack()
@@ -160,7 +173,7 @@ class TransectSession:
         self._placed, self._takes_acceleration, self._facts = True, False, SurveyFacts(armed=None, mode=None)
         self._since_s, self._hold_mode, self._hold = clock(), GUIDED, np.zeros(3)
         self._pulses: list[Array] = []
-        self._settled_s = -math.inf
+        self._settled_s, self._quits = -math.inf, False
         self._anchor: GeoAnchor | None = None
         self._mode_before: int | None = None
 
@@ -225,6 +238,7 @@ class TransectSession:
         self._judge(now_s)
         if self.state != "ready":
             return f"not begun: {self.why or self.state}"
+        self.ended_by = ""
         if self.known.mode == GUIDED:
             self._settle(now_s)
             return "begun"
@@ -240,7 +254,8 @@ class TransectSession:
         return "pauses"
 
     def abort(self, why: str) -> None:
-        """End it in the firmware's own hold."""
+        """End it in the firmware's own hold, and do not go on."""
+        self._quits = True
         if self.state in ENGAGED:
             self._let_go(why, self._clock())
         elif self.state != "holding":
@@ -260,7 +275,8 @@ class TransectSession:
         self._judge(now_s)
         self._came["turn"] = now_s
         entered = self.known.mode == GUIDED and self._mode_before not in (None, GUIDED)
-        if entered and self.state in ("ready", "asked"):
+        meant = self.state == "ready" and now_s - self._since_s >= READY_S
+        if entered and (meant or self.state == "asked"):
             self._settle(now_s)
         self._mode_before = self.known.mode
         if self.state == "asked" and now_s - self._since_s > ASKS_FOR_S:
@@ -356,7 +372,8 @@ class TransectSession:
                 if away > self.options.limits.fence_m:
                     raise InputError(f"survey: {away:.0f} m from here, --fence is {self.options.limits.fence_m:g} m")
             except InputError as fault:
-                self._let_go(str(fault), now_s)
+                self.refused = str(fault)
+                self._let_go(self.refused, now_s)
                 return
             self.plan, self.at = plan, PlanProgress(heading_rad=heading)
             words = "unknown" if self.current_W_m_s is None else f"{np.round(current, 3).tolist()} m/s"
@@ -463,24 +480,27 @@ class TransectSession:
     # How it ends.
 
     def _let_go(self, why: str, now_s: float) -> None:
-        self.interruptions += why != "finished"
+        """Send no target any more, and ask for a hold mode unless somebody else just changed mode or arming."""
+        if why != "finished":
+            self.interruptions, self.ended_by = self.interruptions + 1, why
         self._hold_mode = hold_mode(self._facts, self.options.limits)
-        guided = self.known.mode == GUIDED or self.state == "asked"
-        self._turn("holding" if guided else "ended", why)
-        if guided:
+        guided = self.known.armed is not False and (self.known.mode == GUIDED or self.state == "asked")
+        self._turn("holding" if guided else "waiting", why)
+        if guided and not self._facts.takeover:
             self._request(self._hold_mode, now_s)
-        elif not self.finished:
-            self._turn("waiting", why)
+        elif guided:
+            self._came["mode"] = now_s + GIVES_WAY_S
 
     def _hold_on(self, now_s: float) -> None:
         """Ask until the mode has changed; what POSHOLD refuses, ALT_HOLD may give."""
-        if self.known.mode != GUIDED and self.known.heartbeat_s > self._since_s:
-            why, done = self.why, self.finished
-            self._turn("ended" if done or why.startswith("Ctrl-C") else "waiting", why)
+        heard = self.known.heartbeat_s > self._since_s
+        if heard and (self.known.mode != GUIDED or self.known.armed is False):
+            self._turn("ended" if self.finished or self.refused or self._quits else "waiting", self.why)
         elif now_s - self._since_s > ASKS_FOR_S:
             self._turn("ended", f"{self.why}; the autopilot did not answer, its own time-out stops the vehicle")
         elif now_s - self._came["mode"] >= ASK_S:
-            self._request(self._hold_mode if now_s - self._since_s < 2.0 * ASK_S else 2, now_s)
+            refused = self.known.heartbeat_s > self._since_s + 2.0 * ASK_S
+            self._request(ALT_HOLD if refused else self._hold_mode, now_s)
 
     # What goes out.
 
@@ -541,7 +561,7 @@ class TransectSession:
                 f"{self.state}  {self.at.flown_m:.1f} of {self.plan.line_m:.1f} m, {left / 60.0:.1f} min left, "
                 f"{self._facts.altitude_m:.2f} m above the bed, {self.photographs} photographs{waits}"
             )
-        return f"{self.state}  {self.why}"
+        return f"{self.state}  {self.why or self.ended_by}"
 
     def figures(self) -> dict[str, Any]:
         """Figures by the autopilot's own position and rangefinder, of cruise on lines; None where nothing was flown."""
