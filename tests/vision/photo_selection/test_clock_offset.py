@@ -69,7 +69,7 @@ def test_clocks_that_do_not_overlap_are_told_in_one_line(tmp_path: Path) -> None
 
 def test_a_clock_that_lost_its_date_is_found_in_a_wide_window(tmp_path: Path) -> None:
     """--window of years finds a camera that begins at 1970 again."""
-    made = dive(4)
+    made = dive(4, 70.0)
     write_photos(tmp_path / "photos", made, 500 * 86_400.0 + 0.4)
     request = PickRequest(window_s=1e9)
     offset = pick_photos(tmp_path / "photos", made.track, request).figures["offset"]
@@ -131,12 +131,11 @@ def test_pictures_of_different_places_have_no_motion(tmp_path: Path) -> None:
     assert np.isnan(statistics.motion).all()
 
 
-@pytest.mark.parametrize("stated_deg", [30.0, 50.0])
-def test_a_camera_that_looks_ahead_and_down_tells_the_offset_too(tmp_path: Path, stated_deg: float) -> None:
-    """A camera tilted by 50 deg: error at most 0.1 s, also where the tilt is stated 20 deg wrong."""
-    made = replace(dive(301), tilt_deg=50.0)
+def test_a_camera_that_looks_ahead_and_down_tells_the_offset_too(tmp_path: Path) -> None:
+    """A camera tilted by 50 deg, stated as 30 deg: error at most 0.1 s."""
+    made = replace(dive(301, 80.0), tilt_deg=50.0)
     write_photos(tmp_path / "photos", made, 3.7)
-    request = PickRequest(X_BC=mounted_camera(np.zeros(3), stated_deg))
+    request = PickRequest(X_BC=mounted_camera(np.zeros(3), 30.0))
     offset = pick_photos(tmp_path / "photos", made.track, request).figures["offset"]
     assert offset["offset_s"] == pytest.approx(3.7, abs=0.1)
 

@@ -117,7 +117,6 @@ def pick(
     from wakewise.vision.photo_selection.pick import (
         PICTURE,
         PickRequest,
-        PositionUncertainty,
         check_folder,
         pick_photos,
         write_picked,
@@ -134,7 +133,8 @@ def pick(
         X_BC=_camera(vehicle, camera_at, tilt),
         distance_m=distance,
         field_of_view_deg=fov,
-        uncertainty=PositionUncertainty(position_m=position_sigma, drift_pct=drift),
+        position_sigma_m=position_sigma,
+        drift_pct=drift,
     )
     track = read_track(log)
     with ProgressBars().stage("pick") as progress:

@@ -113,20 +113,9 @@ def find_offset(
 ) -> ClockOffset:
     """Offset of the log's clock from the camera's.
 
-    Parameters
-    ----------
-    predicted : PredictedMotion
-    time_s : ndarray, shape (n,)
-        Of the pictures, rising, by the camera's clock.
-    motion : ndarray, shape (n - 1, 4)
-        Of `picture_statistics`.
-    window_s : tuple of float or None
-        Least and greatest offset; None for all with which pictures lie in the log.
-
-    Raises
-    ------
-    InputError
-        If too few motions were measured, or no allowed offset lays the pictures into the log.
+    `time_s`, shape (n,), rising: of the pictures, by the camera's clock. `motion`, shape (n - 1, 4): of
+    `picture_statistics`. `window_s`: least and greatest offset, None for all with which pictures lie in the log. Raises
+    InputError if too few motions were measured, or no allowed offset lays the pictures into the log.
     """
     first_s, last_s = time_s[:-1], time_s[1:]
     good = np.isfinite(motion).all(axis=1) & (last_s > first_s) & (last_s - first_s <= LONGEST_PAIR_S)
@@ -148,14 +137,16 @@ def find_offset(
             "log; state it with --offset, or allow more with --window"
         )
     best = _refined(predicted, pairs, float(offsets[np.argmax(score)]), 2.0 * COARSE_S)
-    pairs = pairs.part(np.flatnonzero(_plausible(predicted, pairs, best)))
+    left, known, _ = _residuals(predicted, pairs, best)
+    # Those beyond five times the median residual were matched wrongly.
+    pairs = pairs.part(known & (np.abs(left) <= 5.0 * np.median(np.abs(left[known])) + 1e-6))
     best = _refined(predicted, pairs, best, COARSE_S)
     correlation = _correlations(predicted, pairs, np.array([best]))[0]
     at = int(np.argmin(np.abs(offsets - best)))
     others = _outside_peak(score, at)
     second = int(np.argmax(np.where(others, score, -np.inf))) if others.any() else None
     share = max(float(score[second] / score[at]), 0.0) if second is not None and score[at] > 0.0 else 0.0
-    evidence = (1.0 - share) * float(score[at]) * _independent_share(predicted, pairs, best)
+    evidence = (1.0 - share) * float(score[at]) if len(pairs.first_s) >= LEAST_PAIRS else 0.0
     told = {name: float(value) for name, value in zip(_QUANTITIES, correlation[0], strict=True)}
     return ClockOffset(
         offset_s=best,
@@ -235,7 +226,7 @@ def _correlations(predicted: PredictedMotion, pairs: _Pairs, offsets: Array) -> 
 def _scores(predicted: PredictedMotion, pairs: _Pairs, offsets: Array, progress: Progress = no_progress) -> Array:
     """Log-likelihood of offsets, shape (m,): Gaussian errors of unknown size in each quantity; -inf off the log."""
     size = max(1, _CELLS // max(len(pairs.first_s), 1))
-    needed = max(LEAST_PAIRS, LEAST_SHARE * len(pairs.first_s))
+    needed = max(0.5 * LEAST_PAIRS, LEAST_SHARE * len(pairs.first_s))
     out = np.full(len(offsets), -np.inf)
     for start in range(0, len(offsets), size):
         progress(start, len(offsets), "offset")
@@ -266,39 +257,16 @@ def _residuals(predicted: PredictedMotion, pairs: _Pairs, offset_s: float) -> tu
     return b - factor * a, known, float(abs(factor))
 
 
-def _plausible(predicted: PredictedMotion, pairs: _Pairs, offset_s: float) -> BoolArray:
-    """Pairs whose shift lies within five times the median residual: the others were matched wrongly."""
-    left, known, _ = _residuals(predicted, pairs, offset_s)
-    size = np.abs(left)
-    return np.asarray(known & (size <= 5.0 * np.median(size[known]) + 1e-6))
-
-
-def _independent_share(predicted: PredictedMotion, pairs: _Pairs, offset_s: float) -> float:
-    """Share of the pairs that count, by the correlation of a residual with the next."""
-    left, known, _ = _residuals(predicted, pairs, offset_s)
-    left = left[known]
-    whole = float(np.vdot(left, left).real)
-    next_to = float(np.vdot(left[:-1], left[1:]).real) / whole if whole > 0.0 else 0.0
-    return (1.0 - max(next_to, 0.0)) / (1.0 + max(next_to, 0.0))
-
-
 def _outside_peak(score: Array, at: int) -> BoolArray:
     """Offsets beyond the peak: from where the score first falls below half on either side, and two seconds further."""
-    low = high = at
-    while low > 0 and score[low] > 0.5 * score[at]:
-        low -= 1
-    while high < len(score) - 1 and score[high] > 0.5 * score[at]:
-        high += 1
-    margin = round(2.0 / COARSE_S)
-    number = np.arange(len(score))
+    number, margin = np.arange(len(score)), 2.0 / COARSE_S
+    low = number[(score < 0.5 * score[at]) & (number < at)].max(initial=0)
+    high = number[(score < 0.5 * score[at]) & (number > at)].min(initial=len(score))
     return np.asarray(((number < low - margin) | (number > high + margin)) & np.isfinite(score))
 
 
 def _jackknife(predicted: PredictedMotion, pairs: _Pairs, offset_s: float) -> float:
     """Standard deviation of the offset in s, from blocks of pairs left out in turn; at least `LEAST_SIGMA_S`."""
-    blocks = np.array_split(np.arange(len(pairs.first_s)), _BLOCKS)
-    found = np.array([
-        _refined(predicted, pairs.part(np.setdiff1d(np.arange(len(pairs.first_s)), block)), offset_s, 2 * COARSE_S)
-        for block in blocks
-    ])  # fmt: skip
+    block = np.arange(len(pairs.first_s)) * _BLOCKS // len(pairs.first_s)
+    found = np.array([_refined(predicted, pairs.part(block != k), offset_s, 2 * COARSE_S) for k in range(_BLOCKS)])
     return max(math.sqrt((_BLOCKS - 1) * float(np.mean((found - found.mean()) ** 2))), LEAST_SIGMA_S)

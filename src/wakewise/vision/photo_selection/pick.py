@@ -17,7 +17,13 @@ from wakewise.core.files import write_json, write_rows
 from wakewise.core.geometry import Pose, euler_from_quat, quat_from_matrix
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.vision.photo_selection.clock_offset import ClockOffset, find_offset, predict_motion
-from wakewise.vision.photo_selection.dive_track import DiveTrack, camera_poses, mounted_camera, poses_at
+from wakewise.vision.photo_selection.dive_track import (
+    DiveTrack,
+    InterpolatedPoses,
+    camera_poses,
+    mounted_camera,
+    poses_at,
+)
 from wakewise.vision.photo_selection.photo_times import PhotoTime, name_time, photo_times
 from wakewise.vision.photo_selection.picture_statistics import PictureStatistics, film_statistics, photo_statistics
 from wakewise.vision.photo_selection.spacing import choose_spaced, path_length
@@ -29,29 +35,14 @@ WINDOW_S = 54_000.0
 """Greatest difference of two clocks with a calendar: all time zones, and an hour more."""
 DISTANCE_M = 1.5
 """Distance to the surface where neither the log nor the user states one."""
+DEPTH_SIGMA_M, ATTITUDE_SIGMA_DEG = 0.05, 1.0
+"""Standard deviations that are assumed of a pressure gauge, and of roll, pitch and heading."""
 RULER_SHARE, WAY_STEP_S = 0.1, 0.2
 """Length of the ruler that the way is measured with, of a step; steps of time along the way."""
 _COLUMNS = (
     "name", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "roll_deg", "pitch_deg", "heading_deg", "sigma_x_m",
     "sigma_y_m", "sigma_z_m", "sigma_attitude_deg", "time_s", "altitude_m", "way_m", "sharpness",
 )  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class PositionUncertainty:
-    """Standard deviations of a log's poses where it states none: of a position, its drift as a share of the way since
-    the first photograph, depth, and attitude.
-    """
-
-    position_m: float = 0.1
-    drift_pct: float = 1.0
-    depth_m: float = 0.05
-    attitude_deg: float = 1.0
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InputError(f"uncertainty {name} {value:g}: must be a number from 0 on")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,7 +52,8 @@ class PickRequest:
     `offset_s`: to add to the camera's clock for the log's; found from motion if None. `window_s`: greatest offset that
     is tried. `interval_s`: from one photograph to the next, where nothing else says when they were taken. `X_BC`: the
     camera in the body. `distance_m`: to the surface where the log has no altitude. `field_of_view_deg`: across the
-    picture, in water; found from motion if None.
+    picture, in water; found from motion if None. `position_sigma_m` and `drift_pct` (of the way flown) are standard
+    deviations of the log's positions, where it states none.
     """
 
     every_m: float | None = 1.0
@@ -72,23 +64,24 @@ class PickRequest:
     X_BC: Pose = field(default_factory=lambda: mounted_camera(np.zeros(3), 90.0))
     distance_m: float | None = None
     field_of_view_deg: float | None = None
-    uncertainty: PositionUncertainty = field(default_factory=PositionUncertainty)
+    position_sigma_m: float = 0.1
+    drift_pct: float = 1.0
 
     def __post_init__(self) -> None:
         if (self.every_m is None) == (self.overlap_pct is None):
             raise InputError("--every and --overlap: one of them says how far apart photos are picked")
-        if self.every_m is not None and not 0.0 < self.every_m < math.inf:
-            raise InputError(f"--every {self.every_m:g}: must be a length above 0 m")
-        if self.overlap_pct is not None and not 0.0 <= self.overlap_pct <= 95.0:
-            raise InputError(f"--overlap {self.overlap_pct:g}: must be from 0 to 95 %")
-        if self.offset_s is not None and not math.isfinite(self.offset_s):
-            raise InputError(f"--offset {self.offset_s:g}: must be a finite number of seconds")
-        if not self.window_s > 0.0:
-            raise InputError(f"--window {self.window_s:g}: must be above 0 s")
-        if self.distance_m is not None and not 0.0 < self.distance_m < math.inf:
-            raise InputError(f"--distance {self.distance_m:g}: must be a length above 0 m")
-        if self.field_of_view_deg is not None and not 1.0 <= self.field_of_view_deg < 180.0:
-            raise InputError(f"--fov {self.field_of_view_deg:g}: must be from 1 to below 180 deg")
+        for option, value, low, high in (
+            ("--every", self.every_m, 1e-3, 1e4),
+            ("--overlap", self.overlap_pct, 0.0, 95.0),
+            ("--offset", self.offset_s, -1e10, 1e10),
+            ("--window", self.window_s, 1e-3, 1e10),
+            ("--distance", self.distance_m, 0.01, 1e3),
+            ("--fov", self.field_of_view_deg, 1.0, 179.0),
+            ("--position-sigma", self.position_sigma_m, 0.0, 1e3),
+            ("--drift", self.drift_pct, 0.0, 100.0),
+        ):
+            if value is not None and not low <= value <= high:
+                raise InputError(f"{option} {value:g}: must be a number from {low:g} to {high:g}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -144,13 +137,18 @@ def pick_photos(
     calendar = pictures.times[0].calendar and track.started_s is not None
     zero_s = float(track.started_s or 0.0) if calendar else pictures.times[0].time_s
     time_s = np.array([one.time_s for one in pictures.times]) - zero_s
-    distance_m = request.distance_m or DISTANCE_M
-    if request.offset_s is None:
+    offset, offset_s, sigma_s = None, request.offset_s, 0.0
+    if offset_s is None:
         window = (-request.window_s, request.window_s) if calendar else None
-        offset = _offset(track, request, time_s, pictures.statistics.motion, window, distance_m, progress)
+        predicted = predict_motion(track, request.X_BC, request.distance_m or DISTANCE_M)
+        offset = find_offset(predicted, time_s, pictures.statistics.motion, window, progress)
+        if offset.ambiguous is not None:
+            second = "" if offset.second_offset_s is None else f", next is {offset.second_offset_s:+.1f} s"
+            raise InputError(
+                f"clock offset is ambiguous: {offset.ambiguous}; best is {offset.offset_s:+.1f} s{second}; state it "
+                "with --offset, or check that the log is of this dive"
+            )
         offset_s, sigma_s = offset.offset_s, offset.sigma_s
-    else:
-        offset, offset_s, sigma_s = None, request.offset_s, 0.0
     log_s = time_s + offset_s
     poses = poses_at(track, log_s)
     if not poses.known.any():
@@ -162,15 +160,19 @@ def pick_photos(
     usable = poses.known & ~dark & ~uniform
     if not usable.any():
         raise InputError(f"{photos}: all {int(poses.known.sum())} photos within the log are dark or uniform")
-    grid_s, track_W, way = _way(track, request, log_s[poses.known])
+    first_s, last_s = log_s[poses.known][[0, -1]]
+    grid_s = np.linspace(first_s, last_s, max(int((last_s - first_s) / WAY_STEP_S), 1) + 1)
+    along = poses_at(track, grid_s)
+    # The vehicle's way: a camera ahead of it moves when it turns, too.
+    way = path_length(along.position_W_m, RULER_SHARE * (request.every_m or 0.5))
     way_of = np.interp(log_s, grid_s, way)
     unit, step = way_of, request.every_m
     if step is None:
         step = 1.0 - float(request.overlap_pct or 0.0) / 100.0
-        unit = _in_footprints(track, request, offset, pictures.statistics, grid_s, way, log_s)
+        unit = np.interp(log_s, grid_s, _in_footprints(along, request, offset, pictures.statistics, way))
     chosen = choose_spaced(unit, pictures.statistics.sharpness, usable, step)
     centres, R_WC = camera_poses(poses, request.X_BC)
-    sigma_m, sigma_deg = _sigmas(track, request.uncertainty, pictures.times, sigma_s, log_s, way_of)
+    sigma_m, sigma_deg = _sigmas(track, request, pictures.times, sigma_s, log_s, way_of)
     degrees = np.degrees(euler_from_quat(poses.q_WB))
     rows = [
         (
@@ -212,7 +214,12 @@ def pick_photos(
         "spacing_median_m": float(np.median(gaps)) if len(gaps) else None,
         "spacing_max_m": float(gaps.max()) if len(gaps) else None,
         "uncertainty_from": "the log" if track.sigma_m is not None else "assumed",
-        "uncertainty": asdict(request.uncertainty),
+        "assumed": {
+            "position_sigma_m": request.position_sigma_m,
+            "drift_pct": request.drift_pct,
+            "depth_sigma_m": DEPTH_SIGMA_M,
+            "attitude_sigma_deg": ATTITUDE_SIGMA_DEG,
+        },
         "left_out": [{"name": name, "why": why} for name, why in left_out],
     }
     return PickedPhotos(
@@ -220,7 +227,7 @@ def pick_photos(
         film=pictures.film,
         rows=rows,
         figures=figures,
-        track_W_m=track_W,
+        track_W_m=camera_poses(along, request.X_BC)[0],
         photos_W_m=centres[inside],
         chosen=np.searchsorted(inside, chosen),
     )
@@ -272,26 +279,6 @@ def _read_pictures(photos: Path, request: PickRequest, threads: int, progress: P
     return _Pictures(times=[times[k] for k in read], statistics=statistics, film=False, left_out=left_out)
 
 
-def _offset(
-    track: DiveTrack,
-    request: PickRequest,
-    time_s: Array,
-    motion: Array,
-    window: tuple[float, float] | None,
-    distance_m: float,
-    progress: Progress,
-) -> ClockOffset:
-    """The offset by motion; InputError if it is ambiguous."""
-    found = find_offset(predict_motion(track, request.X_BC, distance_m), time_s, motion, window, progress)
-    if found.ambiguous is not None:
-        second = "" if found.second_offset_s is None else f", next is {found.second_offset_s:+.1f} s"
-        raise InputError(
-            f"clock offset is ambiguous: {found.ambiguous}; best is {found.offset_s:+.1f} s{second}; state it with "
-            "--offset, or check that the log is of this dive"
-        )
-    return found
-
-
 def _told_offset(offset: ClockOffset | None, offset_s: float, sigma_s: float, *, calendar: bool) -> dict[str, Any]:
     """The offset as plain values; with calendars also in whole hours and the rest."""
     told: dict[str, Any] = {"offset_s": offset_s, "sigma_s": sigma_s, "from": "motion" if offset else "given"}
@@ -301,46 +288,34 @@ def _told_offset(offset: ClockOffset | None, offset_s: float, sigma_s: float, *,
     return told | (asdict(offset) if offset is not None else {})
 
 
-def _way(track: DiveTrack, request: PickRequest, log_s: Array) -> tuple[Array, Array, Array]:
-    """Times from the first to the last photograph, the camera's places then, shape (n, 3), and the way in m."""
-    grid_s = np.linspace(log_s[0], log_s[-1], max(int((log_s[-1] - log_s[0]) / WAY_STEP_S), 1) + 1)
-    poses = poses_at(track, grid_s)
-    # The vehicle's way, as a camera ahead of it moves when it turns, too.
-    way = path_length(poses.position_W_m, RULER_SHARE * (request.every_m or 0.5))
-    return grid_s, camera_poses(poses, request.X_BC)[0], way
-
-
 def _in_footprints(
-    track: DiveTrack,
+    along: InterpolatedPoses,
     request: PickRequest,
     offset: ClockOffset | None,
     statistics: PictureStatistics,
-    grid_s: Array,
     way: Array,
-    log_s: Array,
 ) -> Array:
-    """Way to each photograph in units of the ground that the picture's shorter side shows."""
+    """The way, shape (n,), in units of the ground that the picture's shorter side shows."""
     if request.field_of_view_deg is not None:
         focal_widths = 0.5 / math.tan(math.radians(request.field_of_view_deg / 2.0))
     elif offset is not None and offset.correlation["shift"] > 0.5:
         focal_widths = offset.focal_widths
     else:
         raise InputError("--overlap: the field of view is not known from motion; state it with --fov DEG, in water")
-    poses = poses_at(track, grid_s)
-    down = np.maximum(camera_poses(poses, request.X_BC)[1][:, 2, 2], 0.3)
-    depth = poses.altitude_m / down
+    depth = along.altitude_m / np.maximum(camera_poses(along, request.X_BC)[1][:, 2, 2], 0.3)
     good = np.isfinite(depth)
     if not good.any() and request.distance_m is None:
         raise InputError("--overlap: the log holds no altitude (rangefinder); state the distance with --distance M")
-    depth = np.interp(grid_s, grid_s[good], depth[good]) if good.any() else np.full(len(grid_s), request.distance_m)
+    number = np.arange(len(way))
+    depth = np.interp(number, number[good], depth[good]) if good.any() else np.full(len(way), request.distance_m)
     size = np.median(statistics.size_px, axis=0)
     footprint = np.maximum(depth, 0.1) / focal_widths * float(size.min() / size[0])
     steps = np.diff(way) / (0.5 * (footprint[1:] + footprint[:-1]))
-    return np.asarray(np.interp(log_s, grid_s, np.concatenate([[0.0], np.cumsum(steps)])))
+    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _sigmas(
-    track: DiveTrack, stated: PositionUncertainty, times: list[PhotoTime], sigma_s: float, log_s: Array, way: Array
+    track: DiveTrack, request: PickRequest, times: list[PhotoTime], sigma_s: float, log_s: Array, way: Array
 ) -> tuple[Array, Array]:
     """Standard deviations of positions, shape (n, 3) in m, and of the attitude, shape (n,) in deg.
 
@@ -351,8 +326,8 @@ def _sigmas(
     speed = np.abs(after.position_W_m - before.position_W_m)
     turn = np.degrees(2.0 * np.arccos(np.clip(np.abs((before.q_WB * after.q_WB).sum(axis=1)), 0.0, 1.0)))
     if track.sigma_m is None:
-        flat = np.hypot(stated.position_m, 0.01 * stated.drift_pct * way)
-        base = np.column_stack([flat, flat, np.full(len(way), stated.depth_m)])
+        flat = np.hypot(request.position_sigma_m, 0.01 * request.drift_pct * way)
+        base = np.column_stack([flat, flat, np.full(len(way), DEPTH_SIGMA_M)])
     else:
         base = np.column_stack([np.interp(log_s, track.time_s, column) for column in track.sigma_m.T])
-    return np.hypot(base, speed * late[:, None]), np.hypot(stated.attitude_deg, turn * late)
+    return np.hypot(base, speed * late[:, None]), np.hypot(ATTITUDE_SIGMA_DEG, turn * late)
