@@ -155,6 +155,12 @@ def test_an_autopilots_own_log_gives_dvl_rangefinder_and_calendar(
     assert log.series["calendar"].values[0, 0] == pytest.approx(1_659_830_400.0 + 43_200.0 - 18.0)
 
 
+def test_a_clock_that_was_set_during_the_dive_counts_as_it_was_afterwards(tmp_path: Path) -> None:
+    """A ground station whose clock jumped by 900 s after 8 s began 900 s later than it said."""
+    (tmp_path / "dive.tlog").write_bytes(made_logs.tlog(8.0, 900.0, position=True))
+    assert read_dive_log(tmp_path / "dive.tlog").started_s == pytest.approx(made_logs.START_S + 900.0, abs=0.2)
+
+
 @pytest.mark.parametrize(
     ("make", "told"),
     [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 import re
 from collections import Counter
@@ -10,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -42,15 +42,15 @@ class PhotoTime:
     step_s: float
 
 
-def exif_time(data: bytes) -> tuple[float, float] | None:
-    """Time of an encoded picture by EXIF's DateTimeOriginal, in s since 1970, and its resolution in s; None without.
+def exif_time(file: Path | BinaryIO) -> tuple[float, float] | None:
+    """Time of a picture's file by EXIF's DateTimeOriginal, in s since 1970, and its resolution in s; None without.
 
     Without OffsetTimeOriginal the clock is taken for UTC.
     """
     from PIL import Image
 
     try:
-        with Image.open(io.BytesIO(data)) as image:
+        with Image.open(file) as image:
             tags = image.getexif().get_ifd(_EXIF)
         taken = datetime.strptime(str(tags[_TAKEN]).strip("\0 "), "%Y:%m:%d %H:%M:%S")
     except (*UNREADABLE, Image.DecompressionBombError):
@@ -92,7 +92,7 @@ def photo_times(folder: Path, files: Sequence[Path], interval_s: float | None) -
             for k, name in enumerate(names)
         ], []
     for source in ("EXIF", "name"):
-        found = [exif_time(path.read_bytes()) if source == "EXIF" else name_time(path.name) for path in files]
+        found = [exif_time(path) if source == "EXIF" else name_time(path.name) for path in files]
         if sum(one is not None for one in found) >= max(2, LEAST_SHARE * len(files)):
             told = [
                 PhotoTime(name=name, time_s=one[0], source=source, calendar=True, step_s=one[1])

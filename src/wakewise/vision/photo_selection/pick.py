@@ -121,8 +121,9 @@ def check_folder(out: Path, photos: Path) -> None:
         raise InputError(f"--out {out}: a file is there, a folder is needed")
     if inside == out.resolve() or out.resolve() in inside.parents:
         raise InputError(f"--out {out}: the photos lie in it; give another folder, the originals are never changed")
-    if out.is_dir() and any(out.iterdir()) and not (out / FIGURES).is_file():
-        raise InputError(f"--out {out}: holds other files than those of `wakewise photos pick`; give another folder")
+    others = {path.name for path in out.iterdir()} - {PHOTOS, CAMERAS, FIGURES, PICTURE} if out.is_dir() else set()
+    if others:
+        raise InputError(f"--out {out}: holds {min(others)}, which would be lost; give another folder")
 
 
 def pick_photos(

@@ -13,6 +13,7 @@ from wakewise.vision.photo_selection.dive_track import DiveTrack
 from wakewise_ardusub.logs.channels import ChannelSeries, VehicleLog
 from wakewise_ardusub.logs.read import read_log
 from wakewise_ardusub.logs.table import depth_series
+from wakewise_ardusub.optional_dependencies import need
 
 RATE_HZ = 20.0
 EARTH_M = 6_371_008.8
@@ -31,6 +32,7 @@ def read_dive_log(path: Path) -> DiveTrack:
 
     Raises InputError as `wakewise_ardusub.logs.read.read_log`, or if the log holds no attitude or no positions.
     """
+    need("wakewise photos pick --log", "links", only=("pymavlink", "mcap"))
     return dive_track(read_log(path, any_vehicle=True))
 
 
@@ -125,6 +127,8 @@ def _altitude(log: VehicleLog, time_s: Array) -> Array:
 def _started(log: VehicleLog) -> float | None:
     """Time 0 of the log in s since 1970; the autopilot's own log has it from a GPS only."""
     if log.kind != "dataflash":
-        return log.started_s if log.started_s is not None and log.started_s > 1e9 else None
+        # A computer's clock that was set during the dive is right afterwards.
+        started_s = (log.started_s or 0.0) + sum(jump.step_s for jump in log.jumps)
+        return started_s if started_s > 1e9 else None
     told = _finite(log.series.get("calendar"))
     return None if told is None else float(np.median(told.values[:, 0] - told.time_s))
