@@ -59,7 +59,6 @@ _LASTS = {
     "models": "hours",
     "operator": "hours",
     "reef": "hours",
-    "survey": "an hour",
     "target": "hours",
     "worlds": "hours",
 }

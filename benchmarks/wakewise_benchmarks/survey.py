@@ -37,6 +37,8 @@ RELIEFS = ("trapezoid", "sawtooth")
 MINUTES, LINE_M, APART_M = 20.0, 20.0, 0.5
 SPEED_M_S, FASTEST_CURRENT_M_S = 0.1, 0.15
 ASKED = {"speed_rms_cm_s": 1.0, "altitude_p95_cm": 5.0, "cross_track_p95_cm": 10.0}
+SURVEYED: tuple[str, ...] = ()
+"""Losses that are injected; all if empty."""
 HOLD_S, TIME_OUT_S = 1.0, 3.0
 _LOOP_S = 0.1
 """What a loss may take longer than asked: a turn of the program and one of the autopilot."""
@@ -130,7 +132,8 @@ def loss_figures() -> dict[str, Any]:
     from wakewise_ardusub.sitl.survey_harness import BY_TIME_OUT, SURVEY_FAULTS, SurveyHarness, seconds_to_hold
 
     vehicle, found = load_vehicle(VEHICLE), dict[str, Any]()
-    for name, fault in SURVEY_FAULTS.items():
+    for name in SURVEYED or SURVEY_FAULTS:
+        fault = SURVEY_FAULTS[name]
         harness = SurveyHarness(vehicle, current=lambda _: np.array([0.05, 0.08, 0.0]))
         took_s = seconds_to_hold(harness.flying(3.0), fault)
         asked = (TIME_OUT_S if name in BY_TIME_OUT else HOLD_S) + _LOOP_S

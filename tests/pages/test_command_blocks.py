@@ -180,6 +180,10 @@ RULES: list[Run | Start | Elsewhere | Never] = [
         "--motor-test",
     ),
     Start(r"wakewise link ardusub .*", "heartbeat"),
+    Elsewhere(
+        r"wakewise link transect .*", "packages/wakewise-ardusub/tests/cli/test_link_transect_command.py", '"transect"'
+    ),
+    Elsewhere(r"wakewise bench survey.*", "benchmarks/tests/test_survey_bench.py", '"survey"'),
     Start(r"wakewise link sitl .*", "now start the firmware"),
     Start(r"wakewise link route", "shares udpin"),
     Start(r"wakewise link sitl-autopilot .*", "MANUAL"),

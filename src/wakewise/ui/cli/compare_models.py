@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import ProgressBars, answer, print_table
+from wakewise.ui.cli.console import ProgressBars, answer, print_table, write_page
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
@@ -77,8 +77,9 @@ def compare_models(
     if out is not None:
         from wakewise.ui.reports.change_map import write_change_map
 
-        write_change_map(out, found)
         write_json(out.with_suffix(".json"), figures)
+        if not write_page("picture", partial(write_change_map, out, found)):
+            out = None
     rows = [(key, found.figures[key], text) for key, text in figures["definitions"].items()]
     table = partial(print_table, "tnt", ("figure", "value", "what it is"), rows, f"{second} against {first}")
     missing = [f"scale of {name}: {reason}" for name, reason in figures["scale_unknown"].items()]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, status_line
-from wakewise.ui.cli.options import Json, Preset, ScenarioFile, Sets, Vehicle, World, overrides
+from wakewise.ui.cli.options import Json, Preset, ScenarioFile, Sets, Vehicle, World, overrides, seed_option
 
 if TYPE_CHECKING:
     from wakewise.core.arrays import Array
@@ -164,7 +164,10 @@ def sitl_autopilot(
     current: Annotated[
         float, typer.Option(metavar="M/S", min=0.0, max=0.5, help="Speed of a drawn current, with --relief.")
     ] = 0.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of relief, current and errors of sensors, with --relief.")] = 0,
+    seed: Annotated[
+        int,
+        typer.Option(callback=seed_option, help="Of relief, current and errors of sensors, with --relief."),
+    ] = 0,
     loop: Annotated[float, typer.Option(metavar="HZ", help="Loops a second.")] = 100.0,
     seconds: Seconds = None,
     json: Json = False,

@@ -74,6 +74,8 @@ def missing(facts: SurveyFacts, limits: SurveyLimits) -> str:
         return "no rangefinder that looks down (DISTANCE_SENSOR, orientation 25); an altitude needs one"
     if facts.sticks_s > limits.sticks_s:
         return "no sticks are heard (MANUAL_CONTROL): the pilot could not end it"
+    if facts.station_s > limits.station_s:
+        return "no ground station is heard (HEARTBEAT)"
     if facts.stick > 0.0:
         return "a stick is not in its middle"
     if facts.rival:

@@ -38,6 +38,7 @@ from wakewise_ardusub.link.protocol import (
     AUTOPILOT_COMPONENT,
     HEARTBEAT_PERIOD_S,
     MOST_PARAMETERS,
+    PARAMETERS_S,
     SET_MESSAGE_INTERVAL,
     parameter_request,
 )
@@ -168,7 +169,9 @@ class TransectSession:
         self._depth: DepthShaper | None = None
         self._reached = False
         self._place: tuple[Array, Array] | None = None
-        self._came = dict.fromkeys(("position", "doppler", "range", "turn", "beat", "asked", "mode", "told"), -math.inf)
+        self._came = dict.fromkeys(
+            ("position", "doppler", "range", "turn", "beat", "asked", "parameters", "mode", "told"), -math.inf
+        )
         self._history: deque[tuple[float, float, float]] = deque(maxlen=200)
         self._placed, self._takes_acceleration, self._facts = True, False, SurveyFacts(armed=None, mode=None)
         self._since_s, self._hold_mode, self._hold = clock(), GUIDED, np.zeros(3)
@@ -518,15 +521,19 @@ class TransectSession:
             self._came["beat"] = now_s
             fields = {"type": _ONBOARD, "autopilot": _NO_AUTOPILOT, "base_mode": 0, "system_status": _ACTIVE}
             self._post("heartbeat", {**fields, "custom_mode": self.known.session})
-        if now_s - self._came["asked"] < AGAIN_S or self.state in ENGAGED[1:]:
+        heard = math.isfinite(self.known.heartbeat_s)  # before that nobody is there, or no address is known
+        if not heard or self.state in ("flying", "paused"):
             return
-        self._came["asked"] = now_s
-        for number, rate_hz in _RATES_HZ.items():
-            self._command(SET_MESSAGE_INTERVAL, float(number), 1e6 / rate_hz)
-        self._command(REQUEST_MESSAGE, float(AUTOPILOT_VERSION))
         unknown = [name for name in self._motors.needs if name not in self.known.parameters]
-        for name in unknown[: 2 * MOST_PARAMETERS]:
-            self._post("param_request_read", parameter_request(self.known.system, name))
+        if unknown and now_s - self._came["parameters"] >= PARAMETERS_S:
+            self._came["parameters"] = now_s
+            for name in unknown[: 2 * MOST_PARAMETERS]:
+                self._post("param_request_read", parameter_request(self.known.system, name))
+        if now_s - self._came["asked"] >= AGAIN_S:
+            self._came["asked"] = now_s
+            for number, rate_hz in _RATES_HZ.items():
+                self._command(SET_MESSAGE_INTERVAL, float(number), 1e6 / rate_hz)
+            self._command(REQUEST_MESSAGE, float(AUTOPILOT_VERSION))
 
     def _command(self, number: int, *params: float, component: int = AUTOPILOT_COMPONENT) -> None:
         filled = (*params, *[0.0] * (7 - len(params)))
@@ -561,7 +568,8 @@ class TransectSession:
                 f"{self.state}  {self.at.flown_m:.1f} of {self.plan.line_m:.1f} m, {left / 60.0:.1f} min left, "
                 f"{self._facts.altitude_m:.2f} m above the bed, {self.photographs} photographs{waits}"
             )
-        return f"{self.state}  {self.why or self.ended_by}"
+        words = "holds its place and measures the current" if self.state == "settling" else self.why or self.ended_by
+        return f"{self.state}  {words}"
 
     def figures(self) -> dict[str, Any]:
         """Figures by the autopilot's own position and rangefinder, of cruise on lines; None where nothing was flown."""

@@ -1,0 +1,120 @@
+"""`wakewise link transect`: refusals in one line, and a flight over loopback beside the stand-in."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pymavlink", reason="the extra `links` is not installed")
+pytest.importorskip("lupa", reason="the extra `links` is not installed")
+
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.ui.cli.main import run
+from wakewise_ardusub.link.protocol import ALT_HOLD, POSHOLD
+from wakewise_ardusub.physics.physics import PulseTable
+from wakewise_ardusub.physics.surface import FreeWater
+from wakewise_ardusub.sitl.inprocess_session import ScriptedGroundStation, route_messages
+from wakewise_ardusub.sitl.sea_sensors import Relief, SeaSensors, SensorErrors
+from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
+from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics, UdpEndpoint
+from wakewise_ardusub.sitl.udp_endpoints import run as run_stand_in
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def sea() -> Iterator[tuple[SimulatedAutopilot, str]]:
+    """A stand-in with a pilot above a flat bed, in ALT_HOLD 0.9 m above it, and where it speaks to."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    sensors = SeaSensors(Relief(), SensorErrors(gaps_per_min=0.0), np.random.default_rng(0))
+    autopilot = SimulatedAutopilot({"SCR_ENABLE": 0.0}, loop_hz=50.0, sensors=sensors)
+    autopilot.set_mode(ALT_HOLD)
+    vehicle = load_vehicle("bluerov2-heavy")
+    start = BodyState(X_WB=Pose(np.array([0.0, 0.0, 4.1]), np.array([1.0, 0.0, 0.0, 0.0])))
+    behind = InProcessPhysics(body=FreeWater(vehicle, start), table=PulseTable.of(vehicle))
+    link, ended = UdpEndpoint("127.0.0.1", port, out=True), threading.Event()
+    pilot = ScriptedGroundStation(autopilot, route_messages(autopilot, [link]))
+    runner = threading.Thread(
+        target=run_stand_in,
+        args=(autopilot, behind, [link], lambda: not ended.is_set()),
+        kwargs={"turn": pilot.turn},
+    )
+    runner.start()
+    yield autopilot, f"udpin:127.0.0.1:{port}"
+    ended.set()
+    runner.join(10.0)
+    link.close()
+
+
+@pytest.mark.slow
+def test_a_short_line_is_flown_over_loopback(
+    sea: tuple[SimulatedAutopilot, str], tmp_path: Path, capsys: Capture
+) -> None:
+    """1 m at 30 cm/s with consent given beforehand: it ends in POSHOLD, with figures and a journal."""
+    autopilot, connection = sea
+    line = ["--length", "1", "--speed", "0.3", "--every", "0.5", "--gap", "3"]
+    code = run(["link", "transect", "--connection", connection, *line, "--consent", "--out", str(tmp_path), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert code == 0
+    assert told["finished"]
+    assert told["flown_m"] == pytest.approx(1.0, abs=0.02)
+    assert autopilot.mode == POSHOLD
+    assert autopilot.photographs == told["photographs"] == 2
+    assert (tmp_path / "journal.jsonl").stat().st_size > 200
+
+
+def test_an_altitude_without_a_rangefinder_is_refused(
+    sea: tuple[SimulatedAutopilot, str], tmp_path: Path, capsys: Capture
+) -> None:
+    """After the time to wait: one line, exit code 2, and the vehicle was told nothing."""
+    autopilot, connection = sea
+    autopilot.sensors.range_lost = True
+    code = run(["link", "transect", "--connection", connection, "--consent", "--wait", "6", "--out", str(tmp_path)])
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert code == 2
+    assert "survey not begun within 6 s: no rangefinder that looks down" in said
+    assert autopilot.mode == ALT_HOLD
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--altitude", "nan"], "--altitude nan: must be from 0.4 to 10"),
+        (["--altitude", "0.2"], "--altitude 0.2"),
+        (["--speed", "0.5"], "--speed 0.5: must be from 0.05 to 0.3"),
+        (["--length", "nan"], "a length of nan m"),
+        (["--area", "4"], "must be WIDTHxLENGTH"),
+        (["--area", "4x20", "--length", "3"], "give one of them"),
+        (["--area", "4x20", "--spacing", "0"], "--spacing 0"),
+        (["--heading", "up"], "--heading 'up': must be degrees"),
+        (["--current", "fast"], "--current 'fast'"),
+        (["--camera", "film"], "must be mavlink or digicam"),
+        (["--gap", "60"], "--gap 60: must be from 0.3 to 5"),
+        (["--every", "nan"], "--every nan"),
+        (["--map", "utm.geojson"], "another projection"),
+        (["--map", "none.geojson"], "No such file"),
+        (["--connection", "udp:1"], "--connection"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(
+    options: list[str], words: str, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit code 2 before anything is connected, and nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    line = {"type": "LineString", "coordinates": [[500000.0, 3740000.0], [500010.0, 3740000.0]]}
+    (tmp_path / "utm.geojson").write_text(json.dumps(line))
+    assert run(["link", "transect", *options]) == 2
+    said = capsys.readouterr().err.strip()
+    assert words in said
+    assert len(said.splitlines()) == 1
+    assert not (tmp_path / "runs").exists()
