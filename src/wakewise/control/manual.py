@@ -30,6 +30,7 @@ from wakewise.control.operator_model import (
     sample_operator,
     steer,
 )
+from wakewise.control.operator_population import POPULATION, OperatorPopulation
 from wakewise.control.pid import Pid, PidState, make_pid
 from wakewise.control.pipeline import Demand, MotionStage, Pipeline, PipelineState
 from wakewise.control.settings import ControlSettings
@@ -135,14 +136,20 @@ def manual(
     wake: WakeModel,
     settings: ControlSettings,
     _: Surroundings | None = None,
+    *,
+    name: str = "manual",
+    people: OperatorPopulation = POPULATION,
 ) -> Pipeline:
-    """`manual`: the person whom the trial's seed draws; the wake model is only asked what D the thrusts cause."""
+    """`manual`: the person whom the trial's seed draws; the wake model is only asked what D the thrusts cause.
+
+    A seed draws the same person of other `people`, but for the ranges in which these differ.
+    """
     pid, layout = make_pid(vehicle, settings), vehicle_layout(vehicle)
     motion = ManualStage(
-        person=sample_operator(settings.operator_seed or 0, vehicle_sticks(vehicle, pid)),
+        person=sample_operator(settings.operator_seed or 0, vehicle_sticks(vehicle, pid), people),
         pid=pid,
         X_BC=vehicle.X_BC,
         middle_W_m=np.average(region.points_W_m, axis=0, weights=region.weights),
     )
     allocator = least_thrust_allocator(layout, vehicle, region, wake, settings)
-    return Pipeline(name="manual", layout=layout, motion=motion, allocator=allocator)
+    return Pipeline(name=name, layout=layout, motion=motion, allocator=allocator)

@@ -15,6 +15,7 @@ plan. The rest of a method is its settings:
 | `linear` | MPC | null space, gentle | believes in the `linear` wake model (an ablation) |
 | `pseudo-inverse` | MPC | least thrusts | the wrenches of `wake-aware` (an ablation) |
 | `manual` | person and autopilot | least thrusts | see `manual.py` |
+| `manual-careful` | the same | the same | the pilot gain of survey pilots, 20 to 30 % |
 | `ardusub` | ArduSub's loops | ArduSub's mixer | see `ardusub.py` |
 """
 
@@ -40,6 +41,7 @@ from wakewise.control.null_space_allocation import (
     least_thrust_allocator,
     vehicle_layout,
 )
+from wakewise.control.operator_population import CAREFUL
 from wakewise.control.pid import make_pid
 from wakewise.control.pipeline import Pipeline, TrackingStage
 from wakewise.control.settings import ControlSettings
@@ -201,6 +203,7 @@ MAKERS: dict[str, Maker] = {
     "no-forward-jets": partial(tracking, name="no-forward-jets", layout=bow_layout),
     "weighted-pseudo-inverse": weighted,
     "manual": manual,
+    "manual-careful": partial(manual, name="manual-careful", people=CAREFUL),
     "ardusub": ardusub,
     "pseudo-inverse": partial(mpc, name="pseudo-inverse", least=True),
     "mpc": unaware,

@@ -15,6 +15,8 @@ PLANNING = frozenset({"pseudo-inverse", "mpc", "mpc-smooth", "linear", "wake-awa
 """Methods of ours with a plan."""
 MITIGATION_METHODS = frozenset({"pseudo-inverse", "linear", "allocation-only", "wake-aware"})
 """Methods of ours with null-space allocation; with a plan, `null_space` turns all of it off but the bed."""
+BY_HAND = frozenset({"manual", "manual-careful"})
+"""Methods of ours in which a modelled person flies."""
 _NEED_NULL_SPACE = ("merging_jets", "advection", "power_limit")
 
 
@@ -41,7 +43,7 @@ def ineffective_settings(scenario: Scenario, vehicle: Vehicle) -> tuple[str, ...
                 found.append(f"control.obstacles: not kept clear of by {method}, which does not plan")
             if control.plan != PlanSettings():
                 found.append(f"control.plan: nothing for {method}, which does not plan")
-        if control.operator_seed is not None and method != "manual" and scenario.pilot not in ("human", "assisted"):
+        if control.operator_seed is not None and method not in BY_HAND and scenario.pilot not in ("human", "assisted"):
             found.append(f"control.operator_seed: nobody flies {method} by hand with the pilot {scenario.pilot}")
     if control.pulse_s is not None and vehicle.thrust_steps is None:
         found.append(f"control.pulse_s: the thrusters of {vehicle.name} hold any thrust, so none is sent as pulses")

@@ -294,6 +294,7 @@ APPROACHES: dict[str, dict[str, Any]] = {
 COMPARED = (
     "dp",
     "manual",
+    "manual-careful",
     "ardusub",
     "no-forward-jets",
     "weighted-pseudo-inverse",
@@ -331,11 +332,12 @@ def _asked(world: str) -> tuple[str, ...]:
 VARIANTS = ("mpc", "linear", "six thrusters")
 """Methods of the ablation; the whole is `wake-aware`."""
 _FLOWN = (PUMP_TANK, TROUBLE, PAPER)
-_STATION_METHODS = ("manual", "dp-paper", "dp", "weighted-pseudo-inverse", "mpc", "mpc-smooth", "wake-aware")
+_BY_HAND = ("manual", "manual-careful")
+_STATION_METHODS = (*_BY_HAND, "dp-paper", "dp", "weighted-pseudo-inverse", "mpc", "mpc-smooth", "wake-aware")
 
 TABLE: dict[str, TableDefinition] = {
     "dynamic": TableDefinition(
-        methods=ORDER,
+        methods=(*_BY_HAND, *ORDER[1:]),
         worlds=(PUMP_TANK, TROUBLE, SHELTERED),
         targets=_corals,
         task=_scan,

@@ -114,6 +114,7 @@ def only_name(name: str) -> str:
 METHODS = (
     "dp",
     "manual",
+    "manual-careful",
     "no-forward-jets",
     "weighted-pseudo-inverse",
     "ardusub",

@@ -39,6 +39,7 @@ from wakewise_paper.world_study.lattice_comparison import JUDGED, judge_table, j
 METHODS = (
     "dp",
     "manual",
+    "manual-careful",
     "ardusub",
     "mpc",
     "mpc-smooth",
