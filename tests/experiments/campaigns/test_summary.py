@@ -2,8 +2,9 @@
 
 import pytest
 
+from wakewise.experiments.campaigns.definition import CampaignPlan, PlanEntry
 from wakewise.experiments.campaigns.summary import summarize, worst_trials
-from wakewise.experiments.campaigns.table import ComparisonMetric
+from wakewise.experiments.campaigns.table import ComparisonMetric, Results, TrialRecord, status
 
 RMSE = ComparisonMetric("rmse_mm", "mm RMSE", 1.0, True)
 
@@ -60,3 +61,17 @@ def test_twenty_pairs_are_no_longer_preliminary():
         place(who, k, 1.0 + 0.1 * ((k + (who == "b")) % 2) - 0.001 * (who == "a")) for k in range(1, 21) for who in "ab"
     ]
     assert summarize(RMSE, "pump-tank", mixed).sure == "not told apart"
+
+
+def test_a_trial_that_several_rows_share_counts_once():
+    """Two rows of one key are one trial, with its attempts counted once."""
+
+    def record(key, state="done"):
+        entry = PlanEntry(key=key, name=key, factors={})
+        return TrialRecord(entry=entry, state=state, figures={}, reason=None, attempts=2, took_s=4.0)
+
+    plan = CampaignPlan(name="shared", campaign={}, wakewise="0", sources="0", trials=())
+    made = (record("a"), record("a"), record("b", "failed"), record("b", "failed"), record("c", "waiting"))
+    told = status(Results(plan=plan, made=made, drivers=0, others=0))
+    assert [told[name] for name in ("trials", "done", "failed", "waiting", "attempts")] == [3, 1, 1, 1, 6]
+    assert len(told["failures"]) == 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -101,22 +101,23 @@ def results(folder: Path) -> Results:
 
 
 def status(found: Results) -> dict[str, Any]:
-    """How many trials are where, and why those failed that did."""
-    took = [one.took_s for one in found.made if one.state == "done"]
+    """How many trials are where, and why those failed that did; a trial that several rows share counts once."""
+    distinct = replace(found, made=tuple({one.entry.key: one for one in found.made}.values()))
+    took = [one.took_s for one in distinct.made if one.state == "done"]
     return {
         "name": found.plan.name,
-        "trials": len(found.made),
-        "done": found.count("done"),
-        "failed": found.count("failed"),
-        "running": found.count("running"),
-        "waiting": found.count("waiting"),
-        "attempts": sum(one.attempts for one in found.made),
+        "trials": len(distinct.made),
+        "done": distinct.count("done"),
+        "failed": distinct.count("failed"),
+        "running": distinct.count("running"),
+        "waiting": distinct.count("waiting"),
+        "attempts": sum(one.attempts for one in distinct.made),
         "others": found.others,
         "drivers": found.drivers,
         "trial_s": float(np.mean(took)) if took else None,
         "wakewise": found.plan.wakewise,
         "sources": found.plan.sources,
-        "failures": failures(found),
+        "failures": failures(distinct),
         "why": {} if took else {"trial_s": "no trial is finished"},
     }
 
