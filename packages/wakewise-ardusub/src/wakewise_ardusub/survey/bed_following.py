@@ -22,6 +22,8 @@ GATE_M = 0.25
 AGREE_M, AGREE = 0.15, 4
 _HUBER_M = 0.02
 _ROUNDS = 3
+_BRAKES = 0.8
+"""Share of the largest acceleration that a way is planned to end with."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +78,7 @@ class DepthShaper:
     depth_m: float
     speed_m_s: float = 0.0
     acceleration_m_s2: float = 0.0
-    fastest_m_s: float = 0.12
+    fastest_m_s: float = 0.25
     most_m_s2: float = 0.15
     bandwidth_rad_s: float = 2.5
 
@@ -84,7 +86,10 @@ class DepthShaper:
         """The target one step later, on its way to a depth that moves with a speed."""
         w, most = self.bandwidth_rad_s, self.fastest_m_s
         ahead = min(max(speed_m_s, -most), most)
-        asked = w * w * (depth_m - self.depth_m) + 2.0 * w * (ahead - self.speed_m_s)
+        gap_m = depth_m - self.depth_m
+        stops = math.sqrt(2.0 * _BRAKES * self.most_m_s2 * abs(gap_m))  # else a long way ends beyond its target
+        nearing = min(max(0.5 * w * gap_m, -stops), stops)
+        asked = 2.0 * w * (ahead + nearing - self.speed_m_s)
         speed = self.speed_m_s + dt_s * min(max(asked, -self.most_m_s2), self.most_m_s2)
         speed = min(max(speed, -most), most)
         return replace(
