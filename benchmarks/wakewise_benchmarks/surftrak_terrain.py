@@ -1,6 +1,6 @@
 """Bed following beside ArduSub's own: the terrains and results of the public project on SURFTRAK.
 
-github.com/clydemcqueen/ardusub_surftrak (MIT), commit 7a85f52, flew ArduSub's real firmware in simulation over a terrain
+github.com/clydemcqueen/ardusub_surftrak (MIT), commit 7a85f52, flew ArduSub's real firmware in simulation over terrain
 that is replayed in time: a trapezoid of 5 m and a sawtooth of 1 m, faces of 0.2 m/s, 20 m deep, rangefinder noise 5 cm,
 delay 0.3 s. Here the same bed passes under a survey at 0.1 m/s, with the simulated autopilot in place of the firmware.
 Its results are figures over all rows of results/sitl/surftrak/TERRAIN/stamped_terrain.csv: the vehicle's height above
