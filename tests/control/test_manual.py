@@ -16,10 +16,10 @@ CENTRE = np.array([0.0, 0.0, 1.4])
 EYE = np.array([-0.7, 0.0, 1.4])
 
 
-def controller(seed=1, shift=(0.0, 0.0, 0.0)):
+def controller(seed=1, shift=(0.0, 0.0, 0.0), method="manual"):
     points = CENTRE + np.array(shift) + np.random.default_rng(0).uniform(-0.1, 0.1, (60, 3))
     region = Region(points_W_m=points, weights=np.ones(60), distance_m=np.zeros(60))
-    return make_controller("manual", VEHICLE, region, wake_model("jet"), ControlSettings(operator_seed=seed))
+    return make_controller(method, VEHICLE, region, wake_model("jet"), ControlSettings(operator_seed=seed))
 
 
 def commands(hand, estimates, goals):
@@ -108,3 +108,19 @@ def test_a_hover_is_flown_by_hand():
         assert flight.figures["collisions"] == 0 and flight.figures["fallbacks"] == 0
         off[method] = flight.figures["position_rmse_mm"]
     assert off["dp"] < 20.0 < off["manual"] < 200.0
+
+
+def test_a_careful_pilot_is_the_same_person_at_a_survey_pilots_gain():
+    """Seed by seed all but the gain is the same; the gain is 0.2 to 0.3, and the finest push goes with it."""
+    for seed in range(1, 6):
+        usual, careful = (controller(seed, method=name).motion.person for name in ("manual", "manual-careful"))
+        assert 0.25 <= usual.gain <= 0.5 and 0.2 <= careful.gain <= 0.3
+        assert careful.gain * careful.stick_step <= usual.gain * usual.stick_step
+        for name in ("delay_s", "video_s", "remnant", "attended", "pace", "trim_s", "stick_step", "drift_s"):
+            assert getattr(careful, name) == getattr(usual, name), name
+        np.testing.assert_array_equal(careful.crossover_rad_s, usual.crossover_rad_s)
+
+
+def test_the_pipeline_of_a_careful_pilot_has_its_name():
+    """Tables tell the two apart."""
+    assert controller(method="manual-careful").name == "manual-careful"

@@ -115,8 +115,8 @@ class ControlSettings(Settings):
     operator_seed: int | None = Field(
         default=None,
         ge=0,
-        description="who flies `manual`, or is the pilot `human` or `assisted`, by number; none = the one whom the "
-        "trial's seed draws",
+        description="who flies `manual` or `manual-careful`, or is the pilot `human` or `assisted`, by number; "
+        "none = the one whom the trial's seed draws",
     )
 
     def without_attitude_optimization(self) -> ControlSettings:

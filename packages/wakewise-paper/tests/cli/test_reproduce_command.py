@@ -18,7 +18,14 @@ def made(monkeypatch, tmp_path):
 
     def campaign(tasks, folder, engine, **options):
         rivals = {"wakewise_paper.dp_paper:make_dp_paper": 0.025, "weighted-pseudo-inverse": 0.01}
-        wash = rivals | {"manual": 0.03, "dp": 0.02, "mpc": 0.02, "mpc-smooth": 0.018, "wake-aware": 0.005}
+        wash = rivals | {
+            "manual": 0.03,
+            "manual-careful": 0.028,
+            "dp": 0.02,
+            "mpc": 0.02,
+            "mpc-smooth": 0.018,
+            "wake-aware": 0.005,
+        }
         fields = [task.settings["scenario"] for task in tasks]
         return [
             TrialOutcome(

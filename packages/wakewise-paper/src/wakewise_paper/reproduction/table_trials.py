@@ -341,7 +341,7 @@ TABLE: dict[str, TableDefinition] = {
         worlds=(PUMP_TANK, TROUBLE, SHELTERED),
         targets=_corals,
         task=_scan,
-        block_s=400.0,
+        block_s=500.0,
         weight=4.0,
         every_third=(TROUBLE, SHELTERED),
     ),
@@ -359,7 +359,7 @@ TABLE: dict[str, TableDefinition] = {
         worlds=_FLOWN,
         targets=_own,
         task=_station,
-        block_s=150.0,
+        block_s=170.0,
         weight=3.0,
         every_third=(TROUBLE, PAPER),
     ),
@@ -409,7 +409,7 @@ TABLE: dict[str, TableDefinition] = {
         has_targets=False,
     ),
     "comparison": TableDefinition(
-        methods=(*COMPARED, *APPROACHES), worlds=(TROUBLE,), targets=_own, task=_compared, block_s=170.0
+        methods=(*COMPARED, *APPROACHES), worlds=(TROUBLE,), targets=_own, task=_compared, block_s=178.0
     ),
 }
 assert set(TABLE) == set(TABLES)
