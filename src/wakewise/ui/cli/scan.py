@@ -41,7 +41,7 @@ def scan(
     method: Annotated[
         str | None,
         typer.Option(
-            help="dp, no-forward-jets, weighted-pseudo-inverse, manual, ardusub, pseudo-inverse, "
+            help="dp, no-forward-jets, weighted-pseudo-inverse, manual, manual-careful, ardusub, pseudo-inverse, "
             "mpc, mpc-smooth, linear, allocation-only, "
             "wake-aware, a plug-in, or package.module:make."
         ),
