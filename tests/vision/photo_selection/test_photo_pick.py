@@ -5,16 +5,20 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+import struct
+from datetime import UTC, datetime
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from made_dive import Dive, dive, write_photos, write_table
+from made_dive import START_S, Dive, dive, write_photos, write_table
+from PIL import Image
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.main import run
 from wakewise.vision.photo_selection.dive_track import read_track, read_track_table
+from wakewise.vision.photo_selection.pick import PickRequest, pick_photos
 from wakewise.vision.reconstruction import read_reference_cameras
 
 OFFSET_S = 7204.3
@@ -149,6 +153,14 @@ def test_photographs_without_a_time_need_an_interval(
         (["empty", "--log", "dive.csv"], "at least 2"),
         (["dark", "--log", "dive.csv", "--offset", "7204.3"], "dark"),
         (["few", "--log", "dive.csv"], "--offset"),
+        (["PHOTOS", "--log", "mm.csv"], "must be in metres"),
+        (["PHOTOS", "--log", "ms.csv"], "must be in seconds"),
+        (["PHOTOS", "--log", "up.csv"], "z_m must rise with depth"),
+        (["PHOTOS", "--log", "below.csv"], "line 2: altitude_m -1"),
+        (["PHOTOS", "--log", "still.csv"], "holds no motion"),
+        (["PHOTOS", "--log", "dive.csv", "--every", "50"], "shorter than a step"),
+        (["PHOTOS", "--log", "dive.csv", "--camera-at", "nan", "0", "0"], "--camera-at nan 0 0"),
+        (["PHOTOS", "--log", "dive.csv", "--interval", "1.05"], "--interval or the camera's clock is wrong"),
     ],
 )
 def test_bad_input_is_told_in_one_line(
@@ -158,6 +170,7 @@ def test_bad_input_is_told_in_one_line(
     (here / "empty").mkdir(exist_ok=True)
     header = (here / "dive.csv").read_text().splitlines()[0]
     (here / "short.csv").write_text(header + "\n")
+    _bad_tables(here)
     (here / "words.csv").write_text(f"{header}\n0,a,0,0,0,0,0,\n")
     (here / "qgc.csv").write_text('Timestamp,roll,pitch,heading,altitudeRelative\n"2022-08-15 10:16:17.386",1,2,3,4\n')
     for name, numbers in (("few", range(5)), ("dark", (10, 11))):
@@ -167,11 +180,61 @@ def test_bad_input_is_told_in_one_line(
     assert told in _refused(capsys, *words)
 
 
+def _bad_tables(here: Path) -> None:
+    """The dive in millimetres, in milliseconds, with z up, with an altitude below 0, and without motion."""
+    with (here / "dive.csv").open() as file:
+        header, *rows = list(csv.reader(file))
+    changes = {
+        "mm": lambda t, x, y, z, *rest: [t, 1e3 * x, 1e3 * y, 1e3 * z, *rest],
+        "ms": lambda t, *rest: [1e3 * t, *rest],
+        "up": lambda t, x, y, z, *rest: [t, x, y, -z, *rest],
+        "below": lambda *row: [*row[:-1], -1.0],
+        "still": lambda t, *rest: [t, 0, 0, 0, 0, 0, 0, 1],
+    }
+    for name, change in changes.items():
+        lines = [",".join(f"{value:.6f}" for value in change(*map(float, row))) for row in rows]
+        (here / f"{name}.csv").write_text("\n".join([",".join(header), *lines]))
+
+
+def test_a_clock_that_was_set_in_the_dive_is_named(here: Path, made: Dive, capsys: pytest.CaptureFixture[str]) -> None:
+    """Summer time begins in the photographs' names: a warning counts those outside the log, and says since when."""
+    (here / "summer").mkdir(exist_ok=True)
+    for k, path in enumerate(sorted((here / "PHOTOS").iterdir())):
+        at = datetime.fromtimestamp(START_S + 3.0 + k + (3600.0 if k >= 50 else 0.0), tz=UTC)
+        shutil.copy(path, here / "summer" / at.strftime("%Y-%m-%d %H.%M.%S.jpg"))
+    for path in (here / "summer").iterdir():
+        Image.open(path).convert("RGB").save(path, exif=b"")
+    assert run(["photos", "pick", "summer", "--log", "dive.csv", "--out", "out"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    last = datetime.fromtimestamp(START_S + 52.0, tz=UTC).strftime("%H.%M.%S.jpg")
+    assert "warning: 34 photos lie outside the log" in told and last in told
+
+
+def test_a_film_of_variable_frame_rate_keeps_its_own_times(here: Path, made: Dive) -> None:
+    """After 20 s every second frame is missing, which only the file's table of times says; the begin is found."""
+    times = [*np.arange(21.0, 41.0, 0.1), *np.arange(41.0, 61.0, 0.2)]
+    film = cv2.VideoWriter("vfr.mp4", cv2.VideoWriter_fourcc(*"mp4v"), 10.0, (320, 240))
+    for at in times:
+        film.write(cv2.cvtColor(made.picture(float(at)), cv2.COLOR_GRAY2BGR))
+    film.release()
+    data = bytearray((here / "vfr.mp4").read_bytes())
+    at = data.index(b"stts")
+    entries, count, ticks = struct.unpack(">III", data[at + 8 : at + 20])
+    assert (entries, count) == (1, 300)
+    data[at + 8 : at + 20] = struct.pack(">IIIII", 2, 200, ticks, 100, 2 * ticks)
+    for box in (b"moov", b"trak", b"mdia", b"minf", b"stbl", b"stts"):
+        at = data.index(box) - 4
+        data[at : at + 4] = struct.pack(">I", struct.unpack(">I", data[at : at + 4])[0] + 8)
+    (here / "vfr.mp4").write_bytes(data)
+    found = pick_photos(here / "vfr.mp4", read_track(here / "dive.csv"), PickRequest())
+    assert found.figures["offset"]["offset_s"] == pytest.approx(21.0, abs=0.1)
+
+
 def test_a_folder_with_other_files_is_left_alone(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """--out may be neither the folder of the photographs, nor one above it, nor one that holds anything else."""
+    """--out may be neither the folder of the photographs, nor one above or in it, nor one that holds anything else."""
     (here / "other").mkdir(exist_ok=True)
     (here / "other" / "thesis.txt").write_text("years of work")
-    for out in ("PHOTOS", ".", "other", "dive.csv"):
+    for out in ("PHOTOS", ".", "PHOTOS/picked", "other", "dive.csv"):
         assert run(["photos", "pick", "PHOTOS", "--log", "dive.csv", "--out", out]) == 2
         assert f"--out {out}" in capsys.readouterr().err
     assert (here / "other" / "thesis.txt").read_text() == "years of work"
@@ -188,5 +251,5 @@ def test_a_table_of_poses_may_state_its_uncertainty(tmp_path: Path, made: Dive) 
     (tmp_path / "bare.csv").write_text("\n".join([lines[0], *(f"{k},{k},0,0,0,0,0," for k in range(3))]))
     assert read_track(tmp_path / "bare.csv").started_s is None
     (tmp_path / "back.csv").write_text("\n".join([lines[0], "1,0,0,0,0,0,0,", "0,0,0,0,0,0,0,"]))
-    with pytest.raises(InputError, match="rising"):
+    with pytest.raises(InputError, match=r"line 3: time_s 0 after 1: times must rise"):
         read_track(tmp_path / "back.csv")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import ProgressBars, answer, print_table, write_page
 from wakewise.ui.cli.options import Json
 
@@ -158,6 +159,8 @@ def _camera(vehicle: str | None, at: tuple[float, float, float] | None, tilt: fl
     from wakewise.robot.vehicles import load_vehicle
     from wakewise.vision.photo_selection.dive_track import mounted_camera
 
+    if at is not None and not (np.isfinite(at).all() and np.abs(at).max() <= 100.0):
+        raise InputError(f"--camera-at {' '.join(f'{x:g}' for x in at)}: must be numbers from -100 to 100 m")
     mount = mounted_camera(np.zeros(3), 90.0) if vehicle is None else load_vehicle(vehicle).X_BC
     if tilt is not None:
         mount = mounted_camera(mount.p_m, tilt)
@@ -175,6 +178,10 @@ def _lines(figures: dict[str, Any]) -> list[str]:
     said = f"clock offset {offset['offset_s']:+.2f} s, {said}"
     if abs(offset.get("whole_hours", 0)) >= 1:
         said += f" (whole hours {offset['whole_hours']:+d}, rest {offset['rest_s']:+.2f} s)"
+    outside = figures["counts"].get("outside_the_log", 0)
+    if outside:
+        said += f"\nwarning: {outside} photos lie outside the log; the longest pause of their clock is "
+        said += f"{figures['longest_pause_s']:.0f} s after {figures['longest_pause_after']} (was it set in the dive?)"
     lines = [said, f"positions from {figures['positions_from']}, times from {figures['times_from']}"]
     if figures["spacing_median_m"] is not None:
         lines.append(

@@ -32,6 +32,8 @@ LEAST_PAIRS, LEAST_SHARE = 10, 0.5
 LEAST_CORRELATION, LEAST_SHIFT, HIGHEST_SECOND, LEAST_EVIDENCE = 0.4, 0.3, 0.7, 6.0
 """An offset is ambiguous if no quantity correlates so much, or the shift alone so much, the second peak's
 log-likelihood is a larger share of the best one's, or it is not less by so much."""
+MOST_DRIFT_S = 0.5
+"""An offset is also ambiguous if its standard deviation, or its change from half to half of the dive, is larger."""
 LEAST_SIGMA_S = 0.02
 """The standard deviation is not below this, to which the model of the motion was found to be good."""
 _BLOCKS, _COARSE_PAIRS, _CELLS = 8, 800, 400_000
@@ -131,11 +133,14 @@ def find_offset(
     offsets: Array = COARSE_S * np.arange(math.ceil(low / COARSE_S), math.floor(high / COARSE_S) + 1.0)
     thin = pairs.part(np.unique(np.linspace(0, len(pairs.first_s) - 1, _COARSE_PAIRS).astype(int)))
     score = _scores(predicted, thin, offsets, progress)
-    if not (score > 0.0).any():
+    if not np.isfinite(score).any():
         raise InputError(
             "photos and log do not overlap in time: with no allowed clock offset are half of the photos within the "
-            "log; state it with --offset, or allow more with --window"
+            f"log (photos last {time_s[-1] - time_s[0]:.0f} s, the log {predicted.last_s - predicted.first_s:.0f} s); "
+            "state it with --offset, or allow more with --window"
         )
+    if not (score > 0.0).any():
+        raise InputError("log: holds no motion like that of the photos; is it of this dive, and did the vehicle move?")
     best = _refined(predicted, pairs, float(offsets[np.argmax(score)]), 2.0 * COARSE_S)
     left, known, _ = _residuals(predicted, pairs, best)
     # Those beyond five times the median residual were matched wrongly.
@@ -148,20 +153,31 @@ def find_offset(
     share = max(float(score[second] / score[at]), 0.0) if second is not None and score[at] > 0.0 else 0.0
     evidence = (1.0 - share) * float(score[at]) if len(pairs.first_s) >= LEAST_PAIRS else 0.0
     told = {name: float(value) for name, value in zip(_QUANTITIES, correlation[0], strict=True)}
+    sigma_s = _jackknife(predicted, pairs, best)
+    half = pairs.first_s > np.median(pairs.first_s)
+    begin, end = (_refined(predicted, pairs.part(side), best, 4.0 * MOST_DRIFT_S) for side in (~half, half))
+    drift = f"it goes from {begin:+.1f} s in the first half to {end:+.1f} s in the second (standard deviation "
+    drift += f"{sigma_s:.1f} s): --interval or the camera's clock is wrong"
+    drifts = max(abs(end - begin), sigma_s) > MOST_DRIFT_S
     return ClockOffset(
         offset_s=best,
-        sigma_s=_jackknife(predicted, pairs, best),
+        sigma_s=sigma_s,
         pairs=len(pairs.first_s),
         correlation=told,
         second_offset_s=None if second is None else float(offsets[second]),
         second_share=share,
         focal_widths=_residuals(predicted, pairs, best)[2],
-        ambiguous=_doubt(told, share, evidence),
+        ambiguous=_doubt(told, share, evidence, len(pairs.first_s)) or (drift if drifts else None),
     )
 
 
-def _doubt(correlation: dict[str, float], share: float, evidence: float) -> str | None:
+def _doubt(correlation: dict[str, float], share: float, evidence: float, count: int) -> str | None:
     best = max(correlation.values())
+    for quantity, wrong in (("rotation", "heading must rise clockwise"), ("scale", "z_m must rise with depth")):
+        if correlation[quantity] < -max(LEAST_CORRELATION, 4.0 / math.sqrt(max(count, 1))):  # four sigmas of chance
+            return (
+                f"the {quantity} of the photos is against the log's (correlation {correlation[quantity]:.2f}); {wrong}"
+            )
     if best < LEAST_CORRELATION:
         return f"the motion in the photos is not that of the log (correlation {best:.2f} at best)"
     if share > HIGHEST_SECOND:
@@ -220,7 +236,7 @@ def _correlations(predicted: PredictedMotion, pairs: _Pairs, offsets: Array) -> 
         # Below a thousandth of a width or of a radian nothing moved.
         moved = (spread_a > 1e-8) & (spread_b > 1e-8)
         columns.append(np.where(moved, size / np.sqrt(np.where(moved, spread_a * spread_b, 1.0)), 0.0))
-    return np.clip(np.column_stack(columns), 0.0, 0.9999), count
+    return np.clip(np.column_stack(columns), -0.9999, 0.9999), count
 
 
 def _scores(predicted: PredictedMotion, pairs: _Pairs, offsets: Array, progress: Progress = no_progress) -> Array:
@@ -231,7 +247,7 @@ def _scores(predicted: PredictedMotion, pairs: _Pairs, offsets: Array, progress:
     for start in range(0, len(offsets), size):
         progress(start, len(offsets), "offset")
         correlation, count = _correlations(predicted, pairs, offsets[start : start + size])
-        gain = -0.5 * count * (np.log1p(-(correlation**2)) @ np.array([2.0, 1.0, 1.0]))
+        gain = -0.5 * count * (np.log1p(-(np.maximum(correlation, 0.0) ** 2)) @ np.array([2.0, 1.0, 1.0]))
         out[start : start + size] = np.where(count >= needed, gain, -np.inf)
     return out
 

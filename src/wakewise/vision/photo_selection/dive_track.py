@@ -22,6 +22,8 @@ LONGEST_GAP_S = 2.0
 """Poses are interpolated across gaps up to this."""
 SINCE_1970_S = 1e8
 """Times of a table above this are seconds since 1970, those below are of a clock of their own."""
+LATEST_S, FASTEST_M_S = 1e10, 20.0
+"""Later times are not in seconds. Faster positions, in the median while the vehicle moves, are not in metres."""
 _POSE = ("time_s", "x_m", "y_m", "z_m", "roll_deg", "pitch_deg", "heading_deg")
 _SIGMAS = ("sigma_x_m", "sigma_y_m", "sigma_z_m")
 _NEEDED = f"a table with columns {', '.join(_POSE)}, optionally altitude_m and {', '.join(_SIGMAS)}"
@@ -147,10 +149,23 @@ def read_track_table(path: Path) -> DiveTrack:
             raise InputError(f"{where}: {', '.join(_POSE)} must be numbers") from None
         if not np.isfinite([*values, *sigma]).all():
             raise InputError(f"{where}: {', '.join(_POSE)} must be finite numbers")
+        if height <= 0.0:
+            raise InputError(f"{where}: altitude_m {height:g}: must be above 0 (m above the bed), or empty if unknown")
+        if rows and values[0] <= rows[-1][0]:
+            raise InputError(f"{where}: time_s {values[0]:.12g} after {rows[-1][0]:.12g}: times must rise")
         rows.append([*values, height, *sigma])
     if len(rows) < 2:
         raise InputError(f"{path}: holds {len(rows)} poses, at least 2 are needed")
     table = np.array(rows)
+    if table[-1, 0] > LATEST_S:
+        raise InputError(f"{path}: time_s {table[-1, 0]:.3g}: must be in seconds, it is in milliseconds or less")
+    speed = np.linalg.norm(np.diff(table[:, 1:4], axis=0), axis=1) / np.diff(table[:, 0])
+    fast = float(np.median(speed[speed > 0.0])) if (speed > 0.0).any() else 0.0
+    if fast > FASTEST_M_S:
+        raise InputError(
+            f"{path}: x_m, y_m, z_m move at {fast:.3g} m/s (median), at most {FASTEST_M_S:g} can be: they must be in "
+            "metres, time_s in seconds"
+        )
     started = float(table[0, 0]) if table[0, 0] > SINCE_1970_S else None
     roll, pitch, heading = np.radians(table[:, 4:7]).T
     return DiveTrack(

@@ -119,8 +119,10 @@ def check_folder(out: Path, photos: Path) -> None:
     inside = photos.resolve()
     if out.exists() and not out.is_dir():
         raise InputError(f"--out {out}: a file is there, a folder is needed")
-    if inside == out.resolve() or out.resolve() in inside.parents:
-        raise InputError(f"--out {out}: the photos lie in it; give another folder, the originals are never changed")
+    if out.resolve() in (inside, *inside.parents) or inside in out.resolve().parents:
+        raise InputError(
+            f"--out {out}: the photos lie in it, or it in them; give another folder, the originals are never changed"
+        )
     others = {path.name for path in out.iterdir()} - {PHOTOS, CAMERAS, FIGURES, PICTURE} if out.is_dir() else set()
     if others:
         raise InputError(f"--out {out}: holds {min(others)}, which would be lost; give another folder")
@@ -172,6 +174,11 @@ def pick_photos(
         step = 1.0 - float(request.overlap_pct or 0.0) / 100.0
         unit = np.interp(log_s, grid_s, _in_footprints(along, request, offset, pictures.statistics, way))
     chosen = choose_spaced(unit, pictures.statistics.sharpness, usable, step)
+    if len(chosen) < 2:
+        raise InputError(
+            f"the way along the usable photos within the log is {np.ptp(way_of[usable]):.2f} m, shorter than a step; "
+            "give less --every or more --overlap, or a log whose positions move"
+        )
     centres, R_WC = camera_poses(poses, request.X_BC)
     sigma_m, sigma_deg = _sigmas(track, request, pictures.times, sigma_s, log_s, way_of)
     degrees = np.degrees(euler_from_quat(poses.q_WB))
@@ -197,6 +204,7 @@ def pick_photos(
     ]
     inside = np.flatnonzero(poses.known)
     gaps = np.diff(way_of[chosen])
+    jump = int(np.argmax(np.diff(log_s))) if len(log_s) > 1 else 0
     figures = {
         "log": track.name,
         "positions_from": track.positions_from,
@@ -212,6 +220,8 @@ def pick_photos(
             "usable": int(usable.sum()),
             "picked": len(chosen),
         },
+        "longest_pause_s": float(np.diff(log_s).max()),
+        "longest_pause_after": pictures.times[jump].name,
         "spacing_median_m": float(np.median(gaps)) if len(gaps) else None,
         "spacing_max_m": float(gaps.max()) if len(gaps) else None,
         "uncertainty_from": "the log" if track.sigma_m is not None else "assumed",
@@ -255,15 +265,15 @@ def write_picked(picked: PickedPhotos, folder: Path, link: bool = False, progres
 
 def _read_pictures(photos: Path, request: PickRequest, threads: int, progress: Progress) -> _Pictures:
     if is_film(photos):
-        statistics, numbers, rate = film_statistics(photos, progress)
+        statistics, numbers, at_s = film_statistics(photos, progress)
         began = name_time(photos.name)
         calendar = began is not None
         start_s = began[0] if began is not None else 0.0
         times = [
             PhotoTime(
-                name=f"frame_{k:06d}.jpg", time_s=start_s + k / rate, source="frame", calendar=calendar, step_s=0.0
+                name=f"frame_{k:06d}.jpg", time_s=start_s + float(at), source="frame", calendar=calendar, step_s=0.0
             )
-            for k in numbers
+            for k, at in zip(numbers, at_s, strict=True)
         ]
         return _Pictures(times=times, statistics=statistics, film=True, left_out=[])
     if not photos.is_dir():

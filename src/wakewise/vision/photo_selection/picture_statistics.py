@@ -75,8 +75,8 @@ def photo_statistics(
     return _collected(enumerate(found), len(files), _matched, progress)
 
 
-def film_statistics(film: Path, progress: Progress = no_progress) -> tuple[PictureStatistics, list[int], float]:
-    """Statistics of some frames of a film, their numbers, and the film's frames a second.
+def film_statistics(film: Path, progress: Progress = no_progress) -> tuple[PictureStatistics, list[int], Array]:
+    """Statistics of some frames of a film, their numbers, and their times in s, by the film where it states them.
 
     Raises InputError if the film cannot be read.
     """
@@ -84,19 +84,23 @@ def film_statistics(film: Path, progress: Progress = no_progress) -> tuple[Pictu
         rate = float(reader.get(cv2.CAP_PROP_FPS))
         rate = rate if np.isfinite(rate) and 0.1 < rate < 1000.0 else 30.0
         expected = max(int(reader.get(cv2.CAP_PROP_FRAME_COUNT)), 1)
-        frames = _frames(reader, max(1, round(rate / FRAMES_PER_S)))
+        stated: dict[int, float] = {}
+        frames = _frames(reader, max(1, round(rate / FRAMES_PER_S)), stated)
         statistics, numbers = _collected(frames, expected, _tracked, progress)
     if len(numbers) < 2:
         raise InputError(
             f"{film}: {len(numbers)} of its frames can be decoded; convert it, for example to H.264 in MP4"
         )
-    return statistics, numbers, rate
+    at_s = np.array([stated[number] for number in numbers])
+    # A film of variable frame rate says when each frame is; some backends say nothing.
+    return statistics, numbers, at_s if (np.diff(at_s) > 0.0).all() else np.array(numbers) / rate
 
 
-def _frames(reader: Any, stride: int) -> Iterator[tuple[int, _Picture | None]]:
+def _frames(reader: Any, stride: int, stated: dict[int, float]) -> Iterator[tuple[int, _Picture | None]]:
     number = 0
     while reader.grab():
         if number % stride == 0:
+            stated[number] = 1e-3 * float(reader.get(cv2.CAP_PROP_POS_MSEC))
             ok, image = reader.retrieve()
             yield number, _looked_at(image if ok else None, features=False)
         number += 1
