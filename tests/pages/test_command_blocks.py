@@ -183,6 +183,9 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Elsewhere(
         r"wakewise link transect .*", "packages/wakewise-ardusub/tests/cli/test_link_transect_command.py", '"transect"'
     ),
+    Elsewhere(
+        r"wakewise link orbit .*", "packages/wakewise-ardusub/tests/cli/test_link_transect_command.py", '"orbit"'
+    ),
     Elsewhere(r"wakewise bench survey.*", "benchmarks/tests/test_survey_bench.py", '"survey"'),
     Start(r"wakewise link sitl .*", "now start the firmware"),
     Start(r"wakewise link route", "shares udpin"),

@@ -1,8 +1,9 @@
-"""`wakewise link transect`: refusals in one line, and a flight over loopback beside the stand-in."""
+"""`wakewise link transect` and `orbit`: refusals in one line, and flights over loopback beside the stand-in."""
 
 from __future__ import annotations
 
 import json
+import math
 import socket
 import threading
 from collections.abc import Iterator
@@ -14,7 +15,7 @@ import pytest
 pytest.importorskip("pymavlink", reason="the extra `links` is not installed")
 pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
-from wakewise.core.geometry import Pose
+from wakewise.core.geometry import Pose, euler_from_quat
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.ui.cli.main import run
@@ -73,6 +74,24 @@ def test_a_short_line_is_flown_over_loopback(
     assert (tmp_path / "journal.jsonl").stat().st_size > 200
 
 
+@pytest.mark.slow
+def test_a_part_of_an_orbit_is_flown_over_loopback(
+    sea: tuple[SimulatedAutopilot, str], tmp_path: Path, capsys: Capture
+) -> None:
+    """A tenth of a turn of 1.2 m at 10 cm/s: it ends in POSHOLD with the bow to the centre, which it tells."""
+    autopilot, connection = sea
+    line = ["--ahead", "1.2", "--turns", "0.1", "--direction", "right", "--every", "0.5", "--gap", "3"]
+    code = run(["link", "orbit", "--connection", connection, *line, "--consent", "--out", str(tmp_path), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert code == 0
+    assert told["finished"]
+    assert told["flown_m"] == pytest.approx(0.2 * math.pi * 1.2, abs=0.02)
+    assert told["centre_m"] == pytest.approx([1.2, 0.0], abs=0.2)
+    assert autopilot.mode == POSHOLD
+    assert autopilot.photographs == told["photographs"] == 2
+    assert euler_from_quat(autopilot.motion.q_WB)[2] == pytest.approx(-0.2 * math.pi, abs=0.1)
+
+
 def test_an_altitude_without_a_rangefinder_is_refused(
     sea: tuple[SimulatedAutopilot, str], tmp_path: Path, capsys: Capture
 ) -> None:
@@ -114,6 +133,41 @@ def test_bad_input_is_refused_in_one_line(
     line = {"type": "LineString", "coordinates": [[500000.0, 3740000.0], [500010.0, 3740000.0]]}
     (tmp_path / "utm.geojson").write_text(json.dumps(line))
     assert run(["link", "transect", *options]) == 2
+    said = capsys.readouterr().err.strip()
+    assert words in said
+    assert len(said.splitlines()) == 1
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--ahead", "nan"], "--ahead or --radius nan: must be from 0.5 to 20"),
+        (["--ahead", "0.6"], "at 0.1 m/s it must be 1.00 m or more"),
+        (["--ahead", "1.5", "--speed", "0.3"], "at 0.3 m/s it must be 4.50 m or more"),
+        (["--speed", "0.5"], "--speed 0.5: must be from 0.05 to 0.3"),
+        (["--turns", "0"], "--turns 0: must be from 0.1 to 20"),
+        (["--turns", "nan"], "--turns nan"),
+        (["--altitude", "high"], "--altitude 'high': must be metres above the bed, such as 0.8 or 0.8,1.3"),
+        (["--altitude", "0.8,"], "--altitude '0.8,': must be metres"),
+        (["--altitude", "0.8,0.2"], "--altitude 0.2: must be from 0.4 to 10"),
+        (["--direction", "north"], "--direction 'north': must be auto, right or left"),
+        (["--centre", "3"], "--centre '3': must be NORTH,EAST in m"),
+        (["--centre", "3,nan"], "--centre '3,nan'"),
+        (["--centre", "3,2", "--ahead", "2"], "--ahead, --centre: give one of them"),
+        (["--radius", "2"], "--radius: needs --centre"),
+        (["--fence", "0"], "--fence 0: must be from 1 to 5000"),
+        (["--current", "fast"], "--current 'fast'"),
+        (["--vehicle", "none.yaml"], "none.yaml"),
+        (["--connection", "udp:1"], "--connection"),
+    ],
+)
+def test_bad_input_of_an_orbit_is_refused_in_one_line(
+    options: list[str], words: str, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit code 2 before anything is connected, and nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    assert run(["link", "orbit", *options]) == 2
     said = capsys.readouterr().err.strip()
     assert words in said
     assert len(said.splitlines()) == 1

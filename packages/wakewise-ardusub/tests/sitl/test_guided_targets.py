@@ -63,6 +63,28 @@ def test_a_moving_target_is_followed_across_a_current_and_lapses_after_three_sec
     assert flight.autopilot.mode == GUIDED
 
 
+@pytest.mark.parametrize(("rate", "turns_to"), [(0.2, 1.0), (-0.2, None), (0.0, 1.0)])
+def test_a_turn_rate_beside_a_heading_is_the_rate_of_the_turn_and_a_negative_one_turns_away(
+    rate: float, turns_to: float | None
+) -> None:
+    """As ArduSub: to 1 rad at 11 deg/s (whole degrees) or, for 0, at 60 deg/s; with -0.2 rad/s away from it."""
+    flight = guided()
+    place = flight.autopilot.motion.p_WB_m.copy()
+    for _ in range(30):
+        numbers = (*place, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        flight.companion.send(
+            mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0x1C0, *numbers, 1.0, rate)
+        )
+        flight.run(0.1)
+    heading = euler_from_quat(flight.autopilot.motion.q_WB)[2]
+    if turns_to is None:
+        assert heading < -0.2
+    elif rate:
+        assert heading == pytest.approx(3.0 * math.radians(11.0), abs=0.1)
+    else:
+        assert heading == pytest.approx(turns_to, abs=0.05)
+
+
 def test_targets_that_ardusub_does_not_take_change_nothing() -> None:
     """An acceleration before 4.8, an acceleration alone, another frame, no number, another mode."""
     flight = guided()

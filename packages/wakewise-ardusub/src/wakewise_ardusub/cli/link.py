@@ -9,7 +9,7 @@ import typer
 
 from wakewise.ui.cli.console import ProgressBars, format_value, print_json, write_page
 from wakewise.ui.cli.options import Json
-from wakewise_ardusub.cli import link_ardusub, link_install_script, link_route, link_sitl, link_transect
+from wakewise_ardusub.cli import link_ardusub, link_install_script, link_orbit, link_route, link_sitl, link_transect
 from wakewise_ardusub.cli.link_sensors import sensors
 from wakewise_ardusub.cli.link_wash_meter import Ahead, Points, WakeModelName, region_ahead, region_words, wash_meter
 
@@ -28,6 +28,7 @@ app.command("ardusub")(link_ardusub.ardusub)
 app.command("install-script")(link_install_script.install_script)
 app.command("route")(link_route.route)
 app.command("transect")(link_transect.transect)
+app.command("orbit")(link_orbit.orbit)
 app.command("sitl")(link_sitl.sitl)
 app.command("sitl-autopilot")(link_sitl.sitl_autopilot)
 

@@ -9,7 +9,10 @@ velocity is a velocity, its error in a PI (PSC_VELXY_*) plus the target's accele
 over ANGLE_MAX it is the forward and the lateral demand. Not simulated: the jerk-limited shaping of targets, filters,
 waypoint speed profiles.
 
-Source: ArduPilot, ArduSub/mode_guided.cpp and GCS_MAVLink_Sub.cpp.
+Heading. A turn rate beside a heading is no feed-forward: it is the rate, in whole deg/s, at which ArduSub turns while
+the heading is more than 5 deg off. Its side is that of the error, so that a negative one turns away (`turned_to`).
+
+Source: ArduPilot, ArduSub/mode_guided.cpp, GCS_MAVLink_Sub.cpp and AC_AttitudeControl_Sub.cpp.
 """
 
 from __future__ import annotations
@@ -31,8 +34,8 @@ LAPSE_S = 3.0
 """Age of a target at which its velocity is set to zero (GUIDED_VEL_TIMEOUT_MS)."""
 ACCELERATION_FROM = (4, 8, 0)
 """Oldest release that takes an acceleration."""
-YAW_SLEW_RAD_S = math.radians(60.0)
-"""Fastest turn to a target's heading (AUTO_YAW_SLEW_RATE)."""
+YAW_SLEW_RAD_S, FAR_RAD = math.radians(60.0), math.radians(5.0)
+"""Fastest turn to a target's heading (AUTO_YAW_SLEW_RATE); the error up to which a turn rate is not used."""
 _BODY = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED, mavlink.MAV_FRAME_BODY_FRD)
 _OFFSET = (mavlink.MAV_FRAME_LOCAL_OFFSET_NED, *_BODY)
 _FRAMES = (mavlink.MAV_FRAME_LOCAL_NED, *_OFFSET)
@@ -117,6 +120,19 @@ def read_target(
     )
 
 
+def turned_to(target: GuidedTarget, sought_rad: float, heading_rad: float, dt_s: float) -> float:
+    """The heading that the attitude loop seeks one loop later, from the one it seeks now and the vehicle's own."""
+    turn = 0.0 if target.turn_rad_s is None else target.turn_rad_s
+    if target.heading_rad is None:
+        return sought_rad + turn * dt_s
+    off = _wrapped(target.heading_rad - heading_rad)
+    if turn and abs(off) > FAR_RAD:
+        whole = math.radians(math.trunc(min(math.degrees(turn), math.degrees(YAW_SLEW_RAD_S))))
+        return sought_rad + math.copysign(1.0, off) * whole * dt_s
+    most = YAW_SLEW_RAD_S * dt_s
+    return sought_rad + max(-most, min(most, _wrapped(target.heading_rad - sought_rad)))
+
+
 def horizontal_demands(
     target: GuidedTarget, total: Array, motion: PhysicsState, parameters: ParameterTable, dt_s: float
 ) -> tuple[Array, float, float]:
@@ -135,6 +151,10 @@ def horizontal_demands(
     largest = math.radians(1e-2 * parameters.value("ANGLE_MAX", otherwise=4500.0))
     leans = np.clip(np.arctan(body / GRAVITY_M_S2) / largest, -1.0, 1.0)
     return total, float(leans[0]), float(leans[1])
+
+
+def _wrapped(angle_rad: float) -> float:
+    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def _about_down(angle_rad: float) -> Array:

@@ -42,7 +42,7 @@ from wakewise_ardusub.link.parameters import (
 )
 from wakewise_ardusub.link.protocol import ALT_HOLD, FULL_US, MANUAL, MIDDLE_US, POSHOLD, STABILIZE
 from wakewise_ardusub.physics.datagrams import PhysicsState
-from wakewise_ardusub.sitl.guided import YAW_SLEW_RAD_S, GuidedTarget, hold_here, horizontal_demands
+from wakewise_ardusub.sitl.guided import GuidedTarget, hold_here, horizontal_demands, turned_to
 from wakewise_ardusub.sitl.own_parameters import FRAME_VECTORED, ParameterTable
 
 if TYPE_CHECKING:
@@ -160,11 +160,7 @@ def _place(
     target = target.advanced(motion.time_s, dt_s)
     heading = loops.heading_rad
     if mode == GUIDED and heading is not None:
-        most = YAW_SLEW_RAD_S * dt_s
-        if target.heading_rad is not None:
-            heading += max(-most, min(most, _wrapped(target.heading_rad - heading)))
-        elif target.turn_rad_s is not None:
-            heading += target.turn_rad_s * dt_s
+        heading = turned_to(target, heading, euler_from_quat(motion.q_WB)[2], dt_s)
     loops, turns = _attitude(replace(loops, heading_rad=heading), demands, motion, parameters, dt_s)
     total, forward, lateral = horizontal_demands(target, loops.velocity_sum, motion, parameters, dt_s)
     if mode == POSHOLD and abs(demands.throttle) > 1e-3 * parameters.value("THR_DZ", otherwise=100.0):

@@ -28,7 +28,7 @@ from wakewise_ardusub.sitl.inprocess_session import InProcessSession, MavlinkSen
 from wakewise_ardusub.sitl.modes import GUIDED
 from wakewise_ardusub.sitl.sea_sensors import Relief, SeaSensors, SensorErrors
 from wakewise_ardusub.survey.survey_plan import parallel_lines
-from wakewise_ardusub.survey.transect_session import MakeLines, TransectOptions, TransectSession
+from wakewise_ardusub.survey.transect_session import PERIOD_S, MakeLines, TransectOptions, TransectSession
 
 TICK_LOOPS = 2
 _OFFSET_S = 1000.0
@@ -94,7 +94,9 @@ class SurveyHarness:
             journal=journal,
         )
         self.rows: list[tuple[float, ...]] = []
-        """Each 0.1 s of a line: asked and true speed along it, true altitude, asked speed's end, true place across."""
+        """Each 0.1 s of a line: asked and true speed along it, true altitude, place across and error of the heading by
+        the autopilot's position, and the altitude asked for.
+        """
         self._doppler = MavlinkSender(self.flight.carry, 1, _DOPPLER_COMPONENT, "doppler") if doppler else None
         self._loops = 0
         self.flight.listeners["companion"] = self._hear
@@ -139,12 +141,14 @@ class SurveyHarness:
         plan, at = session.plan, session.at
         if session.state != "flying" or plan is None or at is None or at.leg >= len(plan.legs) or not session.rows:
             return
+        if _OFFSET_S + self.flight.now_s - session.rows[-1].time_s > 1.5 * PERIOD_S:
+            return  # on the way to its altitude
         leg, motion = plan.legs[at.leg], self.flight.autopilot.motion
         north, east, down = (float(v) for v in motion.p_WB_m)
-        way = leg.direction
         if leg.line:
-            speed = float(motion.v_W_m_s[:2] @ way)
-            self.rows.append((at.speed_m_s, speed, self.relief.bed_m(north, east) - down, session.rows[-1][4]))
+            speed, last = float(motion.v_W_m_s[:2] @ leg.way_at(at.along_m)), session.rows[-1]
+            altitude = self.relief.bed_m(north, east) - down
+            self.rows.append((at.speed_m_s, speed, altitude, last.across_m, last.heading_rad, session.altitude_m))
 
     def ready(self) -> SurveyHarness:
         """Armed by the pilot, in ALT_HOLD, and ready; raises WakewiseError saying what is missing."""
@@ -175,11 +179,13 @@ class SurveyHarness:
             self.flight.run(0.1)
 
     def figures(self) -> dict[str, Any]:
-        """Figures by the truth: speed error in cruise, altitude error, and place across the line by the autopilot."""
+        """Figures by the truth: speed error in cruise, altitude error; place across the line (on an arc: along its
+        radius) and heading error (on an arc: from the bearing of its centre) by the autopilot's position.
+        """
         rows = np.array(self.rows)
         pace = self.options.pace
         cruise = rows[rows[:, 0] >= pace.speed_m_s - 1e-6]
-        off = rows[:, 2] - pace.altitude_m
+        off = rows[:, 2] - rows[:, 5]
         return {
             "speed_rms_cm_s": 100.0 * float(np.sqrt(np.mean((cruise[:, 1] - pace.speed_m_s) ** 2))),
             "altitude_rms_cm": 100.0 * float(np.sqrt(np.mean(off**2))),
@@ -187,6 +193,8 @@ class SurveyHarness:
             "altitude_max_cm": 100.0 * float(np.abs(off).max()),
             "cross_track_p95_cm": 100.0 * float(np.percentile(np.abs(rows[:, 3]), 95)),
             "cross_track_max_cm": 100.0 * float(np.abs(rows[:, 3]).max()),
+            "heading_p95_deg": math.degrees(float(np.percentile(np.abs(rows[:, 4]), 95))),
+            "heading_max_deg": math.degrees(float(np.abs(rows[:, 4]).max())),
             "seconds": len(rows) / 10.0,
         }
 

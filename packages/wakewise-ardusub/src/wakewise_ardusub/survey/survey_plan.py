@@ -34,6 +34,7 @@ WEAK_M_S = 0.02
 """A current weaker than this does not change heading, order or side."""
 SHORTEST_M = 0.1
 _THERE_M, _TURNED_RAD = 1e-4, 1e-3
+_SHARES = np.linspace(0.0, 1.0, 33)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,12 +63,18 @@ class SurveyPace:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SurveyLeg:
-    """A straight leg between places north and east, shape (2,); `line` is false of a way between lines."""
+    """A straight leg between places north and east, shape (2,); `line` is false of a way between lines.
+
+    `heading_rad` is the heading at its start. `altitude_m` is None where the pace's altitude holds. `centre_W_m` is the
+    centre of an arc (`orbit_plan.OrbitLeg`), None of a straight leg.
+    """
 
     start_W_m: Array
     end_W_m: Array
     heading_rad: float
     line: bool = True
+    altitude_m: float | None = None
+    centre_W_m: Array | None = None
 
     def __post_init__(self) -> None:
         freeze(self, start_W_m=(2,), end_W_m=(2,))
@@ -79,8 +86,45 @@ class SurveyLeg:
 
     @property
     def direction(self) -> Array:
-        """Unit vector, shape (2,)."""
-        return (self.end_W_m - self.start_W_m) / max(self.length_m, 1e-9)
+        """Unit tangent at its start, shape (2,)."""
+        return (self.end_W_m - self.start_W_m) / max(math.dist(self.start_W_m, self.end_W_m), 1e-9)
+
+    @property
+    def bend_per_m(self) -> float:
+        """Turn to the right of its tangent and of its heading, rad per metre."""
+        return 0.0
+
+    def place_at(self, along_m: float) -> Array:
+        """The place so far along it, shape (2,)."""
+        return self.start_W_m + along_m * self.direction
+
+    def way_at(self, along_m: float) -> Array:
+        """Unit tangent so far along it, shape (2,)."""
+        return turned(self.direction, self.bend_per_m * along_m)
+
+    def heading_at(self, along_m: float) -> float:
+        """Heading so far along it, rad."""
+        return wrapped(self.heading_rad + self.bend_per_m * along_m)
+
+    def aim_from(self, _place_W_m: Array) -> float:
+        """Heading that is right at a place beside it, rad."""
+        return self.heading_rad
+
+    def off(self, place_W_m: Array, along_m: float) -> tuple[float, float]:
+        """How far a place is to the right of it, and ahead of the place so far along it, m."""
+        way, away = self.way_at(along_m), place_W_m - self.place_at(along_m)
+        return float(way[0] * away[1] - way[1] * away[0]), float(away @ way)
+
+    def rest_from(self, along_m: float) -> SurveyLeg:
+        """What is left of it."""
+        return replace(self, start_W_m=self.place_at(along_m))
+
+    def ways_from(self, place_W_m: Array, heading_rad: float) -> list[SurveyLeg]:
+        """Legs that are no lines from a place to its start: none where that is near."""
+        if math.dist(place_W_m, self.start_W_m) < SHORTEST_M:
+            return []
+        way = SurveyLeg(start_W_m=place_W_m, end_W_m=self.start_W_m, heading_rad=heading_rad, line=False)
+        return [replace(way, altitude_m=self.altitude_m)]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,6 +138,16 @@ class SurveyPlan:
     def line_m(self) -> float:
         """Length of all lines, m."""
         return sum(leg.length_m for leg in self.legs if leg.line)
+
+    @property
+    def centre_W_m(self) -> Array | None:
+        """Centre of its first arc, shape (2,)."""
+        return next((leg.centre_W_m for leg in self.legs if leg.centre_W_m is not None), None)
+
+    def farthest_m(self, place_W_m: Array) -> float:
+        """Largest distance of its places from one, m."""
+        places = [leg.place_at(share * leg.length_m) for leg in self.legs for share in _SHARES]
+        return max(math.dist(place_W_m, place) for place in places)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +166,12 @@ class PlanProgress:
 def wrapped(angle_rad: float) -> float:
     """The angle in [-pi, pi)."""
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def turned(vector: Array, angle_rad: float) -> Array:
+    """A vector north and east, shape (2,), turned to the right."""
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
 
 
 def next_speed(left: float, speed: float, most: float, rate: float, dt_s: float, *, go: bool = True) -> float:
@@ -138,9 +198,10 @@ def advance(plan: SurveyPlan, at: PlanProgress, dt_s: float, *, go: bool = True)
     along = at.along_m + step
     flown = at.flown_m + (step if leg.line else 0.0)
     if leg.length_m - along < _THERE_M or (go and speed == 0.0 and left < SHORTEST_M):
-        return PlanProgress(heading_rad=leg.heading_rad, leg=at.leg + 1, flown_m=flown)
+        return PlanProgress(heading_rad=leg.heading_at(leg.length_m), leg=at.leg + 1, flown_m=flown)
     return replace(
         at,
+        heading_rad=leg.heading_at(along),
         along_m=along,
         speed_m_s=speed,
         acceleration_m_s2=(speed - at.speed_m_s) / dt_s,
@@ -150,12 +211,18 @@ def advance(plan: SurveyPlan, at: PlanProgress, dt_s: float, *, go: bool = True)
 
 
 def target_of(plan: SurveyPlan, at: PlanProgress) -> tuple[Array, Array, Array]:
-    """Place, velocity and acceleration, shape (2,) each, in W."""
+    """Place, velocity and acceleration, shape (2,) each, in W; on an arc with the centripetal acceleration."""
     if at.leg >= len(plan.legs):
         return plan.legs[-1].end_W_m, np.zeros(2), np.zeros(2)
     leg = plan.legs[at.leg]
-    way = leg.direction
-    return leg.start_W_m + at.along_m * way, at.speed_m_s * way, at.acceleration_m_s2 * way
+    way = leg.way_at(at.along_m)
+    inwards = at.speed_m_s**2 * leg.bend_per_m * np.array([-way[1], way[0]])
+    return leg.place_at(at.along_m), at.speed_m_s * way, at.acceleration_m_s2 * way + inwards
+
+
+def turn_of(plan: SurveyPlan, at: PlanProgress) -> float:
+    """Turn rate of the heading on an arc, rad/s, positive to the right; 0 on straight legs."""
+    return 0.0 if at.leg >= len(plan.legs) else plan.legs[at.leg].bend_per_m * at.speed_m_s
 
 
 def time_left_s(plan: SurveyPlan, at: PlanProgress) -> float:
@@ -164,10 +231,10 @@ def time_left_s(plan: SurveyPlan, at: PlanProgress) -> float:
     for number in range(at.leg, len(plan.legs)):
         leg = plan.legs[number]
         left = leg.length_m - (at.along_m if number == at.leg else 0.0)
-        turn = abs(wrapped(leg.heading_rad - heading))
+        turn = abs(wrapped(leg.heading_rad - heading)) if number > at.leg or at.along_m == 0.0 else 0.0
         total += left / pace.speed_m_s + pace.speed_m_s / pace.acceleration_m_s2
         total += turn / pace.turn_rad_s + (pace.turn_rad_s / pace.turn_rad_s2 if turn > _TURNED_RAD else 0.0)
-        heading = leg.heading_rad
+        heading = leg.heading_at(leg.length_m)
     return total
 
 
@@ -226,8 +293,12 @@ def upstream_side(heading_rad: float, current_W_m_s: Array) -> int:
     return -1 if flows > 0.0 and math.hypot(*current_W_m_s) >= WEAK_M_S else 1
 
 
-def plan_survey(lines: Sequence[Array], place_W_m: Array, pace: SurveyPace, current_W_m_s: Array) -> SurveyPlan:
+def plan_survey(
+    lines: Sequence[Array | SurveyLeg], place_W_m: Array, pace: SurveyPace, current_W_m_s: Array
+) -> SurveyPlan:
     """The plan of lines in their order, with ways between them and from the vehicle's place, shape (2,), to the first.
+
+    A line is its two ends, shape (2, 2), or a leg that was made already.
 
     Raises
     ------
@@ -236,12 +307,16 @@ def plan_survey(lines: Sequence[Array], place_W_m: Array, pace: SurveyPace, curr
     """
     if not lines:
         raise InputError("survey: no line")
-    points = np.concatenate([place_W_m[None], *lines])
-    if not np.isfinite(points).all():
+    ends = [np.array([line.start_W_m, line.end_W_m]) if isinstance(line, SurveyLeg) else line for line in lines]
+    if not np.isfinite(np.concatenate([place_W_m[None], *ends])).all():
         raise InputError("survey: a place of a line is not a number")
     legs: list[SurveyLeg] = []
     here = place_W_m
     for line in lines:
+        if isinstance(line, SurveyLeg):
+            legs += [*line.ways_from(here, line.heading_rad), line]
+            here = line.end_W_m
+            continue
         if math.dist(line[0], line[1]) < SHORTEST_M:
             raise InputError(f"survey: a line of {math.dist(line[0], line[1]):.2f} m, must be {SHORTEST_M:g} m or more")
         for start, end, is_line in ((here, line[0], False), (line[0], line[1], True)):
@@ -257,21 +332,24 @@ def plan_survey(lines: Sequence[Array], place_W_m: Array, pace: SurveyPace, curr
 
 
 def resumed(plan: SurveyPlan, at: PlanProgress, place_W_m: Array) -> tuple[SurveyPlan, PlanProgress]:
-    """The rest of a plan from where a vehicle is now: back to where it left the plan, then on."""
-    stop, _, _ = target_of(plan, at)
-    rest = plan.legs[at.leg :]
+    """The rest of a plan from where a vehicle is now: back to where it left the plan, then on.
+
+    A way round a centre that was not ended is made anew from here.
+    """
+    rest = list(plan.legs[at.leg :])
     if rest:
-        rest = (replace(rest[0], start_W_m=stop), *rest[1:])
+        rest[0] = rest[0].rest_from(at.along_m)
         rest = rest if rest[0].length_m >= _THERE_M else rest[1:]
-    if math.dist(stop, place_W_m) >= SHORTEST_M:
-        back = SurveyLeg(start_W_m=place_W_m, end_W_m=stop, heading_rad=at.heading_rad, line=False)
-        rest = (back, *rest)
-    return replace(plan, legs=rest), PlanProgress(heading_rad=at.heading_rad, flown_m=at.flown_m)
+    while rest and not rest[0].line and any(leg.centre_W_m is not None for leg in rest):
+        rest = rest[1:]
+    ways = rest[0].ways_from(place_W_m, at.heading_rad) if rest else []
+    return replace(plan, legs=(*ways, *rest)), PlanProgress(heading_rad=at.heading_rad, flown_m=at.flown_m)
 
 
 def warning_of(plan: SurveyPlan, current_W_m_s: Array) -> str:
     """What the current does to a plan that its rules cannot help, in words; empty where there is nothing."""
-    follows = [float(leg.direction @ current_W_m_s) for leg in plan.legs if leg.line]
+    lines = [leg for leg in plan.legs if leg.line]
+    follows = [max(float(leg.way_at(s * leg.length_m) @ current_W_m_s) for s in _SHARES) for leg in lines]
     faster = sum(flow > plan.pace.speed_m_s for flow in follows)
     if not faster:
         return ""

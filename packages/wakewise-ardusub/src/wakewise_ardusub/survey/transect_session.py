@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -44,9 +44,12 @@ from wakewise_ardusub.link.protocol import (
 )
 from wakewise_ardusub.link.session_log import SessionLog
 from wakewise_ardusub.survey.bed_following import BedTrack, DepthShaper
+from wakewise_ardusub.survey.guided_messages import SurveyTarget
 from wakewise_ardusub.survey.hold_current import current_of_hold
+from wakewise_ardusub.survey.survey_figures import SurveyRow, errors_of
 from wakewise_ardusub.survey.survey_plan import (
     PlanProgress,
+    SurveyLeg,
     SurveyPace,
     SurveyPlan,
     advance,
@@ -54,7 +57,9 @@ from wakewise_ardusub.survey.survey_plan import (
     resumed,
     target_of,
     time_left_s,
+    turn_of,
     warning_of,
+    wrapped,
 )
 from wakewise_ardusub.survey.survey_safety import (
     ALT_HOLD,
@@ -79,21 +84,17 @@ LOOKS_DOWN = 25
 LEAD_S = 0.2
 """How far ahead the bed is looked for: the time in which a target becomes motion."""
 REACHED_M = 0.05
-VELOCITY_GAIN, PLACE_GAIN_PER_S, MOST_CORRECTION_M_S = 3.0, 5.0, 0.25
-"""Correction of the velocity target by what is measured. The firmware's default gains (PSC_VELXY_*) need 20 s to push
-through the dead zone of the thrusters."""
 STILL_M, STILL_M_S, REST_S = 0.05, 0.012, 3.0
 """A vehicle nearer than this to its place, and slower, for so long, is at rest."""
 SET_MODE, REQUEST_MESSAGE, AUTOPILOT_VERSION = 176, 512, 148
 ACCELERATION_FROM = 4 << 24 | 8 << 16
 """Release of ArduSub from which GUIDED takes an acceleration (ardupilot 33609), as `flight_sw_version`."""
 _RATES_HZ = {0: 5.0, 30: 20.0, 32: 20.0, 33: 2.0, 36: 5.0, 74: 5.0, 132: 10.0, 193: 5.0}
-_MASK, _NO_ACCELERATION = 0x800, 0x1C0
 _HORIZONTAL, _CONSTANT = 0x08 | 0x10, 0x80
 _ONBOARD, _NO_AUTOPILOT, _ACTIVE = 18, 8, 4
 
-MakeLines = Callable[[Array, float, Array, "GeoAnchor | None"], list[Array]]
-"""Lines, shape (2, 2) each, from place (2,), heading, current (2,) and anchor; raises InputError without any."""
+MakeLines = Callable[[Array, float, Array, "GeoAnchor | None"], Sequence[Array | SurveyLeg]]
+"""Lines, shape (2, 2) or legs, from place (2,), heading, current (2,) and anchor; raises InputError without any."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +111,8 @@ class GeoAnchor:
 class TransectOptions:
     """Pace, limits, the rangefinder's delay (s), shortest and longest settling (s), a current (2,) that is given.
 
-    Photographs: `camera` is the command, mavlink or digicam; `every_m` the metres between two, 0 for none.
+    Photographs: `camera` is the command, mavlink or digicam; `every_m` the metres between two, 0 for none. `layers_m`:
+    altitudes of legs that differ from the pace's.
     """
 
     pace: SurveyPace = field(default_factory=SurveyPace)
@@ -120,6 +122,7 @@ class TransectOptions:
     current_W_m_s: tuple[float, float] | None = None
     camera: str = ""
     every_m: float = 0.0
+    layers_m: tuple[float, ...] = ()
 
 
 class TransectSession:
@@ -164,10 +167,10 @@ class TransectSession:
         self.track = BedTrack()
         self.current_W_m_s: Array | None = None
         self.photographs = self.interruptions = self.unsent = 0
-        self.rows: list[tuple[float, ...]] = []
-        """Each turn on a line: time, speed along it, speed asked for, altitude, place across, place along (m, m/s)."""
+        self.rows: list[SurveyRow] = []
         self._depth: DepthShaper | None = None
-        self._reached = False
+        self._reached, self._least_m = False, 0.0
+        """Whether it is at its leg's altitude; the lowest altitude asked for, 0 until one was reached."""
         self._place: tuple[Array, Array] | None = None
         self._came = dict.fromkeys(
             ("position", "doppler", "range", "turn", "beat", "asked", "parameters", "mode", "told"), -math.inf
@@ -269,6 +272,14 @@ class TransectSession:
         """Whether all lines were flown."""
         return self.plan is not None and self.at is not None and self.at.leg >= len(self.plan.legs)
 
+    @property
+    def altitude_m(self) -> float:
+        """Altitude asked for now, m."""
+        own = None
+        if self.plan is not None and self.at is not None and self.plan.legs:
+            own = self.plan.legs[min(self.at.leg, len(self.plan.legs) - 1)].altitude_m
+        return self.options.pace.altitude_m if own is None else own
+
     # What time does.
 
     def tick(self) -> None:
@@ -330,7 +341,7 @@ class TransectSession:
     def _judge(self, now_s: float) -> None:
         facts = self._facts = self.facts(now_s)
         if self.state in ENGAGED:
-            fault = fault_of(facts, self.options.limits, self.options.pace.altitude_m if self._reached else 0.0)
+            fault = fault_of(facts, self.options.limits, self._least_m)
             if fault:
                 self._let_go(fault, now_s)
         elif self.state in ("waiting", "ready"):
@@ -341,19 +352,17 @@ class TransectSession:
                 self._turn("ready", "")
 
     def _no_water(self, facts: SurveyFacts) -> str:
-        wished = facts.depth_m + facts.altitude_m - self.options.pace.altitude_m
-        if not wished < self.options.limits.least_depth_m:
+        highest = max(self.options.pace.altitude_m, *self.options.layers_m, 0.0)
+        bed_m = facts.depth_m + facts.altitude_m
+        if not bed_m - highest < self.options.limits.least_depth_m:
             return ""
-        return (
-            f"the bed is {facts.depth_m + facts.altitude_m:.1f} m deep: {self.options.pace.altitude_m:g} m above it"
-            " is the surface"
-        )
+        return f"the bed is {bed_m:.1f} m deep: {highest:g} m above it is the surface"
 
     def _settle(self, now_s: float) -> None:
         if self._place is None:
             return
         place = self._place[0].copy()
-        self._hold, self._pulses, self._reached = place, [], False
+        self._hold, self._pulses, self._reached, self._least_m = place, [], False, 0.0
         self._depth = DepthShaper(depth_m=float(place[2]))
         self._came["told"], self._settled_s = -math.inf, now_s
         self._turn("settling", "")
@@ -371,7 +380,7 @@ class TransectSession:
             try:
                 lines = self._lines(place, heading, current, self._anchor)
                 plan = plan_survey(lines, place, self.options.pace, current)
-                away = max(float(np.hypot(*(point - place))) for line in lines for point in line)
+                away = plan.farthest_m(place)
                 if away > self.options.limits.fence_m:
                     raise InputError(f"survey: {away:.0f} m from here, --fence is {self.options.limits.fence_m:g} m")
             except InputError as fault:
@@ -380,9 +389,9 @@ class TransectSession:
                 return
             self.plan, self.at = plan, PlanProgress(heading_rad=heading)
             words = "unknown" if self.current_W_m_s is None else f"{np.round(current, 3).tolist()} m/s"
-            self._write(
-                "plan", legs=len(plan.legs), line_m=plan.line_m, current=words, warning=warning_of(plan, current)
-            )
+            self.warning = warning_of(plan, current)
+            told = {"current": words, "warning": self.warning, "centre": plan.centre_W_m}
+            self._write("plan", legs=len(plan.legs), line_m=plan.line_m, **told)
         self._turn("flying", "")
 
     def _moves(self) -> bool:
@@ -410,61 +419,56 @@ class TransectSession:
             if now_s - self._since_s >= most or now_s - max(self._settled_s + REST_S, self._since_s + least) >= 0.0:
                 self._begin(now_s)
         place, velocity, acceleration = self._hold[:2], np.zeros(2), np.zeros(2)
-        heading = self.known.attitude[2] if self.at is None else self.at.heading_rad
+        heading, turn = self.known.attitude[2] if self.at is None else self.at.heading_rad, 0.0
         if self.state in ("flying", "paused") and self.plan is not None and self.at is not None:
             bed = self.track.bed(now_s + LEAD_S)
             if bed is None or self._facts.range_s > 0.5 * self.options.limits.range_s:
                 self._depth = self._depth.resting(dt_s)
             else:
-                wished = max(bed[0] - self.options.pace.altitude_m, self.options.limits.least_depth_m)
+                wished = max(bed[0] - self.altitude_m, self.options.limits.least_depth_m)
                 self._depth = self._depth.towards(wished, bed[1], dt_s)
-            self._reached |= abs(self._facts.altitude_m - self.options.pace.altitude_m) < REACHED_M
+            asked_m = self.altitude_m
+            self._reached |= abs(self._facts.altitude_m - asked_m) < REACHED_M
+            if self._reached:
+                self._least_m = min(self.options.pace.altitude_m, *self.options.layers_m, asked_m)
             self.at = advance(self.plan, self.at, dt_s, go=self.state == "flying" and self._reached)
+            self._reached &= self.altitude_m == asked_m
             place, velocity, acceleration = target_of(self.plan, self.at)
-            heading = self.at.heading_rad
-            self._noted(now_s, place)
+            heading, turn = self.at.heading_rad, turn_of(self.plan, self.at)
+            self._noted(now_s)
             self._photograph()
-        self._tell(place, velocity, acceleration, heading)
+        depth = self._depth
+        target = SurveyTarget(
+            place_W_m=np.array([*place, depth.depth_m]),
+            velocity_W_m_s=np.array([*velocity, depth.speed_m_s]),
+            acceleration_W_m_s2=np.array([*acceleration, depth.acceleration_m_s2]),
+            heading_rad=heading,
+            turn_rad_s=turn,
+        )
+        if self.state in ENGAGED:
+            fields = target.message(self._place, takes_acceleration=self._takes_acceleration)
+            if fields is None:
+                self._let_go("a target that is not a number", now_s)
+            else:
+                self._post("set_position_target_local_ned", fields | self._aim())
         if self.finished and self.state == "flying":
             self._let_go("finished", now_s)
 
-    def _tell(self, place: Array, velocity: Array, acceleration: Array, heading: float) -> None:
-        depth = self._depth
-        if depth is None or self.state not in ENGAGED:
-            return
-        numbers = [*place, depth.depth_m, *velocity, depth.speed_m_s, *acceleration, depth.acceleration_m_s2, heading]
-        if not np.isfinite(numbers).all():
-            self._let_go("a target that is not a number", self._clock())
-            return
-        numbers[3:6] = self._corrected(np.array(numbers[:3]), np.array(numbers[3:6]))
-        names = ("x", "y", "z", "vx", "vy", "vz", "afx", "afy", "afz", "yaw")
-        fields: dict[str, Any] = dict(zip(names, map(float, numbers), strict=True))
-        mask = _MASK if self._takes_acceleration else _MASK | _NO_ACCELERATION
-        fields |= {"time_boot_ms": 0, "coordinate_frame": 1, "type_mask": mask, "yaw_rate": 0.0}
-        self._post("set_position_target_local_ned", fields | self._aim())
-
-    def _corrected(self, place: Array, velocity: Array) -> Array:
-        """The velocity target, shape (3,), with the bounded correction by place and velocity errors."""
-        if self._place is None:
-            return velocity
-        p, v = self._place
-        more = VELOCITY_GAIN * (velocity - v) + PLACE_GAIN_PER_S * (place - p)
-        return velocity + more * min(1.0, MOST_CORRECTION_M_S / max(float(np.linalg.norm(more)), 1e-9))
-
-    def _noted(self, now_s: float, place: Array) -> None:
+    def _noted(self, now_s: float) -> None:
         plan, at = self.plan, self.at
         if plan is None or at is None or at.leg >= len(plan.legs) or self._place is None:
             return
         leg = plan.legs[at.leg]
         if not leg.line or not self._reached:
             return
-        way, (p, v) = leg.direction, self._place
-        off = p[:2] - place
-        across = float(way[0] * off[1] - way[1] * off[0])
-        row = (now_s, float(v[:2] @ way), at.speed_m_s, self._facts.altitude_m, across, float(off @ way))
+        p, v = self._place
+        across, along = leg.off(p[:2], at.along_m)
+        turned = wrapped(self.known.attitude[2] - leg.aim_from(p[:2]))
+        speed, altitude = float(v[:2] @ leg.way_at(at.along_m)), self._facts.altitude_m
+        row = SurveyRow(now_s, speed, at.speed_m_s, altitude, self.altitude_m, across, along, turned)
         self.rows.append(row)
         if len(self.rows) % 10 == 1:
-            self._write("line", leg=at.leg, flown_m=at.flown_m, place=p, altitude_m=row[3], across_m=across)
+            self._write("line", leg=at.leg, flown_m=at.flown_m, place=p, altitude_m=altitude, across_m=across)
 
     def _photograph(self) -> None:
         every, at, plan = self.options.every_m, self.at, self.plan
@@ -572,26 +576,18 @@ class TransectSession:
         return f"{self.state}  {words}"
 
     def figures(self) -> dict[str, Any]:
-        """Figures by the autopilot's own position and rangefinder, of cruise on lines; None where nothing was flown."""
-        rows = np.array(self.rows).reshape(-1, 6)
-        cruise = rows[rows[:, 2] >= self.options.pace.speed_m_s - 1e-6]
-        off_m = rows[:, 3] - self.options.pace.altitude_m
+        """Figures by the autopilot's own position, heading and rangefinder; None where nothing was flown."""
+        centre = None if self.plan is None else self.plan.centre_W_m
         return {
             "finished": self.finished,
             "state": self.state,
             "why": self.why,
             "flown_m": 0.0 if self.at is None else self.at.flown_m,
             "planned_m": None if self.plan is None else self.plan.line_m,
+            "centre_m": None if centre is None else np.round(centre, 3).tolist(),
             "current_m_s": None if self.current_W_m_s is None else self.current_W_m_s.tolist(),
-            "speed_error_rms_m_s": _rms(cruise[:, 1] - cruise[:, 2]),
-            "altitude_error_rms_m": _rms(off_m),
-            "altitude_error_p95_m": float(np.percentile(np.abs(off_m), 95)) if off_m.size else None,
-            "cross_track_max_m": float(np.abs(rows[:, 4]).max()) if len(rows) else None,
+            **errors_of(self.rows, self.options.pace.speed_m_s),
             "photographs": self.photographs,
             "interruptions": self.interruptions,
             "outliers": self.track.outliers,
         }
-
-
-def _rms(values: Array) -> float | None:
-    return float(np.sqrt(np.mean(np.square(values)))) if values.size else None
