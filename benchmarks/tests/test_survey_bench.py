@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState
 from wakewise.experiments.trials.timing import BenchOptions
-from wakewise_benchmarks import survey
+from wakewise.robot.vehicles import load_vehicle
+from wakewise_ardusub.physics.surface import FreeWater
+from wakewise_benchmarks import survey, survey_by_hand
 from wakewise_benchmarks.registry import BENCHES, run_bench
 
 
@@ -32,6 +37,7 @@ def test_figures_have_intervals_and_are_met_by_their_ends(
     """Three seeds of two reliefs are six flights; altitudes of 3, 4 and 5 cm are not met for certain."""
     monkeypatch.setattr(survey, "flight_figures", lambda relief, seed, _minutes: flight(relief, seed))
     monkeypatch.setattr(survey, "SURVEYED", ("a stick is moved", "the program dies"))
+    monkeypatch.setattr(survey_by_hand, "pair_figures", lambda _vehicle, seed: pair(seed))
     assert "survey" in BENCHES
     told = run_bench("survey", BenchOptions(seeds=3))
     assert told["all"]["flights"] == 6
@@ -43,3 +49,55 @@ def test_figures_have_intervals_and_are_met_by_their_ends(
     printed = capsys.readouterr().out
     assert "sawtooth: 3 of 3 flights finished" in printed
     assert "the program dies" in printed
+    assert told["by_hand"]["pairs"] == 3
+    assert told["wash_pct"]["mean"] == pytest.approx(70.0)
+    assert told["wash_pct"]["met"] is True
+    assert "by hand at 20 % pilot gain: 3 pairs" in printed
+
+
+def pair(seed: int) -> dict[str, Any]:
+    """Wash of the survey 30 % of the person's, in whatever water."""
+    person = dict.fromkeys(survey_by_hand.FIGURES, 100.0 + seed)
+    less = {name: 0.3 * value for name, value in person.items()}
+    return {"seed": seed, "person": person, "survey": less, **dict.fromkeys(survey_by_hand.REASONS, less)}
+
+
+def test_a_reduction_is_met_by_its_interval_alone() -> None:
+    """Pairs of 40 and 80 % have a mean above 60 % and an interval that reaches below it."""
+    pairs = [pair(seed) for seed in range(4)]
+    for k, one in enumerate(pairs):
+        one["survey"] = {**one["survey"], "wash_mm_s": (0.2 if k % 2 else 0.6) * one["person"]["wash_mm_s"]}
+    wash = survey_by_hand.hand_summary(pairs)["wash_pct"]
+    assert wash["mean"] > 60.0 > wash["low"]
+    assert wash["met"] is False
+
+
+def test_a_person_flies_a_short_line_at_a_fifth_of_the_stick() -> None:
+    """3 m in 30 s within 0.4 m of it and 0.4 m of the altitude, by sticks in their range."""
+    sea = survey_by_hand.SurveySea.drawn(load_vehicle(survey.VEHICLE), 2)
+    flown = survey_by_hand.by_hand(sea, np.zeros(2), sea.heading_rad, 2, 3.0).figures()
+    assert flown["speed_mean_cm_s"] == pytest.approx(10.0, abs=2.5)
+    assert flown["altitude_p95_cm"] < 40.0
+    assert flown["cross_track_p95_cm"] < 40.0
+    assert flown["wash_mm_s"] > 0.0
+    assert flown["level_mm_s"] < 1.0
+
+
+def test_the_wash_on_the_bed_is_that_of_the_thrusters_that_blow_at_it() -> None:
+    """Level thrusters alone give none 0.8 m below; vertical ones that hold a weight blow down, those that hold a float
+    up.
+    """
+    vehicle = load_vehicle(survey.VEHICLE)
+    sea = survey_by_hand.SurveySea.drawn(vehicle, 0)
+    motion = FreeWater(vehicle, BodyState(X_WB=Pose(np.array([0.0, 0.0, 4.2]), np.array([1.0, 0.0, 0.0, 0.0])))).step(
+        np.zeros(8), 0.02
+    )
+    level = np.abs(vehicle.thruster_axes_B[:, 2]) < 0.5
+    found = {}
+    for name, thrusts in {"level": 2.0 * level, "down": 0.5 * ~level, "up": -0.5 * ~level}.items():
+        wash = survey_by_hand.BedWash(sea=sea, way=np.array([1.0, 0.0]), start_W_m=np.zeros(2))
+        wash.take(motion, thrusts, 0.0)
+        found[name] = wash.figures()["wash_mm_s"]
+    assert found["level"] < 1.0
+    assert found["down"] == pytest.approx(0.0, abs=1e-6)
+    assert found["up"] > 50.0

@@ -12,8 +12,7 @@ Written down before the figures were known:
   Place across the line is by the autopilot's own position: what its Doppler log drifts is no matter of control;
 - intervals: 95 %, Student's t over flights. `met`: the interval lies within what is asked.
 
-Not measured: wash at the bed under the line against a person at 20 % gain. The person of `control.operator_model` flies
-relative to a target in the tank, not along a line in the free water of the simulated autopilot.
+Wash at the bed against a person at 20 % gain: `survey_by_hand`.
 """
 
 from __future__ import annotations
@@ -31,6 +30,7 @@ from wakewise.experiments.campaigns.statistics import mean_interval
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.optional_dependencies import need
+from wakewise_benchmarks.survey_by_hand import hand_figures, show_by_hand
 
 VEHICLE = "bluerov2-heavy"
 RELIEFS = ("trapezoid", "sawtooth")
@@ -56,10 +56,11 @@ def run(options: BenchOptions) -> dict[str, Any]:
     options.progress(count, count + 1, "losses")
     losses = loss_figures()
     options.progress(count + 1, count + 1, "")
+    by_hand = hand_figures(load_vehicle(VEHICLE), options.seeds, options.progress)
     told: dict[str, Any] = {"asked": ASKED | {"hold_s": HOLD_S, "time_out_s": TIME_OUT_S}, "vehicle": VEHICLE}
     for name in (*RELIEFS, "all"):
         told[name] = summary([flight for flight in flights if name in ("all", flight["relief"])])
-    return {**told, "losses": losses, "flights": flights, "why": {"wash_pct": "no person flies a line here yet"}}
+    return {**told, "losses": losses, "flights": flights, "wash_pct": by_hand["wash_pct"], "by_hand": by_hand}
 
 
 def flight_figures(relief: str, seed: int, minutes: float) -> dict[str, Any]:
@@ -153,3 +154,4 @@ def show_survey(told: dict[str, Any]) -> None:
                 typer.echo(f"  {name:<20}{each['mean']:6.2f}{ends}, worst {each['worst']:.2f}{asked}")
     for name, each in told["losses"].items():
         typer.echo(f"  {name:<38}{each['seconds']:6.2f} s, asked {each['asked']:.1f}")
+    show_by_hand(told["by_hand"])
