@@ -12,7 +12,7 @@ from wakewise.core.interfaces import BodyState
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.physics.surface import FreeWater
-from wakewise_benchmarks import survey, survey_by_hand
+from wakewise_benchmarks import survey, survey_by_hand, survey_orbits
 from wakewise_benchmarks.registry import BENCHES, run_bench
 
 
@@ -31,6 +31,15 @@ def test_a_short_flight_is_flown_and_judged_by_the_truth() -> None:
     assert told["altitude_p95_cm"] < 8.0
 
 
+def test_a_part_of_an_orbit_is_flown_and_judged_by_the_truth() -> None:
+    """0.3 turns of 1 m: finished, near the circle and with the bow near its centre."""
+    told = survey_orbits.orbit_figures(1, 1.0, 0.1, 0.3)
+    assert told["finished"]
+    assert told["flown_m"] == pytest.approx(0.6 * np.pi, abs=0.01)
+    assert told["cross_track_p95_cm"] < 15.0
+    assert told["heading_p95_deg"] < 6.0
+
+
 def test_figures_have_intervals_and_are_met_by_their_ends(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -38,6 +47,8 @@ def test_figures_have_intervals_and_are_met_by_their_ends(
     monkeypatch.setattr(survey, "flight_figures", lambda relief, seed, _minutes: flight(relief, seed))
     monkeypatch.setattr(survey, "SURVEYED", ("a stick is moved", "the program dies"))
     monkeypatch.setattr(survey_by_hand, "pair_figures", lambda _vehicle, seed: pair(seed))
+    heading = {"heading_p95_deg": 1.0, "heading_max_deg": 2.0}
+    monkeypatch.setattr(survey_orbits, "orbit_figures", lambda seed, *_: flight("sawtooth", seed) | heading)
     assert "survey" in BENCHES
     told = run_bench("survey", BenchOptions(seeds=3))
     assert told["all"]["flights"] == 6
@@ -49,6 +60,9 @@ def test_figures_have_intervals_and_are_met_by_their_ends(
     printed = capsys.readouterr().out
     assert "sawtooth: 3 of 3 flights finished" in printed
     assert "the program dies" in printed
+    assert told["orbit"]["heading_p95_deg"]["met"] is True
+    assert told["orbit_fastest"]["altitude_p95_cm"]["met"] is False
+    assert "orbit_small: 3 of 3 flights finished" in printed
     assert told["by_hand"]["pairs"] == 3
     assert told["wash_pct"]["mean"] == pytest.approx(70.0)
     assert told["wash_pct"]["met"] is True

@@ -10,7 +10,8 @@ Written down before the figures were known:
   lines with its turns;
 - speed and altitude are true ones; speed counts in cruise, altitude and place from the first time at the altitude on.
   Place across the line is by the autopilot's own position: what its Doppler log drifts is no matter of control;
-- intervals: 95 %, Student's t over flights. `met`: the interval lies within what is asked.
+- intervals: 95 %, Student's t over flights. `met`: the interval lies within what is asked;
+- orbits of `link orbit`: `survey_orbits`.
 
 Wash at the bed against a person at 20 % gain: `survey_by_hand`.
 """
@@ -19,7 +20,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,12 +32,14 @@ from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.optional_dependencies import need
 from wakewise_benchmarks.survey_by_hand import hand_figures, show_by_hand
+from wakewise_benchmarks.survey_orbits import CIRCLES, orbits
 
 VEHICLE = "bluerov2-heavy"
 RELIEFS = ("trapezoid", "sawtooth")
 MINUTES, LINE_M, APART_M = 20.0, 20.0, 0.5
 SPEED_M_S, FASTEST_CURRENT_M_S = 0.1, 0.15
 ASKED = {"speed_rms_cm_s": 1.0, "altitude_p95_cm": 5.0, "cross_track_p95_cm": 10.0}
+NAMES = ("speed_rms_cm_s", "altitude_rms_cm", "altitude_p95_cm", "cross_track_p95_cm", "cross_track_max_cm")
 SURVEYED: tuple[str, ...] = ()
 """Losses that are injected; all if empty."""
 HOLD_S, TIME_OUT_S = 1.0, 3.0
@@ -60,6 +63,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     told: dict[str, Any] = {"asked": ASKED | {"hold_s": HOLD_S, "time_out_s": TIME_OUT_S}, "vehicle": VEHICLE}
     for name in (*RELIEFS, "all"):
         told[name] = summary([flight for flight in flights if name in ("all", flight["relief"])])
+    told |= orbits(options.seeds, summary)
     return {**told, "losses": losses, "flights": flights, "wash_pct": by_hand["wash_pct"], "by_hand": by_hand}
 
 
@@ -110,12 +114,14 @@ def flight_figures(relief: str, seed: int, minutes: float) -> dict[str, Any]:
     }
 
 
-def summary(flights: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def summary(
+    flights: Sequence[dict[str, Any]], asked_of: Mapping[str, float] = ASKED, names: Sequence[str] = NAMES
+) -> dict[str, Any]:
     """Mean and 95 % interval of each figure over flights, and whether it is within what is asked."""
     told: dict[str, Any] = {"flights": len(flights), "finished": sum(bool(flight["finished"]) for flight in flights)}
-    for name in ("speed_rms_cm_s", "altitude_rms_cm", "altitude_p95_cm", "cross_track_p95_cm", "cross_track_max_cm"):
+    for name in names:
         mean, ends = mean_interval([flight[name] for flight in flights])
-        asked = ASKED.get(name)
+        asked = asked_of.get(name)
         met = None if asked is None or ends is None else ends.high <= asked
         told[name] = {
             "mean": mean,
@@ -144,7 +150,7 @@ def loss_figures() -> dict[str, Any]:
 
 def show_survey(told: dict[str, Any]) -> None:
     """A row per figure and relief, and one per loss."""
-    for relief in (*RELIEFS, "all"):
+    for relief in (*RELIEFS, "all", *CIRCLES):
         row = told[relief]
         typer.echo(f"{relief}: {row['finished']} of {row['flights']} flights finished")
         for name, each in row.items():
