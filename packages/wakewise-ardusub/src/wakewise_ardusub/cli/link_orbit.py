@@ -7,25 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from wakewise.ui.cli.options import Json
-from wakewise_ardusub.cli.link_survey import (
-    DEFAULT_CONNECTION,
-    DEFAULT_VEHICLE,
-    Camera,
-    Connection,
-    Consent,
-    Current,
-    Every,
-    Fence,
-    Gap,
-    Out,
-    RangeDelay,
-    Speed,
-    SurveyCommand,
-    System,
-    VehicleName,
-    Wait,
-    fly_survey,
-)
+from wakewise_ardusub.cli import link_survey
 
 if TYPE_CHECKING:
     from wakewise_ardusub.survey.orbit_plan import Direction
@@ -34,7 +16,7 @@ DEFAULT_RADIUS_M = 1.5
 
 
 def orbit(
-    connection: Connection = DEFAULT_CONNECTION,
+    connection: link_survey.Connection = link_survey.DEFAULT_CONNECTION,
     ahead: Annotated[
         float | None,
         typer.Option(
@@ -57,18 +39,18 @@ def orbit(
             "The layers after it alternate, which unwinds the tether."
         ),
     ] = "auto",
-    speed: Speed = 0.1,
-    every: Every = 0.0,
-    camera: Camera = "mavlink",
-    current: Current = "felt",
-    range_delay: RangeDelay = 0.3,
-    gap: Gap = 0.8,
-    fence: Fence = 20.0,
-    vehicle: VehicleName = DEFAULT_VEHICLE,
-    system: System = 1,
-    consent: Consent = False,
-    wait: Wait = 120.0,
-    out: Out = None,
+    speed: link_survey.Speed = 0.1,
+    every: link_survey.Every = 0.0,
+    camera: link_survey.Camera = "mavlink",
+    current: link_survey.Current = "felt",
+    range_delay: link_survey.RangeDelay = 0.3,
+    gap: link_survey.Gap = 0.8,
+    fence: link_survey.Fence = 20.0,
+    vehicle: link_survey.VehicleName = link_survey.DEFAULT_VEHICLE,
+    system: link_survey.System = 1,
+    consent: link_survey.Consent = False,
+    wait: link_survey.Wait = 120.0,
+    out: link_survey.Out = None,
     json: Json = False,
 ) -> None:
     """Fly circles round a target on stock ArduSub, bow towards it, at an altitude above the bed: GUIDED targets.
@@ -105,11 +87,11 @@ def orbit(
     def legs(here: Any, heading_rad: float, water: Any, _anchor: Any) -> list[Any]:
         return list(asked.legs(here, heading_rad, water))
 
-    given = SurveyCommand(
+    given = link_survey.SurveyCommand(
         name="orbit", connection=connection, every=every, camera=camera, current=current, range_delay=range_delay,
         gap=gap, fence=fence, vehicle=vehicle, system=system, consent=consent, wait=wait, out=out, json=json,
     )  # fmt: skip
-    fly_survey(given, pace, legs, layers_m=layers, off_m=min(0.6, 0.5 * (asked.radius_m - 0.5 * hull_m)))
+    link_survey.fly_survey(given, pace, legs, layers_m=layers, off_m=min(0.6, 0.5 * (asked.radius_m - 0.5 * hull_m)))
 
 
 def _numbers(option: str, text: str, right: str, count: int | None = None) -> tuple[float, ...]:

@@ -9,32 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.ui.cli.options import Json
-from wakewise_ardusub.cli.link_survey import (
-    DEFAULT_CONNECTION,
-    DEFAULT_VEHICLE,
-    Camera,
-    Connection,
-    Consent,
-    Current,
-    Every,
-    Fence,
-    Gap,
-    Out,
-    RangeDelay,
-    Speed,
-    SurveyCommand,
-    System,
-    VehicleName,
-    Wait,
-    fly_survey,
-)
+from wakewise_ardusub.cli import link_survey
 
 if TYPE_CHECKING:
     from wakewise_ardusub.survey.transect_session import MakeLines
 
 
 def transect(
-    connection: Connection = DEFAULT_CONNECTION,
+    connection: link_survey.Connection = link_survey.DEFAULT_CONNECTION,
     length: Annotated[
         float | None,
         typer.Option(metavar="M", help="One line of this length from here; 20 if neither --area nor --map is given."),
@@ -53,19 +35,19 @@ def transect(
             metavar="DEG", help="Of the line or of --area: degrees from north; here (as it is) or current (against it)."
         ),
     ] = "here",
-    speed: Speed = 0.1,
+    speed: link_survey.Speed = 0.1,
     altitude: Annotated[float, typer.Option(metavar="M", help="Of the rangefinder above the bed.")] = 0.8,
-    every: Every = 0.0,
-    camera: Camera = "mavlink",
-    current: Current = "felt",
-    range_delay: RangeDelay = 0.3,
-    gap: Gap = 0.8,
-    fence: Fence = 200.0,
-    vehicle: VehicleName = DEFAULT_VEHICLE,
-    system: System = 1,
-    consent: Consent = False,
-    wait: Wait = 120.0,
-    out: Out = None,
+    every: link_survey.Every = 0.0,
+    camera: link_survey.Camera = "mavlink",
+    current: link_survey.Current = "felt",
+    range_delay: link_survey.RangeDelay = 0.3,
+    gap: link_survey.Gap = 0.8,
+    fence: link_survey.Fence = 200.0,
+    vehicle: link_survey.VehicleName = link_survey.DEFAULT_VEHICLE,
+    system: link_survey.System = 1,
+    consent: link_survey.Consent = False,
+    wait: link_survey.Wait = 120.0,
+    out: link_survey.Out = None,
     json: Json = False,
 ) -> None:
     """Fly slow lines at an altitude above the bed on stock ArduSub: GUIDED targets, no motor override, no script.
@@ -77,11 +59,11 @@ def transect(
 
     pace = SurveyPace(speed_m_s=speed, altitude_m=altitude)
     lines = _lines(length, area, spacing, map_file, heading)
-    given = SurveyCommand(
+    given = link_survey.SurveyCommand(
         name="transect", connection=connection, every=every, camera=camera, current=current, range_delay=range_delay,
         gap=gap, fence=fence, vehicle=vehicle, system=system, consent=consent, wait=wait, out=out, json=json,
     )  # fmt: skip
-    fly_survey(given, pace, lines)
+    link_survey.fly_survey(given, pace, lines)
 
 
 def _lines(length: float | None, area: str | None, spacing: float, map_file: Path | None, heading: str) -> MakeLines:
