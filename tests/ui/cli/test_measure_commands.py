@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from wakewise.scene.targets import Mesh
 from wakewise.ui.cli.main import run
+from wakewise.vision.evaluation.measurement import unseen_pct
 
 
 def colony(path: Path, scale: float = 1.0, seed: int = 0, grown: float = 0.0) -> Path:
@@ -129,3 +131,60 @@ def test_the_same_model_twice_has_not_changed(tmp_path: Path, capsys: pytest.Cap
     assert run(["compare-models", path, path]) == 0
     shown = capsys.readouterr().out
     assert "verdict: no change can be told" in shown and "scale of" in shown
+
+
+def warned(path: Path, capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """All warnings of one measurement."""
+    assert run(["measure", str(path), *words, "--json"]) == 0
+    return " ".join(json.loads(capsys.readouterr().out)["warnings"])
+
+
+def test_doubtful_figures_have_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A plain dome has none; millimetres taken for metres, and half a dome at the model's end do."""
+    good = colony(tmp_path / "good.ply")
+    assert warned(good, capsys) == ""
+    assert "--unit-m" in warned(colony(tmp_path / "mm.ply", 1000.0), capsys)
+    whole = trimesh.load(good, process=False)
+    half = whole.faces[(whole.triangles_center[:, 0] > 0.0)]
+    trimesh.Trimesh(whole.vertices, half, process=False).export(tmp_path / "half.ply")
+    assert "open edges" in warned(tmp_path / "half.ply", capsys)
+
+
+def test_two_colonies_that_touch_have_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Joined below twice the cut only: the length there is that of both, above that of one."""
+    x = np.linspace(-0.15, 0.15, 121)
+    X, Y = np.meshgrid(x, x, indexing="ij")
+    Z = np.zeros_like(X)
+    for middle in (-0.05, 0.045):
+        Z = np.maximum(Z, np.sqrt(np.maximum(0.05**2 - (X - middle) ** 2 - Y**2, 0.0)))
+    i = np.arange(X.size).reshape(X.shape)
+    quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    trimesh.Trimesh(np.stack([X, Y, Z], axis=-1).reshape(-1, 3), faces, process=False).export(tmp_path / "two.ply")
+    assert "another colony" in warned(tmp_path / "two.ply", capsys)
+    box = ("--box", "0.0", "-0.1", "-0.05", "0.12", "0.1", "0.1", "--colony")
+    assert "another colony" not in warned(tmp_path / "two.ply", capsys, *box)
+
+
+def test_a_mesh_without_an_outside_or_in_coarse_steps_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Faces that turn opposite ways have no volume; map coordinates in single precision have no shape."""
+    whole = trimesh.load(colony(tmp_path / "good.ply"), process=False)
+    faces = np.array(whole.faces)
+    faces[::2] = faces[::2, ::-1]
+    trimesh.Trimesh(whole.vertices, faces, process=False).export(tmp_path / "mixed.ply")
+    trimesh.Trimesh(whole.vertices + np.array([5e5, 4.2e6, 0.0]), whole.faces, process=False).export(
+        tmp_path / "map.ply"
+    )
+    for name, told in (("mixed.ply", "opposite ways"), ("map.ply", "single precision")):
+        assert run(["measure", str(tmp_path / name)]) == 2
+        assert told in capsys.readouterr().err
+
+
+def test_a_surface_without_dense_points_is_filled_in() -> None:
+    """Half of a plane has dense points near it: the other half is unseen, but for three edges."""
+    plane = trimesh.creation.box((1.0, 1.0, 1e-3)).subdivide_to_size(0.02)
+    dense = plane.triangles_center[plane.triangles_center[:, 0] < 0.0]
+    share = unseen_pct(Mesh(np.asarray(plane.vertices), np.asarray(plane.faces)), dense)
+    assert share == pytest.approx(45.0, abs=5.0)

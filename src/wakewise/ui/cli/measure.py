@@ -104,6 +104,7 @@ def _figures(read: FinishedModel, found: MeasuredModel) -> dict[str, Any]:
     out |= {
         "bed": found.bed.figures(),
         "groups": found.groups,
+        "warnings": list(found.warnings),
         "scale_from": read.scale_from,
         "scale_sigma_pct": read.scale_sigma_pct,
         "surface_noise_mm": None if read.noise_m is None else 1e3 * read.noise_m,
@@ -120,11 +121,12 @@ def _figures(read: FinishedModel, found: MeasuredModel) -> dict[str, Any]:
 
 def _remarks(read: FinishedModel, found: MeasuredModel) -> list[str]:
     """What the intervals hold and what they leave out, in lines."""
+    warnings = [f"warning: {text}" for text in found.warnings]
     if found.why is not None:
-        return [f"no intervals: {found.why}"]
+        return [f"no intervals: {found.why}", *warnings]
     scale = (
         f"scale from {read.scale_from}, {read.scale_sigma_pct:.2g} % (one standard deviation)"
         if read.scale_sigma_pct is not None
         else f"without the scale's uncertainty: {read.scale_why}"
     )
-    return [f"intervals: {found.groups} groups of photographs left out in turn; {scale}"]
+    return [f"intervals: {found.groups} groups of photographs left out in turn; {scale}", *warnings]

@@ -205,6 +205,16 @@ def pieces(faces: IntArray, vertices: int) -> IntArray:
     return np.unique(connected_components(graph, directed=False)[1][faces[:, 0]], return_inverse=True)[1]
 
 
+def open_edges_m(mesh: Mesh, bed: BedFit, above_m: float, faces: BoolArray) -> float:
+    """Length of the edges of a colony, whose faces are marked, shape (m,), where the mesh ends above a height, m."""
+    some = mesh.faces[faces]
+    edges = np.sort(np.concatenate([some[:, :2], some[:, 1:], some[:, ::2]]), axis=1)
+    edges, count = np.unique(edges, axis=0, return_counts=True)
+    high = (bed.to_plane(mesh.vertices_m)[:, 2] > above_m)[edges].any(axis=1)
+    a, b = np.moveaxis(mesh.vertices_m[edges[high & (count == 1)]], 1, 0)
+    return float(np.linalg.norm(b - a, axis=1).sum())
+
+
 def bed_clearance_m(mesh: Mesh, bed: BedFit) -> float:
     """Height above the bed, m, from which on the shape of the colony's flank is that of the colony.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, KDTree, QhullError
 from scipy.spatial.distance import pdist, squareform
 
 from wakewise.core.arrays import Array, BoolArray
@@ -24,6 +24,9 @@ from wakewise.vision.evaluation.bed_and_colony import (
     cut_above,
     fit_bed,
     in_box,
+    median_edge_m,
+    open_edges_m,
+    pieces,
 )
 
 # key: (unit, power of the scale, definition)
@@ -37,6 +40,10 @@ DEFINITIONS: dict[str, tuple[str, int, str]] = {
     "volume_cm3": ("cm3", 3, "volume between surface and bed plane"),
     "rugosity": ("", 0, "surface area over planar area (Dahl 1973)"),
 }
+LEAST_BED_SHARE_PCT, MOST_OPEN, LEAST_LEFT, MOST_UNSEEN_PCT = 25.0, 0.1, 0.75, 10.0
+"""Bounds of `measuring_warnings`: share of the bed; open edges, and the length one clearance further up, in lengths of
+the colony; share of the surface without dense points."""
+SHORTEST_MM, LONGEST_MM = 5.0, 20_000.0
 CELLS = 1500
 """Cells of the raster of an outline along its longer side."""
 
@@ -92,8 +99,62 @@ def measure(mesh: Mesh, rule: MeasuringRule, rng: np.random.Generator) -> tuple[
     if cuts[0] is None:
         raise InputError(f"colony: nothing stands more than {1e3 * cut_m:.1f} mm above the bed")
     along = feret_direction(bed.to_plane(cuts[0].vertices_m)[:, :2])
+    reach, edge_m = float(np.ptp(bed.to_plane(cuts[0].vertices_m)[:, :2] @ along)), median_edge_m(mesh)
+    if reach < 4.0 * edge_m and float(bed.to_plane(cuts[0].vertices_m)[:, 2].max()) < 10.0 * bed.sigma_m:
+        raise InputError(
+            f"colony: nothing stands above the bed but {1e3 * reach:.1f} mm of its noise (edges of the mesh are "
+            f"{1e3 * edge_m:.1f} mm long)"
+        )
     sections = [_section(cut, bed, along) for cut in cuts if cut is not None]
     return _size(sections, cut_m if len(sections) == 3 else 0.0), bed, cuts[0]
+
+
+def measuring_warnings(mesh: Mesh, rule: MeasuringRule, size: ColonySize, bed: BedFit) -> list[str]:
+    """What makes figures of `measure` doubtful, in lines: unit, bed, holes, a foot that is joined."""
+    out: list[str] = []
+    if not SHORTEST_MM <= size.length_mm <= LONGEST_MM:
+        out.append(f"length of {1e-3 * size.length_mm:.3g} m: is the model in metres? --unit-m 0.001 reads millimetres")
+    if rule.bed is None and bed.share_pct < LEAST_BED_SHARE_PCT:
+        out.append(f"only {bed.share_pct:.0f} % of the surface lies on the bed plane, another may be right: --bed")
+    if not rule.colony:
+        return out
+    part = mesh if rule.box is None else in_box(mesh, *rule.box)
+    cut_m = bed_clearance_m(part, bed)
+    middle = None if rule.box is None else 0.5 * (np.asarray(rule.box[0]) + np.asarray(rule.box[1]))
+    faces = colony_faces(part, bed, cut_m, middle)
+    colony = Mesh(part.vertices_m, part.faces[faces])
+    length = [0.0, 0.0]
+    for k in range(2):
+        cut = cut_above(colony, bed.axes[2], bed.origin_m + (k + 1) * cut_m * bed.axes[2])
+        if cut is not None:
+            piece = pieces(cut.faces, len(cut.vertices_m))
+            largest = cut.faces[piece == np.argmax(np.bincount(piece, cut.face_areas_m2))]
+            length[k] = float(pdist(_hull(bed.to_plane(cut.vertices_m[largest].reshape(-1, 3))[:, :2])).max())
+    if length[1] < LEAST_LEFT * length[0]:
+        out.append(
+            f"length depends on the height of the cut: {1e3 * length[0]:.0f} mm at {1e3 * cut_m:.1f} mm above the bed, "
+            f"{1e3 * length[1]:.0f} mm at {2e3 * cut_m:.1f} mm; humps or another colony may be joined, or it branches "
+            "at its foot: look, and give --box with --colony"
+        )
+    ends_m = open_edges_m(part, bed, 1.5 * cut_m, faces)
+    if ends_m > MOST_OPEN * length[0]:
+        out.append(
+            f"the colony has {1e3 * ends_m:.0f} mm of open edges: it is cut by the end of the model or of the box, or "
+            "has holes; what is missing is not in the figures"
+        )
+    return out
+
+
+def unseen_pct(surface: Mesh, dense_m: Array) -> float:
+    """Share of a surface in percent, by area, without dense points, shape (n, 3), near it: it is filled in.
+
+    Near is three edges of the mesh, or three spacings of the points if that is more.
+    """
+    tree = KDTree(dense_m)
+    spacing = float(np.median(np.asarray(tree.query(dense_m[:: max(1, len(dense_m) // 5000)], k=[2])[0])))
+    away = np.asarray(tree.query(surface.triangles_m.mean(axis=1))[0])
+    far = away > 3.0 * max(median_edge_m(surface), spacing)
+    return 100.0 * float(surface.face_areas_m2[far].sum() / surface.face_areas_m2.sum())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,9 @@ from wakewise.vision.reconstruction.outputs.clouds import read_cloud
 from wakewise.vision.reconstruction.sfm.mapping import MAPPINGS
 from wakewise.vision.reconstruction.sfm.registered_photos import camera_centres
 
-NOISE_POINTS = 20_000
+NOISE_POINTS, DENSE_POINTS = 20_000, 400_000
+MOST_TURNED = 0.01
+"""Share of the edges between two faces whose faces may turn opposite ways: normals, and volumes, need one outside."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -29,7 +31,8 @@ class FinishedModel:
 
     sparse: folder of its cameras and tracks, None of a bare mesh; cameras_m: their centres, shape (k, 3), by name;
     fixed: the cameras were given and stayed; scale_sigma_pct: standard deviation of its scale, None with `scale_why`;
-    scale_from: what gave the scale; noise_m: standard deviation of dense points about the surface, None without them.
+    scale_from: what gave the scale; noise_m: standard deviation of dense points about the surface, None without them;
+    dense_m: some of these points, shape (n, 3), m.
     """
 
     name: str
@@ -42,6 +45,7 @@ class FinishedModel:
     scale_why: str | None = "a bare mesh does not say how its scale came about"
     scale_from: str | None = None
     noise_m: float | None = None
+    dense_m: Array | None = None
 
     @property
     def eyes_m(self) -> Array | None:
@@ -79,8 +83,10 @@ def read_model(path: Path, unit_m: float | None = None) -> FinishedModel:
         unit_m=unit,
         cameras_m=cameras,
         fixed=figures.get("mapping") == MAPPINGS["known"],
-        noise_m=_noise_m(mesh, path / "dense.ply", unit),
+        dense_m=_dense_m(path / "dense.ply", unit),
     )
+    if model.dense_m is not None:
+        model = replace(model, noise_m=_noise_m(mesh, model.dense_m))
     return replace(model, **_scale_of(figures, cameras, unit_m))
 
 
@@ -92,6 +98,21 @@ def _mesh(path: Path) -> Mesh:
         raise InputError(f"{path}: holds points without faces; a surface is needed, mesh the points first") from None
     joined = trimesh.Trimesh(read.vertices_m, read.faces, process=False)
     joined.merge_vertices(merge_tex=True, merge_norm=True)
+    step = float(np.spacing(np.float32(np.abs(joined.vertices).max())))
+    if step > 1e-3 * float(joined.extents.max()) and (joined.vertices == joined.vertices.astype(np.float32)).all():
+        raise InputError(
+            f"{path}: coordinates to {np.abs(joined.vertices).max():.3g} are stored in single precision, in steps of "
+            f"{step:.2g}; subtract an offset before they are written"
+        )
+    a, b = np.concatenate([joined.faces[:, :2], joined.faces[:, 1:], joined.faces[:, ::-2]]).astype(np.int64).T
+    _, edge, count = np.unique(np.minimum(a, b) * len(joined.vertices) + np.maximum(a, b), return_inverse=True,
+                               return_counts=True)  # fmt: skip
+    turned = (np.bincount(edge, np.sign(b - a)) != 0)[count == 2]
+    if turned.sum() > MOST_TURNED * len(turned):
+        raise InputError(
+            f"{path}: neighbouring faces turn opposite ways at {100 * turned.mean():.0f} % of the edges, so the mesh "
+            "has no outside; orient them alike (MeshLab: Re-Orient All Faces Coherently)"
+        )
     return Mesh(np.asarray(joined.vertices, dtype=np.float64), np.asarray(joined.faces, dtype=np.int64))
 
 
@@ -150,11 +171,16 @@ def position_scale_pct(rmse_m: float, centres_m: Array, count: int) -> float:
     return 100.0 * rmse_m / np.sqrt(3.0 * freedom) / (np.sqrt(count) * max(spread, 1e-12))
 
 
-def _noise_m(mesh: Mesh, dense: Path, unit: float) -> float | None:
-    """Robust standard deviation of dense points about the surface, along its normals; None without the file."""
+def _dense_m(dense: Path, unit: float) -> Array | None:
+    """Some of the dense points, None without the file."""
     if not dense.is_file():
         return None
     points = unit * read_cloud(dense).points_m
+    return np.asarray(points[:: max(1, len(points) // DENSE_POINTS)])
+
+
+def _noise_m(mesh: Mesh, points: Array) -> float:
+    """Robust standard deviation of dense points about the surface, along its normals."""
     points = points[:: max(1, len(points) // NOISE_POINTS)]
     centres, vectors = mesh.triangles_m.mean(axis=1), mesh.area_vectors_m2
     nearest = np.asarray(KDTree(centres).query(points)[1])

@@ -22,7 +22,15 @@ from wakewise.core.interfaces import Progress, no_progress
 from wakewise.scene.targets import Mesh
 from wakewise.vision.evaluation import umeyama
 from wakewise.vision.evaluation.bed_and_colony import BedFit
-from wakewise.vision.evaluation.measurement import DEFINITIONS, ColonySize, MeasuringRule, measure
+from wakewise.vision.evaluation.measurement import (
+    DEFINITIONS,
+    MOST_UNSEEN_PCT,
+    ColonySize,
+    MeasuringRule,
+    measure,
+    measuring_warnings,
+    unseen_pct,
+)
 from wakewise.vision.reconstruction.quality.finished_models import FinishedModel
 from wakewise.vision.reconstruction.sfm.colmap import bundle_adjustment, pycolmap, silence_logging
 
@@ -118,7 +126,7 @@ class FigureInterval:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredModel:
     """Figures of `measurement.DEFINITIONS` with intervals; `why` there are none; the bed; groups of photographs left
-    out in turn; the surface that counted.
+    out in turn; the surface that counted; warnings in lines.
     """
 
     intervals: dict[str, FigureInterval]
@@ -126,6 +134,7 @@ class MeasuredModel:
     groups: int
     bed: BedFit
     surface: Mesh
+    warnings: tuple[str, ...] = ()
 
 
 def measure_model(
@@ -160,7 +169,16 @@ def measure_model(
     intervals = {
         key: _interval(key, value, drawn if why is None else [], model) for key, value in size.values().items()
     }
-    return MeasuredModel(intervals=intervals, why=why, groups=len(drawn), bed=bed, surface=surface)
+    warnings = measuring_warnings(model.mesh, rule, size, bed)
+    unseen = 0.0 if model.dense_m is None else unseen_pct(surface, model.dense_m)
+    if unseen > MOST_UNSEEN_PCT:
+        warnings.append(
+            f"{unseen:.0f} % of the surface has no dense points near it, it was filled in (gaps between branches, "
+            "sides that no photograph shows): the volume is that of an envelope, areas are too small"
+        )
+    return MeasuredModel(
+        intervals=intervals, why=why, groups=len(drawn), bed=bed, surface=surface, warnings=tuple(warnings)
+    )
 
 
 def _interval(key: str, value: float, drawn: list[dict[str, float]], model: FinishedModel) -> FigureInterval:
