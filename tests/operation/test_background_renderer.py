@@ -107,6 +107,7 @@ def test_a_worker_that_cannot_be_started_is_told_and_the_flight_goes_on(parts, e
             darkroom.finish()
 
 
+@pytest.mark.slow
 def test_made_ready_for_nothing_it_ends_by_itself(parts, tmp_path):
     """Begun before the flight, once however often it is asked; without an exposure it ends well and makes nothing."""
     with warnings.catch_warnings(), BackgroundRenderer(parts, tmp_path) as darkroom:

@@ -24,6 +24,7 @@ def flown():
     return parts, water
 
 
+@pytest.mark.slow
 def test_what_holds_the_vehicle_up_goes_down_in_the_water(flown):
     """The water's momentum is downwards and no more than the jets gave it; sideways there is next to none."""
     parts, water = flown
@@ -49,6 +50,7 @@ def test_in_a_current_only_what_the_vehicle_adds_is_excess():
     assert water.water().target_speed_mean_m_s < 0.1
 
 
+@pytest.mark.slow
 def test_the_target_is_solid_where_it_stands(flown):
     """Cells on its surface are, far ones are not, and the count is that of its size."""
     parts, _ = flown

@@ -87,7 +87,7 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Never(r"\. \.venv/bin/activate", "this test runs in the environment already"),
     Never(r"pip install .*", "installs packages; tests/test_core.py and the lock file's test judge what is installed"),
     # Flights, photographs, models.
-    Run(r"wakewise scan --target branching", also=(*BRIEF, "--json"), shows=r'"registered_images"'),
+    Run(r"wakewise scan --target branching", also=(*BRIEF, "--json"), slow=True, shows=r'"registered_images"'),
     Run(r"wakewise scan( --world reef( --seed 3)?)?", also=(*BRIEF, "--out", "runs/a-scan"), slow=True),
     Run(r"wakewise scan --method \S+( --set \S+)?", also=(*BRIEF, "--out", "runs/by-name"), slow=True),
     Run(r"wakewise scan --target colony\.ply .*", also=tuple(BRIEF), slow=True),

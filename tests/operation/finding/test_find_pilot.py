@@ -448,6 +448,7 @@ def test_a_detectors_box_is_proposed_and_not_accepted(flight: Flight) -> None:
     assert getattr(flight.parts.estimator, "detector", "missing") is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("answer", [True, False])
 def test_an_operator_accepts_or_refuses_what_is_proposed(answer: bool) -> None:
     """Nothing is accepted by time; what is accepted is tracked, what is refused is not asked of again."""
@@ -474,6 +475,7 @@ def test_an_operator_accepts_or_refuses_what_is_proposed(answer: bool) -> None:
         assert all(metres > 0.03 for metres in away)
 
 
+@pytest.mark.slow
 def test_a_flight_that_is_over_can_be_flown_again() -> None:
     """The pilot of the same parts begins anew, also after a mission that ended."""
     parts = SCENARIO.replace(**{"find.give_up_s": 5.0, "perception.rate_hz": 0.5}).parts()

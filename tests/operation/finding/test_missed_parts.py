@@ -191,6 +191,7 @@ def test_further_views_are_different_ones_and_no_more_than_asked_for(most: int) 
     assert len({tuple(place.tolist()) for place in places}) == len(places)
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.floats(-180.0, 180.0), st.floats(5.0, 75.0)), max_size=6), st.integers(1, 10))
 @settings(max_examples=8, deadline=None)
 def test_further_views_never_cover_less(taken: list[tuple[float, float]], most: int) -> None:

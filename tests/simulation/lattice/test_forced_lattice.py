@@ -61,6 +61,7 @@ def test_the_water_keeps_the_momentum_it_is_given():
     assert water.momentum_N_s(RHO) == pytest.approx([0.5 * water.time_s, 0.0, 0.0], abs=0.001 * 0.5 * water.time_s)
 
 
+@pytest.mark.slow
 def test_a_jet_decays_as_published():
     """U x / sqrt(T / rho) is 5.8 to 7.0 half a metre and more from a disk of four cells (5.8 and 6.1: Hussein et al.
     1994; 6.5 to 7.0: ducted propellers, see `wakewise.simulation.water.round_jet_closure`).
@@ -83,6 +84,7 @@ def test_a_jet_decays_as_published():
     assert np.all((K > 5.0) & (K < 7.5)) and 5.6 < K.mean() < 7.0
 
 
+@pytest.mark.slow
 def test_a_jet_that_leaves_by_a_side_does_not_come_back():
     """Half a metre a second through an open side, for ten seconds: behind the disk the water stays as slow as it is
     drawn in, and no water is faster than the jet.
@@ -99,6 +101,7 @@ def test_a_jet_that_leaves_by_a_side_does_not_come_back():
     assert speed[22:].max() < 0.1
 
 
+@pytest.mark.slow
 def test_a_current_goes_round_a_body_and_stays_what_it_was_beside():
     """From once to three times the box's length it has its speed upstream, none in the body, less behind it, in the
     mean: an instant of an eddying wake is another on every processor.

@@ -68,6 +68,7 @@ def test_registration_recovers_a_motion(before: Mesh) -> None:
     assert np.linalg.norm(found.R_AB @ np.array(SHIFT) + found.t_A_m) < 3e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1000.0, 1.4])
 def test_models_of_different_scale_are_refused_unless_scale_is_to_be_fitted(before: Mesh, scale: float) -> None:
     """A model in millimetres, or 40 % larger, is named in one line; --align-scale finds the ratio within 1 %."""
@@ -95,6 +96,7 @@ def test_bodies_without_a_bed_are_compared_as_a_whole() -> None:
     assert found.bed is None and found.verdict.startswith("no change"), found.verdict
 
 
+@pytest.mark.slow
 def test_two_things_that_have_nothing_in_common_are_no_growth() -> None:
     """A cone against a coral is refused or told as change, never as none."""
     try:

@@ -43,7 +43,7 @@ X_WC = AT @ VEHICLE.X_BC
 LEVEL = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 AHEAD, DOWN_AHEAD = np.array([1.0, 0.0, 0.0]), np.array([math.sqrt(0.5), 0.0, math.sqrt(0.5)])
 ACCEPTED, DENIED = 0, 2
-PATIENT = EngagementLimits(pose_s=1.0, telemetry_s=1.0, operator_s=1.0, thrusts_s=1.0, standstill_s=1.0)
+PATIENT = EngagementLimits(pose_s=5.0, telemetry_s=5.0, operator_s=5.0, thrusts_s=5.0, standstill_s=5.0)
 """For a computer that has other work."""
 
 

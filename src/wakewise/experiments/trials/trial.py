@@ -220,13 +220,14 @@ def compare_methods(
 
     `meanwhile` is that of `run_trial`, with the method's name before.
     """
+    folders = {name: child_path(folder, name, "compare") for name in flights}
     for flight in flights.values():  # what does not fit is refused before the first of them flies
         _ = parts_of(flight).preflight
     result = comparison(
         {
             name: run_trial(
                 flight,
-                child_path(folder, name, "compare"),
+                folders[name],
                 watch,
                 None,
                 None if meanwhile is None else partial(meanwhile, name),
