@@ -101,5 +101,5 @@ class OperatorPopulation:
 POPULATION = OperatorPopulation()
 """Those who are drawn unless others are named."""
 CAREFUL = OperatorPopulation(gain=(0.2, 0.3))
-"""Survey pilots: the same people at the pilot gain of survey dives [SA]. The finest push is `stick_step` times the gain,
-and the most is the gain, so both are smaller; nothing else is changed."""
+"""Survey pilots: the same people at the pilot gain of survey dives [SA]. The finest push is `stick_step` times the
+gain, and the most is the gain, so both are smaller; nothing else is changed."""

@@ -46,7 +46,8 @@ class RegionMethods(Mapping[str, Pipeline]):
 
 def region_methods(parts: Parts) -> RegionMethods:
     """Both methods of an assisted flight: the scenario's, or `wake-aware` where that is no such method, and direct."""
-    gentle = parts.scenario.method if parts.scenario.method not in ("dp", "manual", "manual-careful", "ardusub") else WAYS[0]
+    direct = ("dp", "manual", "manual-careful", "ardusub")
+    gentle = WAYS[0] if parts.scenario.method in direct else parts.scenario.method
     layout = vehicle_layout(parts.vehicle)
 
     def make(region: Region) -> dict[str, Pipeline]:
