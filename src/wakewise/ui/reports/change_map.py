@@ -14,7 +14,8 @@ from wakewise.core.files import whole_file
 from wakewise.vision.evaluation.surface_change import SurfaceChange
 
 LOSS_AND_GROWTH = "RdBu"
-NOT_SEEN = "#d9d9d9"
+NOT_SEEN, BEHIND = "#b3b3b3", "#4a525c"
+"""Places that one date does not show; what is behind the surface, which is nearly white where nothing changed."""
 
 
 def write_change_map(path: Path, change: SurfaceChange) -> None:
@@ -39,7 +40,7 @@ def write_change_map(path: Path, change: SurfaceChange) -> None:
         drawn = axes.scatter(
             points[order, 0], points[order, across], s=size, c=mm[order], cmap=LOSS_AND_GROWTH, norm=norm, linewidths=0
         )
-        axes.set(xlabel="across, mm", ylabel=label, aspect="equal")
+        axes.set(xlabel="across, mm", ylabel=label, aspect="equal", facecolor=BEHIND)
     above.set_title("from above", fontsize=10, loc="left")
     side.set_title("from the side", fontsize=10, loc="left")
     figure.colorbar(drawn, ax=above, label="growth (blue) and loss (red), mm", shrink=0.7, location="left")
