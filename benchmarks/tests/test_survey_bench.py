@@ -49,6 +49,8 @@ def test_figures_have_intervals_and_are_met_by_their_ends(
     monkeypatch.setattr(survey_by_hand, "pair_figures", lambda _vehicle, seed: pair(seed))
     heading = {"heading_p95_deg": 1.0, "heading_max_deg": 2.0}
     monkeypatch.setattr(survey_orbits, "orbit_figures", lambda seed, *_: flight("sawtooth", seed) | heading)
+    terrain = {"altitude_rms_cm": 11.0, "firmware_rms_cm": 17.8}
+    monkeypatch.setattr(survey, "surftrak_figures", lambda _name: terrain)
     assert "survey" in BENCHES
     told = run_bench("survey", BenchOptions(seeds=3))
     assert told["all"]["flights"] == 6
@@ -62,6 +64,7 @@ def test_figures_have_intervals_and_are_met_by_their_ends(
     assert "the program dies" in printed
     assert told["orbit"]["heading_p95_deg"]["met"] is True
     assert told["orbit_fastest"]["altitude_p95_cm"]["met"] is False
+    assert "SURFTRAK's trapezoid    altitude  11.0 cm rms, the firmware's own mode  17.8" in printed
     assert "orbit_small: 3 of 3 flights finished" in printed
     assert told["by_hand"]["pairs"] == 3
     assert told["wash_pct"]["mean"] == pytest.approx(70.0)

@@ -2,7 +2,7 @@
 
 Written down before the figures were known:
 
-- asked (ardupilot 27767, issue 42): speed within 1 cm/s rms, altitude within 5 cm at 95 % of the time, place across the
+- asked (ardupilot 27767): speed within 1 cm/s rms, altitude within 5 cm at 95 % of the time, place across the
   line within 10 cm at 95 % of the time; from each loss 1 s to the firmware's hold, and 3 s where the program is dead or
   cut off, so that only the firmware's own time-out is left;
 - flights: seeds 0 to `--seeds`, each over `trapezoid` and `sawtooth` (drawn height, slope, phase), in a drawn current
@@ -11,7 +11,8 @@ Written down before the figures were known:
 - speed and altitude are true ones; speed counts in cruise, altitude and place from the first time at the altitude on.
   Place across the line is by the autopilot's own position: what its Doppler log drifts is no matter of control;
 - intervals: 95 %, Student's t over flights. `met`: the interval lies within what is asked;
-- orbits of `link orbit`: `survey_orbits`.
+- orbits of `link orbit`: `survey_orbits`;
+- terrains on which ArduSub's own bed following was tried: `surftrak_terrain`.
 
 Wash at the bed against a person at 20 % gain: `survey_by_hand`.
 """
@@ -31,6 +32,7 @@ from wakewise.experiments.campaigns.statistics import mean_interval
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.optional_dependencies import need
+from wakewise_benchmarks.surftrak_terrain import TERRAINS, surftrak_figures
 from wakewise_benchmarks.survey_by_hand import hand_figures, show_by_hand
 from wakewise_benchmarks.survey_orbits import CIRCLES, orbits
 
@@ -64,6 +66,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     for name in (*RELIEFS, "all"):
         told[name] = summary([flight for flight in flights if name in ("all", flight["relief"])])
     told |= orbits(options.seeds, summary)
+    told["surftrak"] = {name: surftrak_figures(name) for name in TERRAINS}
     return {**told, "losses": losses, "flights": flights, "wash_pct": by_hand["wash_pct"], "by_hand": by_hand}
 
 
@@ -160,4 +163,9 @@ def show_survey(told: dict[str, Any]) -> None:
                 typer.echo(f"  {name:<20}{each['mean']:6.2f}{ends}, worst {each['worst']:.2f}{asked}")
     for name, each in told["losses"].items():
         typer.echo(f"  {name:<38}{each['seconds']:6.2f} s, asked {each['asked']:.1f}")
+    for name, each in told["surftrak"].items():
+        typer.echo(
+            f"  SURFTRAK's {name:<12} altitude {each['altitude_rms_cm']:5.1f} cm rms, the firmware's own mode "
+            f"{each['firmware_rms_cm']:5.1f}"
+        )
     show_by_hand(told["by_hand"])
