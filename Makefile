@@ -10,7 +10,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: help setup scan test test-all coverage check bench results figures docs lock clean
 
 help:
-	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs, cockpit, ros, gamepad and links (LGPL), dask, detector, tools for tests"
+	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs, cockpit, ros, gamepad and links (LGPL), dask, detector, learning, tools for tests"
 	@echo "make scan    fly, photograph, reconstruct and judge a coral; leaves runs/quick/report.html"
 	@echo "make test    ruff, mypy, the import contract and the tests but the slow ones"
 	@echo "make test-all  the same with the slow ones"
@@ -88,7 +88,7 @@ docs: setup
 	$(BIN)/python tools/draw_layers.py
 
 lock: setup
-	$(BIN)/uv pip compile pyproject.toml packages/wakewise-ardusub/pyproject.toml --extra all --extra gamepad --extra links --extra ros --extra dask --extra detector --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate --no-emit-package wakewise -o requirements.lock
+	$(BIN)/uv pip compile pyproject.toml packages/wakewise-ardusub/pyproject.toml --extra all --extra gamepad --extra links --extra ros --extra dask --extra detector --extra learning --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate --no-emit-package wakewise -o requirements.lock
 
 clean:
 	rm -rf $(VENV) runs dist

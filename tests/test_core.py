@@ -55,7 +55,7 @@ import wakewise.robot.thrusters
 import wakewise.api, wakewise.operation.parts, wakewise.operation.flying, wakewise.operation.recorder
 import wakewise_paper.wash_reduction.flight, wakewise_paper.wake_validation, wakewise_benchmarks
 import wakewise.ui.reports.vehicle, wakewise_nerf.field, wakewise.vision.reconstruction.photos.lenses
-import wakewise.experiments.trials.export
+import wakewise.experiments.trials.export, wakewise.learning
 from wakewise.vision.evaluation import flight_figures, umeyama
 from wakewise.vision.imaging import ImagingSettings
 from wakewise.operation import load_scenario
@@ -65,6 +65,24 @@ load_scenario("quick", None, {})
         tmp_path,
     )
     assert found.returncode == 0, found.stderr
+
+
+def test_an_environment_says_which_extra_it_needs(tmp_path):
+    """Without Gymnasium the task can be had; an environment is refused in one line."""
+    found = without_extras(
+        """
+from wakewise.core.errors import MissingExtra
+from wakewise.learning import StationKeepingTask
+StationKeepingTask()
+try:
+    from wakewise.learning import StationKeepingEnv
+except MissingExtra as fault:
+    print(fault)
+""",
+        tmp_path,
+    )
+    assert found.returncode == 0, found.stderr
+    assert "wakewise.learning.StationKeepingEnv needs gymnasium" in found.stdout and "[learning]" in found.stdout
 
 
 @pytest.mark.slow

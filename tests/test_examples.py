@@ -45,9 +45,9 @@ def is_picture(path):
     return path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n" and path.stat().st_size > 10_000
 
 
-def test_there_are_ten():
-    """Ten questions."""
-    assert len(list(EXAMPLES.glob("*.py"))) == 10
+def test_there_are_eleven():
+    """Eleven questions."""
+    assert len(list(EXAMPLES.glob("*.py"))) == 11
 
 
 def test_types_of_the_examples_are_checked():
@@ -122,6 +122,16 @@ def test_many_vehicles_at_once_say_which_stiffness_is_best(tmp_path):
     median_mm = [float(mm) for mm in re.findall(r"(\d+) mm off", run("many_vehicles.py", tmp_path))]
     assert len(median_mm) == 4
     assert median_mm[0] > median_mm[1] > median_mm[2] < median_mm[3]
+
+
+@pytest.mark.slow
+def test_a_learned_policy_flies_beside_dp_in_both_worlds(tmp_path):
+    """A generation of training and two tanks: a line for each policy in each world."""
+    rows = run("learned_policy.py", tmp_path, "1", "2").splitlines()
+    assert [row.split(":")[0] for row in rows] == [
+        f"{world}, {name}" for world in ("jet model", "tank") for name in ("dp", "learned")
+    ]
+    assert all(re.search(r"return -\d+\.\d\d, water \d+\.\d\d mm/s, \d+\.\d mm off, \d+\.\d J$", row) for row in rows)
 
 
 def test_wake_models_are_ranked_by_the_lattice(tmp_path):

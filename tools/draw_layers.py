@@ -19,6 +19,7 @@ LAYERS = (
     "ui",
     "api",
     "experiments",
+    "learning",
     "operation",
     "control",
     "planning",

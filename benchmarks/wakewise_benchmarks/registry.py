@@ -23,6 +23,7 @@ BENCHES = {
     "campaign": "what a campaign costs: a trial, two workers beside one, what lies between trials, a list of many",
     "cold": "what a user waits for at first: import, --help, compiling, first flight, second flight",
     "disturbance": "the Gram matrix of D against the sum over points",
+    "learning": "environments for learning: steps a second; a small policy beside dp, in the jet model and in the tank",
     "estimator": "the filter in the default tank: error, consistency, ten seconds without a camera",
     "dynamics": "one step of the vehicle, with and without Jacobians, and of many vehicles at once",
     "gentle": "what each method does to the target's water where users have the trouble, and what each "

@@ -138,6 +138,8 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     ),
     Elsewhere(r"wakewise scan --set pilot=find.*", "tests/operation/finding/test_find_pilot.py", 'pilot="find"'),
     Elsewhere(r"wakewise scan --preset reef.*", "tests/operation/finding/test_survey_pilot.py", 'preset("reef"'),
+    Elsewhere(r"python examples/learned_policy\.py", "tests/test_examples.py", "learned_policy.py"),
+    Elsewhere(r"wakewise bench learning.*", "benchmarks/tests/test_learning_bench.py", '"learning"'),
     Elsewhere(r"wakewise bench reef.*", "benchmarks/tests/test_reef_bench.py", "patch_figures"),
     Elsewhere(r"wakewise bench target.*", "benchmarks/tests/test_target_bench.py", "figures_of"),
     Elsewhere(r"wakewise bench truth.*", "benchmarks/tests/test_truth_bench.py", '"truth"'),

@@ -28,6 +28,7 @@ EXTRAS: dict[str, dict[str, str]] = {
     "ros": {"rosbags": "rosbags"},
     "logs": {"foxglove": "foxglove-sdk"},
     "detector": {"onnxruntime": "onnxruntime"},
+    "learning": {"gymnasium": "gymnasium"},
     "nerf": {"torch": "torch"},
     "film": {"av": "av"},
     "dask": {"distributed": "distributed"},

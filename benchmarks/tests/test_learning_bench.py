@@ -1,0 +1,35 @@
+"""The bench of the environments for learning: speed, protocol, refusals."""
+
+import numpy as np
+import pytest
+
+from wakewise.core.errors import InputError
+from wakewise.experiments.trials.timing import BenchOptions
+from wakewise.learning import ResidualPolicy, StationKeepingTask
+from wakewise_benchmarks import learning
+from wakewise_benchmarks.registry import run_bench
+
+SHORT = StationKeepingTask(episode_s=0.2, points=12)
+
+
+def test_steps_per_second_are_more_than_asked() -> None:
+    """By thread CPU on one thread, the default task makes more than 20,000 environment steps per second."""
+    figures = learning.speed_figures(StationKeepingTask(), count=256, rounds=3)
+    assert figures["steps_per_s_cpu_1_thread"] > learning.ASKED_STEPS_PER_S == figures["asked_steps_per_s"]
+    assert figures["tank_steps_per_cpu_s"] > 0.0
+
+
+def test_the_untrained_policy_differs_from_dp_in_nothing() -> None:
+    """Both worlds compare pairs of the same episodes: for the same policy all differences are zero."""
+    parameters = ResidualPolicy.start(SHORT, np.random.default_rng(0))
+    found = learning.policy_figures(SHORT, parameters, tanks=2)
+    assert (found["jet"]["episodes"], found["tank"]["episodes"]) == (learning.JET_EPISODES, 2)
+    for world in ("jet", "tank"):
+        for name in ("return", "wash_m_s", "position_rmse_m", "energy_J"):
+            assert found[world][name]["difference"][0] == 0.0
+
+
+def test_an_unknown_part_is_refused() -> None:
+    """The message names the parts that there are."""
+    with pytest.raises(InputError, match="allowed speed, policy"):
+        run_bench("learning", BenchOptions(only=("quality",)))
