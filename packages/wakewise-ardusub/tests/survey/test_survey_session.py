@@ -167,13 +167,23 @@ def test_what_is_missing_is_told_and_keeps_it_from_beginning() -> None:
 
 def test_a_bed_that_rises_too_fast_ends_it() -> None:
     """Over a wall the vehicle stops while it is still above it."""
-    wall = Relief(shape="trapezoid", height_m=0.9, slope=2.0, period_m=8.0, phase=0.3)
+    wall = Relief(shape="trapezoid", height_m=0.9, slope=3.5, period_m=8.0, phase=0.3)
     survey = harness(relief=wall, current=None)
     survey.flying(1.0)
     survey.to_the_end()
     assert "the bed is" in survey.session.ended_by
     motion = survey.flight.run(5.0).autopilot.motion
-    assert wall.bed_m(*motion.p_WB_m[:2]) - motion.p_WB_m[2] > 0.1
+    assert wall.bed_m(*motion.p_WB_m[:2]) - motion.p_WB_m[2] > 0.03
+
+
+def test_a_steep_face_is_climbed_before_it_is_passed() -> None:
+    """Over a face of 70 degrees the way ahead stops until the altitude is there again, and the line is finished."""
+    face = Relief(shape="trapezoid", height_m=0.9, slope=2.7, period_m=8.0, phase=0.3)
+    survey = harness(relief=face, current=None, lines=straight_line(3.0))
+    survey.flying(1.0)
+    survey.to_the_end()
+    assert survey.session.finished
+    assert min(row[2] for row in survey.rows) > 0.25
 
 
 def test_lines_out_of_the_fence_are_refused_before_anything_moves_far() -> None:

@@ -30,7 +30,7 @@ class SurveyLimits:
     station_s: float = 3.5
     range_s: float = 0.8
     off_m: float = 0.6
-    near_share: float = 0.5
+    near_share: float = 0.25
     least_depth_m: float = 0.3
     fence_m: float = 200.0
 

@@ -84,6 +84,8 @@ LOOKS_DOWN = 25
 LEAD_S = 0.2
 """How far ahead the bed is looked for: the time in which a target becomes motion."""
 REACHED_M = 0.05
+LOW, BRAKE_M_S2 = 0.8, 0.05
+"""Share of the altitude below which the way ahead stops, by this deceleration, until the altitude is there again."""
 STILL_M, STILL_M_S, REST_S = 0.05, 0.012, 3.0
 """A vehicle nearer than this to its place, and slower, for so long, is at rest."""
 SET_MODE, REQUEST_MESSAGE, AUTOPILOT_VERSION = 176, 512, 148
@@ -429,9 +431,13 @@ class TransectSession:
                 self._depth = self._depth.towards(wished, bed[1], dt_s)
             asked_m = self.altitude_m
             self._reached |= abs(self._facts.altitude_m - asked_m) < REACHED_M
+            self._reached &= self._facts.altitude_m > LOW * asked_m
+            plan = self.plan
             if self._reached:
                 self._least_m = min(self.options.pace.altitude_m, *self.options.layers_m, asked_m)
-            self.at = advance(self.plan, self.at, dt_s, go=self.state == "flying" and self._reached)
+            else:  # too low: it waits for its altitude, and stops sooner than elsewhere
+                plan = replace(plan, pace=replace(plan.pace, acceleration_m_s2=BRAKE_M_S2))
+            self.at = advance(plan, self.at, dt_s, go=self.state == "flying" and self._reached)
             self._reached &= self.altitude_m == asked_m
             place, velocity, acceleration = target_of(self.plan, self.at)
             heading, turn = self.at.heading_rad, turn_of(self.plan, self.at)
