@@ -80,7 +80,7 @@ class DepthShaper:
     acceleration_m_s2: float = 0.0
     fastest_m_s: float = 0.25
     most_m_s2: float = 0.15
-    bandwidth_rad_s: float = 2.5
+    bandwidth_rad_s: float = 1.0
 
     def towards(self, depth_m: float, speed_m_s: float, dt_s: float) -> DepthShaper:
         """The target one step later, on its way to a depth that moves with a speed."""
