@@ -12,13 +12,13 @@ from wakewise.core.interfaces import BodyState
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.physics.surface import FreeWater
-from wakewise_benchmarks import survey, survey_by_hand, survey_orbits
-from wakewise_benchmarks.registry import BENCHES, run_bench
+from wakewise_benchmarks import repeat_scans, survey, survey_by_hand, survey_orbits
+from wakewise_benchmarks.registry import BENCHES, bench_target, run_bench
 
 
 def flight(relief: str, seed: int) -> dict[str, Any]:
     figures = {"speed_rms_cm_s": 0.3 + 0.1 * seed, "altitude_rms_cm": 1.0, "altitude_p95_cm": 3.0 + seed}
-    figures |= {"cross_track_p95_cm": 2.0, "cross_track_max_cm": 6.0}
+    figures |= {"cross_track_rms_cm": 1.0, "cross_track_p95_cm": 2.0, "cross_track_max_cm": 6.0}
     return {"relief": relief, "seed": seed, "finished": True, **figures}
 
 
@@ -51,6 +51,7 @@ def test_figures_have_intervals_and_are_met_by_their_ends(
     monkeypatch.setattr(survey_orbits, "orbit_figures", lambda seed, *_: flight("sawtooth", seed) | heading)
     terrain = {"altitude_rms_cm": 11.0, "firmware_rms_cm": 17.8}
     monkeypatch.setattr(survey, "surftrak_figures", lambda _name: terrain)
+    monkeypatch.setattr(repeat_scans, "colony_figures", lambda kind, _scans: colony(kind))
     assert "survey" in BENCHES
     told = run_bench("survey", BenchOptions(seeds=3))
     assert told["all"]["flights"] == 6
@@ -65,11 +66,34 @@ def test_figures_have_intervals_and_are_met_by_their_ends(
     assert told["orbit"]["heading_p95_deg"]["met"] is True
     assert told["orbit_fastest"]["altitude_p95_cm"]["met"] is False
     assert "SURFTRAK's trapezoid    altitude  11.0 cm rms, the firmware's own mode  17.8" in printed
+    assert told["speed_rms_cm_s"] == told["all"]["speed_rms_cm_s"]["mean"]
+    assert 2.0 < told["hold_after_loss_s_max"] < 3.2
+    assert told["volume_cv_pct"] == 2.0
+    assert told["growth_3mm_told"] is True
+    assert told["growth_1mm_claimed"] is True
+    assert "branching: CV of 2 scans: length 1.00 % (asked 0.5)" in printed
     assert "orbit_small: 3 of 3 flights finished" in printed
     assert told["by_hand"]["pairs"] == 3
     assert told["wash_pct"]["mean"] == pytest.approx(70.0)
     assert told["wash_pct"]["met"] is True
     assert "by hand at 20 % pilot gain: 3 pairs" in printed
+
+
+def colony(kind: str) -> dict[str, Any]:
+    """A colony whose 3 mm are told, and of which the branching one's 1 mm is claimed."""
+    size = 2.0 if kind == "branching" else 1.0
+    grown = {"1": {"told": kind == "branching", "verdict": "?"}, "3": {"told": True, "verdict": "grown by 3 mm"}}
+    cvs = {f"{name}_cv_pct": 0.5 * size for name in ("length", "planar_area", "area")} | {"volume_cv_pct": size}
+    return {"scans": [{}, {}], "grown": grown, **cvs}
+
+
+def test_a_colony_that_grew_has_its_surface_moved_out() -> None:
+    """By 3 mm along its normals: every vertex moved by so much, and the top rose."""
+    target = bench_target()
+    grown = repeat_scans.grown_target(target, 0.003)
+    moved = np.linalg.norm(grown.mesh.vertices_m - target.mesh.vertices_m, axis=1)
+    assert moved == pytest.approx(0.003)
+    assert grown.mesh.vertices_m[:, 2].min() < target.mesh.vertices_m[:, 2].min()
 
 
 def pair(seed: int) -> dict[str, Any]:

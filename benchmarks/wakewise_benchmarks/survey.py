@@ -12,6 +12,7 @@ Written down before the figures were known:
   Place across the line is by the autopilot's own position: what its Doppler log drifts is no matter of control;
 - intervals: 95 %, Student's t over flights. `met`: the interval lies within what is asked;
 - orbits of `link orbit`: `survey_orbits`;
+- repeat scans of a colony, for `wakewise measure` and `compare-models`: `repeat_scans`;
 - terrains on which ArduSub's own bed following was tried: `surftrak_terrain`.
 
 Wash at the bed against a person at 20 % gain: `survey_by_hand`.
@@ -28,10 +29,12 @@ import numpy as np
 import typer
 
 from wakewise.core.arrays import Array
+from wakewise.core.optional_dependencies import need as need_of_core
 from wakewise.experiments.campaigns.statistics import mean_interval
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.optional_dependencies import need
+from wakewise_benchmarks.repeat_scans import repeat_figures, show_repeats
 from wakewise_benchmarks.surftrak_terrain import TERRAINS, surftrak_figures
 from wakewise_benchmarks.survey_by_hand import hand_figures, show_by_hand
 from wakewise_benchmarks.survey_orbits import CIRCLES, orbits
@@ -41,7 +44,14 @@ RELIEFS = ("trapezoid", "sawtooth")
 MINUTES, LINE_M, APART_M = 20.0, 20.0, 0.5
 SPEED_M_S, FASTEST_CURRENT_M_S = 0.1, 0.15
 ASKED = {"speed_rms_cm_s": 1.0, "altitude_p95_cm": 5.0, "cross_track_p95_cm": 10.0}
-NAMES = ("speed_rms_cm_s", "altitude_rms_cm", "altitude_p95_cm", "cross_track_p95_cm", "cross_track_max_cm")
+NAMES = (
+    "speed_rms_cm_s",
+    "altitude_rms_cm",
+    "altitude_p95_cm",
+    "cross_track_rms_cm",
+    "cross_track_p95_cm",
+    "cross_track_max_cm",
+)
 SURVEYED: tuple[str, ...] = ()
 """Losses that are injected; all if empty."""
 HOLD_S, TIME_OUT_S = 1.0, 3.0
@@ -52,6 +62,7 @@ _LOOP_S = 0.1
 def run(options: BenchOptions) -> dict[str, Any]:
     """Figures over flights with intervals, of each relief and all, and seconds from each loss to the hold."""
     need("wakewise bench survey", "links", only=("pymavlink", "lupa"))
+    need_of_core("wakewise bench survey", "photos")
     flights: list[dict[str, Any]] = []
     count = options.seeds * len(RELIEFS)
     for seed in range(options.seeds):
@@ -67,7 +78,11 @@ def run(options: BenchOptions) -> dict[str, Any]:
         told[name] = summary([flight for flight in flights if name in ("all", flight["relief"])])
     told |= orbits(options.seeds, summary)
     told["surftrak"] = {name: surftrak_figures(name) for name in TERRAINS}
-    return {**told, "losses": losses, "flights": flights, "wash_pct": by_hand["wash_pct"], "by_hand": by_hand}
+    told |= {"losses": losses, "flights": flights, "wash_pct": by_hand["wash_pct"], "by_hand": by_hand}
+    told |= {name: told["all"][name]["mean"] for name in ("speed_rms_cm_s", "altitude_rms_cm", "cross_track_rms_cm")}
+    told["wash_reduction_vs_manual20_pct"] = by_hand["wash_pct"]["mean"]
+    told["hold_after_loss_s_max"] = max(row["seconds"] for row in losses.values())
+    return told | repeat_figures(options.progress)
 
 
 def flight_figures(relief: str, seed: int, minutes: float) -> dict[str, Any]:
@@ -169,3 +184,4 @@ def show_survey(told: dict[str, Any]) -> None:
             f"{each['firmware_rms_cm']:5.1f}"
         )
     show_by_hand(told["by_hand"])
+    show_repeats(told)

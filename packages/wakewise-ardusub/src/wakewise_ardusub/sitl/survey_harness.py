@@ -191,6 +191,7 @@ class SurveyHarness:
             "altitude_rms_cm": 100.0 * float(np.sqrt(np.mean(off**2))),
             "altitude_p95_cm": 100.0 * float(np.percentile(np.abs(off), 95)),
             "altitude_max_cm": 100.0 * float(np.abs(off).max()),
+            "cross_track_rms_cm": 100.0 * float(np.sqrt(np.mean(rows[:, 3] ** 2))),
             "cross_track_p95_cm": 100.0 * float(np.percentile(np.abs(rows[:, 3]), 95)),
             "cross_track_max_cm": 100.0 * float(np.abs(rows[:, 3]).max()),
             "heading_p95_deg": math.degrees(float(np.percentile(np.abs(rows[:, 4]), 95))),
