@@ -36,6 +36,7 @@ _SHOWN = {
     "front": "wakewise_paper.cli.bench_models:show_front",
     "gentle": "wakewise_paper.cli.bench_wash:show_gentle",
     "models": "wakewise_paper.cli.bench_models:show_models",
+    "onboard": "wakewise_benchmarks.onboard:show_onboard",
     "operator": "wakewise_paper.cli.bench_operator:show_operator",
     "reef": "wakewise_benchmarks.reef:show_reef",
     "survey": "wakewise_benchmarks.survey:show_survey",

@@ -30,6 +30,7 @@ BENCHES = {
     "mechanism is worth",
     "front": "wash against energy: our method at several power limits beside every rival, over whole scans",
     "models": "where wash ruins a model: mechanisms one by one, dose and response, what helps",
+    "onboard": "one thread of an onboard computer: allocation at 50 Hz, a plan at 10 Hz, memory, five times slower",
     "planner": "the planner against the paper's recipe and IPOPT",
     "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
     "operator": "an operator's velocity obeyed and the target's water spared, by w_track, where users have the trouble",
