@@ -153,6 +153,8 @@ def _fly(session: TransectSession, codec: MavlinkCodec, *, consent: bool, wait_s
     from wakewise.core.errors import InputError
 
     keys = sys.stdin if sys.stdin is not None and sys.stdin.isatty() else None
+    if keys is None and not consent:
+        typer.echo("no terminal: Enter is not heard; the pilot's GUIDED begins, or --consent beforehand", err=True)
     began_s = told_s = time.monotonic()
     told, asked, warned, ends_s = "", False, "", math.inf
     while session.state != "ended" and time.monotonic() < ends_s:

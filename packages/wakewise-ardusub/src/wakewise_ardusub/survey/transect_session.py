@@ -578,8 +578,9 @@ class TransectSession:
                 f"{self.state}  {self.at.flown_m:.1f} of {self.plan.line_m:.1f} m, {left / 60.0:.1f} min left, "
                 f"{self._facts.altitude_m:.2f} m above the bed, {self.photographs} photographs{waits}"
             )
-        words = "holds its place and measures the current" if self.state == "settling" else self.why or self.ended_by
-        return f"{self.state}  {words}"
+        begins = {"settling": "holds its place and measures the current", "ready": "Enter or the pilot's GUIDED begins"}
+        words = (self.why or self.ended_by, begins.get(self.state, ""))
+        return f"{self.state}  {'; '.join(filter(None, words))}"
 
     def figures(self) -> dict[str, Any]:
         """Figures by the autopilot's own position, heading and rangefinder; None where nothing was flown."""
