@@ -34,6 +34,7 @@ def test_what_holds_the_vehicle_up_goes_down_in_the_water(flown):
     assert water.water().target_speed_mean_m_s >= 0.0 and water.observe().power_W > 0.0
 
 
+@pytest.mark.slow
 def test_in_a_current_only_what_the_vehicle_adds_is_excess():
     """Before anything is pushed there is none in a current that has not settled, and the current is the ambient one."""
     told = {**STILL, "tank.current.velocity_m_s": [0.1, 0.0, 0.0]}

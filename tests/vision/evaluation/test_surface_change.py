@@ -51,6 +51,7 @@ def test_loss_is_told_as_loss(before: Mesh) -> None:
     assert found.figures["growth_volume_cm3"] == 0.0 < (found.figures["loss_volume_cm3"] or 0.0)
 
 
+@pytest.mark.slow
 def test_growth_at_the_top_alone_is_told_there(before: Mesh) -> None:
     """The rest of the colony holds the registration."""
     height = np.asarray(smooth_coral().vertices)[:, 2]

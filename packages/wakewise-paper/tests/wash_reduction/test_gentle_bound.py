@@ -145,6 +145,7 @@ def test_where_no_jet_reaches_the_target_nothing_is_to_be_gained():
     assert judge.energy(0) == 1.0
 
 
+@pytest.mark.slow
 def test_a_flight_of_dp_is_judged_with_the_rule_and_the_belief_among_the_choices(monkeypatch, tmp_path):
     """Its first seconds: all choices make its wrench, the rule's bow thrusters never blow ahead, and all keys are told;
     the belief spares the target by what it knows, for power.
