@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from wakewise.core.errors import InputError
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.learning import ResidualPolicy, StationKeepingTask
 from wakewise_benchmarks import learning
@@ -29,7 +28,11 @@ def test_the_untrained_policy_differs_from_dp_in_nothing() -> None:
             assert found[world][name]["difference"][0] == 0.0
 
 
-def test_an_unknown_part_is_refused() -> None:
-    """The message names the parts that there are."""
-    with pytest.raises(InputError, match="allowed speed, policy"):
-        run_bench("learning", BenchOptions(only=("quality",)))
+def test_the_bench_trains_and_compares_in_both_worlds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`wakewise bench learning` gives speed, time of training and both worlds; cut to one short generation."""
+    cut = {"ENVIRONMENTS": 8, "ROUNDS": 1, "GENERATIONS": 1, "CANDIDATES": 2, "EPISODES": 2, "JET_EPISODES": 4}
+    for name, value in (cut | {"EPISODE_S": 0.1, "StationKeepingTask": lambda: SHORT}).items():
+        monkeypatch.setattr(learning, name, value)
+    found = run_bench("learning", BenchOptions(seeds=2))
+    assert found.keys() == {"speed", "training_s", "training_cpu_s", "jet", "tank"}
+    assert found["tank"]["episodes"] == 2

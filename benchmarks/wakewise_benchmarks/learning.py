@@ -15,7 +15,6 @@ import numpy as np
 from gymnasium.vector import SyncVectorEnv
 
 from wakewise.core.arrays import Array
-from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns.statistics import mean_interval, paired_test
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.learning import (
@@ -33,31 +32,18 @@ ENVIRONMENTS, ROUNDS = 1024, 9
 TRAINING_SEED, GENERATIONS, CANDIDATES, EPISODES, EPISODE_S, BUDGET_S = 0, 150, 64, 16, 5.0, 900.0
 JET_SEED, JET_EPISODES = 2000, 256
 TANK_SEED = 5000
-PARTS = ("speed", "policy")
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
-    """`speed`, `policy`, or both; `options.seeds` is the number of episodes in the tank.
-
-    Raises InputError if `options.only` names another part.
-    """
-    only = PARTS if options.only is None else options.only
-    unknown = sorted(set(only) - set(PARTS))
-    if unknown:
-        raise InputError(f"--only {','.join(unknown)}: no such part, allowed {', '.join(PARTS)}")
+    """Speed, then training and comparison; `options.seeds` is the number of episodes in the tank."""
     task = StationKeepingTask()
-    figures: dict[str, Any] = {}
-    if "speed" in only:
-        figures["speed"] = speed_figures(task)
-    if "policy" in only:
-        began, worked = time.monotonic(), time.process_time()
-        env = StationKeepingVectorEnv(CANDIDATES * EPISODES, replace(task, episode_s=EPISODE_S))
-        rng = np.random.default_rng(TRAINING_SEED)
-        goes = options.progress
-        parameters = train(env, rng, generations=GENERATIONS, episodes=EPISODES, budget_s=BUDGET_S, progress=goes)
-        trained = {"training_s": time.monotonic() - began, "training_cpu_s": time.process_time() - worked}
-        figures["policy"] = trained | policy_figures(task, parameters, options.seeds)
-    return figures
+    speed = speed_figures(task)
+    began, worked = time.monotonic(), time.process_time()
+    env = StationKeepingVectorEnv(CANDIDATES * EPISODES, replace(task, episode_s=EPISODE_S))
+    rng, goes = np.random.default_rng(TRAINING_SEED), options.progress
+    parameters = train(env, rng, generations=GENERATIONS, episodes=EPISODES, budget_s=BUDGET_S, progress=goes)
+    spent = {"training_s": time.monotonic() - began, "training_cpu_s": time.process_time() - worked}
+    return {"speed": speed, **spent, **policy_figures(task, parameters, options.seeds)}
 
 
 def speed_figures(task: StationKeepingTask, count: int = ENVIRONMENTS, rounds: int = ROUNDS) -> dict[str, Any]:

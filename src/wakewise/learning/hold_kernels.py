@@ -18,7 +18,7 @@ from wakewise.wake.jets import speed_and_slope
 BLOCK = 32
 """Vehicles that one thread takes at a time, with one set of work arrays."""
 LOAD_TIME_S = 1.0
-"""Time constant of the observed load: of the order of the state estimator's (tests of `estimation`)."""
+"""Time constant of the observed load; an estimate: a state estimator needs about as long to find a new load."""
 
 
 class HoldCase(NamedTuple):
