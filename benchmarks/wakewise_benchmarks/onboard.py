@@ -30,8 +30,8 @@ from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.planning.planner import Planner
 from wakewise.wake import WakeSettings, wake_model
 from wakewise.wake.influence import InfluenceModel
+from wakewise_benchmarks.peak_memory import peak_memory_MB
 from wakewise_benchmarks.planner import MismatchedPlant, plan_model
-from wakewise_benchmarks.reconstruction import peak_memory_MB
 from wakewise_benchmarks.registry import VEHICLE, bench_region
 
 SECONDS, WARM_UP_S = 60.0, 3.0

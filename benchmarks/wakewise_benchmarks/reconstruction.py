@@ -9,8 +9,6 @@ figures: `mesh_s` is apart, and its memory is counted.
 from __future__ import annotations
 
 import multiprocessing
-import re
-import resource
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -23,6 +21,7 @@ from wakewise.operation import Scenario, load_scenario
 from wakewise.scene.targets import stony_kinds
 from wakewise.vision.reconstruction import ReconstructionSettings
 from wakewise_benchmarks import imaging
+from wakewise_benchmarks.peak_memory import peak_memory_MB
 from wakewise_paper.photo_sets import judge, planned_views, read_photo_set, write_photos
 
 PRESET, SEED = "standard", 1
@@ -82,13 +81,3 @@ def _model(scenario: Scenario, folder: Path, settings: ReconstructionSettings) -
     photos = read_photo_set(folder, scenario.imaging.camera().focal_px)
     out = folder / settings.mapper
     return judge(photos, target, settings, out) | {"memory_MB": peak_memory_MB()}
-
-
-def peak_memory_MB() -> float:
-    """Most memory that this process has held. Linux's own record is preferred: getrusage's counts the parent's too."""
-    status = Path("/proc/self/status")
-    if status.exists():
-        found = re.search(r"VmHWM:\s+(\d+) kB", status.read_text(encoding="ascii"))
-        if found:
-            return int(found.group(1)) * 1024 / 1e6
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
