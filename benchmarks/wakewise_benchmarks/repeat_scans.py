@@ -18,14 +18,14 @@ import numpy as np
 import trimesh
 import typer
 
+from wakewise.core.errors import StageError
 from wakewise.core.interfaces import Progress
 from wakewise.operation import Scenario, load_scenario
 from wakewise.scene.targets import Mesh, Target
 from wakewise.vision.evaluation.measurement import MeasuringRule, measure
 from wakewise.vision.evaluation.surface_change import compare_models
-from wakewise.vision.reconstruction import mesh_model, reconstruct
 from wakewise.vision.reconstruction.quality.finished_models import FinishedModel, read_model
-from wakewise_paper.photo_sets import planned_views, write_photos
+from wakewise_paper.photo_sets import judge, planned_views, write_photos
 
 KINDS = ("brain", "branching")
 SCANS, GROWN_MM = 3, (1.0, 3.0)
@@ -99,17 +99,9 @@ def scan(scenario: Scenario, target: Target, seed: int, folder: Path) -> Finishe
     """Photograph a target anew, reconstruct it from the photographs and estimated poses, and mesh it."""
     views = planned_views(target, scenario.mission, scenario.imaging.window_s, np.random.default_rng([7, seed]))
     photos = write_photos(folder, views, None, scenario.imaging, target, seed=seed)
-    settings = scenario.reconstruction.model_copy(update={"mesh": False, "check_shared_intrinsics": False})
-    reconstruct(
-        photos.folder,
-        folder / "model",
-        settings,
-        focal_px=photos.focal_px,
-        reference_positions=photos.references,
-        reference_rotations=photos.rotations,
-        region=(target.centre_W_m, 1.5 * target.radius_m),
-    )
-    mesh_model(folder / "model", settings)
+    found = judge(photos, target, scenario.reconstruction.model_copy(update={"mesh": True}), folder / "model")
+    if found["failure"] is not None:
+        raise StageError(f"repeat scans of {target.name}: {found['failure']}")
     return read_model(folder / "model", 1.0)
 
 
