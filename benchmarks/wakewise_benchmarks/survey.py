@@ -37,12 +37,11 @@ from wakewise_ardusub.optional_dependencies import need
 from wakewise_benchmarks.repeat_scans import repeat_figures, show_repeats
 from wakewise_benchmarks.surftrak_terrain import TERRAINS, surftrak_figures
 from wakewise_benchmarks.survey_by_hand import hand_figures, show_by_hand
-from wakewise_benchmarks.survey_orbits import CIRCLES, orbits
+from wakewise_benchmarks.survey_orbits import CIRCLES, FASTEST_CURRENT_M_S, VEHICLE, orbits
 
-VEHICLE = "bluerov2-heavy"
 RELIEFS = ("trapezoid", "sawtooth")
 MINUTES, LINE_M, APART_M = 20.0, 20.0, 0.5
-SPEED_M_S, FASTEST_CURRENT_M_S = 0.1, 0.15
+SPEED_M_S = 0.1
 ASKED = {"speed_rms_cm_s": 1.0, "altitude_p95_cm": 5.0, "cross_track_p95_cm": 10.0}
 NAMES = (
     "speed_rms_cm_s",
@@ -76,7 +75,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     told: dict[str, Any] = {"asked": ASKED | {"hold_s": HOLD_S, "time_out_s": TIME_OUT_S}, "vehicle": VEHICLE}
     for name in (*RELIEFS, "all"):
         told[name] = summary([flight for flight in flights if name in ("all", flight["relief"])])
-    told |= orbits(options.seeds, summary)
+    told |= orbits(options.seeds, summary, options.progress)
     told["surftrak"] = {name: surftrak_figures(name) for name in TERRAINS}
     told |= {"losses": losses, "flights": flights, "wash_pct": by_hand["wash_pct"], "by_hand": by_hand}
     told |= {name: told["all"][name]["mean"] for name in ("speed_rms_cm_s", "altitude_rms_cm", "cross_track_rms_cm")}

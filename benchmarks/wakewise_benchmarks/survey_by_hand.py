@@ -2,7 +2,7 @@
 
 Written down before the figures were known:
 
-- asked (issue 42): wash at the bed under the line at least 60 % below that of a person at 20 % of the pilot gain, or
+- asked: wash at the bed under the line at least 60 % below that of a person at 20 % of the pilot gain, or
   the reason;
 - pairs: seeds 0 to `PAIRS` - 1, relief by turns, one line of `LINE_M` each, with the draws of `survey.flight_figures`
   (bed, current, heading) and a trim of -3.3 to 3.3 N beyond the vehicle's own, as the world `close` draws it;
@@ -97,7 +97,8 @@ class SurveySea:
     def drawn(cls, vehicle: Vehicle, seed: int) -> SurveySea:
         """That of a seed."""
         from wakewise_ardusub.sitl.sea_sensors import SHAPES, Relief, drawn_current
-        from wakewise_benchmarks.survey import FASTEST_CURRENT_M_S, RELIEFS
+        from wakewise_benchmarks.survey import RELIEFS
+        from wakewise_benchmarks.survey_orbits import FASTEST_CURRENT_M_S
 
         index = seed % len(RELIEFS)
         rng = np.random.default_rng([seed, index])

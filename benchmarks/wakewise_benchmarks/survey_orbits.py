@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.interfaces import Progress
 from wakewise.robot.vehicles import load_vehicle
 
 VEHICLE, FASTEST_CURRENT_M_S = "bluerov2-heavy", 0.15
@@ -74,10 +75,11 @@ def orbit_figures(seed: int, radius_m: float, speed_m_s: float, turns: float = 1
     }
 
 
-def orbits(seeds: int, summary: Callable[..., dict[str, Any]]) -> dict[str, Any]:
+def orbits(seeds: int, summary: Callable[..., dict[str, Any]], progress: Progress) -> dict[str, Any]:
     """Summary and flights of each of `CIRCLES`."""
     told: dict[str, Any] = {}
     for name, (radius_m, speed_m_s) in CIRCLES.items():
+        progress(len(told), len(CIRCLES), f"{name}, {seeds} flights")
         flights = [orbit_figures(seed, radius_m, speed_m_s) for seed in range(seeds)]
         row = {"radius_m": radius_m, "speed_m_s": speed_m_s, **summary(flights, ASKED, NAMES)}
         told[name] = row | {"each": flights}
