@@ -140,22 +140,38 @@ def test_the_prediction_is_the_vehicle_s_own_motion():
 
 @pytest.mark.parametrize(("gap", "row"), [(plane_gap, [0.6, 0.0, -0.8, -1.5]), (sphere_gap, [0.2, 0.1, 1.4, 0.08])])
 def test_slopes_of_clearance_are_those_of_the_clearance(gap, row):
-    """By position and by turn, at a tilted pose."""
+    """By position and by turn, at a tilted pose and near level, where corners are rounded off."""
     half, row = np.array([0.22, 0.17, 0.14]), np.array(row)
-    p, q = np.array([0.3, -0.5, 1.0]), quat_from_euler(0.2, -0.1, 0.7)
 
     def at(p, q):
         R, unused = np.empty((3, 3)), np.empty(6)
         rotation(np.concatenate([p, q, np.zeros(6)]), R)
         return gap(p, R, half, row, unused), unused
 
-    _, slope = at(p, q)
-    for i in range(6):
-        e = np.zeros(6)
-        e[i] = 1e-6
-        ahead, _ = at(p + e[:3], quat_multiply(q, quat_from_rotvec(e[3:])))
-        behind, _ = at(p - e[:3], quat_multiply(q, quat_from_rotvec(-e[3:])))
-        assert (ahead - behind) / 2e-6 == pytest.approx(slope[i], abs=1e-6)
+    level = quat_from_euler(0.0, np.arctan2(0.6, 0.8), 0.0)  # an axis of the box along the plane's normal
+    p = np.array([0.3, -0.5, 1.0])
+    for q in (quat_from_euler(0.2, -0.1, 0.7), quat_multiply(level, quat_from_rotvec(np.array([0.02, -0.03, 0.0])))):
+        _, slope = at(p, q)
+        for i in range(6):
+            e = np.zeros(6)
+            e[i] = 1e-6
+            ahead, _ = at(p + e[:3], quat_multiply(q, quat_from_rotvec(e[3:])))
+            behind, _ = at(p - e[:3], quat_multiply(q, quat_from_rotvec(-e[3:])))
+            assert (ahead - behind) / 2e-6 == pytest.approx(slope[i], abs=1e-6)
+
+
+def test_clearance_to_a_plane_is_that_of_the_nearest_corner():
+    """Exact where level and beyond the rounded tilts, too large by at most 0.0074 of the half sizes in between."""
+    half, floor, rng = np.array([0.22, 0.17, 0.14]), np.array([0.0, 0.0, -1.0, -2.0]), np.random.default_rng(4)
+    corners = half * np.stack(np.meshgrid(*3 * [[-1.0, 1.0]]), axis=-1).reshape(-1, 3)
+    for tilt, most in ((0.0, 0.0), (0.02, 0.0074), (0.06, 0.0074), (0.6, 0.0)):
+        for heading in rng.uniform(-np.pi, np.pi, 8):
+            R = np.empty((3, 3))
+            # Roll and pitch alike: neither axis is within the rounded tilts at 0.6 rad.
+            rotation(np.concatenate([np.zeros(3), quat_from_euler(tilt, tilt, heading), np.zeros(6)]), R)
+            gap = plane_gap(np.array([0.1, 0.2, 1.5]), R, half, floor, np.empty(6))
+            over = gap - (2.0 - 1.5 - (corners @ R.T)[:, 2].max())
+            assert -1e-12 < over <= most * half.sum() + 1e-12
 
 
 def test_the_barrier_is_smooth_falls_to_zero_and_stands_at_contact():

@@ -31,8 +31,9 @@ from wakewise.robot.vehicles.kernels import rk4_jacobian_kernel, rk4_kernel
 from wakewise.wake.plan_disturbance import PackedWakeModel, WakeScratch, stage_disturbance
 
 ROUNDED = 0.05
-"""Sine of the tilt within which the corner nearest to a plane changes: |c| is rounded to sqrt(c^2 + 0.05^2), which
-is on the safe side. A level hull over a level floor would otherwise sit on a kink that no gradient can leave."""
+"""Sine of the tilt below which |c| is rounded to c^2 (2 r - |c|) / r^2, since the corner nearest to a plane changes at
+0. A level hull over a level floor would otherwise sit on a kink that no gradient can leave. The clearance is exact for
+a level hull and beyond 2.9 deg; in between it is too large by at most 0.0074 of the half size."""
 
 
 @njit(inline="always")
@@ -53,8 +54,9 @@ def barrier_value(h: float, reach: float, least: float) -> tuple[float, float, f
 
 @njit(apart=True)
 def plane_gap(p: Array, R: Array, half: Array, plane: Array, slope: Array) -> float:
-    """Distance of the box's nearest corner to a plane (less up to 5 % of its half size); `slope`, (6,), by position
-    in W and rotation vector in B.
+    """Distance of the box's nearest corner to a plane; `slope`, (6,), by position in W and rotation vector in B.
+
+    Near level the corners are rounded off, see `ROUNDED`.
     """
     n0, n1, n2 = plane[0], plane[1], plane[2]
     gap = n0 * p[0] + n1 * p[1] + n2 * p[2] - plane[3]
@@ -64,9 +66,13 @@ def plane_gap(p: Array, R: Array, half: Array, plane: Array, slope: Array) -> fl
     for i in range(3):
         # The normal in B; the corner that is nearest lies against it.
         c[i] = R[0, i] * n0 + R[1, i] * n1 + R[2, i] * n2
-        size = np.sqrt(c[i] * c[i] + ROUNDED * ROUNDED)
+        size = abs(c[i])
+        rate = 1.0 if c[i] > 0.0 else -1.0
+        if size < ROUNDED:
+            rate = c[i] * (4.0 * ROUNDED - 3.0 * size) / (ROUNDED * ROUNDED)
+            size = c[i] * c[i] * (2.0 * ROUNDED - size) / (ROUNDED * ROUNDED)
         gap -= half[i] * size
-        s[i] = -half[i] * c[i] / size
+        s[i] = -half[i] * rate
     # The gap changes by s . dc with dc = -theta x c, so the slope is s x c.
     slope[3] = s[1] * c[2] - s[2] * c[1]
     slope[4] = s[2] * c[0] - s[0] * c[2]

@@ -4,7 +4,8 @@ Released sticks brake: the commanded velocity falls to zero, and the position wh
 velocity is kept in the frame of the sticks, which turns with the vehicle or along the sphere about the target.
 
 Collision limits: towards each plane and sphere of the surroundings the velocity of approach is at most v = sqrt(2 a d),
-from which the hull stops within d, the distance less the clearance. Tangential velocity is not limited.
+from which the hull stops within d, the distance less the clearance and `STICK_MARGIN_M`. Tangential velocity is not
+limited.
 """
 
 from __future__ import annotations
@@ -113,6 +114,9 @@ def elevation_rad(eye_W_m: Array, centre_W_m: Array) -> float:
     return math.atan2(-float(away[2]), math.hypot(away[0], away[1]))
 
 
+STICK_MARGIN_M = 0.025
+"""What a commanded place keeps beyond the clearance: a hull that is stopped from full stick goes up to 33 mm farther
+than its command (research log 86)."""
 FELT_M_S = 0.02
 """Loss of speed from which it is worth saying what is in the way."""
 
@@ -141,7 +145,7 @@ class CollisionLimiter:
             else:
                 gap = sphere_gap(X_WB.p_m, R, self.half_m, spheres[k - len(planes)], slope)
             closing = -float(slope[:3] @ velocity + slope[3:] @ omega_B_rad_s)
-            most = math.sqrt(2.0 * self.braking_m_s2 * max(gap - CLEARANCE_M, 0.0))
+            most = math.sqrt(2.0 * self.braking_m_s2 * max(gap - CLEARANCE_M - STICK_MARGIN_M, 0.0))
             if closing > most:
                 velocity += (closing - most) * slope[:3]
                 blocks = self.around.name(k) if closing - most > FELT_M_S else blocks
