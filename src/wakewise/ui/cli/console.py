@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
+from contextvars import ContextVar
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -26,6 +27,19 @@ if TYPE_CHECKING:
 
 HEARTBEAT_S = 30.0
 """Longest silence of a stage whose progress goes into a pipe or a file."""
+
+
+_QUIET = ContextVar("quiet", default=False)
+
+
+@contextmanager
+def quiet_progress(quiet: bool = True) -> Iterator[None]:
+    """Show no progress of stages while the block runs, if `quiet`; results, warnings and errors are shown."""
+    token = _QUIET.set(quiet)
+    try:
+        yield
+    finally:
+        _QUIET.reset(token)
 
 
 @cache
@@ -58,8 +72,8 @@ class ProgressBars:
             TimeRemainingColumn(),
             TextColumn("[dim]{task.fields[note]}"),
         )
-        began = time.perf_counter()
-        with Progress(*columns, console=stderr, transient=True, disable=not stderr.is_terminal) as progress:
+        began, quiet = time.perf_counter(), _QUIET.get()
+        with Progress(*columns, console=stderr, transient=True, disable=quiet or not stderr.is_terminal) as progress:
             task = progress.add_task(name, total=None, note="")
 
             def advance(done: float, total: float, note: str = "") -> None:
@@ -69,14 +83,16 @@ class ProgressBars:
                 where[:] = [done, total, note]
 
             where: list[Any] = [0, 0, ""]
-            with nullcontext() if stderr.is_terminal else _heartbeat(name, where):
+            with nullcontext() if quiet or stderr.is_terminal else _heartbeat(name, where):
                 yield advance
         took_s = round(time.perf_counter() - began)
-        stderr.print(f"[green]✓[/] {name:<12} {took_s // 60:>3}:{took_s % 60:02} min")
+        if not quiet:
+            stderr.print(f"[green]✓[/] {name:<12} {took_s // 60:>3}:{took_s % 60:02} min")
 
     def skipped(self, name: str) -> None:
         """Say that a stage was already done."""
-        _stderr().print(f"[green]✓[/] {name:<12} [dim]already done")
+        if not _QUIET.get():
+            _stderr().print(f"[green]✓[/] {name:<12} [dim]already done")
 
 
 @contextmanager

@@ -38,6 +38,7 @@ from wakewise.ui.cli import (
     world,
 )
 from wakewise.ui.cli.commands import FLIGHT, PANELS, PHOTOGRAPHS, STUDIES, VEHICLES, CliCommand, installed_commands
+from wakewise.ui.cli.console import quiet_progress
 from wakewise.ui.cli.signals import EXIT_INTERRUPTED, INTERRUPTED, close_output, exit_code, program_signals
 
 _COMMANDS = (
@@ -101,6 +102,11 @@ for _command in _COMMANDS:
     else:
         _parent.command(_command.name, rich_help_panel=_panel)(_command.run)
 
+QUIET = "--quiet"
+_NEXT_STEP = (
+    "Next: `wakewise scan` flies round a simulated coral, reconstructs it and writes a report (a minute or two);\n"
+    "`wakewise COMMAND -h` explains a command."
+)
 _STOPPED = "stopped; what was finished is kept, run the same command again to go on"
 
 
@@ -116,10 +122,12 @@ def _root(
     _version: bool = typer.Option(
         False, "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
     ),
+    _quiet: bool = typer.Option(False, QUIET, help="Show no progress; also after the name of a command."),
 ) -> None:
     """Fly over-actuated underwater vehicles so gently that what they photograph stays undisturbed."""
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
+        typer.echo(f"\n{_NEXT_STEP}")
 
 
 @cache
@@ -133,8 +141,12 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
     0 done, 1 failed on good input, 2 bad input, 130 stopped by Ctrl-C, 143 ended by SIGTERM.
     """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    # Wherever it stands: the parser knows options of the program before the command's name only.
+    rest = [word for word in words if word != QUIET]
     try:
-        code = _commands()(args=arguments, standalone_mode=False)
+        with quiet_progress(len(rest) < len(words)):
+            code = _commands()(args=rest, standalone_mode=False)
         sys.stdout.flush()
         if code == EXIT_INTERRUPTED:  # Ctrl-C inside a command
             return _stopped()
