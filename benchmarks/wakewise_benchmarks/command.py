@@ -151,8 +151,8 @@ def bench(
     only: Annotated[
         str,
         typer.Option(
-            help="truth: which folders of the data, with commas between, such as dynamics,cube_channel; all if not "
-            "given.",
+            help="gpu: lattice, colmap, field, with commas between; truth: which folders of the data, such as "
+            "dynamics,cube_channel; all if not given.",
             show_default=False,
         ),
     ] = "",
@@ -185,11 +185,11 @@ def bench(
     ):  # fmt: skip
         if given and not listed(given):
             raise InputError(f"{option} '{given}': no name in it; leave it out for all")
-    if only and name not in ("truth", "all"):
-        raise InputError("--only: of `wakewise bench truth` alone")
+    if only and name not in ("truth", "gpu", "all"):
+        raise InputError("--only: of `wakewise bench truth` and `wakewise bench gpu` alone")
     if name == "truth" and not data.is_dir():
         raise InputError(f"--data {data}: no such folder; --data or WAKEWISE_DATA must name the reference data")
-    if name in ("truth", "all"):
+    if name == "truth" or (name == "all" and only):
         from wakewise_benchmarks.truth import chosen
 
         chosen(listed(only) or None)

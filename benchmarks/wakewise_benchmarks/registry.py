@@ -40,6 +40,7 @@ BENCHES = {
     "truth": "figures held against data that nobody in this project made: measured, asked, reached, met",
     "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
     "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",
+    "gpu": "lattice, COLMAP's stages and a neural field on a graphics card, each beside the processor",
     "link": "physics behind a firmware, the relay, the loop at sea, noise, and what every loss leads to",
     "tank": "the world of a trial against the clock",
     "adversarial-photos": "photographs that deceive: of each the model is right, or says that it is not",
