@@ -500,3 +500,22 @@ def test_a_broken_record_of_what_was_found_is_refused(text: str, tmp_path: Path)
     (tmp_path / "found.json").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match="centre_W_m"):
         found_region(tmp_path)
+
+
+def test_orbits_keep_the_hull_off_the_floor(caplog: pytest.LogCaptureFixture) -> None:
+    """A target found low beside the floor is scanned from higher orbits than asked for, which is told once an orbit."""
+    parts = SCENARIO.parts()
+    pilot = parts.pilot
+    assert isinstance(pilot, FindPilot)
+    floor_z_m, asked = float(parts.bounds.high_W_m[2]), parts.scenario.mission.elevations_deg
+    low = target_at(np.array([0.0, 0.0, floor_z_m - 0.01]))
+    for _ in range(2):
+        pilot._keep_clear(low)
+    raised = pilot._mission.elevations_deg
+    assert raised[0] > asked[0]
+    assert all(now >= before for now, before in zip(raised, asked, strict=True))
+    told = [record.getMessage() for record in caplog.records if "raised to" in record.getMessage()]
+    assert len(told) == sum(now > before for now, before in zip(raised, asked, strict=True))
+    assert all("the floor" in line for line in told)
+    pilot.begin()
+    assert pilot._mission.elevations_deg == asked

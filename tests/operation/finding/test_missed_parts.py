@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-from wakewise.core.geometry import Pose
+from wakewise.core.geometry import Pose, quat_from_matrix
 from wakewise.core.interfaces import TargetEstimate
 from wakewise.operation.finding.missed_parts import LAST_S, PhotographedSurface, ViewChooser, route_through
 from wakewise.perception.surface_map import CELL_M
 from wakewise.scene.missions import CameraAim, MissionSettings, TankBounds
-from wakewise.scene.missions.orbit import camera_pose
+from wakewise.scene.missions.orbit import R_FC, camera_pose
 from wakewise.scene.missions.point_surface import LEAST_POINTS
 from wakewise.vision.imaging import PinholeCamera
 
@@ -356,3 +356,36 @@ def test_a_route_leaves_its_places_as_they_were() -> None:
     places = [np.array([6.0, 0.4, 0.5]), np.array([-6.0, 0.4, 0.5])]
     route_through(places, np.zeros(3) + 0.5, CENTRE, MISSION)
     assert [place[0] for place in places] == [6.0, -6.0]
+
+
+AHEAD = replace(CHOOSER, aim=CameraAim(X_BC=Pose(np.array([0.2, 0.0, 0.0]), quat_from_matrix(R_FC))))
+"""With the camera before the hull."""
+
+
+@pytest.mark.parametrize("floor_z_m", [2.5, 1.2, 1.1, 1.05])
+def test_an_orbit_is_raised_until_the_hull_is_clear_of_the_floor(floor_z_m: float) -> None:
+    """No higher than needed, by the steps that are tried; as wished where that is clear, and then nothing is below."""
+    chooser = replace(AHEAD, bounds=replace(AHEAD.bounds, high_W_m=np.array([3.0, 2.5, floor_z_m])))
+    elevation_deg, below = chooser.clear_elevation_deg(estimate(), 20.0)
+
+    def least(at_deg: float) -> float:
+        poses = [at(azimuth, at_deg, MISSION.standoff_m) for azimuth in range(0, 360, 45)]
+        return min(chooser.gaps(X_WC, SURFACE)["the floor"] for X_WC in poses)
+
+    assert least(elevation_deg) >= MISSION.clearance_m
+    assert (below == "the floor") is (elevation_deg > 20.0) is (least(20.0) < MISSION.clearance_m)
+    assert elevation_deg == 20.0 or least(elevation_deg - 2.5) < MISSION.clearance_m
+
+
+def test_an_orbit_that_is_clear_nowhere_is_as_high_as_is_tried() -> None:
+    """About a target nearly as wide as the standoff, by its mapped surface or by its region alone."""
+    wide = CENTRE + (MISSION.standoff_m - 0.01) * OUT
+    for target in (estimate(surface_W_m=wide), region_alone(wide)):
+        assert AHEAD.clear_elevation_deg(target, 40.0) == (80.0, "the target")
+
+
+def region_alone(points_W_m: Array) -> TargetEstimate:
+    """An estimate without a mapped surface."""
+    n = len(points_W_m)
+    fields = {"points_W_m": points_W_m, "weights": np.ones(n), "distance_m": np.zeros(n)}
+    return estimate(surface_W_m=None, towards_W=None, **fields)

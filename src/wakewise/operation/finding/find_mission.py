@@ -6,6 +6,7 @@ about the centre that the camera has found so far, which moves slowly enough for
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -23,6 +24,8 @@ from wakewise.scene.missions.route import open_route, plan_route, rest_to_rest
 FOLLOWS_M_S = 0.03
 """Largest speed at which the legs' centre follows the estimate."""
 LOWEST_RAD = math.radians(5.0)
+
+log = logging.getLogger(__name__)
 
 
 PhaseName = Literal["look", "approach", "hold", "scan", "missed parts", "done"]
@@ -53,12 +56,13 @@ class FindPilot:
         find: FindSettings,
         chooser: ViewChooser | None = None,
     ) -> None:
-        self._aim, self._mission, self._find, self._chooser = aim, mission, find, chooser
+        self._aim, self._wished, self._find, self._chooser = aim, mission, find, chooser
         self._start, self._assumed_m = start, assumed_m
         self.begin()
 
     def begin(self) -> None:
         """Forget an earlier flight: what is known at the start of one."""
+        self._mission = self._wished
         self.centre_W_m = self._start.p_m + self._assumed_m * self._start.R[:, 2]
         self._here = on_sphere(self._start.p_m - self.centre_W_m)
         self._last_s = 0.0
@@ -162,6 +166,7 @@ class FindPilot:
         elif phase.name in ("scan", "missed parts"):
             self._after_photographs(time_s, target)
         elif phase.name == "look" and target is not None and target.status != "assumed":
+            self._keep_clear(target)
             self._begin("approach", self._approach(), time_s)
         elif not known:  # what is proposed is looked at from near, what is not from here again
             self._here = self._at(time_s)
@@ -169,6 +174,8 @@ class FindPilot:
         elif phase.name == "approach" and self._find.hold_s > 0.0:
             self._begin("hold", open_route(self.centre_W_m, self._find.hold_s, "hold", self._at(time_s)), time_s)
         else:
+            if target is not None:
+                self._keep_clear(target)
             self._begin("scan", self._scan(time_s), time_s)
 
     def _after_photographs(self, time_s: float, target: TargetEstimate | None) -> None:
@@ -207,6 +214,21 @@ class FindPilot:
         )
         leg = rest_to_rest("approach", here, end, self._mission.speed_m_s, self._mission.acceleration_m_s2)
         return _route(self.centre_W_m, [leg], [0.0], leg.duration_s)
+
+    def _keep_clear(self, target: TargetEstimate) -> None:
+        """Raise orbits on which the hull would come too near to the floor or to what is mapped of the target."""
+        if self._chooser is None:
+            return
+        before, now = self._mission.elevations_deg, []
+        for wished_deg in self._wished.elevations_deg:
+            elevation_deg, below = self._chooser.clear_elevation_deg(target, wished_deg)
+            now.append(elevation_deg)
+            if below and elevation_deg not in before:
+                log.warning(
+                    "orbit at %g deg raised to %g deg: the hull would come nearer to %s than mission.clearance_m",
+                    wished_deg, elevation_deg, below,
+                )  # fmt: skip
+        self._mission = self._mission.model_copy(update={"elevations_deg": tuple(now)})
 
     def _scan(self, time_s: float) -> Route:
         """The mission's orbits, begun at the azimuth where the vehicle is."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,11 +25,19 @@ from wakewise.scene.missions import (
     find_coverage_gaps,
     reachable_views,
 )
+from wakewise.scene.missions.clearance import gaps_of
+from wakewise.scene.missions.orbit import camera_pose
 from wakewise.scene.missions.point_surface import LEAST_POINTS, MAPPED_CRITERIA, patches_of_points
 from wakewise.scene.missions.route import rest_to_rest
 from wakewise.scene.missions.visibility import CameraIntrinsics
 from wakewise.vision.reconstruction import OrientedPointCloud
 
+CHECKED = 8
+"""Places of an orbit at which clearance is looked at."""
+MAPPED_MARGIN_M = 0.05
+"""By which the mapped surface may lie nearer than it was mapped, besides the mission's clearance."""
+STEP_DEG, STEEPEST_DEG = 2.5, 80.0
+"""An orbit that is not clear is raised in such steps, up to this elevation."""
 LAST_S = 0.5
 """The last shutter closes before the recording ends."""
 
@@ -104,6 +113,31 @@ class ViewChooser:
             clearance_m=self.mission.clearance_m,
             need=MAPPED_CRITERIA,
         )
+
+    def gaps(self, X_WC: Pose, solid_W_m: Array) -> dict[str, float]:
+        """Distances of the hull, its camera at a pose, from the water's bounds and from points, shape (n, 3), in m."""
+        pitch = math.asin(float(np.clip(-X_WC.R[2, 2], -1.0, 1.0)))
+        mount = self.aim.mount(self.aim.tilt(pitch)[0]).inverse()
+        return gaps_of(X_WC @ mount, self.size_m, self.bounds, solid_W_m)
+
+    def clear_elevation_deg(self, target: TargetEstimate, wished_deg: float) -> tuple[float, str]:
+        """Lowest elevation from the wished one on at which the orbit keeps the clearance, and what is below it.
+
+        What is below is "" where the wished one is clear. The bounds are known, the target as far as it is mapped.
+        """
+        solid = target.points_W_m if target.surface_W_m is None else target.surface_W_m
+        azimuths, below, elevation_deg = 2.0 * math.pi / CHECKED * np.arange(CHECKED), "", wished_deg
+        while True:
+            blocks = ""
+            for azimuth in azimuths.tolist():
+                X_WC = camera_pose(target.centre_W_m, azimuth, math.radians(elevation_deg), self.mission.standoff_m)
+                for what, gap in self.gaps(X_WC, solid).items():
+                    least = self.mission.clearance_m + (MAPPED_MARGIN_M if what == "the target" else 0.0)
+                    blocks = what if gap < least and not blocks else blocks
+            # Higher up the surface and the walls are no farther.
+            if blocks not in ("the floor", "the target") or elevation_deg + STEP_DEG > STEEPEST_DEG:
+                return elevation_deg, below
+            below, elevation_deg = below or blocks, elevation_deg + STEP_DEG
 
     def further(self, surface: PhotographedSurface, X_WC: Pose, most: int) -> list[Array]:
         """Azimuth, elevation and range of further views, shape (3,) each, in the order in which they are flown to."""

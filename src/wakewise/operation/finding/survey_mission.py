@@ -18,11 +18,10 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Goal, TargetEstimate
-from wakewise.operation.finding.missed_parts import PhotographedSurface, ViewChooser
+from wakewise.operation.finding.missed_parts import CHECKED, MAPPED_MARGIN_M, PhotographedSurface, ViewChooser
 from wakewise.operation.scenario.find_settings import SurveySettings
 from wakewise.perception.target_shape import thinned
 from wakewise.scene.missions import CameraAim, Coverage, Leg, MissionSettings, Route, open_route
-from wakewise.scene.missions.clearance import gaps_of
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise.scene.missions.part_choice import choose_parts, everywhere, middle_of, need_of
 from wakewise.scene.missions.point_surface import LEAST_POINTS, MAPPED_CRITERIA, patches_of_points
@@ -30,10 +29,6 @@ from wakewise.scene.missions.transects import PartOrbit, PatchTransects, orbits_
 
 ELEVATIONS_DEG = (30.0, 40.0, 50.0, 60.0, 70.0)
 """Orbits are as low as the hull keeps clear of what is mapped."""
-CHECKED = 8
-"""Places of an orbit at which that is looked at."""
-MARGIN_M = 0.05
-"""By which the mapped surface may lie nearer than it was mapped, besides the mission's clearance."""
 MIDDLE_M = np.zeros(2)
 LOOK_DEG = 60.0
 """Angle of the camera below the horizon on transects."""
@@ -116,11 +111,8 @@ class OrbitPlanner:
 
     def _clear(self, X_WC: Pose, solid_W_m: Array) -> bool:
         """Whether the hull keeps clear of what is mapped and of the water's bounds, with its camera at a pose."""
-        views = self.views
-        pitch = math.asin(float(np.clip(-X_WC.R[2, 2], -1.0, 1.0)))
-        mount = views.aim.mount(views.aim.tilt(pitch)[0]).inverse()
-        gaps = gaps_of(X_WC @ mount, views.size_m, views.bounds, solid_W_m)
-        return min(gaps.values()) >= views.mission.clearance_m + MARGIN_M
+        gaps = self.views.gaps(X_WC, solid_W_m)
+        return min(gaps.values()) >= self.views.mission.clearance_m + MAPPED_MARGIN_M
 
 
 class SurveyPilot:
