@@ -4,14 +4,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from analytic_colonies import Array, bed, box, cone, hemisphere, joined, noisy, turned
+from analytic_colonies import UP, Array, bed, box, cone, hemisphere, joined, noisy, turned
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.core.errors import InputError
 from wakewise.scene.targets import Mesh, read_mesh
 from wakewise.vision.evaluation.bed_and_colony import fit_bed, given_bed, in_box
-from wakewise.vision.evaluation.measurement import DEFINITIONS, ColonySize, MeasuringRule, measure, outline_area
+from wakewise.vision.evaluation.measurement import (
+    DEFINITIONS,
+    ColonySize,
+    MeasuringRule,
+    measure,
+    measuring_warnings,
+    outline_area,
+)
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[4] / "shared" / "data"))
 R, PI = 50.0, np.pi
@@ -148,3 +155,17 @@ def test_a_scanned_coral_has_the_area_and_volume_that_trimesh_gives_it() -> None
     hull = theirs.convex_hull.vertices
     assert found.extent_mm == pytest.approx(1e3 * max(np.linalg.norm(hull - one, axis=1).max() for one in hull))
     assert found.height_mm == pytest.approx(1e3 * float(high[2] - low[2]))
+
+
+def test_a_spike_that_sets_the_height_is_told() -> None:
+    """A vertex pulled up from the top, and not a dome or a box by itself."""
+    rng = np.random.default_rng(0)
+    for colony in (hemisphere(), box()):
+        whole = joined(bed(), colony)
+        spiked = whole.vertices_m.copy()
+        spiked[np.argmax(spiked[:, 2])] += 0.03 * UP
+        for vertices, told in ((whole.vertices_m, False), (spiked, True)):
+            mesh = Mesh(vertices, whole.faces)
+            size, plane, _ = measure(mesh, MeasuringRule(), rng)
+            lines = measuring_warnings(mesh, MeasuringRule(), size, plane)
+            assert any("the height rests on" in line for line in lines) is told

@@ -43,6 +43,8 @@ DEFINITIONS: dict[str, tuple[str, int, str]] = {
 LEAST_BED_SHARE_PCT, MOST_OPEN, LEAST_LEFT, MOST_UNSEEN_PCT = 25.0, 0.1, 0.75, 10.0
 """Bounds of `measuring_warnings`: share of the bed; open edges, and the length one clearance further up, in lengths of
 the colony; share of the surface without dense points."""
+TOP, LEAST_TOP_FACES = 0.1, 10
+"""Fewer triangles than this in the uppermost tenth of the height are a spike or a stray one."""
 SHORTEST_MM, LONGEST_MM = 5.0, 20_000.0
 CELLS = 1500
 """Cells of the raster of an outline along its longer side."""
@@ -135,6 +137,14 @@ def measuring_warnings(mesh: Mesh, rule: MeasuringRule, size: ColonySize, bed: B
             f"length depends on the height of the cut: {1e3 * length[0]:.0f} mm at {1e3 * cut_m:.1f} mm above the bed, "
             f"{1e3 * length[1]:.0f} mm at {2e3 * cut_m:.1f} mm; humps or another colony may be joined, or it branches "
             "at its foot: look, and give --box with --colony"
+        )
+    heights = bed.to_plane(colony.vertices_m)[:, 2][colony.faces].max(axis=1)
+    top = int((heights > (1.0 - TOP) * float(heights.max())).sum())
+    if top < LEAST_TOP_FACES:
+        rest_mm = 1e3 * float(np.partition(heights, -top - 1)[-top - 1]) if top < len(heights) else 0.0
+        out.append(
+            f"the height rests on {top} triangles: a spike, perhaps; the rest is no higher than {rest_mm:.0f} mm; give "
+            "--box with --colony, or clean the model"
         )
     ends_m = open_edges_m(part, bed, 1.5 * cut_m, faces)
     if ends_m > MOST_OPEN * length[0]:
