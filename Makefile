@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 # Every process of a scan or a test reads hundreds of modules: their bytecode is kept, whatever the shell says.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup scan test test-all coverage check bench results figures docs lock clean
+.PHONY: help setup scan test test-all coverage check bench bench-history nightly results figures docs lock clean
 
 help:
 	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs, cockpit, ros, gamepad and links (LGPL), dask, detector, learning, tools for tests"
@@ -17,6 +17,8 @@ help:
 	@echo "make coverage  coverage per package; kernels count, run without a compiler"
 	@echo "make check   the same without the tests"
 	@echo "make bench   speed and quality, side by side with a peer"
+	@echo "make bench-history  speed in short, compared with the last time on this processor, kept in docs/benchmarks"
+	@echo "make nightly  test-all, coverage and bench-history"
 	@echo "make results BUDGET=2h   the paper's tables beside ours, from as many trials as fit; writes docs/results"
 	@echo "make figures  the README's animation, from two flights; a minute or two"
 	@echo "make docs    regenerate docs/commands.md from the commands' own help"
@@ -73,6 +75,12 @@ test test-all: setup
 
 bench: setup
 	$(BIN)/wakewise bench all
+
+bench-history: setup
+	$(BIN)/python tools/bench_history.py
+
+# What a change every night should pass beside `make test`: slow tests, coverage, speed.
+nightly: test-all coverage bench-history
 
 BUDGET ?= 2h
 NOTE ?=

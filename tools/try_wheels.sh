@@ -1,35 +1,33 @@
 #!/bin/sh
-# Builds wheels and sources of all packages and flies with each in an empty environment:
+# Builds wheels and sources of all packages and tries them in empty environments, one for each Python that is given:
 #   sh tools/try_wheels.sh python3.11 python3.12 python3.13
-# Without extras: import and a first flight. With the extra `all`: the help of a scan and a picture-free report too.
+# First without extras: a first flight. Then with the extra `all` and the other packages: a scan's help, a photograph, the
+# commands of the packages. Last from the sources. A first flight compiles kernels, a minute or two for each Python.
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-build=$root/.venv/bin/uv
 for package in . packages/wakewise-ardusub packages/wakewise-paper packages/wakewise-nerf; do
-    "$build" build --quiet --out-dir "$work/dist" "$root/$package"
+    "$root/.venv/bin/uv" build --quiet --out-dir "$work/dist" "$root/$package"
 done
-ls "$work/dist"
 cd "$work" # not beside the sources
+ls dist
+install() { "env/bin/pip" install --quiet --disable-pip-version-check "$@" 2>&1 | grep -v '^WARNING' || true; }
 for python in "$@"; do
-    for extra in "" "[all]"; do
-        rm -rf env
-        "$python" -m venv env
-        wheel=$(ls dist/wakewise-*.whl)
-        env/bin/pip install --quiet --disable-pip-version-check "$wheel$extra"
-        env/bin/python -c "
+    rm -rf env
+    "$python" -m venv env
+    wheel=$(ls dist/wakewise-*.whl)
+    install "$wheel"
+    env/bin/python -c "
 import sys, wakewise as ww
-flight = ww.fly(ww.Scenario.preset('quick', world='quasi-steady', method='wake-aware'), duration_s=2.0)
-print(sys.version.split()[0], '$extra' or 'core', flight)"
-        env/bin/wakewise vehicle show bluerov2-heavy --quiet >/dev/null
-        env/bin/wakewise scan --help >/dev/null
-    done
-    env/bin/pip install --quiet --disable-pip-version-check dist/wakewise_ardusub-*.whl dist/wakewise_paper-*.whl
-    env/bin/wakewise link --help >/dev/null
-    env/bin/wakewise reproduce --help >/dev/null
-    # The sources make the same package.
-    rm -rf env && "$python" -m venv env
-    env/bin/pip install --quiet --disable-pip-version-check dist/wakewise-*.tar.gz
-    env/bin/wakewise --version
+print(sys.version.split()[0], 'core:', ww.fly(ww.Scenario.preset('quick'), duration_s=2.0))"
+    env/bin/wakewise vehicle show bluerov2-heavy --quiet >/dev/null
+    install "$wheel[all]" dist/wakewise_ardusub-*.whl dist/wakewise_paper-*.whl
+    env/bin/wakewise target show brain --out brain.svg --quiet >/dev/null
+    for command in scan reconstruct link reproduce; do env/bin/wakewise $command --help >/dev/null; done
+    echo "extras and packages: commands run"
+    rm -rf env
+    "$python" -m venv env
+    install dist/wakewise-*.tar.gz
+    echo "sources: $(env/bin/wakewise --version)"
 done
