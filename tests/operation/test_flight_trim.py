@@ -15,7 +15,9 @@ from wakewise.scene.targets import Region
 
 TWIST = ("u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 WATER = {"target.points": 60, "tank.mismatch.trim_N": 0.0}
-FEW_POINTS = Region(points_W_m=np.array([[0.0, 0.0, 1.4], [0.05, 0.0, 1.35]]), weights=np.ones(2), distance_m=np.zeros(2))
+FEW_POINTS = Region(
+    points_W_m=np.array([[0.0, 0.0, 1.4], [0.05, 0.0, 1.35]]), weights=np.ones(2), distance_m=np.zeros(2)
+)
 """Weights are found wherever the water is asked about: no region has to be sampled for them."""
 
 
