@@ -61,7 +61,7 @@ check: setup
 # Three processes on two cores: two share the rooms out, a file at a time, so that what a room's tests share is made, and
 # its kernels are loaded, by one of them; the third runs what mostly waits (tests/sharing.py). The library of linear
 # algebra would have all cores in each.
-# `make test` leaves out what is marked slow (ten seconds and more each) and draws the same examples each time;
+# `make test` leaves out what is marked slow (pyproject.toml) and draws the same examples each time;
 # `make test-all` leaves out nothing and draws new ones.
 test test-all: setup
 	$(BIN)/ruff check .

@@ -169,37 +169,74 @@ print(json.dumps(answers))
     assert (tmp_path / "v.html").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize(
-    ("words", "extras"),
-    [
-        ("scan --out runs/x", "photos,reports,logs"),
-        ("compare --out runs/x", "photos,reports,logs"),
-        ("reconstruct . --out runs/x", "photos"),
-        ("evaluate cloud.ply --reference cloud.ply", "photos"),
-        ("film runs/x", "photos,reports"),
-        ("export runs/x --to rosbag2", "ros"),
-        ("photo-robustness --out runs/x", "photos,reports"),
-        ("calibrate .", "photos"),
-        ("colour . --out runs/x", "photos"),
-        ("nerf . --out runs/x", "nerf,photos"),
-        ("target show plate --out runs/x.html", "reports,photos"),
-        ("wake validate --quick --out runs/x", "reports"),
-        ("bench gentle --plot runs/x.svg", "reports"),
-        ("bench imaging", "photos"),
-    ],
-)
-def test_a_command_says_in_one_line_which_extra_it_needs(words, extras, tmp_path):
-    """Exit code 2, the packages and how to install them; nothing is written."""
-    (tmp_path / "cloud.ply").write_text(
+COMMANDS = {
+    "scan --out runs/x": "photos,reports,logs",
+    "compare --out runs/x": "photos,reports,logs",
+    "reconstruct . --out runs/x": "photos",
+    "evaluate cloud.ply --reference cloud.ply": "photos",
+    "film runs/x": "photos,reports",
+    "export runs/x --to rosbag2": "ros",
+    "photo-robustness --out runs/x": "photos,reports",
+    "calibrate .": "photos",
+    "colour . --out runs/x": "photos",
+    "nerf . --out runs/x": "nerf,photos",
+    "target show plate --out runs/x.html": "reports,photos",
+    "wake validate --quick --out runs/x": "reports",
+    "bench gentle --plot runs/x.svg": "reports",
+    "bench imaging": "photos",
+}
+CALLS = {
+    "ww.trial(scenario, 'runs/x')": "photos,reports,logs",
+    "ww.compare({'a': scenario, 'b': scenario}, 'runs/x')": "photos,reports,logs",
+    "ww.reconstruct('.', 'runs/x')": "photos",
+    "ww.evaluate('cloud.ply', 'mesh.ply')": "photos",
+}
+_EACH = f"""
+import json
+from contextlib import redirect_stderr
+from io import StringIO
+from pathlib import Path
+import wakewise as ww
+from wakewise.core.errors import MissingExtra
+from wakewise.ui.cli.main import run
+
+scenario = ww.Scenario.preset("quick")
+answers = {{}}
+for words in {list(COMMANDS)}:
+    with redirect_stderr(StringIO()) as said:
+        code = run(words.split())
+    answers[words] = [code, said.getvalue(), Path("runs").exists()]
+for call in {list(CALLS)}:
+    try:
+        eval(call)
+    except MissingExtra as refusal:
+        answers[call] = [None, str(refusal), Path("runs").exists()]
+Path("answers.json").write_text(json.dumps(answers))
+"""
+
+
+@pytest.fixture(scope="module")
+def refusals(tmp_path_factory):
+    """Exit code, words and whether something was written, of each command and call, all in one process."""
+    folder = tmp_path_factory.mktemp("refusals")
+    (folder / "cloud.ply").write_text(
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
         "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
     )
-    found = without_extras(f"from wakewise.ui.cli.main import run\nsys.exit(run({words.split()!r}))", tmp_path)
-    assert found.returncode == 2, found.stderr
-    (line,) = found.stderr.strip().splitlines()
+    found = without_extras(_EACH, folder)
+    assert found.returncode == 0, found.stderr
+    return json.loads((folder / "answers.json").read_text())
+
+
+@pytest.mark.parametrize(("words", "extras"), COMMANDS.items())
+def test_a_command_says_in_one_line_which_extra_it_needs(words, extras, refusals):
+    """Exit code 2, the packages and how to install them; nothing is written."""
+    code, said, written = refusals[words]
+    assert code == 2, said
+    (line,) = said.strip().splitlines()
     assert line.startswith("wakewise: ")
     assert f"pip install -e '.[{extras}]' (in the clone's folder)" in line
-    assert not (tmp_path / "runs").exists()
+    assert not written
 
 
 def test_python_is_told_which_extra_a_name_needs(tmp_path):
@@ -225,33 +262,13 @@ assert len(lines) == 6, lines
     assert found.returncode == 0, found.stderr
 
 
-@pytest.mark.parametrize(
-    ("call", "extras"),
-    [
-        ("ww.trial(scenario, 'runs/x')", "photos,reports,logs"),
-        ("ww.compare({'a': scenario, 'b': scenario}, 'runs/x')", "photos,reports,logs"),
-        ("ww.reconstruct('.', 'runs/x')", "photos"),
-        ("ww.evaluate('cloud.ply', 'mesh.ply')", "photos"),
-    ],
-)
-def test_a_function_names_all_that_is_missing_before_it_begins(call, extras, tmp_path):
+@pytest.mark.parametrize(("call", "extras"), CALLS.items())
+def test_a_function_names_all_that_is_missing_before_it_begins(call, extras, refusals):
     """One line with every extra, not one after the other; nothing is written."""
-    found = without_extras(
-        f"""
-import wakewise as ww
-from wakewise.core.errors import MissingExtra
-scenario = ww.Scenario.preset("quick")
-try:
-    {call}
-except MissingExtra as refusal:
-    print(refusal)
-""",
-        tmp_path,
-    )
-    assert found.returncode == 0, found.stderr
-    assert found.stdout.startswith(f"{call.partition('(')[0]} needs ")
-    assert how_to_install(extras) in found.stdout
-    assert not (tmp_path / "runs").exists()
+    _, said, written = refusals[call]
+    assert said.startswith(f"{call.partition('(')[0]} needs ")
+    assert how_to_install(extras) in said
+    assert not written
 
 
 HEAVY = ("numpy", "scipy", "numba", "polars", "pydantic", "yaml", "rich", "matplotlib", "cv2", "trimesh")

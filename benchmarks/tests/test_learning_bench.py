@@ -1,5 +1,7 @@
 """The bench of the environments for learning: speed, protocol, refusals."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,7 @@ def test_the_bench_trains_and_compares_in_both_worlds(monkeypatch: pytest.Monkey
     cut = {"ENVIRONMENTS": 8, "ROUNDS": 1, "GENERATIONS": 1, "CANDIDATES": 2, "EPISODES": 2, "JET_EPISODES": 4}
     for name, value in (cut | {"EPISODE_S": 0.1, "StationKeepingTask": lambda: SHORT}).items():
         monkeypatch.setattr(learning, name, value)
+    monkeypatch.setattr(learning, "speed_figures", partial(learning.speed_figures, count=8, rounds=1))
     found = run_bench("learning", BenchOptions(seeds=2))
     assert found.keys() == {"speed", "training_s", "training_cpu_s", "jet", "tank"}
     assert found["tank"]["episodes"] == 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,6 +19,9 @@ WRITERS = {
     *("write_text", "write_bytes", "touch", "to_csv", "to_parquet", "dump"),
     *("copy", "copy2", "copyfile", "copyfileobj", "copytree", "Writer", "FileHandler"),
 }
+OPENERS = ("open", "ZipFile", "TarFile", "GzipFile")
+CALLED = re.compile(rf"\b({'|'.join((*sorted(WRITERS), *OPENERS))})\s*\(")
+"""Stands in every file that holds a write."""
 _GUARDS = {"whole_file", "whole_folder", "TemporaryDirectory", "database_folder"}
 # Whole by other means, or no result. A line here needs a reason that is true of every write of that function.
 ALLOWED = dict.fromkeys(
@@ -131,7 +135,7 @@ def _name(node: ast.AST) -> str:
 def _writes(call: ast.Call, buffers: frozenset[str]) -> bool:
     name = _name(call)
     method = isinstance(call.func, ast.Attribute)
-    if name in ("open", "ZipFile", "TarFile", "GzipFile"):
+    if name in OPENERS:
         return _opens_to_write(call)
     if name not in WRITERS or (not method and name in ("write_text", "write_bytes", "copy", "dump", "export", "save")):
         return False  # those of `wakewise.core.files`, and of a module's own
@@ -166,8 +170,11 @@ def _everywhere() -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for source in SOURCES:
         for path in sorted(source.glob("wakewise*/**/*.py")):
+            text = path.read_text(encoding="utf-8")
+            if not CALLED.search(text):
+                continue
             module = ".".join(part for part in path.relative_to(source).with_suffix("").parts if part != "__init__")
-            for where, line, words in writes(ast.parse(path.read_text(encoding="utf-8"))):
+            for where, line, words in writes(ast.parse(text)):
                 found.setdefault(f"{module}.{where}", []).append(f"{path.relative_to(ROOT)}:{line}: {words}")
     return found
 

@@ -11,9 +11,14 @@ from wakewise.core.errors import InputError
 from wakewise.operation.flight_trim import ballast_proposal, flight_trim, folder_trim, hover_mask
 from wakewise.robot.vehicles import compile_body, load_vehicle, restoring_wrench
 from wakewise.robot.vehicles.ballast import BallastBlock, net_buoyancy_N, with_blocks
+from wakewise.scene.targets import Region
 
 TWIST = ("u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 WATER = {"target.points": 60, "tank.mismatch.trim_N": 0.0}
+FEW_POINTS = Region(
+    points_W_m=np.array([[0.0, 0.0, 1.4], [0.05, 0.0, 1.35]]), weights=np.ones(2), distance_m=np.zeros(2)
+)
+"""Weights are found wherever the water is asked about: no region has to be sampled for them."""
 
 
 @pytest.mark.parametrize(
@@ -26,7 +31,7 @@ WATER = {"target.points": 60, "tank.mismatch.trim_N": 0.0}
 )
 def test_seven_seconds_of_hover_say_what_nobody_knew(seed: int, load: BallastBlock) -> None:
     """In the tank, with drawn drag and gains: weight within .3 N, and the advice cancels load and turn."""
-    parts = ww.Scenario.preset("quick", method="dp", seed=seed, **WATER).parts()
+    parts = ww.Scenario.preset("quick", method="dp", seed=seed, **WATER).parts().replace(region=FEW_POINTS)
     laden = with_blocks(parts.world.vehicle, [load])
     flight = ww.fly(parts.replace(world=replace(parts.world, vehicle=laden)), duration_s=7.0, water_every_s=np.inf)
     found = flight_trim(parts.vehicle, flight.steps)
@@ -79,7 +84,8 @@ def test_the_settling_hover_says_the_ballast_before_the_first_leg(caplog) -> Non
     for trim_N, lines in ((-4.0, 1), (0.2, 0)):
         caplog.clear()
         told = {"tank.mismatch.trim_N": trim_N, "mission.settle_s": 8.0, "tank.current.velocity_m_s": (0.0, 0.0, 0.0)}
-        ww.fly(ww.Scenario.preset("quick", method="dp", world="tank", **told), duration_s=8.5, water_every_s=60.0)
+        parts = ww.Scenario.preset("quick", method="dp", world="tank", **told).parts().replace(region=FEW_POINTS)
+        ww.fly(parts, duration_s=8.5, water_every_s=60.0)
         said = [record.message for record in caplog.records if "settling hover" in record.message]
         assert len(said) == lines
         assert all("N of float" in words and "N heavy" in words for words in said)

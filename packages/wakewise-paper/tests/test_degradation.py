@@ -46,7 +46,8 @@ def told(tmp_path_factory):
     asked = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(photo_robustness, "judge", made_up)
-        scenario, folder = load_scenario("quick", None, SMALL), tmp_path_factory.mktemp("told")
+        scenario = load_scenario("quick", None, SMALL | {"mission.views": [4]})
+        folder = tmp_path_factory.mktemp("told")
         return folder, scenario, degrade(scenario, folder, {"silt": (0.0, 3000.0, 4000.0)})
 
 

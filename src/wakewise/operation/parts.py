@@ -3,7 +3,7 @@
 This is the one place where the controller's model and the simulated world meet. The world gets the perturbed vehicle
 and its own water; the controller gets the nominal vehicle and a wake model. No module below sees both.
 
-Sampling a region takes seconds, so the regions of the last flights are cached.
+Sampling a region takes seconds and a soft target's modes a third of one, so those of the last flights are cached.
 """
 
 from __future__ import annotations
@@ -33,7 +33,15 @@ from wakewise.robot.importers import any_vehicle
 from wakewise.robot.vehicles import Vehicle
 from wakewise.robot.vehicles.ballast import with_blocks
 from wakewise.scene.missions import CameraAim, Route, TankBounds, aim_of, plan_route
-from wakewise.scene.targets import BendingModes, Region, Target, find_fragility, find_target, sample_region
+from wakewise.scene.targets import (
+    BendingModes,
+    Region,
+    Target,
+    TissueProperties,
+    find_fragility,
+    find_target,
+    sample_region,
+)
 from wakewise.simulation.tank import build_ambient
 from wakewise.simulation.tank.soft_body import DRAG, TargetCompliance, UnanchoredTarget
 from wakewise.wake import wake_model
@@ -203,7 +211,7 @@ class Parts:
             return None
         loose = None if weight_N is None else UnanchoredTarget(weight_N=weight_N, friction=settings.unanchored.friction)
         drag = tissue.drag if tissue is not None else settings.drag or DRAG
-        sway = None if tissue is None else BendingModes.of(self.target, tissue, self.scenario.tank.density_kg_m3)
+        sway = None if tissue is None else modes_of(self.target, tissue, self.scenario.tank.density_kg_m3)
         return TargetCompliance(drag=drag, sway=sway, loose=loose)
 
     @ReplaceablePart
@@ -422,6 +430,28 @@ CACHED_REGIONS = 16
 _regions: dict[bytes, Region] = {}
 _regions_lock = Lock()
 
+CACHED_MODES = 8
+"""Soft targets whose modes are in the cache, the last ones used; one's modes are 1 MB."""
+
+_modes: dict[bytes, BendingModes] = {}
+_modes_lock = Lock()
+
+
+def modes_of(target: Target, tissue: TissueProperties, water_kg_m3: float) -> BendingModes:
+    """Stems and modes of a soft target, cached by its shape and depth, tissue and water.
+
+    Raises InputError as `BendingModes.of`.
+    """
+    key = _shape_digest(target, tissue, float(water_kg_m3), target.bed_z_m)
+    with _modes_lock:
+        found = _modes.pop(key, None)
+        if found is None:
+            found = BendingModes.of(target, tissue, water_kg_m3)
+        _modes[key] = found  # the last used is dropped last
+        while len(_modes) > CACHED_MODES:
+            del _modes[next(iter(_modes))]
+        return found
+
 
 def region_of(target: Target, points: int, seeds: Seeds, fragility_gain: float = 0.0) -> Region:
     """Sample points around a target, cached by its shape and place, the number of points, the seed and the gain.
@@ -443,7 +473,12 @@ def region_of(target: Target, points: int, seeds: Seeds, fragility_gain: float =
 
 def _fingerprint(target: Target, points: int, seeds: Seeds, fragility_gain: float) -> bytes:
     """Digest of the inputs of a region; the target's name is not one of them."""
-    digest = blake2b(repr((points, seeds.seed, float(fragility_gain), target.bed_z_m, target.radius_m)).encode())
+    return _shape_digest(target, points, seeds.seed, float(fragility_gain), target.bed_z_m, target.radius_m)
+
+
+def _shape_digest(target: Target, *more: Any) -> bytes:
+    """Digest of a target's mesh and place and of what else counts."""
+    digest = blake2b(repr(more).encode())
     for values in (target.mesh.vertices_m, target.mesh.faces, target.centre_W_m):
         digest.update(repr(values.shape).encode())
         digest.update(np.ascontiguousarray(values).data)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from wakewise.scene.missions.point_surface import LEAST_POINTS
 from wakewise.vision.imaging import PinholeCamera
 
 CENTRE = np.array([0.0, 0.0, 1.0])
-RADIUS = 0.08
+RADIUS = 0.06
 MISSION = MissionSettings()
 
 
@@ -70,6 +71,12 @@ def at(azimuth_deg: float, elevation_deg: float = 20.0, range_m: float = 0.5) ->
 def one_side(azimuth_deg: float) -> list[Pose]:
     """Poses of eighteen photographs from within 50 degrees of an azimuth, at two heights."""
     return [at(azimuth_deg + aside, elevation) for elevation in (20.0, 45.0) for aside in range(-50, 51, 12)]
+
+
+@cache
+def seen_from(azimuth_deg: float) -> PhotographedSurface:
+    """The ball after photographs from one side: choosing views changes nothing of it."""
+    return photographed(one_side(azimuth_deg))
 
 
 def photographed(taken_from: list[Pose], chooser: ViewChooser = CHOOSER) -> PhotographedSurface:
@@ -129,7 +136,7 @@ def test_without_a_mapped_surface_nothing_is_told() -> None:
 
 def test_photographs_from_one_side_show_that_side() -> None:
     """What faces them is seen well, the other side is not; without a photograph nothing is."""
-    surface = photographed(one_side(0.0))
+    surface = seen_from(0.0)
     well, side = surface.coverage.covered, (at(0.0, 30.0).p_m - CENTRE) / 0.5
     assert well[OUT @ side > 0.6].all()
     assert not well[OUT @ side < -0.5].any()
@@ -155,7 +162,7 @@ def test_shares_are_told_in_percent_and_add_up() -> None:
 
 def test_the_surface_is_coloured_by_what_was_seen_well() -> None:
     """Points that are seen well have one colour, the others another."""
-    surface = photographed(one_side(0.0))
+    surface = seen_from(0.0)
     cloud = surface.as_cloud()
     well = surface.coverage.covered
     assert (cloud.points_m == SURFACE).all()
@@ -169,7 +176,7 @@ def test_the_surface_is_coloured_by_what_was_seen_well() -> None:
 def test_the_first_further_view_is_on_the_other_side(side_deg: float) -> None:
     """After photographs from one side all further views show what they did not, the first from the other side."""
     taken = one_side(side_deg)
-    surface = photographed(taken)
+    surface = seen_from(side_deg)
     places = CHOOSER.further(surface, taken[-1], 8)
     assert len(places) == 8
     aside = [apart_rad(float(place[0]), math.radians(side_deg)) for place in places]
@@ -181,7 +188,7 @@ def test_the_first_further_view_is_on_the_other_side(side_deg: float) -> None:
 def test_further_views_are_different_ones_and_no_more_than_asked_for(most: int) -> None:
     """At most so many are named, each a view that the vehicle can reach, at the standoff; fewer are the first ones."""
     taken = one_side(0.0)
-    surface = photographed(taken)
+    surface = seen_from(0.0)
     places = CHOOSER.further(surface, taken[-1], most)
     assert len(places) <= most
     reachable = {tuple(place) for place in surface.coverage.views.places.tolist()}
@@ -211,7 +218,7 @@ def test_further_views_never_cover_less(taken: list[tuple[float, float]], most: 
 def test_further_views_bring_much_after_one_side() -> None:
     """Eight views more raise what is seen well from half of a ball to more than three quarters."""
     taken = one_side(0.0)
-    surface = photographed(taken)
+    surface = seen_from(0.0)
     more = [camera_pose(CENTRE, *place.tolist()) for place in CHOOSER.further(surface, taken[-1], 8)]
     assert surface.coverage.share < 0.6
     assert photographed(taken + more).coverage.share > 0.75
@@ -219,7 +226,7 @@ def test_further_views_bring_much_after_one_side() -> None:
 
 def test_choosing_views_leaves_what_was_photographed() -> None:
     """The surface that views are chosen for is not changed by choosing them."""
-    surface = photographed(one_side(0.0))
+    surface = seen_from(0.0)
     before = surface.as_dict(), surface.coverage.level.copy()
     CHOOSER.further(surface, at(0.0), 5)
     assert surface.as_dict() == before[0]
@@ -242,7 +249,7 @@ def test_no_view_is_chosen_beyond_a_wall() -> None:
     places = walled.further(surface, at(180.0), 8)
     assert places
     assert all(camera_pose(CENTRE, *place.tolist()).p_m[0] < 0.4 - MISSION.clearance_m for place in places)
-    free = CHOOSER.further(photographed(one_side(180.0)), at(180.0), 8)
+    free = CHOOSER.further(seen_from(180.0), at(180.0), 8)
     assert max(camera_pose(CENTRE, *place.tolist()).p_m[0] for place in free) > 0.4
 
 
@@ -273,7 +280,7 @@ def test_with_no_room_for_a_view_there_is_none() -> None:
         bounds=TankBounds(low_W_m=np.array([-0.2, -0.2, 0.8]), high_W_m=np.array([0.2, 0.2, 1.2])),
     )
     surface = photographed(one_side(0.0), tight)
-    assert surface.coverage.share == photographed(one_side(0.0)).coverage.share
+    assert surface.coverage.share == seen_from(0.0).coverage.share
     assert tight.further(surface, at(0.0), 8) == []
 
 

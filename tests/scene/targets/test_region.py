@@ -16,7 +16,7 @@ def ball(radius_m=0.07, height_m=0.1, subdivisions=4):
     return place_on_bed("ball", Mesh(mesh.vertices + np.array([0, 0, height_m]), mesh.faces), BED_Z_M)
 
 
-@pytest.fixture(scope="module", params=["branching", "brain", "plate"])
+@pytest.fixture(scope="module", params=["branching", pytest.param("brain", marks=pytest.mark.slow), "plate"])
 def sampled(request):
     """A coral, its region of 151 points and the measure it stands for."""
     target = place_on_bed(request.param, coral(request.param), BED_Z_M)

@@ -33,7 +33,7 @@ def _water(steps, seed=0, **options):
 def test_the_flow_is_that_of_its_parts():
     """All jets together are the parcels and their images one by one and the rings, both in double precision, to 1 %."""
     water = _water(160)
-    now, points = water.now, np.random.default_rng(1).uniform([-1, -1, 0.6], [1, 1, 1.5], (700, 3))
+    now, points = water.now, np.random.default_rng(1).uniform([-1, -1, 0.6], [1, 1, 1.5], (300, 3))
     room = TankFaces.of(1.5, (1.5, 1.5), surface=True)
     free = impulse_velocity(
         points,

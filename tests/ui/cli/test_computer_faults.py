@@ -28,7 +28,7 @@ def wakewise(*arguments: str, stdout: object, env: dict[str, str] | None = None)
     "arguments",
     [
         ["vehicle", "list"],
-        ["vehicle", "show", "paper"],
+        pytest.param(["vehicle", "show", "paper"], marks=pytest.mark.slow),
         ["vehicle", "show", "paper", "--json"],
     ],
 )

@@ -95,12 +95,19 @@ NAMES = (
 )  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def bad(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, tuple[list[str], str]]]:
+    """A folder of what cannot be measured, in which no test leaves anything."""
+    folder = tmp_path_factory.mktemp("bad")
+    return folder, bad_inputs(folder)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_what_cannot_be_measured_is_refused_in_one_line(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, bad: tuple[Path, dict[str, tuple[list[str], str]]], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 2, one line that says what is wrong, and no file."""
-    words, says = bad_inputs(tmp_path)[name]
+    tmp_path, (words, says) = bad[0], bad[1][name]
     before = sorted(tmp_path.rglob("*"))
     out = [] if "--out" in words else ["--out", str(tmp_path / "out.png")]
     assert run([*words, *out]) == 2

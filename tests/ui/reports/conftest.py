@@ -182,6 +182,12 @@ def small_views() -> Iterator[None]:
         yield
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are put together, but not drawn: for what a page says in words."""
+    monkeypatch.setattr("wakewise.ui.reports.svg_style.inline_svg", lambda *_: "<svg></svg>")
+
+
 @pytest.fixture(scope="session")
 def made_up(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A whole made-up trial; read only."""

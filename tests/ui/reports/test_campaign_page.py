@@ -12,6 +12,8 @@ from wakewise.experiments.campaigns.table import Results, TrialRecord
 from wakewise.ui.reports import write_campaign
 from wakewise.ui.reports.campaign import campaign_page
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def campaign(seeds=6, worlds=("mud",), waiting=0, factor="method", names=("dp", "<ours>"), lost=True):
     """Models of two methods, the second better; maybe one of its models did not come about."""

@@ -13,6 +13,8 @@ from wakewise.core.errors import InputError
 from wakewise.experiments.trials.metrics import BETTER
 from wakewise.ui.reports import write_comparison
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
 def rough(made_up: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:

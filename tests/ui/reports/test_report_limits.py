@@ -15,6 +15,8 @@ from wakewise.ui.reports.compare import comparison_page
 from wakewise.ui.reports.references import limits_section
 from wakewise.ui.reports.trial import Trial, read_trial
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def flown(folder: Path, **fields: object) -> Trial:
     """A trial of which only figures and scenario are left."""

@@ -16,6 +16,8 @@ from wakewise.ui.reports.report import report_page
 from wakewise.ui.reports.trial import read_trial
 from wakewise.vision.texturing.textured import y_up_vertices
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture
 def own(made_up: Path, tmp_path: Path) -> Path:

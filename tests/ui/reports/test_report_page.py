@@ -141,6 +141,7 @@ def test_damaged_parts_are_named(made_up: Path, tmp_path: Path) -> None:
         assert f"<code>{name}</code> could not be read" in text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_markup_in_a_trial_is_shown_not_run(made_up: Path, tmp_path: Path) -> None:
     """Text from the folder is escaped."""
     trial = tmp_path / "trial"

@@ -7,11 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
+import pytest
 import trimesh
 import yaml
 
 from wakewise.ui.reports.report import report_page
 from wakewise.ui.reports.trial import read_trial
+
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 def test_a_whole_folder_is_read_whole(made_up: Path) -> None:

@@ -20,6 +20,8 @@ from wakewise.ui.reports.references import (
 from wakewise.ui.reports.report import report_page
 from wakewise.ui.reports.trial import read_trial
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 FIGURES = {
     "target_speed_mean_m_s": 0.005,
     "ambient_speed_m_s": 0.04,

@@ -6,8 +6,10 @@ import csv
 import json
 import shutil
 import struct
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,6 +19,7 @@ from PIL import Image
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.main import run
+from wakewise.vision.photo_selection import pick
 from wakewise.vision.photo_selection.dive_track import read_track, read_track_table
 from wakewise.vision.photo_selection.pick import PickRequest, pick_photos
 from wakewise.vision.reconstruction import read_reference_cameras
@@ -37,6 +40,24 @@ def folder(tmp_path_factory: pytest.TempPathFactory, made: Dive) -> Path:
     write_photos(path / "PHOTOS", made, OFFSET_S)
     write_table(path / "dive.csv", made)
     return path
+
+
+@pytest.fixture(scope="module", autouse=True)
+def looked_at_once() -> Iterator[None]:
+    """The same photographs are looked at once: what is found in them hangs on the files alone."""
+    known: dict[Any, Any] = {}
+    look = pick.photo_statistics
+
+    def once(files: list[Path], *more: Any) -> Any:
+        key = tuple((path.resolve(), path.stat().st_mtime_ns, path.stat().st_size) for path in files)
+        if key not in known:
+            known[key] = look(files, *more)
+        statistics, indices = known[key]
+        return statistics, list(indices)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pick, "photo_statistics", once)
+        yield
 
 
 @pytest.fixture

@@ -88,7 +88,7 @@ def test_guided_that_was_set_before_is_no_consent() -> None:
 
 
 def test_a_line_over_relief_is_flown_as_asked(tmp_path: Path) -> None:
-    """8 m at 10 cm/s and 80 cm over trapezoids in a current: figures within what is asked, a photograph a metre."""
+    """5 m at 10 cm/s and 80 cm over trapezoids in a current: figures within what is asked, a photograph a metre."""
     journal = SessionLog(tmp_path / "journal.jsonl")
     rng = np.random.default_rng(4)
     relief = Relief.drawn("trapezoid", rng)
@@ -96,7 +96,7 @@ def test_a_line_over_relief_is_flown_as_asked(tmp_path: Path) -> None:
     survey = harness(
         relief=relief,
         current=current,
-        lines=straight_line(8.0),
+        lines=straight_line(5.0),
         options=TransectOptions(every_m=1.0),
         journal=journal,
     )
@@ -108,7 +108,7 @@ def test_a_line_over_relief_is_flown_as_asked(tmp_path: Path) -> None:
     assert figures["speed_rms_cm_s"] < 1.0
     assert figures["altitude_p95_cm"] < 5.0
     assert figures["cross_track_p95_cm"] < 10.0
-    assert told["photographs"] == survey.flight.autopilot.photographs == 8
+    assert told["photographs"] == survey.flight.autopilot.photographs == 5
     assert told["current_m_s"] == pytest.approx(current(20.0)[:2], abs=0.02)
     events = [line["event"] for line in read_journal(tmp_path / "journal.jsonl")[0]]
     assert {"state", "plan", "line", "photograph"} <= set(events)
@@ -129,7 +129,7 @@ def test_a_pause_holds_and_consent_goes_on() -> None:
 
 def test_a_survey_that_a_stick_ended_is_resumed_where_it_ended() -> None:
     """The pilot flies away and lets go; consent flies back to the place and finishes the line, counted once."""
-    survey = harness(lines=straight_line(3.0)).flying(5.0)
+    survey = harness(lines=straight_line(2.0)).flying(5.0)
     survey.flight.sticks = (0, 400, 500, 0)
     survey.flight.run(4.0)
     survey.flight.sticks = (0, 0, 500, 0)
@@ -138,7 +138,7 @@ def test_a_survey_that_a_stick_ended_is_resumed_where_it_ended() -> None:
     assert survey.session.consent() == "GUIDED requested"
     survey.to_the_end()
     assert survey.session.finished
-    assert survey.session.at.flown_m == pytest.approx(3.0, abs=0.05)
+    assert survey.session.at.flown_m == pytest.approx(2.0, abs=0.05)
 
 
 def test_what_is_missing_is_told_and_keeps_it_from_beginning() -> None:
@@ -216,15 +216,15 @@ def test_an_acceleration_is_sent_from_4_8_on_alone() -> None:
 
 
 def test_a_lawnmower_is_flown_with_its_turns() -> None:
-    """Two lines of 2 m, 1 m apart, at 20 cm/s: 4 m of line, and the vehicle ends 1 m aside."""
+    """Two lines of 1.5 m, 1 m apart, at 20 cm/s: 3 m of line, and the vehicle ends 1 m aside."""
     options = TransectOptions(pace=SurveyPace(speed_m_s=0.2, acceleration_m_s2=0.03))
     survey = harness(
         options=options,
         current=None,
-        lines=lambda place, heading, _c, _a: parallel_lines(place, heading, 1.0, 2.0, 1.0, 1),
+        lines=lambda place, heading, _c, _a: parallel_lines(place, heading, 1.0, 1.5, 1.0, 1),
     )
     survey.ready().session.consent()
     survey.to_the_end()
     assert survey.session.finished
-    assert survey.session.at.flown_m == pytest.approx(4.0, abs=0.01)
+    assert survey.session.at.flown_m == pytest.approx(3.0, abs=0.01)
     assert float(survey.flight.autopilot.motion.p_WB_m[1]) == pytest.approx(1.0, abs=0.25)
