@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +80,7 @@ def card_name() -> str | None:
         name = cuda.get_current_device().name
         return name.decode() if isinstance(name, bytes) else str(name)
     try:
-        import torch  # type: ignore[import-not-found,unused-ignore]
+        torch = import_module("torch")  # an extra that no type checker knows
     except ImportError:
         return None
     return str(torch.cuda.get_device_name()) if torch.cuda.is_available() else None
@@ -159,8 +160,7 @@ def _field(photos: PhotoSet | None, scenario: Scenario, folder: Path) -> tuple[d
     names = [f"{device}_{key}" for device in ("cpu", "gpu") for key in ("train_s", "psnr_db", "loss")]
     figures: dict[str, Any] = {"steps": FIELD_STEPS, **dict.fromkeys(names)}
     try:
-        import torch
-
+        torch = import_module("torch")
         from wakewise_nerf.field import build_field
         from wakewise_nerf.field.settings import PROFILES
     except ImportError:

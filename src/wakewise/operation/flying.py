@@ -137,7 +137,10 @@ class Flight:
             if (value := figures[key]) is not None and math.isfinite(value)
         ]
         amiss = [f"{figures[key]} {key}" for key in ("collisions", "fallbacks") if figures[key]]
-        return f"{figures['method']}, seed {figures['seed']}: {', '.join([*words, *amiss])}"
+        hover = ""
+        if (self.steps["leg"] == SETTLING).all():
+            hover = f" (hover only: the first leg begins after {self.parts.route.starts_s[0]:.0f} s)"
+        return f"{figures['method']}, seed {figures['seed']}: {', '.join([*words, *amiss])}{hover}"
 
     def write(self, folder: Path) -> None:
         """Write exposures.npz, timings.parquet; last steps.parquet, which says that the flight is whole.
@@ -240,7 +243,7 @@ def fly(
 def _say_trim(parts: Parts, recorder: FlightRecorder) -> None:
     """Log the ballast that the settling hover asks for, before the first photograph; the flight goes on."""
     if (words := ballast_proposal(parts.vehicle, recorder.frame())) is not None:
-        log.warning("settling hover: %s; after the flight: wakewise vehicle trim --flight FOLDER --write FILE", words)
+        log.warning("settling hover: %s; `wakewise vehicle trim` writes it into a vehicle file", words)
 
 
 def parts_of(flight: Parts | Scenario) -> Parts:

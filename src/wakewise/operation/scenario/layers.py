@@ -16,6 +16,7 @@ from typing import Any
 from wakewise.core.checks import quoted
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import YamlError, read_yaml, text_of
+from wakewise.core.settings import guess
 from wakewise.operation.worlds.library import load_world, world_names
 from wakewise.simulation.tank.settings import SILTS
 from wakewise.vision.imaging import ImagingSettings
@@ -35,7 +36,8 @@ def merge_layers(preset: str | None, path: Path | None, overrides: dict[str, Any
     layers: list[Tree] = []
     if preset is not None:
         if not isinstance(preset, str) or preset not in PRESETS:
-            raise InputError(f"--preset: '{quoted(preset)}', allowed are {', '.join(PRESETS)}")
+            near = guess(preset, tuple(PRESETS)) if isinstance(preset, str) else ""
+            raise InputError(f"preset {quoted(preset)}: {near}allowed are {', '.join(PRESETS)}")
         text = resources.files("wakewise.operation").joinpath("presets", f"{preset}.yaml").read_text(encoding="utf-8")
         layers.append(read_yaml(text))
     if path is not None:

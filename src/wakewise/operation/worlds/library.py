@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import Field, ValidationError, model_validator
 
 from wakewise.core.errors import InputError
-from wakewise.core.safe_yaml import read_yaml
+from wakewise.core.safe_yaml import YamlError, read_yaml
 from wakewise.core.settings import Settings, describe_faults, guess
 from wakewise.operation.scenario.randomization import FieldDistribution
 
@@ -117,5 +117,8 @@ def parse_world(name: str, text: str) -> NamedWorld:
     """
     try:
         return NamedWorld(name=name, file=WorldFile.model_validate(read_yaml(text)))
+    except YamlError as fault:
+        line = "" if fault.line is None else f" line {fault.line}"
+        raise InputError(f"world {name}{line}: not YAML ({fault.reason})") from None
     except ValidationError as fault:
         raise InputError(f"world {name}: {describe_faults(fault, WorldFile, 'world')}") from None

@@ -157,6 +157,13 @@ def status_line(line: str) -> None:
     sys.stderr.flush()
 
 
+def end_status_line() -> None:
+    """Begin a new line after `status_line` on a terminal."""
+    if sys.stderr.isatty():
+        sys.stderr.write("\n")
+        sys.stderr.flush()
+
+
 def answer(json: bool, figures: Any, *shown: str | Callable[[], None] | None) -> None:
     """Print the result of a command: one JSON object with `json`, else lines of text and what callables print."""
     if json:

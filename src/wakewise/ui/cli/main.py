@@ -98,13 +98,13 @@ for _command in _COMMANDS:
     _panel = _command.parent if _command.parent in PANELS else None
     _parent = _GROUPS["" if _panel else _command.parent]
     if isinstance(_command.run, typer.Typer):
-        _parent.add_typer(_command.run, name=_command.name, rich_help_panel=_panel)
+        _parent.add_typer(_command.run, name=_command.name, rich_help_panel=_panel, no_args_is_help=True)
     else:
         _parent.command(_command.name, rich_help_panel=_panel)(_command.run)
 
 QUIET = "--quiet"
 _NEXT_STEP = (
-    "Next: `wakewise scan` flies round a simulated coral, reconstructs it and writes a report (a minute or two);\n"
+    "Next: `wakewise scan` flies round a simulated coral, reconstructs it and writes a report (3 minutes the first time);\n"
     "`wakewise COMMAND -h` explains a command."
 )
 _STOPPED = "stopped; what was finished is kept, run the same command again to go on"

@@ -37,10 +37,16 @@ def show(
     json: Json = False,
 ) -> None:
     """Show a world: why it is flown, its fields, from where a seed draws them, and the source of each number."""
+    from wakewise.core.errors import InputError
+    from wakewise.operation import load_scenario
     from wakewise.operation.scenario.randomization import sample_fields
     from wakewise.operation.worlds.library import load_world
 
     world = load_world(name)
+    try:
+        load_scenario("quick", None, {"world": name})  # its fields are a scenario's
+    except InputError as fault:
+        raise InputError(f"world {name}: {fault}") from None
     drawn = sample_fields(world.randomize, seed) if seed is not None else {}
     if json:
         fields: dict[str, Any] = {}

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.ui.cli.console import format_value, print_json, status_line
+from wakewise.ui.cli.console import end_status_line, format_value, print_json, status_line
+from wakewise_ardusub.survey.survey_figures import FIGURE_MEANINGS
 
 if TYPE_CHECKING:
     from wakewise_ardusub.link.transports import MavlinkCodec
@@ -140,12 +141,23 @@ def fly_survey(
     if given.json:
         print_json(figures)
     else:
-        for name, value in figures.items():
-            typer.echo(f"{name:24}{format_value(value)}")
+        _print(figures)
     if session.refused:
         raise InputError(session.refused)
     if not session.finished:
-        raise EnvironmentFailure(f"survey ended after {figures['flown_m']:.1f} m: {session.ended_by or session.why}")
+        planned_m = figures["planned_m"]
+        way = f"{figures['flown_m']:.2f} m" + ("" if planned_m is None else f" of {planned_m:.2f} m")
+        before = session.ended_by if session.ended_by and session.ended_by != session.why else ""
+        last = session.why or session.ended_by
+        raise EnvironmentFailure(f"survey ended after {way}: {last}" + (f" (before that: {before})" if before else ""))
+
+
+def _print(figures: dict[str, Any]) -> None:
+    """A line for each figure that there is: name, value, what it is."""
+    for name, value in figures.items():
+        if value is not None:
+            shown = [round(part, 3) for part in value] if isinstance(value, list) else value
+            typer.echo(f"{name:24}{format_value(shown)!s:24}  {FIGURE_MEANINGS[name]}".rstrip())
 
 
 def _fly(session: TransectSession, codec: MavlinkCodec, *, consent: bool, wait_s: float) -> None:
@@ -171,6 +183,7 @@ def _fly(session: TransectSession, codec: MavlinkCodec, *, consent: bool, wait_s
                 session.consent()
             begun = asked or session.plan is not None
             if not begun and session.state == "waiting" and now_s - began_s > wait_s:
+                end_status_line()
                 raise InputError(f"survey not begun within {wait_s:g} s: {session.why}")
             if session.ended_by and session.state in ("waiting", "ready") and keys is None:
                 return  # nobody is there to go on
@@ -187,6 +200,7 @@ def _fly(session: TransectSession, codec: MavlinkCodec, *, consent: bool, wait_s
         except KeyboardInterrupt:
             session.abort("Ctrl-C")
             ends_s = min(ends_s, time.monotonic() + ENDS_S)
+    end_status_line()
 
 
 def _key(session: TransectSession, keys: Any) -> None:
@@ -196,7 +210,7 @@ def _key(session: TransectSession, keys: Any) -> None:
         return
     word = keys.readline()
     if word.strip().lower() == "q":
-        session.abort("Ctrl-C: q")
+        session.abort("q")
     elif word:
         said = session.pause() if session.state == "flying" else session.consent()
         typer.echo(f"\r{said}", err=True)
@@ -210,5 +224,7 @@ def _current(text: str) -> tuple[float, float]:
     except ValueError:
         speed = towards = math.nan
     if not (0.0 <= speed <= 1.0 and -360.0 <= towards <= 360.0):
-        raise InputError(f"--current {text!r}: must be M/S,DEG, a speed up to 1 and where the water goes to, or felt")
+        raise InputError(
+            f"--current {text!r}: must be M/S,DEG such as 0.1,90 (0.1 m/s to the east), or felt, which measures it"
+        )
     return speed * math.cos(math.radians(towards)), speed * math.sin(math.radians(towards))

@@ -37,6 +37,8 @@ def read_map(path: Path) -> Array:
     try:
         size = path.stat().st_size
         text = path.read_text(encoding="utf-8") if size <= LARGEST_B else ""
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file, a GeoJSON or KML file with one LineString is needed") from None
     except (OSError, UnicodeDecodeError) as fault:
         raise InputError(f"{path}: {getattr(fault, 'strerror', None) or 'is no text'}") from None
     if size > LARGEST_B:

@@ -142,13 +142,13 @@ class OrbitRequest:
 
     def check(self, pace: SurveyPace, hull_m: float) -> None:
         """Raise InputError where an orbit is none, or its radius is too small for the speed or a hull of a length."""
-        for option, value, (least, most) in (
-            ("--turns", self.turns, TURNS),
-            ("--ahead or --radius", self.radius_m, RADII_M),
-            *(("--altitude", altitude, ALTITUDES_M) for altitude in self.altitudes_m),
+        for option, value, (least, most), unit in (
+            ("--turns", self.turns, TURNS, ""),
+            ("--ahead or --radius", self.radius_m, RADII_M, " m"),
+            *(("--altitude", altitude, ALTITUDES_M, " m") for altitude in self.altitudes_m),
         ):
             if not least <= value <= most:
-                raise InputError(f"{option} {value:g}: must be from {least:g} to {most:g}")
+                raise InputError(f"{option} {value:g}: must be from {least:g} to {most:g}{unit}")
         if not 1 <= len(self.altitudes_m) <= MOST_LAYERS:
             raise InputError(f"--altitude: {len(self.altitudes_m)} layers, must be 1 to {MOST_LAYERS}")
         turn = min(MOST_TURN_RAD_S, pace.turn_rad_s)

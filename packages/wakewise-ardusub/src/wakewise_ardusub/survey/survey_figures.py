@@ -10,6 +10,26 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 
+FIGURE_MEANINGS = {
+    "folder": "journal of place, altitude and photographs",
+    "finished": "all of it was flown",
+    "state": "of the session",
+    "why": "what it ended by",
+    "flown_m": "metres of line flown",
+    "planned_m": "metres of line in all",
+    "centre_m": "centre of the orbits: north, east of the autopilot's origin, m",
+    "current_m_s": "current: north, east, m/s",
+    "speed_error_rms_m_s": "speed along the line against the one asked for, in cruise, m/s",
+    "altitude_error_rms_m": "altitude above the bed against the one asked for, m",
+    "altitude_error_p95_m": "the same, 95 % of the time within, m",
+    "cross_track_p95_m": "place across the line, 95 % of the time within, m",
+    "cross_track_max_m": "the same, at most, m",
+    "heading_error_p95_deg": "heading against the one asked for (which turns into the current), 95 % within, deg",
+    "photographs": "triggered",
+    "interruptions": "times that it was paused by the pilot or a loss",
+    "outliers": "distances of the rangefinder that were refused",
+}
+
 
 class SurveyRow(NamedTuple):
     """One target on a line: time, speed along it and as asked for, altitude and as asked for, place beside and ahead of

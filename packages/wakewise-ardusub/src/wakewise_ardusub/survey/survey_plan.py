@@ -50,12 +50,12 @@ class SurveyPace:
     turn_rad_s2: float = 0.05
 
     def __post_init__(self) -> None:
-        for option, value, (least, most) in (
-            ("--speed", self.speed_m_s, SPEEDS_M_S),
-            ("--altitude", self.altitude_m, ALTITUDES_M),
+        for option, value, (least, most), unit in (
+            ("--speed", self.speed_m_s, SPEEDS_M_S, "m/s"),
+            ("--altitude", self.altitude_m, ALTITUDES_M, "m"),
         ):
             if not least <= value <= most:
-                raise InputError(f"{option} {value:g}: must be from {least:g} to {most:g}")
+                raise InputError(f"{option} {value:g}: must be from {least:g} to {most:g} {unit}")
         for value in (self.acceleration_m_s2, self.turn_rad_s, self.turn_rad_s2):
             if not 0.0 < value < 10.0:
                 raise InputError(f"survey: a bound of {value:g}, must be more than 0")
@@ -270,7 +270,7 @@ def parallel_lines(
     """
     for name, value in (("width", width_m), ("length", length_m)):
         if not SHORTEST_M <= value <= LONGEST_M:
-            raise InputError(f"--area: a {name} of {value:g} m, must be from {SHORTEST_M:g} to {LONGEST_M:g}")
+            raise InputError(f"--area: a {name} of {value:g} m, must be from {SHORTEST_M:g} to {LONGEST_M:g} m")
     if not SHORTEST_M <= spacing_m <= LONGEST_M:
         raise InputError(f"--spacing {spacing_m:g}: must be from {SHORTEST_M:g} to {LONGEST_M:g} m")
     count = math.floor(width_m / spacing_m + 1e-9) + 1
