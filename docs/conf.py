@@ -40,8 +40,10 @@ myst_dmath_double_inline = True
 default_role = "code"
 # Names in the sidebar of every page would double the time of a build; pages of the API list theirs at the top.
 toc_object_entries = False
-autodoc_typehints = "signature"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
 autodoc_typehints_format = "short"
+autodoc_type_aliases = {name: name for name in ("Array", "IntArray", "BoolArray", "ArrayLike", "PoseLike")}
 autodoc_member_order = "alphabetical"
 autodoc_preserve_defaults = True
 autodoc_class_signature = "mixed"
@@ -63,6 +65,9 @@ sphinx_gallery_conf = {
     "image_scrapers": ("matplotlib",),
     "reference_url": {"wakewise": None},
     "nested_sections": False,
+    "within_subsection_order": "FileNameSortKey",
+    # What a last line returns, such as axes, is not what a reader asks for; what is printed is shown.
+    "capture_repr": (),
 }
 
 # MathML of _extensions/site_math.py: no script from elsewhere draws the formulas.

@@ -16,7 +16,7 @@ load_vehicle, load_target, wake_model, methods
 Pose, BodyState, Goal, Command
     What an own controller is told and what it answers.
 
-Rooms below this page are imported when they are first asked for. SI units and radians; the world is north, east, down.
+Packages are imported when a name is first used. SI units and radians; the world is north, east, down.
 """
 
 from __future__ import annotations

@@ -200,19 +200,19 @@ def wash_energy(flights: Flights, *, ax: Axes | None = None) -> Axes:
     InputError
         If these are no flights, or a flight has no such figures, as a flight without a simulated world.
     """
-    ax = _axes(ax)
+    ax, places = _axes(ax), []
     for name, flight in _named(flights).items():
         energy_kJ, speed_m_s = flight.figures["energy_kJ"], flight.figures["target_speed_mean_m_s"]
         if energy_kJ is None or speed_m_s is None:
             raise InputError(f"{name}: its figures have no energy or no water speed at the target")
-        (point,) = ax.plot(energy_kJ, 1e3 * speed_m_s, "o", markersize=7)
-        ax.annotate(
-            name, (energy_kJ, 1e3 * speed_m_s), xytext=(7, 5), textcoords="offset points", color=point.get_color()
-        )
+        place = (energy_kJ, 1e3 * speed_m_s)
+        places.append(place)
+        (point,) = ax.plot(*place, "o", markersize=7)
+        ax.annotate(name, place, xytext=(7, 5), textcoords="offset points", color=point.get_color())
+    # From zero, so that lengths are ratios; the names stand to the right of the points.
+    right, top = np.max(places, axis=0)
     ax.set(xlabel="energy (kJ)", ylabel="water speed at the target (mm/s)")
-    ax.margins(0.25)
-    ax.set_xlim(left=0.0)
-    ax.set_ylim(bottom=0.0)
+    ax.set(xlim=(0.0, 1.35 * right or 1.0), ylim=(0.0, 1.15 * top or 1.0))
     return ax
 
 
