@@ -94,7 +94,7 @@ docs: setup $(DOCS_STAMP)
 	$(BIN)/python tools/write_docs.py
 	$(BIN)/python tools/draw_hardware.py
 	$(BIN)/python tools/draw_layers.py
-	$(BIN)/python tools/readability.py
+	$(BIN)/python tools/readability.py --strict
 	OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -W --keep-going -n -q docs docs/_build/html
 	@echo "open docs/_build/html/index.html"
 

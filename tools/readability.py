@@ -2,7 +2,7 @@
 
 Bounds: README at most grade 9; a page at most 1,500 words; a sentence at most 30 words. Tables, code, formulas
 and headings are no sentences; the words of tables count as words of the page. Pages of EXCEPTIONS are looked up in, not
-read. `--strict` makes what is passed an error; without it, it is said and the exit code is 0.
+read. `--strict`, as `make docs` calls it, makes what is passed an error.
 """
 
 from __future__ import annotations
