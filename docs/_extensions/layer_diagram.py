@@ -11,8 +11,8 @@ WIDTH, ROW, HEIGHT = 640, 46, 26
 
 def layer_diagram(text: str) -> str:
     """Inline SVG of a Mermaid flowchart of names and arrows: a row for each depth, arrows point down."""
-    edges = [(a, b) for a, b in re.findall(r"(\w+) --> (\w+)", text) if (b, a) != ("ui", "api")]
-    edges = [(a, b) for a, b in edges if (a, b) != ("api", "ui")]
+    # api makes reports and ui calls api: of the two arrows the one that points down is drawn.
+    edges = [edge for edge in re.findall(r"(\w+) --> (\w+)", text) if edge != ("api", "ui")]
     names = list(dict.fromkeys(re.findall(r"^\s+(\w+)\s*$", text, re.MULTILINE)))
     depth = dict.fromkeys(names, 0)
     for _ in names:
