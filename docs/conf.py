@@ -59,6 +59,8 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "remove_config_comments": True,
     "show_memory": False,
+    # Its page of times would fetch scripts from elsewhere.
+    "write_computation_times": False,
     "min_reported_time": 1000,
     "plot_gallery": "True",
     "matplotlib_animations": False,
