@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 # Every process of a scan or a test reads hundreds of modules: their bytecode is kept, whatever the shell says.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup scan test test-all coverage check bench bench-history nightly results figures docs lock clean
+.PHONY: help setup scan test test-all coverage check bench bench-history nightly results figures docs notebooks lock clean
 
 help:
 	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs, cockpit, ros, gamepad and links (LGPL), dask, detector, learning, tools for tests"
@@ -18,10 +18,11 @@ help:
 	@echo "make check   the same without the tests"
 	@echo "make bench   speed and quality, side by side with a peer"
 	@echo "make bench-history  speed in short, compared with the last time on this processor, kept in docs/benchmarks"
-	@echo "make nightly  test-all, coverage and bench-history"
+	@echo "make nightly  test-all, docs, notebooks, coverage and bench-history"
 	@echo "make results BUDGET=2h   the paper's tables beside ours, from as many trials as fit; writes docs/results"
 	@echo "make figures  the README's animation, from two flights; a minute or two"
-	@echo "make docs    regenerate docs/commands.md from the commands' own help"
+	@echo "make docs    regenerate pages from the code, and build the site: docs/_build/html/index.html"
+	@echo "make notebooks  run the notebooks of examples/notebooks"
 	@echo "make lock    resolve requirements.lock anew (needs uv, which setup installs)"
 
 setup: $(STAMP)
@@ -79,8 +80,8 @@ bench: setup
 bench-history: setup
 	$(BIN)/python tools/bench_history.py
 
-# What a change every night should pass beside `make test`: slow tests, coverage, speed.
-nightly: test-all coverage bench-history
+# What a change every night should pass beside `make test`: slow tests, site, notebooks, coverage, speed.
+nightly: test-all docs notebooks coverage bench-history
 
 BUDGET ?= 2h
 NOTE ?=
@@ -90,13 +91,27 @@ results: setup
 figures: setup
 	$(BIN)/python tools/figures.py
 
-docs: setup
+# Tools of the site and of the notebooks, installed by the targets that need them, so that `make setup` does not grow.
+DOCS_STAMP := $(VENV)/.docs-installed
+$(DOCS_STAMP): docs/requirements.lock $(STAMP)
+	sh tools/install.sh $(BIN)/python docs/requirements.lock
+	@touch $@
+
+# The gallery's scripts fly: a library of linear algebra on all cores would slow them down.
+docs: setup $(DOCS_STAMP)
 	$(BIN)/python tools/write_docs.py
 	$(BIN)/python tools/draw_hardware.py
 	$(BIN)/python tools/draw_layers.py
+	$(BIN)/python tools/readability.py --strict
+	OPENBLAS_NUM_THREADS=1 $(BIN)/sphinx-build -W --keep-going -n -q docs docs/_build/html
+	@echo "open docs/_build/html/index.html"
+
+notebooks: setup $(DOCS_STAMP)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 0 --nbmake --nbmake-timeout=120 examples/notebooks
 
 lock: setup
 	$(BIN)/uv pip compile pyproject.toml packages/wakewise-ardusub/pyproject.toml --extra all --extra gamepad --extra links --extra ros --extra dask --extra detector --extra learning --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate --no-emit-package wakewise -o requirements.lock
+	$(BIN)/uv pip compile docs/requirements.in --constraint requirements.lock --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o docs/requirements.lock
 
 clean:
 	rm -rf $(VENV) runs dist

@@ -14,7 +14,7 @@ from wakewise.ui.cli.main import app
 ROOT = Path(__file__).parents[1]
 PAGES = ["README.md", "CONTRIBUTING.md"]
 PAGES += [f"docs/{name}.md" for name in ("README", "howto", "limits", "python", "extending", "worlds")]
-PAGES += [f"docs/{name}.md" for name in ("reproduce", "campaigns")]
+PAGES += [f"docs/{name}.md" for name in ("reproduce", "campaigns", "clusters", "tutorial")]
 PAGES += ["docs/vehicle-file.md"]
 
 
@@ -154,7 +154,8 @@ def test_the_python_of_docs_campaigns_runs(tmp_path, monkeypatch, capsys):
         ("-5.1", "dp"),
         ("-6.0", "mpc"),
     ]
-    assert len([ast.parse(block) for block in blocks("docs/campaigns.md", "python")]) == 5
+    parsed = [ast.parse(block) for page in ("campaigns", "clusters") for block in blocks(f"docs/{page}.md", "python")]
+    assert len(parsed) == 5
 
 
 def bare(text):

@@ -12,7 +12,8 @@ by_pip() { "$python" -m pip install --no-compile --quiet --disable-pip-version-c
 index=$("$python" -m pip config get global.index-url 2>/dev/null) || index=
 index=${UV_DEFAULT_INDEX:-${PIP_INDEX_URL:-$index}}
 if [ -n "$index" ]; then export UV_DEFAULT_INDEX="$index"; fi
-if by_pip "$alone" 2>/dev/null &&
+# A lock without uv is one of what is installed on top of what has it.
+if { [ ! -s "$alone" ] || by_pip "$alone" 2>/dev/null; } &&
     "$(dirname "$python")/uv" pip install --python "$python" --quiet --require-hashes -r "$lock"; then exit 0; fi
 echo "uv cannot install here: pip does, which takes half a minute longer"
 by_pip "$lock"

@@ -9,12 +9,14 @@ allocate, disturbance, velocity
     Thruster allocation of one wrench; the disturbance D of thrusts at a pose, and the velocity of the water they make.
 reconstruct, evaluate
     Photographs to a model; a model against the truth.
+plot
+    Plots of flights and allocations on matplotlib, and a film of a trial.
 load_vehicle, load_target, wake_model, methods
     Things by name or file.
 Pose, BodyState, Goal, Command
     What an own controller is told and what it answers.
 
-Rooms below this page are imported when they are first asked for. SI units and radians; the world is north, east, down.
+Packages are imported when a name is first used. SI units and radians; the world is north, east, down.
 """
 
 from __future__ import annotations
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from wakewise.core.interfaces import BodyState, Command, Goal
     from wakewise.operation import Parts, Scenario, fly
     from wakewise.robot.importers import any_vehicle as load_vehicle
+    from wakewise.ui import plot
     from wakewise.wake import wake_model
 
 __all__ = [
@@ -57,6 +60,7 @@ __all__ = [
     "load_target",
     "load_vehicle",
     "methods",
+    "plot",
     "reconstruct",
     "trial",
     "velocity",

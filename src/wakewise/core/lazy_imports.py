@@ -28,7 +28,7 @@ class _Door(ModuleType):
         if home is None:
             raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
         try:
-            value = getattr(import_module(home[0]), home[1])
+            value = _imported(*home)
         except (ModuleNotFoundError, MissingExtra) as fault:
             # Another room's door may have refused on the way: what was asked for here is what is told of.
             missing = fault.__cause__ if isinstance(fault, MissingExtra) else fault
@@ -68,6 +68,12 @@ def lazy_attributes(name: str, *extras: str) -> None:
         raise ImportError(f"{name}: its source is not there, and a lazy door is read from it", name=name)
     room.__dict__.update(_homes=_homes(source), _extras=extras)
     room.__class__ = _Door
+
+
+def _imported(module: str, name: str) -> Any:
+    """An object of a module, or a module of a package, which is no attribute of it before it is imported."""
+    home = import_module(module)
+    return getattr(home, name) if hasattr(home, name) else import_module(f"{module}.{name}")
 
 
 def _homes(source: str) -> dict[str, tuple[str, str]]:

@@ -1,3 +1,3 @@
-"""User interface: pages (`reports/`), films (`film/`), the pilot's page (`cockpit/`), the web server (`web/`), commands
-(`cli/`).
+"""User interface: pages (`reports/`), films (`film/`), the pilot's page (`cockpit/`), the web server (`web/`), plots
+for scripts (`plot.py`), commands (`cli/`).
 """

@@ -110,6 +110,6 @@ def test_every_button_that_a_page_names_is_free_on_a_fresh_autopilot() -> None:
     """README, docs and the help of the commands: what can be pasted neither arms, disarms nor changes a mode."""
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "src").rglob("*.py")]
     found = [(path, given) for path in pages for given in GIVEN.findall(path.read_text(encoding="utf-8"))]
-    assert any(path.name == "ardusub.md" for path, _ in found)
+    assert any(path.name == "ardusub-flight.md" for path, _ in found)
     for path, given in found:
         assert not button_faults(_buttons(given), FRESH), f"{path.name}: {given}"

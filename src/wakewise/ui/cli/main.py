@@ -104,7 +104,7 @@ for _command in _COMMANDS:
 
 QUIET = "--quiet"
 _NEXT_STEP = (
-    "Next: `wakewise scan` flies round a simulated coral, reconstructs it and writes a report (3 minutes the first time);\n"
+    "Next: `wakewise scan` flies round a simulated coral, reconstructs it and writes a report (first time: 3 min);\n"
     "`wakewise COMMAND -h` explains a command."
 )
 _STOPPED = "stopped; what was finished is kept, run the same command again to go on"
