@@ -78,7 +78,7 @@ class Never:
 RULES: list[Run | Start | Elsewhere | Never] = [
     # Before anything can be run.
     Never(
-        r"make (setup|check|test|test-all|docs|notebooks|coverage)",
+        r"make (setup|check|test|test-all|docs|notebooks|coverage|bench-history|nightly)",
         "this test runs in what `make setup` made, as part of `make test`",
     ),
     Never(

@@ -194,7 +194,7 @@ def test_the_benches_are_listed_and_refuse_a_picture_that_they_do_not_draw(capsy
         (["models", "--scenarios", "advice", "--plot", "x.svg"], "draws doses, which --scenarios leaves out"),
         (["truth", "--only", "dynamics", "--plot", "x.svg", "--data", "."], "draws cube_channel, which --only leaves"),
         (["models", "--methods", ","], "--methods ',': no name in it"),
-        (["dynamics", "--only", "dynamics"], "--only: of `wakewise bench truth` alone"),
+        (["dynamics", "--only", "dynamics"], "--only: of `wakewise bench truth` and `wakewise bench gpu` alone"),
     ):
         assert run(["bench", *words]) == 2
         assert said in " ".join(capsys.readouterr().err.split())

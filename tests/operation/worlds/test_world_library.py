@@ -7,6 +7,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.operation import Scenario, load_scenario, read_scenario
 from wakewise.operation.scenario import dump_scenario
+from wakewise.operation.worlds import library
 from wakewise.operation.worlds.library import load_world, parse_world, world_names
 from wakewise.ui.cli.main import run
 
@@ -99,3 +100,32 @@ def test_the_command_shows_a_world_and_what_a_seed_draws(capsys):
     assert run(["world", "show", "payload"]) == 0
     assert "-5 to -2" in capsys.readouterr().out
     assert run(["world", "show", "nowhere"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("title: abc\nseed: 1\nseed: 2\n", "world lagoon line 3: not YAML .*more than once"),
+        ("title: [abc\n", "world lagoon.*: not YAML"),
+    ],
+)
+def test_a_file_that_is_no_yaml_is_refused_in_one_line(text: str, reason: str) -> None:
+    """With the world's name and the line, as that of a scenario is."""
+    with pytest.raises(InputError, match=reason):
+        parse_world("lagoon", text)
+
+
+def test_a_field_that_no_scenario_has_is_refused_when_the_world_is_shown(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """`wakewise world show` is the check of a new world: exit code 2 and the field, as a flight would say it."""
+    text = library._text("reef").replace("tank.waves.amplitude_m:", "tank.waves.amplitude:")
+    whole = library._text
+    monkeypatch.setattr(library, "_text", lambda name: text if name == "reef" else whole(name))
+    load_world.cache_clear()
+    try:
+        assert run(["world", "show", "reef"]) == 2
+    finally:
+        load_world.cache_clear()
+    told = capfd.readouterr()
+    assert told.out == "" and told.err.startswith("wakewise: world reef: ") and "amplitude" in told.err

@@ -59,3 +59,12 @@ def test_too_few_numbers_are_told_by_how_many_are_needed(
     assert run(given) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and f"{option}: needs {count} numbers, {words}" in said
+
+
+@pytest.mark.parametrize("group", ["link", "photos", "world"])
+def test_a_group_without_a_command_says_which_there_are(capfd, group: str) -> None:
+    """Its help on standard error, with exit code 2."""
+    assert run([group]) == 2
+    told = capfd.readouterr()
+    assert told.out == ""
+    assert f" {group} [OPTIONS] COMMAND" in told.err.splitlines()[0] and "Commands:" in told.err

@@ -121,7 +121,7 @@ def test_an_altitude_without_a_rangefinder_is_refused(
         (["--gap", "60"], "--gap 60: must be from 0.3 to 5"),
         (["--every", "nan"], "--every nan"),
         (["--map", "utm.geojson"], "another projection"),
-        (["--map", "none.geojson"], "No such file"),
+        (["--map", "none.geojson"], "no such file"),
         (["--connection", "udp:1"], "--connection"),
     ],
 )

@@ -73,7 +73,7 @@ def compare_models(
             scale_sigma_pct=float(np.hypot(sigmas[0], sigmas[1])),
             align_scale=align_scale,
         )
-    figures = _figures(found, models, align_scale)
+    figures = _figures(found, models, align_scale) | {"warnings": _warnings(models)}
     if out is not None:
         from wakewise.ui.reports.change_map import write_change_map
 
@@ -84,7 +84,25 @@ def compare_models(
     table = partial(print_table, "tnt", ("figure", "value", "what it is"), rows, f"{second} against {first}")
     missing = [f"scale of {name}: {reason}" for name, reason in figures["scale_unknown"].items()]
     picture = None if out is None else f"picture: {out}"
-    answer(json, figures, table, *missing, f"verdict: {found.verdict}", picture)
+    answer(json, figures, table, *missing, *figures["warnings"], f"verdict: {found.verdict}", picture)
+
+
+def _warnings(models: list[FinishedModel]) -> list[str]:
+    """What makes a comparison doubtful, by model: what `wakewise measure` warns of, which rests on the same bed."""
+    import numpy as np
+
+    from wakewise.vision.evaluation.measurement import MeasuringRule, measure, measuring_warnings
+
+    lines = []
+    for model in models:
+        rule = MeasuringRule(eyes_m=model.eyes_m)
+        try:
+            size, bed, _ = measure(model.mesh, rule, np.random.default_rng(0))
+        except InputError as fault:
+            lines.append(f"warning, {model.name}: {fault}")
+            continue
+        lines += [f"warning, {model.name}: {line}" for line in measuring_warnings(model.mesh, rule, size, bed)]
+    return lines
 
 
 def _figures(found: SurfaceChange, models: list[FinishedModel], align_scale: bool) -> dict[str, Any]:

@@ -174,6 +174,9 @@ def _made_of_interrupt(fault: BaseException | None) -> bool:
 def _refused(fault: Exception) -> int | None:
     """Say an error that is foreseen in one line and give its exit code; None where it is not."""
     match fault:
+        case typer.TyperException() if fault.format_message().startswith("Usage:"):  # a group without a command
+            typer.echo(fault.format_message(), err=True)
+            return 2
         case typer.TyperException():
             _say(_how_many(fault) or fault.format_message())
             return 2

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.ui.cli.console import end_status_line, format_value, print_json, status_line
-from wakewise_ardusub.survey.survey_figures import FIGURE_MEANINGS
 
 if TYPE_CHECKING:
     from wakewise_ardusub.link.transports import MavlinkCodec
@@ -154,6 +153,8 @@ def fly_survey(
 
 def _print(figures: dict[str, Any]) -> None:
     """A line for each figure that there is: name, value, what it is."""
+    from wakewise_ardusub.survey.survey_figures import FIGURE_MEANINGS
+
     for name, value in figures.items():
         if value is not None:
             shown = [round(part, 3) for part in value] if isinstance(value, list) else value
