@@ -85,7 +85,7 @@ def test_a_file_that_is_no_scenario_is_refused_by_name(text: str, tmp_path: Path
         load_scenario(None, path, {})
     with pytest.raises(InputError, match=r"gone\.yaml: no such file"):
         load_scenario(None, tmp_path / "gone.yaml", {})
-    with pytest.raises(InputError, match="preset .huge.: allowed are"):
+    with pytest.raises(InputError, match=r"preset .huge.: allowed are"):
         load_scenario("huge", None, {})
 
 
