@@ -36,4 +36,6 @@ for name, T in thrusts.items():
 # %%
 # The same water in the vertical plane through the vehicle:
 
-ww.plot.wake_field(rov, thrusts["gentle thrusts"], pose, region=region, plane="vertical").set_title("gentle thrusts")
+ww.plot.wake_field(
+    rov, thrusts["gentle thrusts"], pose, region=region, plane="vertical"
+).set_title("gentle thrusts")

@@ -10,8 +10,12 @@ import matplotlib.pyplot as plt
 
 import wakewise as ww
 
-parts = ww.Scenario.preset("quick", seed=1, vehicle="bluerov2-heavy", **{"mission.settle_s": 3.0}).parts()
-flights = {method: ww.fly(parts.replace(method=method), duration_s=30.0) for method in ("dp", "wake-aware")}
+settings = {"vehicle": "bluerov2-heavy", "mission.settle_s": 3.0}
+parts = ww.Scenario.preset("quick", seed=1, **settings).parts()
+flights = {
+    method: ww.fly(parts.replace(method=method), duration_s=30.0)
+    for method in ("dp", "wake-aware")
+}
 for flight in flights.values():
     print(flight)
 
@@ -20,12 +24,14 @@ for flight in flights.values():
 
 figure, axes = plt.subplots(2, 1, figsize=(8, 6), sharex=True, layout="constrained")
 for ax, (name, flight) in zip(axes, flights.items(), strict=True):
-    ww.plot.thrusts(flight, ax=ax).set_title(name)
+    ww.plot.thrusts(flight, limit_N=3.0, ax=ax).set_title(name)
 
 # %%
 # Coordinates of the thrusts in the null space. With `dp` they come from thruster limits, deadband and lag alone.
 
-figure, axes = plt.subplots(2, 1, figsize=(8, 6), sharex=True, sharey=True, layout="constrained")
+figure, axes = plt.subplots(
+    2, 1, figsize=(8, 6), sharex=True, sharey=True, layout="constrained"
+)
 for ax, (name, flight) in zip(axes, flights.items(), strict=True):
     ww.plot.null_space(flight, ax=ax).set_title(name)
 

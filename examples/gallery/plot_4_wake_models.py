@@ -15,11 +15,15 @@ import wakewise as ww
 AREA_M2, THRUST_N = 0.25 * np.pi * 0.076**2, 5.0
 
 
-def speed(name: str, along_m: NDArray[np.float64], across_m: NDArray[np.float64]) -> NDArray[np.float64]:
+def speed(
+    name: str, along_m: NDArray[np.float64], across_m: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Water speed (m/s) of a jet along north; speed grows with the square root of thrust."""
     points = np.column_stack([along_m, across_m, np.zeros(len(along_m))])
     north = np.array([[1.0, 0.0, 0.0]])
-    of_root = ww.wake_model(name).unit_velocity(points, np.zeros((1, 3)), north, np.array([AREA_M2]))
+    of_root = ww.wake_model(name).unit_velocity(
+        points, np.zeros((1, 3)), north, np.array([AREA_M2])
+    )
     return np.asarray(THRUST_N**0.5 * np.linalg.norm(of_root[0], axis=1))
 
 
@@ -28,8 +32,17 @@ figure, (along, across) = plt.subplots(1, 2, figsize=(10, 4), layout="constraine
 for name in ("jet", "fitted", "linear", "paper-calibrated"):
     along.plot(distance, speed(name, distance, 0.0 * distance), label=name)
     across.plot(radius, speed(name, 0.5 + 0.0 * radius, radius), label=name)
-along.set(xlabel="distance along the axis (m)", ylabel="water speed (m/s)", title="on the axis", ylim=(0.0, None))
-across.set(xlabel="distance from the axis (m)", title="0.5 m from the thruster", ylim=(0.0, None))
+along.set(
+    xlabel="distance along the axis (m)",
+    ylabel="water speed (m/s)",
+    title="on the axis",
+    ylim=(0.0, None),
+)
+across.set(
+    xlabel="distance from the axis (m)",
+    title="0.5 m from the thruster",
+    ylim=(0.0, None),
+)
 along.legend(frameon=False)
 
 # %%

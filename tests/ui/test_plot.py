@@ -84,6 +84,13 @@ def test_thrusts_are_those_of_the_record(flights, ax):
     assert [label.get_text() for label in ax.get_yticklabels()] == [t.name for t in flight.parts.vehicle.thrusters]
 
 
+def test_thrusts_of_two_flights_can_have_one_scale(flights, ax):
+    """`limit_N` is the end of the colour scale; one that is not more than 0 is refused."""
+    assert plot.thrusts(flights["dp"], limit_N=3.0, ax=ax).images[0].get_clim() == (-3.0, 3.0)
+    with pytest.raises(InputError, match="limit_N: 0, must be more than 0"):
+        plot.thrusts(flights["dp"], limit_N=0.0, ax=ax)
+
+
 def test_null_space_coordinates_are_what_exceeds_the_minimum_norm(flights, ax):
     """The sum of their squares and the squared minimum norm of the same wrench make the squared norm of the thrusts."""
     flight = flights["wake-aware"]

@@ -109,10 +109,12 @@ def wake_field(
     return ax
 
 
-def thrusts(flight: Flight, *, ax: Axes | None = None) -> Axes:
+def thrusts(flight: Flight, *, limit_N: float | None = None, ax: Axes | None = None) -> Axes:
     """Thrust of every thruster over time, a row each; forward and reverse in two colours.
 
-    Raises InputError if `flight` is no flight.
+    - `limit_N`: end of the colour scale, for pictures that are compared; 99.5 % of the thrusts if not given.
+
+    Raises InputError if `flight` is no flight, or `limit_N` is not more than 0.
     """
     time_s, thrusts_N = _recorded(flight)
     ax = _axes(ax)
@@ -120,7 +122,9 @@ def thrusts(flight: Flight, *, ax: Axes | None = None) -> Axes:
     buckets = min(1200, len(time_s))
     edges = np.linspace(0, len(time_s), buckets + 1).astype(int)
     shown = np.add.reduceat(np.nan_to_num(thrusts_N), edges[:-1], axis=0) / np.diff(edges)[:, None]
-    limit = max(float(np.quantile(np.abs(shown), 0.995)), 1e-6)
+    if limit_N is not None and not limit_N > 0.0:
+        raise InputError(f"limit_N: {limit_N:g}, must be more than 0")
+    limit = limit_N or max(float(np.quantile(np.abs(shown), 0.995)), 1e-6)
     count = shown.shape[1]
     drawn = ax.imshow(
         shown.T,
