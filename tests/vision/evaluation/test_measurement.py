@@ -169,3 +169,13 @@ def test_a_spike_that_sets_the_height_is_told() -> None:
             size, plane, _ = measure(mesh, MeasuringRule(), rng)
             lines = measuring_warnings(mesh, MeasuringRule(), size, plane)
             assert any("the height rests on" in line for line in lines) is told
+
+
+def test_a_bed_of_little_share_is_found_whatever_is_drawn() -> None:
+    """A sixth of the surface, below a rough dome: the same plane with each of thirty generators."""
+    dome = hemisphere()
+    rough = dome.vertices_m * (1.0 + 0.1 * np.random.default_rng(1).uniform(-1.0, 1.0, (len(dome.vertices_m), 1)))
+    mesh = joined(Mesh(rough, dome.faces), bed(half_m=0.031, cells=40))
+    beds = [fit_bed(mesh, np.random.default_rng(seed)) for seed in range(30)]
+    assert all(15.0 <= found.share_pct < 25.0 for found in beds)
+    assert min(float(found.axes[2] @ UP) for found in beds) > np.cos(np.radians(1.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +15,12 @@ from wakewise.core.errors import InputError
 from wakewise.scene.targets import Mesh
 from wakewise.vision.evaluation.cloud_to_surface import Crop, sample_surface
 
-TRIALS, SAMPLES = 400, 6000
+SAMPLES = 6000
 REACH_SHARE = 0.02
 """Farthest that a point of the bed lies from its plane, of the diagonal of the model's box."""
 LEAST_BED_PCT, MOST_BELOW_PCT = 15.0, 10.0
+TRIALS = math.ceil(math.log(1e-3) / math.log(1.0 - (0.01 * LEAST_BED_PCT) ** 3))
+"""With so many, three points of a bed of the least share are drawn once with a chance of 99.9 %."""
 CUT_SIGMAS, CUT_EDGES = 3.0, 4.0
 """A surface from photographs rounds the corner between colony and bed: by up to four edges of its mesh."""
 
