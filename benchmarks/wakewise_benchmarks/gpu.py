@@ -32,6 +32,7 @@ from wakewise.vision.reconstruction.dense.dense_points import require_cuda
 from wakewise_paper.lattice_reference.engines import make_engine, why_no_gpu
 from wakewise_paper.photo_sets import PhotoSet, judge, planned_views, write_photos
 
+PARTS = ("lattice", "colmap", "field")
 CELLS, STEPS = 96, 40
 VIEWS = (8, 6, 4)
 SEED = 1
@@ -47,25 +48,24 @@ def run(options: BenchOptions) -> dict[str, Any]:
     InputError
         If there is no such part.
     """
-    parts: dict[str, Callable[[PhotoSet | None, Scenario, Path], tuple[dict[str, Any], str | None]]] = {
-        "lattice": _lattice,
-        "colmap": _colmap,
-        "field": _field,
-    }
-    chosen = options.only or tuple(parts)
+    chosen = options.only or PARTS
     for name in chosen:
-        if name not in parts:
-            raise InputError(f"--only {name}: no such part, allowed {', '.join(parts)}")
+        if name not in PARTS:
+            raise InputError(f"--only {name}: no such part, allowed {', '.join(PARTS)}")
     result: dict[str, Any] = {"card": card_name(), "parts": {}}
     why = {} if result["card"] else {"card": "no library here can use a graphics card"}
     scenario = load_scenario("quick", None, {"target.kind": "brain", "mission.views": list(VIEWS), "seed": SEED})
     with tempfile.TemporaryDirectory(prefix="wakewise-bench-") as scratch:
-        photos = None
+        photos: PhotoSet | None = None
         for k, name in enumerate(chosen):
             options.progress(k, len(chosen), name)
-            if photos is None and name != "lattice":
-                photos = _photographs(scenario, Path(scratch) / "photographs", options)
-            figures, reason = parts[name](photos, scenario, Path(scratch) / name)
+            if name == "lattice":
+                figures, reason = _lattice()
+            else:
+                photos = photos or _photographs(scenario, Path(scratch) / "photographs", options)
+                options.progress(k, len(chosen), name)
+                part = _colmap if name == "colmap" else _field
+                figures, reason = part(photos, scenario, Path(scratch) / name)
             result["parts"][name] = figures
             if reason is not None:
                 why[name] = reason
@@ -92,9 +92,8 @@ def _photographs(scenario: Scenario, folder: Path, options: BenchOptions) -> Pho
     return write_photos(folder, views, None, scenario.imaging, target, seed=SEED, progress=options.progress)
 
 
-def _lattice(photos: PhotoSet | None, scenario: Scenario, folder: Path) -> tuple[dict[str, Any], str | None]:
+def _lattice() -> tuple[dict[str, Any], str | None]:
     """Random water in a cube with open faces; gap: largest difference over the largest population."""
-    del photos, scenario, folder
     figures: dict[str, Any] = {"cells": CELLS**3, "cpu_mlups": None, "gpu_mlups": None, "ratio": None, "gap_rel": None}
     start = (1e-3 * np.random.default_rng(SEED).standard_normal((19, CELLS, CELLS, CELLS))).astype(np.float32)
     ends = {}
@@ -117,9 +116,8 @@ def _lattice(photos: PhotoSet | None, scenario: Scenario, folder: Path) -> tuple
     return figures, reason
 
 
-def _colmap(photos: PhotoSet | None, scenario: Scenario, folder: Path) -> tuple[dict[str, Any], str | None]:
+def _colmap(photos: PhotoSet, scenario: Scenario, folder: Path) -> tuple[dict[str, Any], str | None]:
     """Features and exhaustive matching by COLMAP alone, then a whole model with stereo and with patch-match."""
-    assert photos is not None
     reason = None
     try:
         require_cuda()
@@ -154,9 +152,8 @@ def _features_and_matches(images: Path, folder: Path, device: pycolmap.Device) -
     return {"features_s": features_s, "matching_s": matching_s, "features": features, "inlier_matches": matches}
 
 
-def _field(photos: PhotoSet | None, scenario: Scenario, folder: Path) -> tuple[dict[str, Any], str | None]:
+def _field(photos: PhotoSet, scenario: Scenario, folder: Path) -> tuple[dict[str, Any], str | None]:
     """The small profile of a neural field for some hundred steps, from one model of the photographs."""
-    assert photos is not None
     names = [f"{device}_{key}" for device in ("cpu", "gpu") for key in ("train_s", "psnr_db", "loss")]
     figures: dict[str, Any] = {"steps": FIELD_STEPS, **dict.fromkeys(names)}
     try:

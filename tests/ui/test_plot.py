@@ -87,7 +87,7 @@ def test_thrusts_are_those_of_the_record(flights, ax):
 def test_thrusts_of_two_flights_can_have_one_scale(flights, ax):
     """`limit_N` is the end of the colour scale; one that is not more than 0 is refused."""
     assert plot.thrusts(flights["dp"], limit_N=3.0, ax=ax).images[0].get_clim() == (-3.0, 3.0)
-    with pytest.raises(InputError, match="limit_N: 0, must be more than 0"):
+    with pytest.raises(InputError, match="limit_N: 0, must be finite and more than 0"):
         plot.thrusts(flights["dp"], limit_N=0.0, ax=ax)
 
 

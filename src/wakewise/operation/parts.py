@@ -8,7 +8,7 @@ Sampling a region takes seconds and a soft target's modes a third of one, so tho
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from hashlib import blake2b
 from threading import Lock
@@ -444,13 +444,7 @@ def modes_of(target: Target, tissue: TissueProperties, water_kg_m3: float) -> Be
     """
     key = _shape_digest(target, tissue, float(water_kg_m3), target.bed_z_m)
     with _modes_lock:
-        found = _modes.pop(key, None)
-        if found is None:
-            found = BendingModes.of(target, tissue, water_kg_m3)
-        _modes[key] = found  # the last used is dropped last
-        while len(_modes) > CACHED_MODES:
-            del _modes[next(iter(_modes))]
-        return found
+        return _cached(_modes, CACHED_MODES, key, lambda: BendingModes.of(target, tissue, water_kg_m3))
 
 
 def region_of(target: Target, points: int, seeds: Seeds, fragility_gain: float = 0.0) -> Region:
@@ -459,25 +453,27 @@ def region_of(target: Target, points: int, seeds: Seeds, fragility_gain: float =
     With `fragility_gain` above 0 thin and sharp features of the target weigh more. Raises InputError as
     `sample_region`.
     """
-    key = _fingerprint(target, points, seeds, fragility_gain)
+
+    def sampled() -> Region:
+        marks = find_fragility(target.mesh) if fragility_gain > 0.0 else None
+        return sample_region(target, points, seeds.region(), marks, fragility_gain)
+
+    key = _shape_digest(target, points, seeds.seed, float(fragility_gain), target.bed_z_m, target.radius_m)
     with _regions_lock:
-        found = _regions.pop(key, None)
-        if found is None:
-            marks = find_fragility(target.mesh) if fragility_gain > 0.0 else None
-            found = sample_region(target, points, seeds.region(), marks, fragility_gain)
-        _regions[key] = found  # the last used is dropped last
-        while len(_regions) > CACHED_REGIONS:
-            del _regions[next(iter(_regions))]
-        return found
+        return _cached(_regions, CACHED_REGIONS, key, sampled)
 
 
-def _fingerprint(target: Target, points: int, seeds: Seeds, fragility_gain: float) -> bytes:
-    """Digest of the inputs of a region; the target's name is not one of them."""
-    return _shape_digest(target, points, seeds.seed, float(fragility_gain), target.bed_z_m, target.radius_m)
+def _cached(cache: dict[bytes, T], most: int, key: bytes, make: Callable[[], T]) -> T:
+    """The value of a key, made where it is not there; the last used are kept, so many at most."""
+    found = cache.pop(key) if key in cache else make()
+    cache[key] = found
+    while len(cache) > most:
+        del cache[next(iter(cache))]
+    return found
 
 
 def _shape_digest(target: Target, *more: Any) -> bytes:
-    """Digest of a target's mesh and place and of what else counts."""
+    """Digest of a target's mesh and place and of what else counts; its name does not."""
     digest = blake2b(repr(more).encode())
     for values in (target.mesh.vertices_m, target.mesh.faces, target.centre_W_m):
         digest.update(repr(values.shape).encode())

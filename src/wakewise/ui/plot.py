@@ -117,14 +117,14 @@ def thrusts(flight: Flight, *, limit_N: float | None = None, ax: Axes | None = N
     Raises InputError if `flight` is no flight, or `limit_N` is not more than 0.
     """
     time_s, thrusts_N = _recorded(flight)
+    if limit_N is not None:
+        limit_N = finite_number(limit_N, "limit_N", above=0.0)
     ax = _axes(ax)
     # A row of colour cannot show more instants than a page has pixels; means over some keep short pulses in view.
     buckets = min(1200, len(time_s))
     edges = np.linspace(0, len(time_s), buckets + 1).astype(int)
     shown = np.add.reduceat(np.nan_to_num(thrusts_N), edges[:-1], axis=0) / np.diff(edges)[:, None]
-    if limit_N is not None and not limit_N > 0.0:
-        raise InputError(f"limit_N: {limit_N:g}, must be more than 0")
-    limit = limit_N or max(float(np.quantile(np.abs(shown), 0.995)), 1e-6)
+    limit = max(float(np.quantile(np.abs(shown), 0.995)), 1e-6) if limit_N is None else limit_N
     count = shown.shape[1]
     drawn = ax.imshow(
         shown.T,

@@ -126,16 +126,16 @@ class ViewChooser:
         What is below is "" where the wished one is clear. The bounds are known, the target as far as it is mapped.
         """
         solid = target.points_W_m if target.surface_W_m is None else target.surface_W_m
-        azimuths, below, elevation_deg = 2.0 * math.pi / CHECKED * np.arange(CHECKED), "", wished_deg
+        clearance_m, elevation_deg, below = self.mission.clearance_m, wished_deg, ""
+        # Higher up, the surface and the walls are no farther.
+        least = {"the floor": clearance_m, "the target": clearance_m + MAPPED_MARGIN_M}
+        azimuths = (2.0 * math.pi / CHECKED * np.arange(CHECKED)).tolist()
         while True:
-            blocks = ""
-            for azimuth in azimuths.tolist():
-                X_WC = camera_pose(target.centre_W_m, azimuth, math.radians(elevation_deg), self.mission.standoff_m)
-                for what, gap in self.gaps(X_WC, solid).items():
-                    least = self.mission.clearance_m + (MAPPED_MARGIN_M if what == "the target" else 0.0)
-                    blocks = what if gap < least and not blocks else blocks
-            # Higher up the surface and the walls are no farther.
-            if blocks not in ("the floor", "the target") or elevation_deg + STEP_DEG > STEEPEST_DEG:
+            elevation_rad, range_m = math.radians(elevation_deg), self.mission.standoff_m
+            poses = [camera_pose(target.centre_W_m, azimuth, elevation_rad, range_m) for azimuth in azimuths]
+            around = [self.gaps(X_WC, solid) for X_WC in poses]
+            blocks = next((what for what in least if min(gaps[what] for gaps in around) < least[what]), "")
+            if not blocks or elevation_deg + STEP_DEG > STEEPEST_DEG:
                 return elevation_deg, below
             below, elevation_deg = below or blocks, elevation_deg + STEP_DEG
 

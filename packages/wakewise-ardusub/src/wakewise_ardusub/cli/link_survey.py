@@ -135,7 +135,10 @@ def fly_survey(
             session=secrets.randbelow(2**31) + 1,
         )
         typer.echo(f"listening at {vehicle_at.words}; journal: {folder / JOURNAL_FILE}", err=True)
-        _fly(session, codec, consent=given.consent, wait_s=given.wait)
+        try:
+            _fly(session, codec, consent=given.consent, wait_s=given.wait)
+        finally:
+            end_status_line()
     figures = {"folder": str(folder), **session.figures()}
     if given.json:
         print_json(figures)
@@ -184,7 +187,6 @@ def _fly(session: TransectSession, codec: MavlinkCodec, *, consent: bool, wait_s
                 session.consent()
             begun = asked or session.plan is not None
             if not begun and session.state == "waiting" and now_s - began_s > wait_s:
-                end_status_line()
                 raise InputError(f"survey not begun within {wait_s:g} s: {session.why}")
             if session.ended_by and session.state in ("waiting", "ready") and keys is None:
                 return  # nobody is there to go on
@@ -201,7 +203,6 @@ def _fly(session: TransectSession, codec: MavlinkCodec, *, consent: bool, wait_s
         except KeyboardInterrupt:
             session.abort("Ctrl-C")
             ends_s = min(ends_s, time.monotonic() + ENDS_S)
-    end_status_line()
 
 
 def _key(session: TransectSession, keys: Any) -> None:
