@@ -123,7 +123,7 @@ def drawn(both: list[tuple[Flown, ww.Parts]], out: Path) -> None:
 
     count = min(len(kept.times_s) for kept, _ in both)
     animation = FuncAnimation(figure, frame, frames=count, blit=False)
-    animation.save(out, writer=PillowWriter(fps=FRAMES_HZ), dpi=84, savefig_kwargs={"facecolor": BACKGROUND})
+    animation.save(out, writer=PillowWriter(fps=FRAMES_HZ), dpi=78, savefig_kwargs={"facecolor": BACKGROUND})
     plt.close(figure)
 
 
