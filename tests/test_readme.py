@@ -122,6 +122,7 @@ def test_the_index_names_every_page():
     assert missing == []
 
 
+@pytest.mark.slow
 def test_the_python_of_docs_python_runs(tmp_path, monkeypatch):
     """Pasted one after the other, the blocks run; whole trials, which take minutes, are left out."""
     monkeypatch.chdir(tmp_path)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import ast
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -43,6 +44,7 @@ def package_of(module: str) -> str | None:
     return name if name in LAYERS else None
 
 
+@cache
 def imports() -> dict[str, set[str]]:
     """Packages that each package imports."""
     found: dict[str, set[str]] = {name: set() for name in LAYERS}

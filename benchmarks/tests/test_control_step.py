@@ -6,6 +6,7 @@ from wakewise_benchmarks import planner
 from wakewise_benchmarks.planner import goal_at
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["allocation-only", "wake-aware"])
 def test_a_step_is_timed_after_its_warm_up(monkeypatch, method):
     """The median is no longer than the 99th percentile, and a method that plans has steps that take longer."""

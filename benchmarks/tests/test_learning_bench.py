@@ -10,6 +10,8 @@ from wakewise.learning import ResidualPolicy, StationKeepingTask
 from wakewise_benchmarks import learning
 from wakewise_benchmarks.registry import run_bench
 
+pytestmark = pytest.mark.slow
+
 SHORT = StationKeepingTask(episode_s=0.2, points=12)
 
 

@@ -27,6 +27,7 @@ def figures() -> dict[str, Any]:
         return reef.patch_figures(PARTS.scenario, PARTS.target, (), BenchOptions())
 
 
+@pytest.mark.slow
 def test_two_levels_see_more_than_transects_and_go_less_far_than_orbits_everywhere(figures: dict[str, Any]) -> None:
     """Paths, photographs and expected completeness are those of the planned poses."""
     arms = figures["arms"]
@@ -70,6 +71,7 @@ def test_the_map_has_what_two_photographs_show() -> None:
     assert len(reef.mapped(patches, poses[:6], PARTS).points_W_m) < len(target.points_W_m)
 
 
+@pytest.mark.slow
 def test_the_answer_is_printed_and_an_unknown_survey_refused(
     figures: dict[str, Any], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,6 +14,7 @@ def test_a_terrain_repeats_with_its_heights() -> None:
     assert at == pytest.approx([20.0, 18.0, 17.8, 15.0, 20.0])
 
 
+@pytest.mark.slow
 def test_a_step_of_a_metre_is_followed() -> None:
     """1.2 m over the sawtooth's step: the error is that of the step, and does not last."""
     found = surftrak_figures("sawtooth", 1.2)

@@ -31,6 +31,7 @@ def test_a_short_flight_is_flown_and_judged_by_the_truth() -> None:
     assert told["altitude_p95_cm"] < 8.0
 
 
+@pytest.mark.slow
 def test_a_part_of_an_orbit_is_flown_and_judged_by_the_truth() -> None:
     """0.3 turns of 1 m: finished, near the circle and with the bow near its centre."""
     told = survey_orbits.orbit_figures(1, 1.0, 0.1, 0.3)
@@ -113,6 +114,7 @@ def test_a_reduction_is_met_by_its_interval_alone() -> None:
     assert wash["met"] is False
 
 
+@pytest.mark.slow
 def test_a_person_flies_a_short_line_at_a_fifth_of_the_stick() -> None:
     """3 m in 30 s within 0.4 m of it and 0.4 m of the altitude, by sticks in their range."""
     sea = survey_by_hand.SurveySea.drawn(load_vehicle(survey.VEHICLE), 2)

@@ -87,6 +87,7 @@ def test_a_trap_that_there_is_not_is_refused() -> None:
     assert len(adversarial_photos.TRAPS) >= 20
 
 
+@pytest.mark.slow
 def test_photographs_are_of_what_stands_there() -> None:
     """A pixel's ray, as long as the distance says, ends on the relief and on the rock."""
     camera = adversarial_scenes.ring(3)[1]

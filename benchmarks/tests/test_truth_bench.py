@@ -209,9 +209,8 @@ def test_the_table_has_a_line_for_every_row(tmp_path: Path, capsys: pytest.Captu
     assert "0 met, 0 missed, 3 not computed" in printed
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "mesh_bunny" else []) for name in FAST]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FAST)
 def test_the_fast_figures_are_met_for_real(name: str) -> None:
     """Each part that takes seconds is computed from its data, and all of its figures are as asked."""
     if not (DATA / name).is_dir():

@@ -21,6 +21,7 @@ FEW_POINTS = Region(
 """Weights are found wherever the water is asked about: no region has to be sampled for them."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "load"),
     [

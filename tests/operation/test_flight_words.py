@@ -30,6 +30,7 @@ def test_a_flight_is_one_line():
     )
 
 
+@pytest.mark.slow
 def test_figures_of_a_flight_that_reaches_a_leg_are_not_called_those_of_a_hover():
     """A flight of two seconds whose hover takes one."""
     fields = {"target.points": 60, "mission.settle_s": 1.0}

@@ -97,6 +97,7 @@ def test_a_target_that_yields_has_columns_of_its_own():
     assert {"sway_m", "sway_x_m", "target_stress_Pa", "shifted_m"} < set(step_columns(2, yields=True))
 
 
+@pytest.mark.slow
 def test_the_scene_of_an_exposure_is_bent_and_shifted(parts):
     """Vertices are where the modes and the shift put them; one scene where the tips hardly move, more where they do."""
     scenes = scenes_of(parts, BENT)

@@ -110,7 +110,7 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Run(r"wakewise evaluate .*", slow=True, shows="rmse_mm"),
     Run(r"wakewise measure runs/metres.*", slow=True, shows="volume_cm3"),
     Elsewhere(r"wakewise compare-models runs/spring .*", "tests/ui/cli/test_measure_commands.py", '"compare-models"'),
-    Run(r"wakewise calibrate BOARD_PHOTOS .*", shows="focal"),
+    Run(r"wakewise calibrate BOARD_PHOTOS .*", slow=True, shows="focal"),
     Run(r"wakewise colour PHOTOS"),
     Run(r"wakewise photo-robustness", also=("--levels", "silt=0", "--out", "runs/degraded", *BRIEF), slow=True),
     Elsewhere(r"wakewise nerf .*", "packages/wakewise-nerf/tests/test_nerf_pipeline.py", '"nerf"'),

@@ -10,6 +10,8 @@ from wakewise_paper import photo_robustness
 from wakewise_paper.photo_robustness import COLUMNS, FACTORS, degrade
 from wakewise_paper.reports.operator_bench_plot import plot_degradation
 
+pytestmark = pytest.mark.slow
+
 SMALL = {
     "target.kind": "brain",
     "mission.elevations_deg": [45],
@@ -51,7 +53,6 @@ def told(tmp_path_factory):
         return folder, scenario, degrade(scenario, folder, {"silt": (0.0, 3000.0, 4000.0)})
 
 
-@pytest.mark.slow
 def test_clear_water_gives_a_model_and_mud_gives_none(study):
     """In clear water there are figures; in mud a reason instead of every one of them, and it ends there."""
     _, _, rows = study

@@ -22,6 +22,7 @@ def case_names():
     return [(part, case.name) for part in load_parts() for case in cases_of(part)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("part", "name"), case_names())
 def test_every_case_is_a_scan_that_can_begin(part, name):
     """Its fields are a scenario's, with few target points; what is checked before a flight finds nothing."""

@@ -93,6 +93,7 @@ def _run(package: Path, name: str = "caller.g") -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.slow
 def test_a_change_far_below_a_kernel_compiles_it_anew(small_package: Path) -> None:
     """What was kept is used while nothing changed, and not once a constant of a callee's file has."""
     assert _run(small_package) == ["10.0", "0"]
@@ -114,6 +115,7 @@ def test_a_kernel_apart_is_kept_and_compiled_anew_as_any(small_package: Path) ->
     assert _run(small_package) == ["20.0", "0"]
 
 
+@pytest.mark.slow
 def test_a_kernel_apart_is_brought_along_through_one_that_was_read_from_disk(small_package: Path) -> None:
     """Two levels up, where the level between was kept before: the caller finds it when it is read from disk alone."""
     callee = small_package / "callee.py"

@@ -42,6 +42,7 @@ def test_the_list_names_kernels_that_are_there() -> None:
         assert len(inspect.signature(work.py_func).parameters) >= len(kernel.types), kernel.name
 
 
+@pytest.mark.slow
 def test_once_warm_a_flight_compiles_nothing() -> None:
     """The list is whole: tools/list_kernels.py writes it anew after a change in how kernels are called."""
     done = subprocess.run([sys.executable, "-c", FLIGHT], capture_output=True, text=True, check=True)

@@ -85,6 +85,7 @@ def test_the_other_process_makes_the_mesh_that_this_one_would(folder, monkeypatc
     assert (folder / "mesh.ply").read_bytes() == beside
 
 
+@pytest.mark.slow
 def test_what_was_begun_is_waited_for_and_not_made_twice(folder, monkeypatch):
     """Also where the mesh is there before anybody asks for it: its stages ran, and none of them in this process."""
     for name in ("_mesh", "_colours"):

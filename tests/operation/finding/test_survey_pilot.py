@@ -109,6 +109,7 @@ def test_a_survey_without_a_map_flies_its_orbits_all_the_same() -> None:
     assert pilot.photographed is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("orbits", "count"), [("none", 0), ("everywhere", 16)])
 def test_baselines_are_settings(orbits: str, count: int) -> None:
     """Transects alone, and orbits side by side over the whole patch."""

@@ -12,6 +12,7 @@ from wakewise.operation.worlds.library import load_world, parse_world, world_nam
 from wakewise.ui.cli.main import run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", world_names())
 def test_every_world_is_a_scenario_that_can_begin(name):
     """It passes what is checked before a flight, with the presets' vehicle and mission; what seeds draw is allowed."""

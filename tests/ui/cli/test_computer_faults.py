@@ -48,6 +48,7 @@ def test_a_reader_that_went_away_is_no_fault() -> None:
     assert (done.returncode, done.stderr) == (1, "")
 
 
+@pytest.mark.slow
 def test_an_output_without_signs_shows_the_rest() -> None:
     """A terminal of ASCII alone gets a question mark for a sign that it lacks, not an error at the end."""
     done = wakewise("vehicle", "show", "paper", stdout=subprocess.PIPE, env=os.environ | {"PYTHONIOENCODING": "ascii"})

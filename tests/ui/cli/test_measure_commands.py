@@ -132,6 +132,7 @@ def test_growth_is_shown_in_a_picture_and_told_in_a_line(tmp_path: Path, capsys:
         assert picture.format == "PNG" and min(picture.size) > 500
 
 
+@pytest.mark.slow
 def test_the_same_model_twice_has_not_changed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The table ends with the verdict, and says that bare meshes do not know their scale."""
     path = str(colony(tmp_path / "a.ply"))

@@ -57,6 +57,7 @@ def test_size_does_not_depend_on_the_frame_and_goes_with_the_power_of_the_scale(
         assert moved[key] == pytest.approx(value * scale ** DEFINITIONS[key][1], rel=0.003)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [hemisphere, cone])
 def test_repeat_models_agree(make: object) -> None:
     """Of six models with a reconstruction's noise the CV of area and volume is below 1 %, of length below .5 %."""
@@ -171,6 +172,7 @@ def test_a_spike_that_sets_the_height_is_told() -> None:
             assert any("the height rests on" in line for line in lines) is told
 
 
+@pytest.mark.slow
 def test_a_bed_of_little_share_is_found_whatever_is_drawn() -> None:
     """A sixth of the surface, below a rough dome: the same plane with each of thirty generators."""
     dome = hemisphere()

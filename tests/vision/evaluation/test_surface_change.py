@@ -48,6 +48,7 @@ def hardly_grown(before: Mesh) -> SurfaceChange:
     return compare(before, turned(grown_coral(0.001, np.random.default_rng(3)), TURN, SHIFT))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["unchanged", "hardly_grown"])
 def test_a_coral_grown_by_1_mm_or_not_at_all_is_not_claimed(name: str, request: pytest.FixtureRequest) -> None:
     """No change can be told, and the smallest one that can is above 1 mm and below 3 mm."""
@@ -110,12 +111,14 @@ def test_models_of_different_scale_are_refused_unless_scale_is_to_be_fitted(befo
         assert fitted.verdict.startswith("no change"), fitted.verdict
 
 
+@pytest.mark.slow
 def test_a_smooth_colony_that_turns_alike_is_compared_too() -> None:
     """A hemisphere tells no turn, which makes no change of it."""
     first, second = (noisy(joined(hemisphere(), bed()), np.random.default_rng(k)) for k in (1, 2))
     assert compare(first, turned(second, TURN, SHIFT)).verdict.startswith("no change")
 
 
+@pytest.mark.slow
 def test_bodies_without_a_bed_are_compared_as_a_whole() -> None:
     """An egg alone is all colony, and no bed is found."""
     found = compare(noisy(egg(), np.random.default_rng(1)), noisy(egg(), np.random.default_rng(2)))

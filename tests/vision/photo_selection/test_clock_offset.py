@@ -67,6 +67,7 @@ def test_clocks_that_do_not_overlap_are_told_in_one_line(tmp_path: Path) -> None
         pick_photos(tmp_path / "photos", dive(1, 20.0).track, PickRequest())
 
 
+@pytest.mark.slow
 def test_a_clock_that_lost_its_date_is_found_in_a_wide_window(tmp_path: Path) -> None:
     """--window of years finds a camera that begins at 1970 again."""
     made = dive(4, 70.0)
@@ -131,6 +132,7 @@ def test_pictures_of_different_places_have_no_motion(tmp_path: Path) -> None:
     assert np.isnan(statistics.motion).all()
 
 
+@pytest.mark.slow
 def test_a_camera_that_looks_ahead_and_down_tells_the_offset_too(tmp_path: Path) -> None:
     """A camera tilted by 50 deg, stated as 30 deg: error at most 0.1 s."""
     made = replace(dive(301, 80.0), tilt_deg=50.0)
@@ -140,6 +142,7 @@ def test_a_camera_that_looks_ahead_and_down_tells_the_offset_too(tmp_path: Path)
     assert offset["offset_s"] == pytest.approx(3.7, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_photograph_every_three_seconds_by_a_clock_of_whole_seconds_is_enough(tmp_path: Path) -> None:
     """Half of the photographs overlap; error at most 0.1 s over five minutes."""
     made = dive(101, 300.0)
@@ -149,6 +152,7 @@ def test_a_photograph_every_three_seconds_by_a_clock_of_whole_seconds_is_enough(
     assert found.figures["offset"]["offset_s"] == pytest.approx(60.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_log_at_few_hertz_without_altitude_still_tells_the_offset(tmp_path: Path) -> None:
     """Poses at 4 Hz, no rangefinder, a camera turned a quarter about its axis: error at most 0.15 s."""
     made, true_s = dive(6, 80.0), 40.0

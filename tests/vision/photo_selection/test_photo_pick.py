@@ -134,6 +134,7 @@ def test_frames_of_a_film_are_picked(here: Path, made: Dive, capsys: pytest.Capt
     assert frames == [row["name"] for row in csv.DictReader((here / "out" / "cameras.csv").read_text().splitlines())]
 
 
+@pytest.mark.slow
 def test_photographs_without_a_time_need_an_interval(
     here: Path, made: Dive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -217,6 +218,7 @@ def _bad_tables(here: Path) -> None:
         (here / f"{name}.csv").write_text("\n".join([",".join(header), *lines]))
 
 
+@pytest.mark.slow
 def test_a_clock_that_was_set_in_the_dive_is_named(here: Path, made: Dive, capsys: pytest.CaptureFixture[str]) -> None:
     """Summer time begins in the photographs' names: a warning counts those outside the log, and says since when."""
     (here / "summer").mkdir(exist_ok=True)

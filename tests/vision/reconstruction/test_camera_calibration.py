@@ -86,6 +86,7 @@ def test_real_boards_behind_an_aquarium_wall():
     assert found.residuals_px["pinhole"] > 2.0
 
 
+@pytest.mark.slow
 def test_what_is_no_file_among_the_photos_is_let_be(boards, tmp_path):
     """A pipe, a folder and a hidden file beside the photos are not waited for nor read."""
     for k in range(3):
@@ -96,15 +97,13 @@ def test_what_is_no_file_among_the_photos_is_let_be(boards, tmp_path):
     assert calibrate(tmp_path, BOARD).photos == 3
 
 
-LATER = ["DICT_APRILTAG_25h9", "DICT_APRILTAG_36h10"]
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "family",
     [
         "DICT_6X6_1000",
         "DICT_ARUCO_ORIGINAL",
-        *(pytest.param(name, marks=[pytest.mark.slow] if name in LATER else []) for name in APRILTAG),
+        *APRILTAG,
     ],
 )
 def test_the_family_of_the_markers_is_found(family, tmp_path):
@@ -129,6 +128,7 @@ def test_another_board_or_too_few_photos_say_what_is_seen(boards, tmp_path):
     assert "a board of 4 x 3 squares has 6, numbered up to 5: does --board give its squares?" in str(fault.value)
 
 
+@pytest.mark.slow
 def test_what_calibrate_writes_reconstruct_begins_with(boards, tmp_path, capsys):
     """As JSON and as COLMAP's cameras.txt: one camera, whose four coefficients were fitted to the same corners."""
     for name in ("cal.json", "cameras.txt"):

@@ -73,7 +73,8 @@ def wide_photos(tmp_path_factory):
     return folder, truth
 
 
-@pytest.mark.parametrize("known", [pytest.param(True, marks=pytest.mark.slow), False])
+@pytest.mark.slow
+@pytest.mark.parametrize("known", [True, False])
 def test_photographs_of_a_fisheye_become_a_model(wide_photos, tmp_path, known):
     """Cameras within 1 % of their spread and points on the ball, with the lens known and with its kind alone."""
     folder, truth = wide_photos

@@ -45,6 +45,7 @@ def test_a_log_becomes_a_folder(capsys: Capture, tmp_path: Path, monkeypatch: py
     assert not (tmp_path / "other" / "report.html").exists()
 
 
+@pytest.mark.slow
 def test_a_logs_folder_goes_where_a_trials_goes(capsys: Capture, tmp_path: Path) -> None:
     """Poses as TUM files and a ROS 2 bag with thrusts; of a log without places the bag holds thrusts, and no pose."""
     pytest.importorskip("rosbags", reason="the extra `ros` is not installed")

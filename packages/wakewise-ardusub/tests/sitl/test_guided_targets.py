@@ -41,6 +41,7 @@ def send(flight: InProcessSession, mask: int, numbers: tuple[float, ...], yaw: f
     flight.companion.send(message)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("firmware", [(4, 5, 3), (4, 8, 0)])
 def test_a_moving_target_is_followed_across_a_current_and_lapses_after_three_seconds(firmware: Any) -> None:
     """Within 2 mm/s and 2 cm; 3 s after the last message the vehicle stops, and holds where it is."""

@@ -65,13 +65,8 @@ def test_an_orbit_over_relief_in_a_current_is_flown_as_asked(direction: Any) -> 
     assert told["centre_m"] == pytest.approx([1.5 * math.cos(1.0), 1.5 * math.sin(1.0)], abs=0.2)
 
 
-NEAREST = ("no Doppler log", "a stick is moved", "the pilot changes the mode", *BY_TIME_OUT)
-"""Looked at each time; the others, which end a line in the same way, by `make test-all`."""
-
-
-@pytest.mark.parametrize(
-    "fault", [pytest.param(fault, marks=[] if fault in NEAREST else [pytest.mark.slow]) for fault in SURVEY_FAULTS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", SURVEY_FAULTS)
 def test_every_loss_on_an_orbit_ends_in_the_firmwares_hold(fault: str) -> None:
     """Within a second by the program, within 3 s by the firmware's time-out."""
     survey = harness().flying(2.0)
@@ -91,6 +86,7 @@ def test_an_orbit_that_is_pushed_towards_its_target_ends_before_it() -> None:
     assert math.dist(survey.flight.autopilot.motion.p_WB_m[:2], survey.session.plan.centre_W_m) > 1.0
 
 
+@pytest.mark.slow
 def test_layers_are_flown_at_their_altitudes() -> None:
     """0.3 turns at 0.8 m, then back at 1.1 m: the altitude asked for is that of the layer, and it is kept."""
     pace = SurveyPace(speed_m_s=0.2, acceleration_m_s2=0.03)
@@ -105,6 +101,7 @@ def test_layers_are_flown_at_their_altitudes() -> None:
     assert float(np.hypot(*motion.p_WB_m[:2])) < 0.3
 
 
+@pytest.mark.slow
 def test_an_orbit_pauses_and_goes_on_round_the_centre() -> None:
     """A pause holds the place; a stick ends it; from 1 m outside consent goes back to the circle and finishes it."""
     pace = SurveyPace(speed_m_s=0.2, acceleration_m_s2=0.03)

@@ -127,6 +127,7 @@ def test_a_pause_holds_and_consent_goes_on() -> None:
     assert survey.session.at.flown_m > flown + 0.2
 
 
+@pytest.mark.slow
 def test_a_survey_that_a_stick_ended_is_resumed_where_it_ended() -> None:
     """The pilot flies away and lets go; consent flies back to the place and finishes the line, counted once."""
     survey = harness(lines=straight_line(2.0)).flying(5.0)
@@ -165,6 +166,7 @@ def test_what_is_missing_is_told_and_keeps_it_from_beginning() -> None:
     assert shallow.session.why.endswith("0.8 m above it is the surface")
 
 
+@pytest.mark.slow
 def test_a_bed_that_rises_too_fast_ends_it() -> None:
     """Over a wall the vehicle stops while it is still above it."""
     wall = Relief(shape="trapezoid", height_m=0.9, slope=3.5, period_m=8.0, phase=0.3)
@@ -176,6 +178,7 @@ def test_a_bed_that_rises_too_fast_ends_it() -> None:
     assert wall.bed_m(*motion.p_WB_m[:2]) - motion.p_WB_m[2] > 0.03
 
 
+@pytest.mark.slow
 def test_a_steep_face_is_climbed_before_it_is_passed() -> None:
     """Over a face of 70 degrees the way ahead stops until the altitude is there again, and the line is finished."""
     face = Relief(shape="trapezoid", height_m=0.9, slope=2.7, period_m=8.0, phase=0.3)
@@ -197,6 +200,7 @@ def test_lines_out_of_the_fence_are_refused_before_anything_moves_far() -> None:
     assert float(np.hypot(*survey.flight.autopilot.motion.p_WB_m[:2])) < 1.0
 
 
+@pytest.mark.slow
 def test_an_acceleration_is_sent_from_4_8_on_alone() -> None:
     """ArduSub before it would take no target at all from such a message."""
     masks: dict[tuple[int, int, int], set[int]] = {}
@@ -215,6 +219,7 @@ def test_an_acceleration_is_sent_from_4_8_on_alone() -> None:
     assert masks == {(4, 5, 3): {0x9C0}, (4, 8, 0): {0x800}}
 
 
+@pytest.mark.slow
 def test_a_lawnmower_is_flown_with_its_turns() -> None:
     """Two lines of 1.5 m, 1 m apart, at 20 cm/s: 3 m of line, and the vehicle ends 1 m aside."""
     options = TransectOptions(pace=SurveyPace(speed_m_s=0.2, acceleration_m_s2=0.03))

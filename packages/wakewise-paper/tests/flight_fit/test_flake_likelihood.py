@@ -76,6 +76,7 @@ def fitted(slope, pairs, seed, gain=1.0):
     return fit_flight(seen(slope, pairs, seed, gain), CAMERA, VEHICLE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slope", [0.1, 0.16])
 def test_it_finds_the_width_that_the_water_has(slope):
     """Within 12 %, and the current within 3 mm/s, from a minute of pairs with a pixel's noise and unknown depths."""

@@ -32,6 +32,7 @@ def test_deviation_is_the_rms_of_what_is_missed_over_that_of_what_is_asked():
     assert deviations(0.0 * asked, asked, asked)["velocity_deviation_pct"] is None
 
 
+@pytest.mark.slow
 def test_the_same_seed_is_the_same_water_for_every_method_and_pilot():
     """Tank, start and course do not depend on who flies; the method does not change what is asked."""
     one, two = (_parts("close", "script", m, 2) for m in ("dp", "no-forward-jets"))
@@ -42,6 +43,7 @@ def test_the_same_seed_is_the_same_water_for_every_method_and_pilot():
     assert course_of("close", "human", 1) == "look"
 
 
+@pytest.mark.slow
 def test_what_a_plan_expects_is_told_of_methods_that_plan():
     """A velocity once there is a plan; nothing of a method without one."""
     for method in ("wake-aware", "dp"):

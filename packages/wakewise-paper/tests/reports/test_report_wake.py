@@ -60,6 +60,7 @@ def test_every_flow_is_explained_where_it_is_first_named(result, page):
     assert "below −1" in page[: page.index("<main")]
 
 
+@pytest.mark.slow
 def test_a_formula_that_would_hold_is_not_called_a_failure(result):
     """The verdict follows the figures: with good ones in their place the headline turns."""
     values = figures(result)

@@ -61,6 +61,7 @@ def test_worlds_and_targets_take_turns():
     ]
 
 
+@pytest.mark.slow
 def test_other_worlds_are_flown_on_each_third_seed():
     """So that a budget buys pairs in the paper's own set-up; alone, another world is flown on every seed."""
 

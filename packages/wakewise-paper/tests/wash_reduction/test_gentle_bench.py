@@ -48,6 +48,7 @@ def here(monkeypatch):
     return MadeUp(monkeypatch, gentle, made_up)
 
 
+@pytest.mark.slow
 def test_the_answer_has_the_keys_that_were_promised(here, tmp_path, capsys):
     """Scenarios with methods, reductions and mechanisms; headline; flows; a picture of them."""
     found = gentle.run(

@@ -19,6 +19,7 @@ from wakewise_paper.wash_reduction.scenario_files import SCENARIOS, VEHICLES
 VEHICLE = load_vehicle("paper")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vehicle", VEHICLES)
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_course_clears_floor_target_and_surface(name, vehicle):

@@ -38,6 +38,7 @@ def test_what_a_seed_draws_lies_within_its_stratum(name):
     assert len({sample_conditions(other, 1).seed for other in SCENARIOS}) == len(SCENARIOS)
 
 
+@pytest.mark.slow
 def test_methods_and_levers_of_one_seed_meet_the_same_world(monkeypatch):
     """Trials of one seed differ in method and control alone, in scenarios and in worlds."""
     monkeypatch.setattr("wakewise_paper.flights.HOVER_S", 7.0)  # of those before a trim; it is enough for one

@@ -8,6 +8,8 @@ from wakewise.operation import Scenario, fly
 from wakewise.simulation.tank.tank import tank_ambient, tank_points
 from wakewise_paper.wash_reduction.prescribed_motion import PrescribedMotionTank, PrescribedPath
 
+pytestmark = pytest.mark.slow
+
 _STATE = (
     ("x_m", "y_m", "z_m"),
     ("qw", "qx", "qy", "qz"),

@@ -125,6 +125,7 @@ def test_the_second_judge_flies_the_same_hovers_in_both_waters(made_up, capsys):
     assert lost["close"]["dp"]["tank_m_s"] is None and lost["close"]["dp"]["tank_less_pct"] is None
 
 
+@pytest.mark.slow
 def test_a_judged_flight_is_the_flight_looked_at_off_its_target_as_well(tmp_path):
     """All figures are those of the same flight; 8 cm off the water is looked at once the vehicle has settled."""
     settings = judge_trials(2)["tank", "payload", "dp", 2].task.settings | {"duration_s": 10.0}
@@ -135,6 +136,7 @@ def test_a_judged_flight_is_the_flight_looked_at_off_its_target_as_well(tmp_path
     assert fly_stage(settings | {"duration_s": 2.0}, tmp_path, no_progress)[CLEAR] is None
 
 
+@pytest.mark.slow
 def test_clear_points_are_off_the_whole_target_and_off_the_bed():
     """No corner of the mesh is nearer than that, and no point as near to the bed as half of it; most are kept."""
     target = parts_of("payload", "dp", 1).target

@@ -94,6 +94,7 @@ def _store(tables, folder):
     return folder
 
 
+@pytest.mark.slow
 def test_the_page_answers_at_a_glance_and_shows_the_worst(tables, tmp_path):
     """First and next best, the difference, the cost, the failures; a failed trial in its own words, escaped."""
     page = write_pages(tables, _store(tables, tmp_path / "store"), tmp_path).read_text(encoding="utf-8")
