@@ -7,13 +7,14 @@ STAMP := $(VENV)/.installed
 # Every process of a scan or a test reads hundreds of modules: their bytecode is kept, whatever the shell says.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup scan test test-all coverage check bench bench-history nightly results figures docs notebooks lock clean
+.PHONY: help setup scan test test-all pytest coverage check bench bench-history nightly results figures docs notebooks lock clean
 
 help:
 	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs, cockpit, ros, gamepad and links (LGPL), dask, detector, learning, tools for tests"
 	@echo "make scan    fly, photograph, reconstruct and judge a coral; leaves runs/quick/report.html"
-	@echo "make test    ruff, mypy, the import contract and the tests but the slow ones"
+	@echo "make test    ruff, spelling, mypy, the import contract and the tests but the slow ones"
 	@echo "make test-all  the same with the slow ones"
+	@echo "make pytest  the tests of make test alone"
 	@echo "make coverage  coverage per package; kernels count, run without a compiler"
 	@echo "make check   the same without the tests"
 	@echo "make bench   speed and quality, side by side with a peer"
@@ -54,25 +55,33 @@ scan: setup
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/codespell
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
 # Types are looked at, a browser is fetched and the tests are read once, so that their bytecode and that of what they
 # import is there for all processes, beside the kernels; what was found of types is said last.
-# Three processes on two cores: two share the rooms out, a file at a time, so that what a room's tests share is made, and
+# Three processes on two cores: two share the folders out, a file at a time, so that what a folder's tests share is made, and
 # its kernels are loaded, by one of them; the third runs what mostly waits (tests/sharing.py). The library of linear
 # algebra would have all cores in each.
 # `make test` leaves out what is marked slow (pyproject.toml) and draws the same examples each time;
 # `make test-all` leaves out nothing and draws new ones.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder
+SELECTED := -m "not slow" --hypothesis-profile=ci
 test test-all: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/codespell
 	$(BIN)/lint-imports
 	@$(BIN)/mypy > $(VENV)/types.txt 2>&1 & types=$$!; \
 	{ sh tools/browser.sh; $(BIN)/pytest --collect-only -qq > /dev/null 2>&1; } & beside=$$!; \
 	$(BIN)/wakewise compile; kernels=$$?; wait $$beside; \
-	test $$kernels -eq 0 && OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder $(if $(filter test,$@),-m "not slow" --hypothesis-profile=ci); \
+	test $$kernels -eq 0 && $(PYTEST) $(if $(filter test,$@),$(SELECTED)); \
 	tests=$$?; wait $$types; types=$$?; cat $(VENV)/types.txt; test $$tests -eq 0 -a $$types -eq 0
+
+# The tests alone, where lint, types and kernels are steps of their own.
+pytest: setup
+	$(PYTEST) $(SELECTED)
 
 bench: setup
 	$(BIN)/wakewise bench all

@@ -12,7 +12,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent / "tests"))
 
-from sharing import next_file, room_of
+from sharing import folder_of, next_file
 
 os.environ.setdefault("WAKEWISE_STRICT", "1")  # a mistake of the program fails a test; it is not flown around
 
@@ -31,7 +31,7 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """`--dist loadfile`, a room at a time; of three processes and more the last runs what mostly waits, then ends.
+    """`--dist loadfile`, a folder at a time; of three processes and more the last runs what mostly waits, then ends.
 
     It is there so that no core is idle while a test waits for a clock or for another process.
     """
@@ -39,10 +39,10 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
         return None
     from xdist.scheduler import LoadFileScheduling
 
-    class RoomByRoom(LoadFileScheduling):
+    class FolderByFolder(LoadFileScheduling):
         def __init__(self) -> None:
             super().__init__(config, log)
-            self._rooms: dict[Any, str] = {}
+            self._folders: dict[Any, str] = {}
             self._waiter: Any = None
 
         def schedule(self) -> None:
@@ -52,12 +52,12 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
         def _assign_work_unit(self, node: Any) -> None:
             waiter = None if self._waiter is None else node is self._waiter
-            file = next_file(list(self.workqueue), set(self._rooms.values()), self._rooms.get(node), waiter)
+            file = next_file(list(self.workqueue), set(self._folders.values()), self._folders.get(node), waiter)
             if file is None:
                 node.shutdown()
                 return
-            self._rooms[node] = room_of(file)
+            self._folders[node] = folder_of(file)
             self.workqueue.move_to_end(file, last=False)
             super()._assign_work_unit(node)
 
-    return RoomByRoom()
+    return FolderByFolder()

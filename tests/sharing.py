@@ -31,7 +31,7 @@ LONGEST = "tests/experiments/trials/test_whole_trial.py"
 """Takes twice as long as any other: begun last, it would be waited for."""
 
 
-def room_of(file: str) -> str:
+def folder_of(file: str) -> str:
     """The first two folders below `tests/` that a file lies in; a file that lies in none is its own."""
     folders = file.split("/")[:-1]
     below = folders.index("tests") + 1
@@ -46,17 +46,17 @@ def waits(file: str) -> bool:
 def next_file(left: Sequence[str], begun: Collection[str], own: str | None, waiter: bool | None) -> str | None:
     """The file to run next of those that are left, in their order; None if there is none for this process.
 
-    A room's kernels are loaded, and what its tests share is made, once in each process that enters it. So a process
-    stays in its own room, then enters one that nobody has begun, then helps in that with the most files left. `LONGEST`
-    comes before all.
+    A folder's kernels are loaded, and what its tests share is made, once in each process that enters it. So a process
+    stays in its own folder, then enters one that nobody has begun, then helps in that with the most files left.
+    `LONGEST` comes before all.
 
     Parameters
     ----------
     left : sequence of str
     begun : collection of str
-        Rooms that some process has entered.
+        Folders that some process has entered.
     own : str or None
-        The room that this process is in.
+        The folder that this process is in.
     waiter : bool or None
         Whether this is the process for what mostly waits, which runs nothing else. The others then run that only
         when nothing else is left; None if there is no such process, and files are alike.
@@ -67,12 +67,12 @@ def next_file(left: Sequence[str], begun: Collection[str], own: str | None, wait
     if LONGEST in files:
         return LONGEST
     for file in files:
-        if room_of(file) == own:
+        if folder_of(file) == own:
             return file
     for file in files:
-        if room_of(file) not in begun:
+        if folder_of(file) not in begun:
             return file
     if not files:
         return None
-    ((fullest, _),) = Counter(map(room_of, files)).most_common(1)
-    return next(file for file in reversed(files) if room_of(file) == fullest)
+    ((fullest, _),) = Counter(map(folder_of, files)).most_common(1)
+    return next(file for file in reversed(files) if folder_of(file) == fullest)

@@ -44,7 +44,7 @@ def without_extras(script: str, folder: Path) -> subprocess.CompletedProcess[str
 
 
 def test_packages_of_the_core_and_all_settings_are_imported_without_extras(tmp_path):
-    """Scenario holds the settings of every room; the names of a lazy room that need no extra can be had."""
+    """Scenario holds the settings of every package; the names of a lazy package that need no extra can be had."""
     found = without_extras(
         """
 import wakewise, wakewise.vision.imaging, wakewise.vision.reconstruction, wakewise.ui.reports
@@ -240,21 +240,21 @@ def test_a_command_says_in_one_line_which_extra_it_needs(words, extras, refusals
 
 
 def test_python_is_told_which_extra_a_name_needs(tmp_path):
-    """The error of a room's door is an ImportError too, and names the room's name and the package."""
+    """The error of a lazy package is an ImportError too, and names the package and what it needs."""
     found = without_extras(
         """
 from wakewise.core.errors import MissingExtra, WakewiseError
 assert issubclass(MissingExtra, WakewiseError) and issubclass(MissingExtra, ImportError)
 lines = []
-for room, name in (
+for package, name in (
     ("vision.imaging", "Scene"), ("vision.reconstruction", "reconstruct"), ("ui.reports", "write_report"),
     ("experiments.trials", "run_trial"), ("operation", "photograph_flight"), ("ui.film", "write_film"),
 ):
     try:
-        exec(f"from wakewise.{room} import {name}")
+        exec(f"from wakewise.{package} import {name}")
     except MissingExtra as refusal:
         lines.append(str(refusal))
-        assert str(refusal).startswith(f"wakewise.{room}.{name} needs "), refusal
+        assert str(refusal).startswith(f"wakewise.{package}.{name} needs "), refusal
 assert len(lines) == 6, lines
 """,
         tmp_path,
@@ -290,7 +290,7 @@ HEAVY = ("numpy", "scipy", "numba", "polars", "pydantic", "yaml", "rich", "matpl
     ],
 )
 def test_what_takes_long_to_import_is_imported_when_it_is_needed(script, heavy, tmp_path):
-    """The front door, the help of all commands, and a scenario read and checked."""
+    """`import wakewise`, the help of all commands, and a scenario read and checked."""
     found = subprocess.run(
         [sys.executable, "-c", f"import sys\n{script}\nprint('HEAVY', sorted(set({heavy}) & sys.modules.keys()))"],
         cwd=tmp_path,

@@ -1,4 +1,4 @@
-"""Tests are shared among processes a room at a time, and what waits is run beside the rest."""
+"""Tests are shared among processes a folder at a time, and what waits is run beside the rest."""
 
 from pathlib import Path
 
@@ -19,8 +19,8 @@ def test_what_is_said_to_wait_is_there() -> None:
     assert [place for place in (*BESIDE, LONGEST) if not (root / place).exists()] == []
 
 
-def test_a_process_stays_in_its_room_then_enters_another_then_helps() -> None:
-    """Its own room first, however deep the file; then the first that nobody entered; then the fullest, from its end."""
+def test_a_process_stays_in_its_folder_then_enters_another_then_helps() -> None:
+    """Its own folder first, however deep the file; then the first that nobody entered; then the fullest, backwards."""
     assert (
         next_file(LEFT, {"tests/ui/cli", "tests/simulation/tank"}, "tests/simulation/tank", None)
         == "tests/simulation/tank/deep/test_b.py"

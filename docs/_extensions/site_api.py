@@ -53,7 +53,7 @@ def _write(app: Sphinx) -> None:
     folder.mkdir(exist_ok=True)
     packages = public_modules()
     homes: dict[int, tuple[str, str]] = {}
-    # The front door first, then the deepest package: where a name is defined rather than passed on.
+    # `wakewise` itself first, then the deepest package: where a name is defined rather than passed on.
     for name in sorted(packages, key=lambda name: (name != "wakewise", -name.count("."), name)):
         for exported in _exported(name):
             homes.setdefault(id(getattr(import_module(name), exported)), (name, exported))

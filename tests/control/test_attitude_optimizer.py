@@ -87,13 +87,13 @@ def test_a_lean_is_gone_before_the_mission_comes_near_a_roof():
         return replace(low, X_WB=Pose(place, low.X_WB.q), nu_B=nu)
 
     _, commands = flown(controller, goal_at, stops_s + 2.0, 5.0)
-    leans, rooms, hull = [], [], controller.attitude.evaluator
+    leans, gaps, hull = [], [], controller.attitude.evaluator
     for k, command in enumerate(commands):
         goal = goal_at(k * DT)
         leans.append(command.goal.tilt_rad - goal.tilt_rad)
-        rooms.append(gap_m(hull, command.goal) - min(CLEARANCE_M, gap_m(hull, goal)))
+        gaps.append(gap_m(hull, command.goal) - min(CLEARANCE_M, gap_m(hull, goal)))
     assert max(np.abs(leans)) > np.radians(4.0)  # down there it leans
-    assert min(rooms) > -0.002
+    assert min(gaps) > -0.002
 
 
 def test_neutral_in_still_water_it_stays_level():

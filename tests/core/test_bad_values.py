@@ -109,7 +109,7 @@ def test_failed_thrusters_are_names_or_places(failed: Any, said: str) -> None:
 
 @pytest.mark.parametrize("word", ["coherant", "", "Coherent", None, 1, ["coherent"]], ids=repr)
 def test_how_jets_add_up_is_one_of_two_words(word: Any) -> None:
-    """At every door where it may be said."""
+    """In every function that takes it."""
     region = ww.Scenario.preset("quick").parts().region
     place = (region.points_W_m, region.weights, np.zeros((1, 3)), np.eye(3)[:1], np.ones(1))
     for asked in (

@@ -81,7 +81,7 @@ def test_numpy_alone_judges_as_the_whole_package_does(vehicle: str, model: str, 
 
 
 def test_the_meters_whole_program_needs_numpy_and_pymavlink_only() -> None:
-    """Every module that the small door opens, pymavlink's dialect too."""
+    """Every module that the small entry point imports, pymavlink's dialect too."""
     found = bare(
         "before = set(sys.modules)\n"
         "import wakewise_ardusub.wash_meter.embedded, pymavlink.dialects.v20.ardupilotmega\n"

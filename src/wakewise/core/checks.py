@@ -1,4 +1,4 @@
-"""Checks of single values at the public doors: a word of a list, a number, a path, a thing of a kind."""
+"""Checks of single values of public functions: a word of a list, a number, a path, an instance of a class."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Constants that several rooms compute with, each in one place."""
+"""Constants that several packages compute with, each in one place."""
 
 GRAVITY_M_S2 = 9.80665
 """Standard gravity (3rd CGPM, 1901)."""

@@ -1,4 +1,4 @@
-"""What the rooms say to each other: small records and Protocols.
+"""Records and Protocols that packages exchange.
 
 Controller and simulated world never import one another; both speak the types of this page, and `operation` joins them.
 World W is NED, body B is FRD, camera C has OpenCV axes. SI units and radians.

@@ -1,8 +1,8 @@
-"""Doors that open when somebody walks through: a room's names are imported when they are asked for, not before.
+"""Lazy imports: the names that a package exports are imported when they are first used (PEP 562).
 
-A room's `__init__` states what it exports as plain imports in a block `if TYPE_CHECKING:`, which type checkers and the
-import contracts read, and hands itself to `lazy_attributes`, which reads the same block: nothing is listed twice. So
-settings can be read without the room's compiled libraries, and commands that need little start fast.
+A package's `__init__` states what it exports as plain imports in a block `if TYPE_CHECKING:`, which type checkers and
+the import contracts read, and hands itself to `lazy_attributes`, which reads the same block: nothing is listed twice. So
+settings can be read without the package's compiled libraries, and commands that need little start fast.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from wakewise.core.errors import MissingExtra
 from wakewise.core.optional_dependencies import missing_extra
 
 
-class _Door(ModuleType):
+class _LazyPackage(ModuleType):
     """A package whose exports are imported at first use (PEP 562, as a class: see `__setattr__`)."""
 
     _homes: dict[str, tuple[str, str]]
@@ -30,7 +30,7 @@ class _Door(ModuleType):
         try:
             value = _imported(*home)
         except (ModuleNotFoundError, MissingExtra) as fault:
-            # Another room's door may have refused on the way: what was asked for here is what is told of.
+            # Another lazy package may have refused on the way: the error names what was asked for here.
             missing = fault.__cause__ if isinstance(fault, MissingExtra) else fault
             if not isinstance(missing, ModuleNotFoundError):
                 raise
@@ -42,7 +42,7 @@ class _Door(ModuleType):
         return value
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Set an attribute, but leave an export alone when a module of the same name is imported below the room."""
+        """Set an attribute, but leave an export alone when a module of the same name is imported below the package."""
         if not (isinstance(value, ModuleType) and name in self.__dict__["_homes"]):
             super().__setattr__(name, value)
 
@@ -61,13 +61,13 @@ def lazy_attributes(name: str, *extras: str) -> None:
     *extras : str
         Extras to name first where a third party's module is missing, see `wakewise.core.optional_dependencies`.
     """
-    room = sys.modules[name]
-    loader = room.__spec__.loader if room.__spec__ is not None else None
+    package = sys.modules[name]
+    loader = package.__spec__.loader if package.__spec__ is not None else None
     source = loader.get_source(name) if loader is not None and hasattr(loader, "get_source") else None
     if source is None:
-        raise ImportError(f"{name}: its source is not there, and a lazy door is read from it", name=name)
-    room.__dict__.update(_homes=_homes(source), _extras=extras)
-    room.__class__ = _Door
+        raise ImportError(f"{name}: its source is not there, and a lazy package is read from it", name=name)
+    package.__dict__.update(_homes=_homes(source), _extras=extras)
+    package.__class__ = _LazyPackage
 
 
 def _imported(module: str, name: str) -> Any:

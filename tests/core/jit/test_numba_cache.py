@@ -15,7 +15,7 @@ from wakewise.core.jit.cache_dir import VARIABLE, can_be_written, needs_folder, 
 
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
-    """A package with two rooms."""
+    """A package with two subpackages."""
     for room in ("a", "b"):
         (tmp_path / "package" / room).mkdir(parents=True)
     return tmp_path / "package"

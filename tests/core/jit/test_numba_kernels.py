@@ -145,7 +145,7 @@ def test_a_kernel_apart_is_not_copied_into_its_caller() -> None:
 
 
 def test_imports_are_found_wherever_they_stand() -> None:
-    """Modules, names from modules, rooms, and imports over several lines."""
+    """Modules, names from modules, packages, and imports over several lines."""
     names = {file.relative_to(PACKAGE).as_posix() for file in imported(PACKAGE / "planning" / "kernels.py")}
     assert {"core/arrays.py", "robot/vehicles/kernels.py", "wake/plan_disturbance.py"} <= names
 

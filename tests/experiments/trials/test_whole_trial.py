@@ -110,7 +110,7 @@ def test_the_small_scan_makes_a_model(trial: tuple[Path, dict]) -> None:
 
 
 GOLDEN = json.loads(Path(__file__).with_name("golden.json").read_text())
-"""A flight of 4 s by `dp` and a small scan, as they were before parts and rooms were moved."""
+"""A flight of 4 s by `dp` and a small scan, as they were before parts and packages were moved."""
 
 
 def test_the_flight_is_the_one_that_was_flown_before() -> None:

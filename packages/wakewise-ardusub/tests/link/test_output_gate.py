@@ -1,4 +1,4 @@
-"""The one door for thrusts: what goes out of it, and what does not, whatever comes in."""
+"""The output gate: which thrusts it sends and which it does not, whatever it is given."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is no path, truth value, function or known number is refused in one line at the public doors."""
+"""What is no path, truth value, function or known number is refused in one line by public functions."""
 
 from pathlib import Path
 
@@ -62,7 +62,7 @@ def test_reconstruct_refuses_other_things_of_a_wrong_kind(tmp_path, wrong):
 
 
 @pytest.mark.parametrize("value", NO_PATHS, ids=lambda value: repr(value)[:12])
-def test_every_other_door_refuses_a_name_that_no_file_can_have(value):
+def test_every_other_function_refuses_a_name_that_no_file_can_have(value):
     """Clouds, meshes, scenarios, targets, vehicles, and the folder of a trial before its flight."""
     coral, points = ww.load_target("plate").mesh, np.zeros((5, 3))
     refused(ww.evaluate, value, coral)

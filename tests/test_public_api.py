@@ -26,8 +26,8 @@ def test_completion_shows_the_names_and_nothing_else():
     assert [name for name in dir(ww) if not name.startswith("__")] == sorted(ww.__all__)
 
 
-def test_importing_it_imports_no_room():
-    """`import wakewise` pulls in neither arrays nor compilers: rooms are fetched when asked for."""
+def test_importing_it_imports_no_package():
+    """`import wakewise` pulls in neither arrays nor compilers: packages are imported when asked for."""
     heavy = "numpy, numba, scipy, polars, pydantic, cv2, pycolmap, matplotlib"
     code = f"import sys, wakewise; print([m for m in '{heavy}'.split(', ') if m in sys.modules])"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
