@@ -1,8 +1,8 @@
 """Lazy imports: the names that a package exports are imported when they are first used (PEP 562).
 
 A package's `__init__` states what it exports as plain imports in a block `if TYPE_CHECKING:`, which type checkers and
-the import contracts read, and hands itself to `lazy_attributes`, which reads the same block: nothing is listed twice. So
-settings can be read without the package's compiled libraries, and commands that need little start fast.
+the import contracts read, and hands itself to `lazy_attributes`, which reads the same block: nothing is listed twice.
+So settings can be read without the package's compiled libraries, and commands that need little start fast.
 """
 
 from __future__ import annotations
