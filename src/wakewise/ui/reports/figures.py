@@ -17,6 +17,7 @@ from wakewise.ui.reports.errors import CloudErrors
 from wakewise.ui.reports.svg_style import (
     CARD,
     CORAL,
+    DASHES,
     ERROR_LIMIT_MM,
     INK,
     LINE,
@@ -319,11 +320,13 @@ def overlaid_speeds(trials: dict[str, Trial], narrow: bool = False) -> Figure | 
     clock, shares = figure.subplots(2, 1) if narrow else figure.subplots(1, 2, width_ratios=(2.4, 1.0))
     style_axes(clock, x="time (s)", y="mean water speed at the target (mm/s)" if not narrow else "mean speed (mm/s)")
     style_axes(shares, x="water speed (mm/s)", y="share of the time below (%)", grid="both")
-    for (name, (time_s, speed)), colour in zip(found.items(), SERIES * len(found), strict=False):
-        clock.plot(*thinned(time_s, speed, 200 if narrow else 900), color=colour, linewidth=1.1, label=name)
+    for k, (name, (time_s, speed)) in enumerate(found.items()):
+        colour, dashes = SERIES[k % len(SERIES)], DASHES[k % len(DASHES)]
+        times, speeds = thinned(time_s, speed, 200 if narrow else 900)
+        clock.plot(times, speeds, color=colour, linestyle=dashes, linewidth=1.1, label=name)
         ordered = np.sort(speed[np.isfinite(speed)])
         pick = np.unique(np.linspace(0, len(ordered) - 1, 300).astype(int))
-        shares.plot(ordered[pick], 100.0 * (pick + 1) / len(ordered), color=colour, linewidth=1.6, label=name)
+        shares.plot(ordered[pick], 100.0 * (pick + 1) / len(ordered), color=colour, linestyle=dashes, linewidth=1.6)
     clock.set_ylim(bottom=0.0)
     clock.margins(x=0.0)
     shares.set_xlim(left=0.0)

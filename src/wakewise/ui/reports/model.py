@@ -167,7 +167,7 @@ def _scene(trial: Trial, errors: ModelErrors | None, poster: str) -> str:
     return scene_box(html, hint + legend, poster)
 
 
-WELL_SEEN, IN_PART = "#3f9b6b", "#e3b341"
+WELL_SEEN, IN_PART = "#2f8a5b", "#ebc35a"
 PIXELS = 300
 LITTLE = 0.15
 """Patches that have come less far than this are shown as not seen."""

@@ -24,6 +24,8 @@ from wakewise.core.arrays import Array
 INK, MUTED, LINE, CARD = "#010a01", "#010a02", "#010a03", "#010a04"
 TEAL, CORAL, SAND, VIOLET, SLATE = "#010a11", "#010a12", "#010a13", "#010a14", "#010a15"
 SERIES = (TEAL, CORAL, VIOLET, SAND, SLATE)
+DASHES: tuple[str | tuple[int, tuple[int, ...]], ...] = ("-", (0, (5, 2)), (0, (1, 1)), (0, (6, 2, 1, 2)))
+"""Line styles beside `SERIES`, so that lines are told apart in greyscale."""
 _VARIABLES = {
     INK: "--ink", MUTED: "--muted", LINE: "--line", CARD: "--card",
     TEAL: "--s1", CORAL: "--s2", VIOLET: "--s3", SAND: "--s4", SLATE: "--s5",
@@ -33,8 +35,8 @@ ERROR_LIMIT_MM = 3.0
 """Errors are coloured from zero to this; what is beyond has a colour of its own."""
 ERROR_STOPS = ("#f4efe2", "#f9dc9a", "#f4ab4e", "#e36b35", "#b72f3c")
 OVER_LIMIT = "#5c0f35"
-NOT_COVERED = "#2f5fb3"
-NOT_COUNTED = "#b9c2c4"
+NOT_COVERED = "#23469a"
+NOT_COUNTED = "#a3adb0"
 ERROR_MAP: Colormap = LinearSegmentedColormap.from_list("error", ERROR_STOPS)
 
 
