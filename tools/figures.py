@@ -60,15 +60,17 @@ def flown(method: str) -> tuple[Flown, ww.Parts]:
     corners = np.array([[length, width], [length, -width], [-length, -width], [-length, width], [length, width]])
     corners = np.column_stack([corners, np.zeros(len(corners))])
 
-    def watch(step: Step, witness: Any) -> None:
+    def watch(step: Step, truth_provider: Any) -> None:
         due = FROM_S + EVERY_S * len(kept.times_s)
         if step.truth is None or step.time_s < due or due > TO_S:
             return
         kept.times_s.append(step.time_s)
         kept.hulls.append(step.truth.state.X_WB.apply(corners) - centre)
         kept.thrusts_N.append(step.truth.thrusts_N)
-        kept.speeds_m_s.append(np.linalg.norm(witness.excess_velocity(kept.grid_W_m), axis=1).reshape(CELLS, CELLS))
-        kept.target_m_s.append(float(witness.water().target_speed_mean_m_s))
+        kept.speeds_m_s.append(
+            np.linalg.norm(truth_provider.excess_velocity(kept.grid_W_m), axis=1).reshape(CELLS, CELLS)
+        )
+        kept.target_m_s.append(float(truth_provider.water().target_speed_mean_m_s))
 
     ww.fly(parts, watch=watch)
     return kept, parts

@@ -126,9 +126,9 @@ class FlightJudge:
     rows: list[tuple[float, ...]] = field(default_factory=list)
     status: list[str] = field(default_factory=list)
 
-    def __call__(self, step: Step, witness: TruthProvider | None) -> None:
+    def __call__(self, step: Step, truth_provider: TruthProvider | None) -> None:
         """Take in one step."""
-        del witness
+        del truth_provider
         assert step.truth is not None
         true, seen, target = step.truth.state.X_WB, step.estimate.X_WB, step.estimate.target
         error = math.nan

@@ -39,7 +39,7 @@ def test_figures_of_a_flight_that_reaches_a_leg_are_not_called_those_of_a_hover(
 
 
 def test_what_nobody_knows_is_not_said():
-    """Without a witness there is no water, no truth and no energy to tell of."""
+    """Without a truth provider there is no water, no truth and no energy to tell of."""
     parts = ww.Scenario.preset("quick", method="dp", **{"target.points": 60}).parts()
     assert str(ww.fly(parts.replace(world=Sea(parts.world)), duration_s=0.4)).startswith("dp, seed 1: 0 s (hover only")
 

@@ -27,7 +27,7 @@ DT_S = 0.02
 
 @dataclass
 class Perfect:
-    """Plant, estimator, controller and witness in one: it is always exactly where the goal was."""
+    """Plant, estimator, controller and truth provider in one: it is always exactly where the goal was."""
 
     commands: list[np.ndarray] = field(default_factory=list)
     state: BodyState = field(default_factory=lambda: ROUTE.body(0.0, X_BC))
@@ -58,18 +58,18 @@ class Perfect:
         return ScalarGrid(origin_W_m=np.zeros(3), spacing_m=0.1, values=np.ones((2, 3, 4)))
 
 
-def flown(witnessed: bool = True, plant: Perfect | None = None) -> tuple[FlightRecorder, Perfect]:
+def flown(known: bool = True, plant: Perfect | None = None) -> tuple[FlightRecorder, Perfect]:
     everything = plant or Perfect()
-    witness = everything if witnessed else None
+    truth_provider = everything if known else None
     recorder = FlightRecorder(
-        route=ROUTE, X_BC=X_BC, exposure_s=0.01, instants=3, thrusters=2, dt_s=DT_S, witness=witness
+        route=ROUTE, X_BC=X_BC, exposure_s=0.01, instants=3, thrusters=2, dt_s=DT_S, truth_provider=truth_provider
     )
     run_loop(
         pilot=RoutePilot(route=ROUTE, aim=X_BC),
         controller=everything,
         estimator=everything,
         plant=everything,
-        witness=witness,
+        truth_provider=truth_provider,
         start=everything.state,
         thrusters=2,
         duration_s=ROUTE.duration_s,
@@ -147,8 +147,8 @@ def test_a_flight_survives_its_files(tmp_path: Path) -> None:
 
 
 def test_at_sea_nobody_knows_the_truth() -> None:
-    """Without a witness the flight is recorded all the same; true columns hold NaN and no exposure is invented."""
-    recorder, _ = flown(witnessed=False)
+    """Without a truth provider the flight is recorded, true columns hold NaN, and no exposure is invented."""
+    recorder, _ = flown(known=False)
     frame = recorder.frame()
     assert frame["true_x_m"].is_nan().all()
     assert frame["target_speed_mean_m_s"].is_nan().all()
@@ -190,7 +190,7 @@ def test_the_estimator_is_told_what_was_flown() -> None:
         instants=3,
         thrusters=2,
         dt_s=DT_S,
-        witness=None,
+        truth_provider=None,
         log=FlightLog(tags={name: NeverRead() for name in TAGS}),
     )
     run_loop(
@@ -198,7 +198,7 @@ def test_the_estimator_is_told_what_was_flown() -> None:
         controller=everything,
         estimator=spy,
         plant=everything,
-        witness=None,
+        truth_provider=None,
         start=everything.state,
         thrusters=2,
         duration_s=50 * DT_S,

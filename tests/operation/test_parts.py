@@ -105,10 +105,10 @@ def test_the_lattices_water_is_the_lattices_jet():
     from wakewise.operation.worlds.quasi_steady_world import free_jet_field
     from wakewise.simulation.lattice import LatticeFlow
 
-    plant, witness = QUICK.replace(method="dp", world="lattice-jets").parts().world.begin()
+    plant, truth_provider = QUICK.replace(method="dp", world="lattice-jets").parts().world.begin()
     for _ in range(40):
         plant.step(np.array([3.0, 0, 0, 0, 0, 0, 0, 0]), 0.02)
-    true = witness.observe()
+    true = truth_provider.observe()
     vehicle = plant._plant.vehicle
     origin = true.state.X_WB.apply(vehicle.thruster_positions_B_m)[0]
     jet = -(true.state.X_WB.R @ vehicle.thruster_axes_B[0])

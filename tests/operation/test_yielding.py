@@ -143,8 +143,8 @@ def test_worlds_without_a_moving_target_say_so(world):
 def test_the_tank_tells_how_its_target_stands():
     """A gorgonian stands bent from the start by the tank's current, a rigid coral has no posture."""
     soft, rigid = scenario(kind="gorgonian").parts(), scenario().parts()
-    _, witness = soft.world.begin()
-    posture = witness.posture()
+    _, truth_provider = soft.world.begin()
+    posture = truth_provider.posture()
     assert isinstance(posture, TargetDeformation)
     current = np.array(soft.scenario.tank.current.velocity_m_s[:2])
     along = posture.sway_mean_W_m[:2] @ current / np.linalg.norm(current)

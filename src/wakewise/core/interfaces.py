@@ -318,7 +318,7 @@ class WaterTruth:
     `target_over_ambient` are the shares of the surface where the excess is more than 1 cm/s, and more than the mean
     speed there of the same water without the vehicle (NaN where that is still). `bed_over_threshold` is the share of
     the bed within 0.2 m of the target's foot where the stress moves grains (NaN where neither bed nor water holds any).
-    NaN where a witness does not know.
+    NaN where a truth provider does not know.
     """
 
     target_speed_mean_m_s: float

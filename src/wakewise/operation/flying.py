@@ -51,7 +51,7 @@ class FlightFigures(TypedDict):
     """What a flight is judged by; the unit is in the name, each is defined at
     `wakewise.vision.evaluation.flight_figures`.
 
-    None where it is not known: with no witness (at sea), before the first exposure, of a target that nothing moves.
+    None where it is not known: without the truth (at sea), before the first exposure, of a target that nothing moves.
     """
 
     method: str
@@ -180,7 +180,7 @@ def fly(
     water_every_s : float
         How often the water at the target is measured.
     watch : callable, optional
-        Called as `(step, witness)` at each step, after the record.
+        Called as `(step, truth_provider)` at each step, after the record.
     exposed : callable, optional
         Called as `(number, exposure)` when the shutter has opened, number counting from 0.
 
@@ -215,13 +215,13 @@ def fly(
     else:
         check_initial_state(parts)
     progress(0, 1, "at the start")
-    plant, witness = parts.world.begin()
+    plant, truth_provider = parts.world.begin()
     if parts.finds:
         pilot: Any = parts.pilot
         pilot.begin()
     # A pilot that takes its own photographs says when, and when its mission is over.
     timetable = cast("PhotoSchedule", parts.pilot) if parts.finds else route
-    recorder = recorder_of(parts, witness, timetable, water_every_s=water_every_s, exposed=exposed)
+    recorder = recorder_of(parts, truth_provider, timetable, water_every_s=water_every_s, exposed=exposed)
 
     before = ""
 
@@ -232,11 +232,11 @@ def fly(
         if left == SETTLING != before:
             _say_trim(parts, recorder)
         if watch is not None:
-            watch(step, witness)
+            watch(step, truth_provider)
 
     with name_external_parts(parts, recorder):
         over = pilot.done if parts.finds else never
-        loop_of(parts, plant, witness, record)(duration_s=lasts_s, progress=progress, stop=over)
+        loop_of(parts, plant, truth_provider, record)(duration_s=lasts_s, progress=progress, stop=over)
     return Flight(parts, recorder)
 
 
@@ -276,7 +276,9 @@ class _Notice:
             )
 
 
-def recorder_of(parts: Parts, witness: TruthProvider | None, timetable: PhotoSchedule, **more: Any) -> FlightRecorder:
+def recorder_of(
+    parts: Parts, truth_provider: TruthProvider | None, timetable: PhotoSchedule, **more: Any
+) -> FlightRecorder:
     """The recorder of a flight of these parts, `more` as for `FlightRecorder`."""
     scenario, vehicle = parts.scenario, parts.vehicle
     return FlightRecorder(
@@ -288,13 +290,13 @@ def recorder_of(parts: Parts, witness: TruthProvider | None, timetable: PhotoSch
         instants=scenario.imaging.instants,
         thrusters=len(vehicle.thrusters),
         dt_s=1.0 / scenario.control.rate_hz,
-        witness=witness,
+        truth_provider=truth_provider,
         **more,
     )
 
 
 def loop_of(
-    parts: Parts, plant: Plant, witness: TruthProvider | None, record: Callable[[Step], None]
+    parts: Parts, plant: Plant, truth_provider: TruthProvider | None, record: Callable[[Step], None]
 ) -> Callable[..., None]:
     """The loop of a flight of these parts; what is left to say is how long, and by which clock (see `run_loop`)."""
     return partial(
@@ -303,7 +305,7 @@ def loop_of(
         controller=parts.pipeline,
         estimator=parts.estimator,
         plant=plant,
-        witness=witness,
+        truth_provider=truth_provider,
         start=parts.start,
         thrusters=len(parts.vehicle.thrusters),
         dt_s=1.0 / parts.scenario.control.rate_hz,

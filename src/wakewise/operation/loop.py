@@ -86,7 +86,7 @@ def run_loop(
     controller: Controller[Any],
     estimator: Estimator[Any],
     plant: Plant,
-    witness: TruthProvider | None,
+    truth_provider: TruthProvider | None,
     start: BodyState,
     thrusters: int,
     duration_s: float | None,
@@ -127,9 +127,9 @@ def run_loop(
         solve_s = time.thread_time() - began
         goal = goal if command.goal is None else command.goal
         truth = None
-        if witness is not None:
+        if truth_provider is not None:
             with _finite("vehicle's motion", now_s):
-                truth = witness.observe()
+                truth = truth_provider.observe()
             _slow("vehicle's motion", now_s, truth.state.nu_B)
         record(
             Step(

@@ -86,7 +86,7 @@ class FlightRecorder:
         How many true poses are kept across each exposure.
     metered : int
         How many true poses are kept from before each exposure, for automatic exposure.
-    witness : Witness or None
+    truth_provider : TruthProvider or None
         Without one, true columns and water columns are NaN and no exposure is rendered.
     water_every_s : float
         How often the water is asked about; in between the last answer stands.
@@ -102,7 +102,7 @@ class FlightRecorder:
     instants: int
     thrusters: int
     dt_s: float
-    witness: TruthProvider | None
+    truth_provider: TruthProvider | None
     water_every_s: float = 0.1
     exposed: Callable[[int, ExposureRecord], None] | None = None
     joint: TiltJoint | None = None
@@ -122,11 +122,13 @@ class FlightRecorder:
         """Take in one step of the loop."""
         opens_s = self.route.shutter_s(self._opened, step.time_s, self.dt_s)
         exposing = opens_s is not None
-        if self.witness is not None and (exposing or step.time_s >= self._water_time_s + self.water_every_s - 1e-9):
-            self._water, self._water_time_s = self.witness.water(), step.time_s
-            self._posture = _posture_of(self.witness)
-        elif self.witness is not None and not self.log.count:
-            self._posture = _posture_of(self.witness)  # all rows have its columns or none has
+        if self.truth_provider is not None and (
+            exposing or step.time_s >= self._water_time_s + self.water_every_s - 1e-9
+        ):
+            self._water, self._water_time_s = self.truth_provider.water(), step.time_s
+            self._posture = _posture_of(self.truth_provider)
+        elif self.truth_provider is not None and not self.log.count:
+            self._posture = _posture_of(self.truth_provider)  # all rows have its columns or none has
         water = [getattr(self._water, name) if self._water is not None else np.nan for name in _WATER]
         truth = step.truth
         lost = np.full(13, np.nan)
@@ -156,7 +158,7 @@ class FlightRecorder:
         self._recent.append(numbers)
         self.log.add(numbers, tags, 1e3 * step.solve_s)
         self._opened += exposing
-        if opens_s is not None and truth is not None and self.witness is not None:
+        if opens_s is not None and truth is not None and self.truth_provider is not None:
             exposure = ExposureRecord(
                 time_s=opens_s,
                 X_WC_true=tuple(
@@ -165,9 +167,9 @@ class FlightRecorder:
                 ),
                 X_WC_est=moved(step.estimate, opens_s - step.time_s + 0.5 * self.exposure_s)
                 @ self._mount(step.tilt_rad),
-                silt=self.witness.silt(),
+                silt=self.truth_provider.silt(),
                 X_WC_before=self._before(),
-                flakes=_flakes_before(self.witness, truth.state.X_WB @ self._mount(truth.tilt_rad)),
+                flakes=_flakes_before(self.truth_provider, truth.state.X_WB @ self._mount(truth.tilt_rad)),
                 **_stance(self._posture),
             )
             self.log.expose(exposure)
@@ -218,9 +220,9 @@ def state_vector(state: BodyState) -> Array:
     return np.concatenate([state.X_WB.p_m, state.X_WB.q, state.nu_B])
 
 
-def _posture_of(witness: TruthProvider) -> TargetDeformation | None:
-    """How a target that yields stands now; None of one that does not, and where a witness knows of none."""
-    ask = getattr(witness, "posture", None)
+def _posture_of(truth_provider: TruthProvider) -> TargetDeformation | None:
+    """How a target that yields stands now; None of one that does not, and where a truth provider knows of none."""
+    ask = getattr(truth_provider, "posture", None)
     posture: TargetDeformation | None = ask() if ask is not None else None
     return posture
 
@@ -240,9 +242,9 @@ def _stance(posture: TargetDeformation | None) -> dict[str, Array]:
     return {} if posture is None else {name: getattr(posture, name) for name in STANCE}
 
 
-def _flakes_before(witness: TruthProvider, X_WC: Pose) -> FlakeCloud | None:
-    """Flakes of a witness that knows them."""
-    look = getattr(witness, "flakes", None)
+def _flakes_before(truth_provider: TruthProvider, X_WC: Pose) -> FlakeCloud | None:
+    """Flakes of a truth provider that knows them."""
+    look = getattr(truth_provider, "flakes", None)
     found: FlakeCloud | None = None if look is None else look(X_WC)
     return found
 

@@ -117,9 +117,9 @@ def test_a_flight_flown_again_is_the_same(flight: Flight) -> None:
 def test_pictures_arrive_late_and_stamped(flight: Flight) -> None:
     """A picture is handed over after its latency with the time at which it was taken; none while the camera is lost."""
     parts = flight.parts
-    plant, witness = parts.world.begin()
+    plant, truth_provider = parts.world.begin()
     assert isinstance(plant, CameraFrames)
-    assert witness is not None
+    assert truth_provider is not None
     settings = SCENARIO.perception
     came = []
     thrusts = np.zeros(len(parts.vehicle.thrusters))

@@ -20,7 +20,7 @@ import os, signal, sys, time
 from pathlib import Path
 from wakewise.operation import LiveFlight, load_scenario
 
-def watch(step, witness):
+def watch(step, truth_provider):
     k = round(step.time_s * 50)
     if k in (5, 20):
         flight.capture()

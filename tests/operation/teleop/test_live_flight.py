@@ -17,7 +17,7 @@ SCENARIO = load_scenario("quick", None, {"method": "dp"})
 def flown(folder: Path | None, steps: int, captures: tuple[int, ...] = (), **more: Any) -> LiveFlight:
     """A flight of so many steps, with photographs asked for at some."""
 
-    def watch(step: Step, witness: TruthProvider | None) -> None:
+    def watch(step: Step, truth_provider: TruthProvider | None) -> None:
         number = round(step.time_s * 50)
         if number in captures:
             flight.capture()

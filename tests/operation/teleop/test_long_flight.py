@@ -17,7 +17,7 @@ MINUTE = 3000
 
 
 class Light:
-    """World, witness, estimator and controller of no weight: it stands where it was put."""
+    """World, truth provider, estimator and controller of no weight: it stands where it was put."""
 
     name = "light"
 
@@ -61,7 +61,7 @@ def test_memory_does_not_grow_with_the_flight(tmp_path: Path) -> None:
     light = Light(parts.start)
     held: list[int] = []
 
-    def watch(step: Step, witness: TruthProvider | None) -> None:
+    def watch(step: Step, truth_provider: TruthProvider | None) -> None:
         k = round(step.time_s * 50)
         if k % 50 == 25:
             flight.capture()

@@ -37,7 +37,7 @@ def test_the_same_hands_give_the_same_flight_to_the_byte(tmp_path: Path) -> None
     )
     desk = OperatorState(OperatorSettings(w_track=3.0))
 
-    def watch(step: Step, witness: TruthProvider | None) -> None:
+    def watch(step: Step, truth_provider: TruthProvider | None) -> None:
         if step.time_s == pytest.approx(0.8):
             first.capture()
             desk.set(w_track=20.0, method="direct")

@@ -19,7 +19,7 @@ DT_S = 0.02
 
 @dataclass
 class Water:
-    """A witness whose water moves at 3 mm/s everywhere, and who counts how often it is asked."""
+    """A truth provider whose water moves at 3 mm/s everywhere, and who counts how often it is asked."""
 
     asked: list[str] = field(default_factory=list)
 

@@ -45,22 +45,22 @@ class _PushedPlant(Plant, Protocol):
 
 
 class PlantBody:
-    """A plant with a witness, as `wakewise_ardusub.physics.SimulatedBody`.
+    """A plant with a truth provider, as `wakewise_ardusub.physics.SimulatedBody`.
 
     The specific force is the mean over the step: what the velocity in the world gained, less gravity, in B.
 
     Parameters
     ----------
     plant : Plant
-    witness : TruthProvider
+    truth_provider : TruthProvider
     surface : Surface, optional
         Where the water ends; the plant must have a method `push`.
     """
 
-    def __init__(self, plant: Plant, witness: TruthProvider, surface: WaterSurface | None = None) -> None:
-        self._plant, self._witness, self._surface = plant, witness, surface
+    def __init__(self, plant: Plant, truth_provider: TruthProvider, surface: WaterSurface | None = None) -> None:
+        self._plant, self._truth_provider, self._surface = plant, truth_provider, surface
         self._time_s = 0.0
-        self.state = witness.observe().state
+        self.state = truth_provider.observe().state
         """Where it is and how it moves."""
         self._v_W_m_s = _velocity_W(self.state)
         self._push: Callable[[Array], None] | None = None if surface is None else cast("_PushedPlant", plant).push
@@ -72,7 +72,7 @@ class PlantBody:
             thrusts_N = self._surface.thrusts(thrusts_N, self.state.X_WB)
         self._plant.step(thrusts_N, dt_s)
         self._time_s += dt_s
-        self.state = state = self._witness.observe().state
+        self.state = state = self._truth_provider.observe().state
         R_WB, before = state.X_WB.R, self._v_W_m_s
         self._v_W_m_s = _velocity_W(state)
         return PhysicsState(
@@ -107,11 +107,11 @@ class SitlPlant:
         InputError
             If there is no truth of the world that could be told, or the vehicle does not fit into it.
         """
-        plant, witness = self.parts.world.begin()
-        if witness is None:
+        plant, truth_provider = self.parts.world.begin()
+        if truth_provider is None:
             raise InputError(f"--world {self.parts.scenario.world}: nobody knows the truth of it, a firmware needs it")
         surface = WaterSurface.of(self.parts.vehicle) if self.has_surface(plant) else None
-        body = PlantBody(plant, witness, surface)
+        body = PlantBody(plant, truth_provider, surface)
         return LoweringBody(body, body.state, self.held_s) if self.held_s > 0.0 else body
 
     @staticmethod
@@ -122,9 +122,9 @@ class SitlPlant:
     def ready(self, progress: Callable[..., None]) -> str:
         """Compile what a flight in it needs and move it once; what people should know of it, in words."""
         compile_kernels(("fly",), progress)
-        plant, witness = self.parts.world.begin()
-        if witness is not None:
-            PlantBody(plant, witness).step(np.zeros(len(self.parts.vehicle.thrusters)), 0.0025)
+        plant, truth_provider = self.parts.world.begin()
+        if truth_provider is not None:
+            PlantBody(plant, truth_provider).step(np.zeros(len(self.parts.vehicle.thrusters)), 0.0025)
         self.begin()
         return "" if self.has_surface(plant) else "the world has no method push: the vehicle can rise out of its water"
 

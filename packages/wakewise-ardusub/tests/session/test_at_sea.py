@@ -92,9 +92,9 @@ def test_arm_engage_fly_an_orbit_capture_release_disarm(tmp_path):
         steps.append(step)
         goals.append(float(np.linalg.norm(step.goal.X_WB.p_m - step.estimate.X_WB.p_m)))
 
-    plant, witness = sea.parts.world.begin()
-    record = recorder_of(sea.parts, witness, shutter)
-    fly = loop_of(sea.parts, plant, witness, watch)
+    plant, truth_provider = sea.parts.world.begin()
+    record = recorder_of(sea.parts, truth_provider, shutter)
+    fly = loop_of(sea.parts, plant, truth_provider, watch)
     at = {"engaged": 0.0, "released": 0.0}
 
     def direct(time_s: float) -> None:
@@ -172,8 +172,8 @@ def test_depth_is_held_while_engaged_in_alt_hold_and_after_hand_back():
             at["released"] = time_s
 
     before_m = float(flight.autopilot.motion.p_WB_m[2])
-    plant, witness = sea.parts.world.begin()
-    fly = loop_of(sea.parts, plant, witness, sea.figures)
+    plant, truth_provider = sea.parts.world.begin()
+    fly = loop_of(sea.parts, plant, truth_provider, sea.figures)
     fly(duration_s=None, pace=direct, stop=lambda: bool(at["released"]))
     assert flight.autopilot.mode in (ALT_HOLD, STABILIZE)
     for _ in range(100):

@@ -1,4 +1,4 @@
-"""A plant with a witness as the body behind a firmware."""
+"""A plant with a truth provider as the body behind a firmware."""
 
 from __future__ import annotations
 
@@ -49,16 +49,16 @@ class World:
 
     name = "sledge"
 
-    def __init__(self, witnessed: bool = True) -> None:
-        self.witnessed = witnessed
+    def __init__(self, known: bool = True) -> None:
+        self.known = known
 
     def begin(self) -> tuple[Sledge, Sledge | None]:
         sledge = Sledge()
-        return sledge, sledge if self.witnessed else None
+        return sledge, sledge if self.known else None
 
 
 def test_the_specific_force_is_acceleration_less_gravity_in_the_body() -> None:
-    """Exactly, over any step; place, velocity and rate are the witness's."""
+    """Exactly, over any step; place, velocity and rate are the truth provider's."""
     sledge = Sledge()
     body = PlantBody(sledge, sledge)
     push = np.array([0.5, -0.25, 0.75])
@@ -81,7 +81,7 @@ def test_each_start_is_the_same_and_a_world_without_truth_is_refused() -> None:
     again = behind.begin().step(np.zeros(8), 0.1)
     assert again.p_WB_m == pytest.approx([0.01, 0.0, 0.0])
     with pytest.raises(InputError, match="nobody knows the truth"):
-        SitlPlant(parts=parts.replace(world=World(witnessed=False))).begin()
+        SitlPlant(parts=parts.replace(world=World(known=False))).begin()
 
 
 class Buoy(Sledge):
@@ -128,11 +128,11 @@ def test_every_plant_of_this_package_can_be_given_a_surface(water: Any) -> None:
 def test_a_push_moves_the_true_vehicle_and_the_surface_holds_it() -> None:
     """In the paper's water: 10 N more of weight sink it; all verticals up, it stays in the water for 20 s."""
     parts = Scenario.preset("quick", world="still-tank", vehicle="bluerov2-heavy", flow="paper").parts()
-    plant, witness = parts.world.begin()
-    begun = witness.observe().state.X_WB.p_m[2]
+    plant, truth_provider = parts.world.begin()
+    begun = truth_provider.observe().state.X_WB.p_m[2]
     plant.push(np.array([0.0, 0.0, 10.0, 0.0, 0.0, 0.0]))
     plant.step(np.zeros(8), 1.0)
-    assert witness.observe().state.X_WB.p_m[2] - begun > 0.05
+    assert truth_provider.observe().state.X_WB.p_m[2] - begun > 0.05
     body = SitlPlant(parts=parts).begin()
     up = np.linalg.pinv(HEAVY.allocation_matrix) @ np.array([0.0, 0.0, -100.0, 0.0, 0.0, 0.0])
     depths = [float(body.step(up, 0.02).p_WB_m[2]) for _ in range(1000)]

@@ -138,9 +138,9 @@ class DisturbanceSeries(FlightProbe):
         self._count = 0
         self._D: list[tuple[float, float]] = []
 
-    def step(self, step: Step, witness: TruthProvider | None) -> None:
+    def step(self, step: Step, truth_provider: TruthProvider | None) -> None:
         """Take D of every tenth step or so."""
-        del witness
+        del truth_provider
         self._count += 1
         if self._count % self._every == 1 and step.truth is not None:
             thrusts = step.truth.thrusts_N

@@ -26,7 +26,7 @@ class Water:
         return np.broadcast_to(self.wash, points.shape)
 
 
-class Witness:
+class FixedTruth:
     """Has a tank with that water."""
 
     def __init__(self, water):
@@ -48,9 +48,9 @@ def watch(times=(1.0,)):
 def test_wash_in_the_sheet_is_seen_in_a_stream_and_noise_is_told():
     """A tenth of a metre a second of wash in a stream three times as fast: within the noise that it states."""
     piv = watch()
-    piv.look(0.5, Witness(Water((0.3, 0.0, 0.0), (0.0, 0.0, 0.1))))
+    piv.look(0.5, FixedTruth(Water((0.3, 0.0, 0.0), (0.0, 0.0, 0.1))))
     assert piv.figures() == {}
-    piv.look(1.0, Witness(Water((0.3, 0.0, 0.0), (0.0, 0.0, 0.1))))
+    piv.look(1.0, FixedTruth(Water((0.3, 0.0, 0.0), (0.0, 0.0, 0.1))))
     found = piv.figures()
     assert tuple(found) == FIGURES
     assert found["piv_speed_m_s"] == pytest.approx(0.1, abs=0.012)
@@ -61,7 +61,7 @@ def test_wash_in_the_sheet_is_seen_in_a_stream_and_noise_is_told():
 def test_without_wash_it_reads_its_own_noise():
     """Which is the floor, not zero."""
     piv = watch()
-    piv.look(1.0, Witness(Water((0.05, 0.0, 0.0), (0.0, 0.0, 0.0))))
+    piv.look(1.0, FixedTruth(Water((0.05, 0.0, 0.0), (0.0, 0.0, 0.0))))
     found = piv.figures()
     assert found["piv_speed_m_s"] == pytest.approx(found["piv_floor_m_s"], rel=0.5)
 
@@ -78,7 +78,7 @@ def test_places_count_in_the_water_near_the_target_alone():
 def test_each_time_is_looked_at_once():
     """And none twice, however often it is asked."""
     piv = watch((1.0, 2.0))
-    still = Witness(Water((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    still = FixedTruth(Water((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     for at in (1.0, 1.1, 1.2, 2.5, 3.0):
         piv.look(at, still)
     assert len(piv.rows) == 2 and piv.times_s == []

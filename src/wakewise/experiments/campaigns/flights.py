@@ -48,8 +48,8 @@ class FlightProbe:
     def __init__(self, parts: Parts, folder: Path) -> None:
         self.parts, self.folder = parts, folder
 
-    def step(self, step: Step, witness: TruthProvider | None) -> None:
-        """Look at one control step; `witness` is the true world, None of a real vehicle."""
+    def step(self, step: Step, truth_provider: TruthProvider | None) -> None:
+        """Look at one control step; `truth_provider` is the true world, None of a real vehicle."""
 
     def figures(self, steps: pl.DataFrame) -> Mapping[str, Any]:
         """Figures by name, from all steps of the flight (`settled` leaves out its settling)."""
@@ -69,9 +69,9 @@ def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress)
     setup = settings.get("setup") or {}
     probes = [function_named(name)(parts, folder, **own) for name, own in (settings.get("probes") or {}).items()]
 
-    def watch(step: Step, witness: TruthProvider | None) -> None:
+    def watch(step: Step, truth_provider: TruthProvider | None) -> None:
         for probe in probes:
-            probe.step(step, witness)
+            probe.step(step, truth_provider)
 
     flight = fly(
         parts,

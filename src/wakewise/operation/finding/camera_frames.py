@@ -24,19 +24,19 @@ SHOWN_M = 0.0007
 class CameraFrames:
     """A `Plant` round another one that also takes pictures and hands them over `latency_s` later.
 
-    `witness` knows the true pose, the silt and how a soft target stands: what the light meets. `lost_s`: spans (from,
-    to) in which the camera gives no picture, for tests.
+    `truth_provider` knows the true pose, the silt and how a soft target stands: what the light meets. `lost_s`: spans
+    (from, to) in which the camera gives no picture, for tests.
     """
 
     def __init__(
         self,
         plant: Plant,
-        witness: TruthProvider,
+        truth_provider: TruthProvider,
         parts: Parts,
         settings: PerceptionSettings,
         lost_s: tuple[tuple[float, float], ...] = (),
     ) -> None:
-        self._plant, self._witness, self._parts, self._perception = plant, witness, parts, settings
+        self._plant, self._truth_provider, self._parts, self._perception = plant, truth_provider, parts, settings
         self._lost_s = lost_s
         self._imaging = picture_settings(parts, settings)
         self._camera = self._imaging.camera()
@@ -52,7 +52,7 @@ class CameraFrames:
         if self._time_s + _TICK_S >= self._taken / self._perception.rate_hz:
             self._taken += 1
             if not any(begin <= self._time_s < end for begin, end in self._lost_s):
-                image = self._picture(self._witness.observe())
+                image = self._picture(self._truth_provider.observe())
                 # The shutter opens now; the picture is that of the middle of its exposure and readout.
                 middle_s = self._time_s + 0.5 * self._imaging.window_s
                 arrives_s = max(middle_s + self._perception.latency_s, self._time_s + self._imaging.window_s)
@@ -75,8 +75,8 @@ class CameraFrames:
         mount = self._parts.vehicle.X_BC_at(truth.tilt_rad)
         window_s = self._imaging.window_s
         poses = [moved(truth.state, after_s) @ mount for after_s in np.linspace(0.0, window_s, 3)]
-        silt = self._witness.silt()
-        flakes = getattr(self._witness, "flakes", None)
+        silt = self._truth_provider.silt()
+        flakes = getattr(self._truth_provider, "flakes", None)
         photo = photograph(
             self._scene(),
             self._camera,
@@ -90,7 +90,7 @@ class CameraFrames:
         return photo.image
 
     def _scene(self) -> Scene:
-        posture = getattr(self._witness, "posture", None)
+        posture = getattr(self._truth_provider, "posture", None)
         stands = None if posture is None else posture()
         if stands is None:
             return self._parts.scene
@@ -115,10 +115,10 @@ class CameraWorld:
 
     def begin(self) -> tuple[Plant, TruthProvider | None]:
         """As the world; raises InputError of one without truth, which pictures are rendered from."""
-        plant, witness = self.inner.begin()
-        if witness is None:
+        plant, truth_provider = self.inner.begin()
+        if truth_provider is None:
             raise InputError(f"world {self.name}: has no truth to render pictures from, take pilot route")
-        return CameraFrames(plant, witness, self.parts, self.settings), witness
+        return CameraFrames(plant, truth_provider, self.parts, self.settings), truth_provider
 
 
 def picture_settings(parts: Parts, settings: PerceptionSettings) -> ImagingSettings:

@@ -230,7 +230,7 @@ class LiveFlight:
     paced : bool
         By the clock; without it as fast as it goes.
     watch : callable, optional
-        Called as `(step, witness)` at each step in the flying thread, after the record: it must not take long.
+        Called as `(step, truth_provider)` at each step in the flying thread, after the record: it must not take long.
     water_every_s : float
         How often the water at the target is measured.
     shutter : Shutter, optional
@@ -331,19 +331,19 @@ class LiveFlight:
             write_or_check_scenario(folder, flown_by_hand(parts))
             write_truth(parts, folder)
         self._prepare(0, 1, "fills the water")
-        plant, witness = parts.world.begin()
+        plant, truth_provider = parts.world.begin()
         log = FlightLog(
             folder=None if folder is None else folder / PARTS, keep=folder is not None, beside=self._keep_hands
         )
         recorder = recorder_of(
-            parts, witness, self._shutter, water_every_s=self._water_every_s, exposed=self._exposed, log=log
+            parts, truth_provider, self._shutter, water_every_s=self._water_every_s, exposed=self._exposed, log=log
         )
 
         def record(step: Step) -> None:
             recorder(step)
             self.latest = step
             if self._watch is not None:
-                self._watch(step, witness)
+                self._watch(step, truth_provider)
 
         def sent(time_s: float) -> None:
             self.pace.sent(time_s)
@@ -352,7 +352,7 @@ class LiveFlight:
         self.preparing = None
         try:
             with name_external_parts(parts, recorder), _undisturbed():
-                loop_of(parts, plant, witness, record)(
+                loop_of(parts, plant, truth_provider, record)(
                     duration_s=None, stop=self._is_over, pace=self.pace.pace, sent=sent
                 )
         finally:  # a flight that a fault ended is kept too

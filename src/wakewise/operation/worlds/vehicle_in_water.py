@@ -117,6 +117,6 @@ class RepeatableWorld:
     draw: Callable[[], np.random.Generator]
 
     def begin(self) -> tuple[VehicleInWater, VehicleInWater]:
-        """Vehicle and water at their start, as plant and as witness."""
+        """Vehicle and water at their start, as plant and as truth provider."""
         water = self.make(self.vehicle, self.draw())
         return water, water

@@ -496,6 +496,6 @@ class TankWorld:
         )
 
     def begin(self) -> tuple[Plant, TruthProvider | None]:
-        """A fresh tank at its start, as plant and witness."""
+        """A fresh tank at its start, as plant and truth provider."""
         tank = self.tank(beside=False)  # a flight has a controller
         return tank, TankTruth(tank=tank)

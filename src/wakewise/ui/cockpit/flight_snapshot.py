@@ -50,10 +50,10 @@ class FlightSnapshot:
 
 
 class SnapshotRecorder:
-    """Called as `(step, witness)` at each step; `now` is the newest snapshot, for any thread.
+    """Called as `(step, truth_provider)` at each step; `now` is the newest snapshot, for any thread.
 
-    `points_W_m`, shape (n, 3): where the true water is asked, if the witness knows. `given`: called when the step's
-    thrusts are on their way. `asked`: velocity that is asked for in W, shape (3,).
+    `points_W_m`, shape (n, 3): where the true water is asked, if the truth provider knows. `given`: called when the
+    step's thrusts are on their way. `asked`: velocity that is asked for in W, shape (3,).
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class SnapshotRecorder:
         """Whether `look` was called within `LOOKS_S`."""
         return time.monotonic() - self._looked_s < LOOKS_S
 
-    def __call__(self, step: Step, witness: TruthProvider | None) -> None:
+    def __call__(self, step: Step, truth_provider: TruthProvider | None) -> None:
         """Take a snapshot of a step."""
         self._given()
         now_s = step.time_s
@@ -101,8 +101,8 @@ class SnapshotRecorder:
         if now_s >= self._sampled_s + SAMPLED_S - 1e-9:
             self._sampled_s = now_s
             self._followed.append((asked_W, velocity_W))
-        if witness is not None and self.looked_at:
-            self._ask(now_s, witness)
+        if truth_provider is not None and self.looked_at:
+            self._ask(now_s, truth_provider)
         tilt_rad = step.truth.tilt_rad if step.truth is not None else step.tilt_rad
         self.now = FlightSnapshot(
             step=step,
@@ -116,13 +116,13 @@ class SnapshotRecorder:
             silt=self._silt,
         )
 
-    def _ask(self, now_s: float, witness: TruthProvider) -> None:
+    def _ask(self, now_s: float, truth_provider: TruthProvider) -> None:
         """Measure silt and true water at their intervals."""
         if now_s >= self._silt_s + SILT_EVERY_S:
-            self._silt_s, self._silt = now_s, witness.silt()
+            self._silt_s, self._silt = now_s, truth_provider.silt()
         elif now_s >= self._true_s + TRUE_EVERY_S:
             self._true_s = now_s
-            excess = getattr(witness, "excess_velocity", None)
+            excess = getattr(truth_provider, "excess_velocity", None)
             if excess is not None:
                 self._true = np.linalg.norm(excess(self._points_W_m), axis=1)
 

@@ -102,7 +102,7 @@ class ArduSubWorld:
     waits: bool = field(default=False, init=False)
 
     def begin(self) -> tuple[ArduSubPlant, TruthProvider | None]:
-        """The vehicle, and no witness."""
+        """The vehicle, and no truth provider."""
         return self.plant(), None
 
 
@@ -306,7 +306,7 @@ class WashFigures:
     _covered_pct: float | None = None
     _coverage: Coverage | None = None
 
-    def __call__(self, step: Step, _witness: TruthProvider | None = None) -> None:
+    def __call__(self, step: Step, _truth_provider: TruthProvider | None = None) -> None:
         """Reckon them anew, if it is time."""
         if step.time_s < self._due_s:
             return

@@ -329,10 +329,10 @@ class VehicleSession:
         if self.boxes is not None:
             self.boxes.take(message)
 
-    def _watch(self, step: Step, witness: TruthProvider | None) -> None:
+    def _watch(self, step: Step, truth_provider: TruthProvider | None) -> None:
         """What is reckoned and told at each step."""
         if self.sea is not None and self.boxes is not None:
-            self.sea.figures(step, witness)
+            self.sea.figures(step, truth_provider)
             self.boxes.told(step.estimate.X_WB @ self.vehicle.X_BC_at(step.tilt_rad))
 
     def _seen_from(self) -> tuple[BodyState, Pose] | None:

@@ -80,10 +80,10 @@ def watched(flight: CalibrationFlight, progress: Progress = no_progress) -> tupl
     watcher = FlakeObserver(camera=camera_of(parts), vehicle=parts.vehicle, rng=rng, per_m3=per_m3)
     current: list[Array | None] = [None]
 
-    def watch(step: Any, witness: Any) -> None:
+    def watch(step: Any, truth_provider: Any) -> None:
         current[0] = step.estimate.current_W_m_s
         if step.time_s >= SETTLE_S:
-            watcher.watch(step, witness)
+            watcher.watch(step, truth_provider)
 
     fly(parts, checked=False, water_every_s=5.0, watch=watch, progress=progress)
     return watcher.sightings(), parts, current[0]

@@ -154,7 +154,7 @@ class FlakeObserver:
     _clock: list[float] = field(default_factory=list)
     _next_s: float = 0.0
 
-    def watch(self, step: Step, witness: object) -> None:
+    def watch(self, step: Step, truth_provider: object) -> None:
         """Take a frame if it is time for one."""
         thrusts = step.command.thrusts_N
         self._pushes.append(np.concatenate([np.maximum(thrusts, 0.0), np.maximum(-thrusts, 0.0)]))
@@ -163,7 +163,7 @@ class FlakeObserver:
             return
         first = len(self._frames) % 2 == 0
         self._next_s = step.time_s + (APART_S if first else EVERY_S - APART_S)
-        look = getattr(witness, "flakes", None)
+        look = getattr(truth_provider, "flakes", None)
         if step.truth is None or look is None:
             return
         X_WC = step.truth.state.X_WB @ self.vehicle.X_BC_at(step.truth.tilt_rad)

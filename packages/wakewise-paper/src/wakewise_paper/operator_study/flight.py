@@ -288,9 +288,9 @@ class OperatorFigures(FlightProbe):
         self._D: list[float] = []
         self._solve_ms: list[float] = []
 
-    def step(self, step: Step, witness: TruthProvider | None) -> None:
+    def step(self, step: Step, truth_provider: TruthProvider | None) -> None:
         """Keep what was asked, flown and planned; D five times a second."""
-        del witness
+        del truth_provider
         asked = self._heard.asked_W_m_s
         if step.time_s < SETTLE_S or step.truth is None or asked is None:
             return

@@ -216,15 +216,15 @@ class PaperOperatorFigures(FlightProbe):
         self._D: list[float] = []
         self._speed: list[float] = []
 
-    def step(self, step: Step, witness: TruthProvider | None) -> None:
+    def step(self, step: Step, truth_provider: TruthProvider | None) -> None:
         """Keep what was asked, flown and planned; D and the water every fifth step."""
-        if step.time_s < HOLD_S or step.truth is None or witness is None:
+        if step.time_s < HOLD_S or step.truth is None or truth_provider is None:
             return
         state, asked, planned = step.truth.state, self._pilot.velocity_W, self._controller.planned_W_m_s
         self._velocities.append((asked, state.X_WB.R @ state.nu_B[:3], asked if planned is None else planned))
         if len(self._velocities) % 5 == 0:
             self._D.append(disturbance(self._view.gram(state.X_WB), step.truth.thrusts_N))
-            self._speed.append(witness.water().target_speed_mean_m_s)
+            self._speed.append(truth_provider.water().target_speed_mean_m_s)
 
     def figures(self, steps: pl.DataFrame) -> dict[str, float | None]:
         """`DEVIATIONS`, `disturbance` and `target_speed_mean_m_s`."""

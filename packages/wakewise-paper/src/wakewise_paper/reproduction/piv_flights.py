@@ -71,9 +71,9 @@ class PivProbe(FlightProbe):
             rng=np.random.default_rng([parts.scenario.seed, 37]),
         )
 
-    def step(self, step: Step, witness: TruthProvider | None) -> None:
+    def step(self, step: Step, truth_provider: TruthProvider | None) -> None:
         """Photograph the water if it is time."""
-        self._recorder.look(step.time_s, witness)
+        self._recorder.look(step.time_s, truth_provider)
 
     def figures(self, steps: pl.DataFrame) -> dict[str, float]:
         """Those of the recorder."""
@@ -91,12 +91,12 @@ class PivRecorder:
     rng: np.random.Generator
     rows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
 
-    def look(self, time_s: float, witness: TruthProvider | None) -> None:
+    def look(self, time_s: float, truth_provider: TruthProvider | None) -> None:
         """Photograph the water if it is time."""
-        if not self.times_s or time_s < self.times_s[0] or witness is None:
+        if not self.times_s or time_s < self.times_s[0] or truth_provider is None:
             return
         self.times_s.pop(0)
-        self.rows.append(self._measured(getattr(witness, "tank", witness)))
+        self.rows.append(self._measured(getattr(truth_provider, "tank", truth_provider)))
 
     def figures(self) -> dict[str, float]:
         """Means over the instants; none of no instant.

@@ -51,10 +51,10 @@ class ClearSpeed(FlightProbe):
         self._points = clear_points(parts.target)
         self._speeds: list[tuple[float, float]] = [(-np.inf, 0.0)]
 
-    def step(self, step: Step, witness: TruthProvider | None) -> None:
+    def step(self, step: Step, truth_provider: TruthProvider | None) -> None:
         """Look at the water twice a second."""
         if step.time_s >= max(_SETTLED_S, self._speeds[-1][0] + _LOOK_S):
-            water: Any = witness  # tank and lattice tell more of their water than every world must
+            water: Any = truth_provider  # tank and lattice tell more of their water than every world must
             excess = water.excess_velocity(self._points)
             self._speeds.append((step.time_s, float(np.linalg.norm(excess, axis=1).mean())))
 
