@@ -67,6 +67,7 @@ load_scenario("quick", None, {})
     assert found.returncode == 0, found.stderr
 
 
+@pytest.mark.slow
 def test_an_environment_says_which_extra_it_needs(tmp_path):
     """Without Gymnasium the task can be had; an environment is refused in one line."""
     found = without_extras(
@@ -239,6 +240,7 @@ def test_a_command_says_in_one_line_which_extra_it_needs(words, extras, refusals
     assert not written
 
 
+@pytest.mark.slow
 def test_python_is_told_which_extra_a_name_needs(tmp_path):
     """The error of a lazy package is an ImportError too, and names the package and what it needs."""
     found = without_extras(
@@ -274,6 +276,7 @@ def test_a_function_names_all_that_is_missing_before_it_begins(call, extras, ref
 HEAVY = ("numpy", "scipy", "numba", "polars", "pydantic", "yaml", "rich", "matplotlib", "cv2", "trimesh")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("script", "heavy"),
     [

@@ -33,6 +33,7 @@ def test_importing_it_imports_no_package():
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUN)
 def test_every_name_ends_with_an_example_that_runs(name, tmp_path, monkeypatch):
     """The docstring's last section is an example; what it prints is what it says."""

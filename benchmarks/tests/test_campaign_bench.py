@@ -12,6 +12,7 @@ from wakewise.experiments.trials.timing import BenchOptions
 from wakewise_benchmarks import campaign
 
 
+@pytest.mark.slow
 def test_little_lies_between_trials_and_many_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Less than a second each, where a trial takes a minute."""
     monkeypatch.setattr(campaign, "EMPTY", 8)
@@ -20,6 +21,7 @@ def test_little_lies_between_trials_and_many_are_listed(tmp_path: Path, monkeypa
     assert set(told) == {"list_50_s", "list_50_cpu_s", "list_50_anew_s"}
 
 
+@pytest.mark.slow
 def test_without_what_a_trial_needs_the_reason_stands_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """Null with a reason, and the rest is measured."""
     monkeypatch.setattr(campaign, "EMPTY", 2)

@@ -69,6 +69,7 @@ print(json.dumps([found, sorted(lines)]))
 """
 
 
+@pytest.mark.slow
 def test_every_module_is_imported_and_kernels_are_run_line_by_line(tmp_path: Path) -> None:
     """All that hold kernels; a tracer enters the kernels, and they answer what they answer compiled."""
     environment = os.environ | {

@@ -110,6 +110,7 @@ def test_importing_wakewise_is_quick_and_settles_it_first() -> None:
     assert done.stdout == "[]\n"
 
 
+@pytest.mark.slow
 def test_a_read_only_installation_compiles_all_the_same(tmp_path: Path) -> None:
     """With neither package nor home writable, kernels go to the folder for temporary files, and the command says so."""
     source = Path(sys.modules["wakewise"].__file__ or "").parents[1]

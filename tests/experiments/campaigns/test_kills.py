@@ -85,6 +85,7 @@ def test_a_kill_between_writing_and_naming_leaves_no_figures(tmp_path: Path) -> 
     assert not list(place.glob(".*"))
 
 
+@pytest.mark.slow
 def test_two_drivers_on_one_folder_share_the_work(tmp_path: Path) -> None:
     """Each takes what the other is not at; no trial is made twice."""
     folder, tasks = tmp_path / "c", cheap.adding(40, takes_s=0.05)

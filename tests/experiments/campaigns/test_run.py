@@ -50,6 +50,7 @@ def test_a_second_run_makes_nothing_and_again_tries_what_failed(tmp_path: Path) 
     assert [outcome.attempts for outcome in third] == [1, 1, 1, 3]
 
 
+@pytest.mark.slow
 def test_more_retries_go_on_where_fewer_gave_up(tmp_path: Path) -> None:
     """Attempts are counted in the folder, over runs."""
     task = cheap.one("die", times=2)
@@ -57,6 +58,7 @@ def test_more_retries_go_on_where_fewer_gave_up(tmp_path: Path) -> None:
     assert run([task], tmp_path / "c", ProcessExecutor(1), retries=2)[0].attempts == 3
 
 
+@pytest.mark.slow
 def test_a_trial_that_never_ends_is_ended(tmp_path: Path) -> None:
     """Even one that never gives the interpreter's lock back; the others are not held up by it."""
     tasks = [cheap.one("hang"), *cheap.adding(1)]
@@ -96,6 +98,7 @@ def test_a_full_disk_is_told_in_a_line_and_nothing_is_lost(tmp_path: Path) -> No
     assert not list(store.place(tasks[-1].key).glob(".*"))
 
 
+@pytest.mark.slow
 def test_a_table_that_does_not_fit_is_a_full_disk_too(tmp_path: Path) -> None:
     """Whoever tells of it: nothing is left under the table's name, and with room the same call makes the trial."""
     folder, room = tmp_path / "c", tmp_path / "room"
@@ -109,6 +112,7 @@ def test_a_table_that_does_not_fit_is_a_full_disk_too(tmp_path: Path) -> None:
     assert outcome.figures == {"made": 1.0}
 
 
+@pytest.mark.slow
 def test_failures_of_the_computer_are_never_the_trials_own(tmp_path: Path) -> None:
     """A run tries them again and then leaves them, with their reason; every later run tries them anew."""
     room = tmp_path / "room"
@@ -136,6 +140,7 @@ def test_stopping_ends_what_is_under_way_and_it_counts_as_no_failure(tmp_path: P
     assert not told.is_failure(0)
 
 
+@pytest.mark.slow
 def test_time_that_is_over_ends_what_is_under_way_and_no_more_than_it_is_told(tmp_path: Path) -> None:
     """Twenty seconds of trials within five: the first are kept, and at most five seconds are told to be left."""
     told: list[str] = []
@@ -150,6 +155,7 @@ def test_time_that_is_over_ends_what_is_under_way_and_no_more_than_it_is_told(tm
     assert left_s and max(left_s) <= 5.0
 
 
+@pytest.mark.slow
 def test_workers_share_the_cores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Libraries in a worker are told how many threads they may have: cores over workers, at least one."""
     monkeypatch.setattr("wakewise.experiments.campaigns.engines.cores", lambda: 8)
@@ -157,6 +163,7 @@ def test_workers_share_the_cores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert outcome.figures == {"threads": 4.0, "omp": 4.0}
 
 
+@pytest.mark.slow
 def test_two_drivers_in_one_process_do_not_disturb_each_other(tmp_path: Path) -> None:
     """The end of one ends its own workers alone, and no trial is made twice."""
     tasks = cheap.adding(12, takes_s=0.05)
@@ -177,6 +184,7 @@ def test_two_drivers_in_one_process_do_not_disturb_each_other(tmp_path: Path) ->
         assert (store.place(task.key) / "work" / "made.txt").read_text() == "made\n"
 
 
+@pytest.mark.slow
 def test_what_is_made_says_of_what(tmp_path: Path) -> None:
     """A trial's folder tells its work, settings and versions, so that anyone can make it again."""
     (task,) = cheap.adding(1)

@@ -45,6 +45,7 @@ def test_photographs_figures_and_reasons_follow_a_flight_by_hand(tmp_path: Path)
     assert "photograph" in json.loads((folder / "stages.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_a_flight_without_photographs_has_no_model(tmp_path: Path) -> None:
     """Said in one line, and nothing of the flight is lost."""
     folder = flown(tmp_path / "hand", [{"at_s": 0.1, "pressed": ["stop"]}])

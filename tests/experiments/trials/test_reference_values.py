@@ -49,6 +49,7 @@ def test_least_thrusts_are_held_against_themselves_and_spare_ones_are_not(parts:
     assert abs(other["disturbance_flown"] / same["disturbance_flown"] - 1.0) > 0.01
 
 
+@pytest.mark.slow
 def test_the_waters_own_speed_is_that_of_its_current(parts: Parts) -> None:
     """A steady current has its own speed, still water has none."""
     times = np.linspace(0.0, 60.0, 50)

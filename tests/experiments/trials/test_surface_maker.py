@@ -113,6 +113,7 @@ def test_what_is_there_is_skipped_and_no_process_is_begun(folder, monkeypatch):
     assert (silent.ran, silent.skips) == ([], [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", ["#!/bin/sh\nexit 3\n", None])
 def test_a_process_that_fails_is_told_and_costs_no_mesh(folder, program, monkeypatch):
     """Whether it ends without an answer or cannot be started, a warning says so and the mesh is made here."""
@@ -128,6 +129,7 @@ def test_a_process_that_fails_is_told_and_costs_no_mesh(folder, program, monkeyp
     assert (folder / "mesh.ply").stat().st_size > 0
 
 
+@pytest.mark.slow
 def test_a_fault_of_the_computer_in_the_other_process_is_this_ones(folder, monkeypatch):
     """A full disk is no missing mesh: it is raised with its words."""
     program = folder / "python"
@@ -166,6 +168,7 @@ surface.serve(sys.stdin.buffer, sys.stdout.buffer)
 """
 
 
+@pytest.mark.slow
 def test_the_other_process_ends_with_the_one_that_began_it(folder):
     """Also where that was killed and could tell nobody: its pipe is closed, and no mesh comes after it."""
     other = subprocess.Popen([sys.executable, "-c", ENDS], stdin=subprocess.PIPE, stderr=subprocess.PIPE)

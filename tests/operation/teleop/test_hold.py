@@ -12,6 +12,7 @@ OVERSHOOT_M = 0.1
 GO_S, LET_GO_S, END_S = 1.0, 3.1, 5.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trim_N", [0.0, -5.0], ids=["neutral", "heavy"])
 @pytest.mark.parametrize("method", ["wake-aware", "direct"])
 def test_a_vehicle_stops_where_it_is_held(method, trim_N):

@@ -24,6 +24,7 @@ def sampled(request):
     return target, region, region_measure(target, 10_000, 10_000, np.random.default_rng(1))
 
 
+@pytest.mark.slow
 def test_a_third_of_the_points_lies_on_the_surface_and_the_others_in_the_water(sampled):
     """Above the bed, outside the flesh, within the shell, at the distance that is stated."""
     target, region, _ = sampled

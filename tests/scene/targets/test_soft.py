@@ -6,6 +6,7 @@ import pytest
 from wakewise.scene.targets import TISSUES, BendingModes, coral, place_on_bed, soft_kinds
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", soft_kinds())
 def test_a_soft_target_is_closed_and_bends_slowly(kind):
     """Closed, 10 to 15 cm high, through the bed, the same for the same seed, and softest below 6 Hz in water."""

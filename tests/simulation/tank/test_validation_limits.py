@@ -306,6 +306,7 @@ def test_every_law_is_measured():
     assert sorted(names) == sorted(MEASURES) and len(set(names)) == len(names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", LIMITS, ids=lambda limit: limit.name)
 def test_the_table_says_what_is_measured(limit):
     """Both ends of what is said to be reached are within 3 % of the law's value of what is measured now."""

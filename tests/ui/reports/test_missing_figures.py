@@ -175,6 +175,7 @@ def _tables() -> dict[str, Any]:
     }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["station", "wake", "operator"])
 def test_the_pages_of_the_papers_tables(name, tmp_path, monkeypatch):
     """As HTML and as Markdown; of rows and of trials."""

@@ -103,6 +103,7 @@ def test_the_same_trial_gives_the_same_page(made_up: Path, report_text: str) -> 
     assert [p.name for p in made_up.iterdir() if p.suffix in (".html", ".js", ".css")] == ["report.html"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "parts",
     [("mesh.ply", "planned.csv"), ("truth.ply", "images.csv"), ("steps.parquet",), ("metrics.json", "scenario.yaml")],

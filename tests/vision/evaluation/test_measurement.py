@@ -44,6 +44,7 @@ def test_shapes_on_a_bed_have_their_exact_size(name: str) -> None:
     assert found.rugosity == pytest.approx(exact[4] / exact[3], rel=0.008)
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None)
 @given(st.tuples(*[st.floats(-3.0, 3.0)] * 3), st.tuples(*[st.floats(-5.0, 5.0)] * 3), st.floats(0.2, 5.0))
 def test_size_does_not_depend_on_the_frame_and_goes_with_the_power_of_the_scale(

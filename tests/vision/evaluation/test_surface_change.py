@@ -64,6 +64,7 @@ def egg(grown_m: float = 0.0) -> Mesh:
     return Mesh(np.asarray(solid.vertices) + grown_m * np.array(solid.vertex_normals), np.asarray(solid.faces))
 
 
+@pytest.mark.slow
 def test_loss_is_told_as_loss() -> None:
     """A body whose surface lies 3 mm farther in has lost, not grown."""
     found = compare(noisy(egg(), np.random.default_rng(1)), noisy(egg(-0.003), np.random.default_rng(2)))

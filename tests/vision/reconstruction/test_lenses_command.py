@@ -45,6 +45,7 @@ def rig(tmp_path, monkeypatch):
     return truth
 
 
+@pytest.mark.slow
 def test_each_lens_gets_its_camera_and_is_told_with_its_photos(rig, tmp_path, capsys):
     """A camera per folder: each begins from its own, cameras within 1 % of the spread, photos named by lens."""
     for side, focal in (("left", relief.FOCAL), ("right", 1.5 * relief.FOCAL)):
