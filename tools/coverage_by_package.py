@@ -1,8 +1,12 @@
-"""Print statement coverage per package from the data that `make coverage` collects."""
+"""Print statement coverage per package from the data that `make coverage` collects, and compare it with the floors.
+
+The floors are in pyproject.toml, `[tool.wakewise.coverage]`: percent per package, raised by hand, never lowered.
+"""
 
 from __future__ import annotations
 
 import sys
+import tomllib
 from collections import defaultdict
 from pathlib import Path
 
@@ -35,17 +39,36 @@ def covered(data: Coverage) -> dict[str, tuple[int, int]]:
     return {name: (run, whole) for name, (run, whole) in sorted(sums.items())}
 
 
+def below_floor(percent: dict[str, float], floors: dict[str, float]) -> list[str]:
+    """A line for each package that has less than its floor, or no floor, or is gone."""
+    lines = [f"{name}: no floor in pyproject.toml" for name in sorted(percent.keys() - floors.keys())]
+    lines += [
+        f"{name}: a floor in pyproject.toml, but no such package" for name in sorted(floors.keys() - percent.keys())
+    ]
+    return lines + [
+        f"{name}: {percent[name]:.1f} % covered, at least {floor:g} asked"
+        for name, floor in floors.items()
+        if percent.get(name, floor) < floor
+    ]
+
+
 def main() -> int:
-    """Print the table; 2 if there is no data."""
+    """Print the table; 1 if a package is below its floor, 2 if there is no data."""
     data = Coverage(data_file=str(ROOT / ".coverage"))
     data.load()
     if not data.get_data().measured_files():
         print("no coverage data: run make coverage", file=sys.stderr)
         return 2
-    print(f"{'package':<28}{'statements':>12}{'covered %':>12}")
+    floors = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["wakewise"]["coverage"]
+    percent = {}
+    print(f"{'package':<28}{'statements':>12}{'covered %':>12}{'floor %':>10}")
     for name, (run, whole) in covered(data).items():
-        print(f"{name:<28}{whole:>12}{100.0 * run / max(whole, 1):>12.1f}")
-    return 0
+        percent[name] = 100.0 * run / max(whole, 1)
+        print(f"{name:<28}{whole:>12}{percent[name]:>12.1f}{floors.get(name, '-'):>10}")
+    failures = below_floor(percent, floors)
+    for line in failures:
+        print(line, file=sys.stderr)
+    return 1 if failures else 0
 
 
 if __name__ == "__main__":
