@@ -63,7 +63,9 @@ def test_a_kind_of_silt_replaces_what_lies_below_and_yields_to_what_lies_beside_
         ({"tank.silt.kind": "mud"}, ["tank.silt.kind", "caco3-50mg"]),
         ({"method": "magic"}, ["method", "magic", "dp", "wake-aware"]),
         ({"seed": float("nan")}, ["seed"]),
-        ({"mission": 3}, ["mission"]),
+        ({"mission": 3}, ["mission", "group with the fields", "standoff_m"]),
+        ({"target": "coral"}, ["target", "'coral'", "kind"]),
+        ({"tank.current.velocity_m_s": 0.1}, ["velocity_m_s", "0.1", "such as [0."]),
     ],
 )
 def test_a_fault_is_one_line_with_field_finding_and_remedy(changes: dict[str, object], words: list[str]) -> None:

@@ -90,11 +90,14 @@ def _words(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
     found = fault["input"]
     plain = isinstance(found, (str, int, float, bool, type(None)))
     shown = f"found {quoted(found)}, " if plain else ""
+    if fault["type"] in {"model_type", "model_attributes_type"}:
+        return f"{shown}should be a group with the fields {', '.join(_owner(model, [*parents, name]).model_fields)}"
     message = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "should").replace("\n", " ")
-    message = message.replace("a valid tuple", "a list in square brackets")
-    message = message.removesuffix(", unable to parse string as a number").replace(
-        "a valid list", "a list in square brackets"
-    )
+    message = message.removesuffix(", unable to parse string as a number")
+    field = _owner(model, parents).model_fields.get(name)
+    usual = list(field.default) if field is not None and isinstance(field.default, tuple) else []
+    for kind in ("a valid tuple", "a valid list"):
+        message = message.replace(kind, "a list in square brackets" + (f", such as {usual}" if usual else ""))
     return f"{shown}{message[:1].lower()}{message[1:]}"
 
 
