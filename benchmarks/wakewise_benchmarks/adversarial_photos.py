@@ -1,6 +1,6 @@
 """Photographs that deceive, twenty and more ways: of each the model is right, or says that it is not.
 
-A row a trap: what came out (`right`, `said`, or `silent`, a wrong model that nobody was told of), how many photographs
+A row per case: the verdict (`right`, `said`, or `silent`, a wrong model without a warning), how many photographs
 found a place, how far the cameras are from where they were, in percent of their spread and after the similarity that
 fits best, how far they are turned, and what was said. `right` asks for places within 1 % and turns within 1 deg of
 every photograph that was given one, and for no place of a photograph that belongs elsewhere.
@@ -59,7 +59,7 @@ class AdversarialCase:
 
 @dataclass(frozen=True, kw_only=True)
 class AdversarialResult:
-    """What came of a trap."""
+    """What came of a case."""
 
     why: str
     verdict: str
@@ -72,31 +72,31 @@ class AdversarialResult:
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
-    """A row per trap and the number of each verdict; `scenarios` chooses traps by name."""
-    names = list(TRAPS) if options.scenarios is None else list(options.scenarios)
+    """A row per case and the number of each verdict; `scenarios` chooses cases by name."""
+    names = list(CASES) if options.scenarios is None else list(options.scenarios)
     for name in names:
-        if name not in TRAPS:
-            raise InputError(f"trap {name!r}: there is none, allowed {', '.join(TRAPS)}")
+        if name not in CASES:
+            raise InputError(f"case {name!r}: there is none, allowed {', '.join(CASES)}")
     rows = {}
     for done, name in enumerate(names):
         options.progress(done, len(names), name)
-        rows[name] = asdict(spring(TRAPS[name]))
+        rows[name] = asdict(judge_case(CASES[name]))
     count = {
         verdict: sum(row["verdict"] == verdict for row in rows.values()) for verdict in ("right", "said", "silent")
     }
-    return {"traps": rows, **count, "silent_wrongs": count["silent"], "why": _why(rows)}
+    return {"cases": rows, **count, "silent_wrongs": count["silent"], "why": _why(rows)}
 
 
 def _why(rows: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     few, one = "fewer than three photographs have a place", "taken from one place: there is no spread to be off by"
     missing = {name: one if row["registered"] >= 3 else few for name, row in rows.items() if row["off_pct"] is None}
-    return {f"traps.{name}.off_pct": reason for name, reason in missing.items()}
+    return {f"cases.{name}.off_pct": reason for name, reason in missing.items()}
 
 
-def spring(trap: AdversarialCase) -> AdversarialResult:
+def judge_case(case: AdversarialCase) -> AdversarialResult:
     """Make the photographs, and a model of them as `wakewise reconstruct` would; hold it against the truth."""
     begin = time.process_time()
-    shots = trap.shots()
+    shots = case.shots()
     names = [f"{k:02d}.png" for k in range(len(shots))]
     with tempfile.TemporaryDirectory(prefix="wakewise-bench-") as scratch:
         folder = Path(scratch) / "photos"
@@ -106,7 +106,7 @@ def spring(trap: AdversarialCase) -> AdversarialResult:
         said: list[str] = []
         placed: dict[str, SceneCamera] = {}
         try:
-            said, placed = _model(trap, shots, folder, Path(scratch))
+            said, placed = _model(case, shots, folder, Path(scratch))
         except (StageError, InputError) as fault:
             said = [str(fault)]
     truth = {name: shot.camera for name, shot in zip(names, shots, strict=True) if shot.camera is not None}
@@ -114,7 +114,7 @@ def spring(trap: AdversarialCase) -> AdversarialResult:
     stranger = any(name not in truth for name in placed)
     right = not stranger and off_pct is not None and off_pct <= MOST_OFF_PCT and (turn_deg or 0.0) <= MOST_TURN_DEG
     return AdversarialResult(
-        why=trap.why,
+        why=case.why,
         verdict="said" if said else "right" if right else "silent",
         photos=len(shots),
         registered=len(placed),
@@ -126,14 +126,14 @@ def spring(trap: AdversarialCase) -> AdversarialResult:
 
 
 def _model(
-    trap: AdversarialCase, shots: list[TestPhoto], folder: Path, scratch: Path
+    case: AdversarialCase, shots: list[TestPhoto], folder: Path, scratch: Path
 ) -> tuple[list[str], dict[str, SceneCamera]]:
     """Doubts, and the cameras of the photographs that found a place, in the model's frame."""
-    settings = SETTINGS.model_copy(update=dict(trap.settings))
+    settings = SETTINGS.model_copy(update=dict(case.settings))
     photos, _ = without_duplicates(read_photos(folder))
     assert not unsupported_files(folder)
     names = [photo.name for photo in photos]
-    known = None if trap.cameras is None else trap.cameras(shots)
+    known = None if case.cameras is None else case.cameras(shots)
     poses = None if known is None else {name: (known.rotations[name], known.positions[name]) for name in names}
     groups = group_photos(photos) if known is None else known_groups(photos, known.lenses)
     database = scratch / "database.db"
@@ -142,7 +142,7 @@ def _model(
         photos,
         database,
         settings,
-        focal_px=trap.focal_px,
+        focal_px=case.focal_px,
         pairs=choose_pairs(names, settings),
         progress=no_progress,
         groups=groups,
@@ -155,7 +155,7 @@ def _model(
         scratch / "sparse",
         settings,
         photos=len(photos),
-        references=None if trap.references is None else trap.references(shots),
+        references=None if case.references is None else case.references(shots),
         progress=no_progress,
         fixed=poses,
     )
@@ -316,7 +316,7 @@ def _known(shots: list[TestPhoto], shift_m: float = 0.0) -> KnownCameras:
 
 
 _RELIEF, _PLANE = scenes.relief(), scenes.relief(bumps_m=0.0)
-TRAPS: dict[str, AdversarialCase] = {
+CASES: dict[str, AdversarialCase] = {
     "none": AdversarialCase(why="photographs as they should be", shots=_plain),
     "two-lenses": AdversarialCase(why="every second lens half as long again", shots=lambda: _lenses(300.0, 450.0)),
     "two-near-lenses": AdversarialCase(why="every second lens a tenth longer", shots=lambda: _lenses(300.0, 330.0)),

@@ -1,4 +1,4 @@
-"""Photographs of things that exist in closed form, for traps: a relief, a rock that can be gone round, and what is
+"""Photographs of things that exist in closed form, for `adversarial_photos`: a relief, a rock, and what is
 done to pictures to deceive.
 
 World z points down; cameras have x right, y down, z ahead. A photograph is computed pixel by pixel from where its ray

@@ -1,6 +1,6 @@
 """`wakewise bench`: speed and quality of one part, side by side with a peer.
 
-What `wakewise bench adversarial-photos` prints: a row a trap, and how many were silent.
+What `wakewise bench adversarial-photos` prints: a row per case, and how many were silent.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from wakewise.ui.cli.console import ProgressBars, format_value, print_json, writ
 from wakewise.ui.cli.options import Json, listed, numbers
 
 
-def show_traps(result: dict[str, Any]) -> None:
-    """A row per trap: verdict, photographs with a place, error of the cameras, and what was said."""
-    for name, row in result["traps"].items():
+def show_adversarial_cases(result: dict[str, Any]) -> None:
+    """A row per case: verdict, photographs with a place, error of the cameras, and what was said."""
+    for name, row in result["cases"].items():
         placed = f"{row['registered']} of {row['photos']}"
         off = "" if row["off_pct"] is None else f"{format_value(row['off_pct'])} %"
         typer.echo(f"  {name:<20}{row['verdict']:<8}{placed:>9}{off:>9}  {row['why']}")
@@ -32,7 +32,7 @@ def show_traps(result: dict[str, Any]) -> None:
 _SEEDS = {"front": 8, "gentle": 3, "models": 1000, "operator": 3, "reef": 3}
 """Seeds of a bench that flies, if not given; 10 of the others."""
 _SHOWN = {
-    "adversarial-photos": f"{__name__}:show_traps",
+    "adversarial-photos": f"{__name__}:show_adversarial_cases",
     "front": "wakewise_paper.cli.bench_models:show_front",
     "gentle": "wakewise_paper.cli.bench_wash:show_gentle",
     "models": "wakewise_paper.cli.bench_models:show_models",
@@ -94,7 +94,8 @@ def bench(
         str,
         typer.Option(
             help="gentle: which, with commas between: orbit (both vehicles), orbit/paper, worlds, world/mud, paper "
-            "(the paper's own world); models: mechanisms, doses, advice, sheltered; traps: by name; all if not given.",
+            "(the paper's own world); models: mechanisms, doses, advice, sheltered; adversarial-photos: by name; "
+            "all if not given.",
             show_default=False,
         ),
     ] = "",

@@ -1,4 +1,4 @@
-"""Traps: what is right is called so, what is wrong is said, and a wrong model without a word would be counted."""
+"""Adversarial photographs: a right model is called right, a wrong one is reported, and a silent one is counted."""
 
 import numpy as np
 import pytest
@@ -6,20 +6,20 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise_benchmarks import adversarial_photos, adversarial_scenes
-from wakewise_benchmarks.command import show_traps
+from wakewise_benchmarks.command import show_adversarial_cases
 from wakewise_benchmarks.registry import BENCHES
 
 
 @pytest.mark.slow
-def test_some_traps_are_right_or_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_some_cases_are_right_or_said(capsys: pytest.CaptureFixture[str]) -> None:
     """A good set is right, mixed-up names are a failure in words; the table has a row each."""
     assert "adversarial-photos" in BENCHES
     found = adversarial_photos.run(BenchOptions(scenarios=("none", "names-mixed-up")))
-    assert found["traps"]["none"]["verdict"] == "right" and found["traps"]["none"]["said"] == []
-    assert found["traps"]["none"]["off_pct"] < 1.0
-    assert found["traps"]["names-mixed-up"]["verdict"] == "said"
+    assert found["cases"]["none"]["verdict"] == "right" and found["cases"]["none"]["said"] == []
+    assert found["cases"]["none"]["off_pct"] < 1.0
+    assert found["cases"]["names-mixed-up"]["verdict"] == "said"
     assert (found["right"], found["said"], found["silent_wrongs"]) == (1, 1, 0)
-    show_traps(found)
+    show_adversarial_cases(found)
     printed = capsys.readouterr().out
     assert "names-mixed-up" in printed and "silently wrong 0" in printed
 
@@ -36,13 +36,13 @@ def test_a_wrong_model_without_a_word_is_silent(monkeypatch: pytest.MonkeyPatch)
     for stands, warnings, verdict in ((placed, [], "right"), (bent, [], "silent"), (bent, ["bent"], "said")):
         monkeypatch.setattr(adversarial_photos, "_model", lambda *_, s=stands, d=warnings: (d, s))
         assert (
-            adversarial_photos.spring(adversarial_photos.AdversarialCase(why="", shots=lambda: shots)).verdict
+            adversarial_photos.judge_case(adversarial_photos.AdversarialCase(why="", shots=lambda: shots)).verdict
             == verdict
         )
     strangers = [*shots[:5], adversarial_photos.TestPhoto(image=picture, camera=None)]
     monkeypatch.setattr(adversarial_photos, "_model", lambda *_: ([], placed))
     assert (
-        adversarial_photos.spring(adversarial_photos.AdversarialCase(why="", shots=lambda: strangers)).verdict
+        adversarial_photos.judge_case(adversarial_photos.AdversarialCase(why="", shots=lambda: strangers)).verdict
         == "silent"
     )
 
@@ -73,18 +73,18 @@ def test_what_was_taken_from_one_place_has_no_error_in_percent(monkeypatch: pyte
     ]
     monkeypatch.setattr(adversarial_photos, "_model", lambda *_: ([], placed))
     monkeypatch.setattr(
-        adversarial_photos, "TRAPS", {"spot": adversarial_photos.AdversarialCase(why="", shots=lambda: shots)}
+        adversarial_photos, "CASES", {"spot": adversarial_photos.AdversarialCase(why="", shots=lambda: shots)}
     )
     told = adversarial_photos.run(BenchOptions())
-    assert told["traps"]["spot"]["off_pct"] is None and told["silent_wrongs"] == 1
-    assert "one place" in told["why"]["traps.spot.off_pct"]
+    assert told["cases"]["spot"]["off_pct"] is None and told["silent_wrongs"] == 1
+    assert "one place" in told["why"]["cases.spot.off_pct"]
 
 
-def test_a_trap_that_there_is_not_is_refused() -> None:
+def test_a_case_that_there_is_not_is_refused() -> None:
     """In a line that names those that there are."""
     with pytest.raises(InputError, match="two-lenses"):
         adversarial_photos.run(BenchOptions(scenarios=("quicksand",)))
-    assert len(adversarial_photos.TRAPS) >= 20
+    assert len(adversarial_photos.CASES) >= 20
 
 
 @pytest.mark.slow
