@@ -40,12 +40,15 @@ $(STAMP): requirements.lock pyproject.toml $(wildcard packages/*/pyproject.toml)
 	@$(BIN)/python tools/check_libraries.py
 	@touch $@
 
-# Kernels run as the Python that they are written in for the second run, so that their lines count.
+# Kernels run as the Python that they are written in for the second run, so that their lines count. A test that fails
+# here fails in `make test` too: what counts is what was run.
 INTERPRETED := tests/allocation tests/estimation
+PARALLEL := --dist loadfile --no-loadscope-reorder
+SELECTED := -m "not slow" --hypothesis-profile=ci
 coverage: setup
 	$(BIN)/coverage erase
-	OPENBLAS_NUM_THREADS=1 $(BIN)/coverage run --parallel-mode -m pytest -n 0 -m "not slow" --hypothesis-profile=ci $(COVERED); \
-	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run --parallel-mode -m pytest -n 0 -m "not slow" --hypothesis-profile=ci $(INTERPRETED); \
+	OPENBLAS_NUM_THREADS=1 $(BIN)/coverage run -m pytest -n 3 $(PARALLEL) $(SELECTED) $(COVERED); \
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -n 2 $(PARALLEL) $(SELECTED) $(INTERPRETED); \
 	$(BIN)/coverage combine --quiet
 	$(BIN)/python tools/coverage_by_package.py
 
@@ -66,8 +69,7 @@ check: setup
 # algebra would have all cores in each.
 # `make test` leaves out what is marked slow (pyproject.toml) and draws the same examples each time;
 # `make test-all` leaves out nothing and draws new ones.
-PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder
-SELECTED := -m "not slow" --hypothesis-profile=ci
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 $(PARALLEL)
 test test-all: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
