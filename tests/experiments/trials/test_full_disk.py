@@ -130,10 +130,10 @@ def test_a_level_that_met_a_full_disk_is_done_again(tmp_path: Path, monkeypatch:
 
 
 def test_a_ledger_that_cannot_be_written_does_not_hide_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first failure is the one that is told; a full disk that only the ledger met is told too."""
+    """The first failure is the one that is told; a full disk that only the file of costs met is told too."""
     monkeypatch.setattr("wakewise.experiments.trials.stages.write_json", _fill)
-    ledger = StageCosts(tmp_path / "stages.json")
-    with pytest.raises(EnvironmentFailure, match="first"), ledger.account("fly"):
+    stage_costs = StageCosts(tmp_path / "stages.json")
+    with pytest.raises(EnvironmentFailure, match="first"), stage_costs.account("fly"):
         raise EnvironmentFailure("first")
-    with pytest.raises(OSError, match="No space"), ledger.account("fly"):
+    with pytest.raises(OSError, match="No space"), stage_costs.account("fly"):
         pass

@@ -159,13 +159,13 @@ def _figures(
     modelled: Callable[[], None],
 ) -> Figures:
     """Run the stages that figures come from and write metrics.json; `modelled` is called when the model is there."""
-    ledger = StageCosts(folder / "stages.json")
+    stage_costs = StageCosts(folder / "stages.json")
 
     def stage(name: str, product: str, work: Callable[[Callable[..., None]], None]) -> None:
         if (folder / product).exists():
             watch.skipped(name)
             return
-        with watch.stage(name) as progress, ledger.account(name):
+        with watch.stage(name) as progress, stage_costs.account(name):
             work(progress)
 
     _forget_what_was_not_measured(folder)
@@ -180,7 +180,7 @@ def _figures(
     gathering = MetricsCollector(figures=figures["figures"], reasons=figures["reasons"])
     gathering.add({"method": scenario.method, "seed": scenario.seed})
     gathering.add({"from_outside": parts.external_parts})
-    gathering.add({"wall_s": ledger.total("wall_s"), "cpu_s": ledger.total("cpu_s")})
+    gathering.add({"wall_s": stage_costs.total("wall_s"), "cpu_s": stage_costs.total("cpu_s")})
     result = gathering.finish()
     write_json(folder / "metrics.json", result)
     return result
