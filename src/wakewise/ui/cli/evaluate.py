@@ -148,7 +148,7 @@ def evaluate(
                 cloud, points, reference, cameras, bed_z, unit_m, thresholds, not no_icp
             )
         except StageError as fault:
-            from wakewise.vision.evaluation.cloud_to_surface import ScaleError
+            from wakewise.vision.evaluation import ScaleError
 
             if isinstance(fault, ScaleError):
                 raise InputError(f"{fault} (--unit-m)") from None

@@ -346,36 +346,23 @@ class ScaleError(StageError):
 
 
 def check_extent(cloud_m: Array, truth_m: Array) -> None:
-    """Raise ScaleError if cloud, shape (n, 3), and truth, shape (k, 3), differ suspiciously in extent."""
-    suspicion = suspicious_extent(cloud_m, truth_m)
-    if suspicion is not None:
-        raise ScaleError(suspicion)
-
-
-def suspicious_scale(cloud_m: Array, mesh: MeshArrays) -> str | None:
-    """A sentence if cloud and mesh differ so much in extent that one of them is hardly in metres; else None.
+    """Check that cloud, shape (n, 3), and truth, shape (k, 3), do not differ so much that one is hardly in metres.
 
     A cloud may hold more than the truth or a part of it only, so that a factor of ten either way proves nothing.
+    Raises ScaleError.
     """
-    return suspicious_extent(cloud_m, np.asarray(mesh.vertices_m))
-
-
-def suspicious_extent(cloud_m: Array, truth_m: Array) -> str | None:
-    """The same of a truth that is points, shape (n, 3)."""
     cloud = np.asarray(cloud_m, dtype=np.float64).reshape(-1, 3)
     if len(cloud) < 2 or len(truth_m) == 0:
-        return None
+        return
     # The middle nine tenths: a stray point must not enlarge the cloud.
     low, high = np.percentile(cloud, (5.0, 95.0), axis=0)
     extent = float(np.linalg.norm(high - low)) / 0.9
     length = float(np.linalg.norm(np.ptp(truth_m, axis=0)))
-    if extent <= 0.0 or length <= 0.0 or 1.0 / MAX_SCALE_RATIO < extent / length < MAX_SCALE_RATIO:
-        return None
-    ratio = extent / length
-    return (
-        f"reference: {length:.3g} m across while the cloud is {extent:.3g} m, a suspicious scale (ratio {ratio:.3g}); "
-        "are both in metres?"
-    )
+    if extent > 0.0 and length > 0.0 and not 1.0 / MAX_SCALE_RATIO < extent / length < MAX_SCALE_RATIO:
+        raise ScaleError(
+            f"reference: {length:.3g} m across while the cloud is {extent:.3g} m, a suspicious scale (ratio "
+            f"{extent / length:.3g}); are both in metres?"
+        )
 
 
 def error_colours(error_mm: Array, top_mm: float = 3.0) -> Array:
