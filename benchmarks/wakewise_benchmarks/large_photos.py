@@ -131,7 +131,7 @@ class _Marks:
         self.begin(words.partition(" ")[0])
 
     def figures(self) -> dict[str, Any]:
-        """What was measured; the mesh is made by a child process, whose memory is the child's."""
+        """What was measured; the mesh is made by a child process, whose memory is added."""
         self.begin("")
         if "mesh" in self.memory_MB:
             self.memory_MB["mesh"] += resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 / 1e6
