@@ -1,4 +1,4 @@
-"""What a campaign costs: a standard trial, two workers beside one, what lies between trials, a list of many.
+"""What a campaign costs: a standard trial, two workers beside one, what lies between trials, a list of many, Dask.
 
 The trial is the quick preset with photographs and model, `wake-aware`; one worker has all cores, two share them. Times
 are those of a clock on the wall, so other work on the computer shows; `load_average` says how much there was before.
@@ -42,18 +42,19 @@ def run(options: BenchOptions) -> dict[str, Any]:
         options.progress(1, 5, f"{EMPTY} trials without work")
         found["between_trials_s"] = between_trials_s(folder / "empty", ProcessExecutor(1))
         found["between_trials_dask_s"] = _dask_s(folder / "dask")
-        why = (
-            {} if has("dask") else dict.fromkeys(("between_trials_dask_s", "overhead_dask_pct"), how_to_install("dask"))
-        )
+        of_dask = ("between_trials_dask_s", "overhead_dask_pct", "dask")
+        why = {} if has("dask") else dict.fromkeys(of_dask, how_to_install("dask"))
         if not (has("photos") and has("logs")):
             reason = f"a trial needs more: {how_to_install('photos,logs')}"
+            found["dask"] = _dask_scaling(folder / "scaling", None)
             return found | dict.fromkeys(_OF_TRIALS) | {"why": why | dict.fromkeys(_OF_TRIALS, reason)}
         compile_kernels(progress=options.progress)
         options.progress(2, 5, f"{TRIALS} trials, one worker")
         alone_s, took_s = standard_trials(folder / "one", ProcessExecutor(1))
         options.progress(4, 5, f"{TRIALS} trials, two workers")
         beside_s, _ = standard_trials(folder / "two", ProcessExecutor(2))
-    trial_s = statistics.mean(took_s)
+        trial_s = statistics.mean(took_s)
+        found["dask"] = _dask_scaling(folder / "scaling", trial_s)
     between, dask = found["between_trials_s"], found["between_trials_dask_s"]
     return found | {
         "trial_s": trial_s,
@@ -96,6 +97,15 @@ def _dask_s(folder: Path) -> float | None:
     from wakewise.experiments.campaigns.engines import DaskExecutor
 
     return between_trials_s(folder, DaskExecutor(workers=1))
+
+
+def _dask_scaling(folder: Path, trial_s: float | None) -> dict[str, Any] | None:
+    """How a campaign on Dask grows with its workers; None without Dask."""
+    if not has("dask"):
+        return None
+    from wakewise_benchmarks.campaign_scaling import dask_scaling
+
+    return dask_scaling(folder, trial_s)
 
 
 def list_many(folder: Path, count: int) -> dict[str, float]:

@@ -164,6 +164,10 @@ def bench(
             "the cube, of models the doses."
         ),
     ] = None,
+    photographs: Annotated[
+        str,
+        typer.Option(help="photographs: how many, with commas between; 12,24 if not given.", show_default=False),
+    ] = "",
     json: Json = False,
 ) -> None:
     """Measure speed and quality of one part: thread CPU, median and p99 after warm-up.
@@ -226,6 +230,7 @@ def bench(
                 workers=workers,
                 store=store,
                 only=listed(only) or None,
+                photographs=_counts(photographs),
             )
             results[each] = run_bench(each, options)
             if each == "operator":
@@ -242,6 +247,16 @@ def bench(
         typer.echo(f"\n{each}: {BENCHES[each]}")
         show = _named(_SHOWN[each]) if each in _SHOWN else _show
         show(result)
+
+
+def _counts(text: str) -> tuple[int, ...] | None:
+    """Whole numbers of --photographs."""
+    from wakewise.core.errors import InputError
+
+    found = numbers("--photographs", text)
+    if any(count != int(count) for count in found):
+        raise InputError(f"--photographs: '{text}', must be whole numbers, such as 12,24")
+    return tuple(map(int, found)) or None
 
 
 def _named(place: str) -> Callable[..., None]:

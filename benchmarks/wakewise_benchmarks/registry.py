@@ -38,6 +38,7 @@ BENCHES = {
     "reef": "a patch of reef in two levels, beside a lawnmower and orbits round everything: path and completeness",
     "survey": "slow lines above a bed on the simulated autopilot: speed, altitude, place, and what every loss leads to",
     "truth": "figures held against data that nobody in this project made: measured, asked, reached, met",
+    "photographs": "photographs of 12 Mpx beside plain pycolmap: memory and time by their number, and of 500",
     "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
     "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",
     "gpu": "lattice, COLMAP's stages and a neural field on a graphics card, each beside the processor",
@@ -55,6 +56,7 @@ _MODULES = {
     "gentle": "wakewise_paper.wash_reduction.bench",
     "models": "wakewise_paper.model_failure.bench",
     "operator": "wakewise_paper.operator_study.bench",
+    "photographs": "wakewise_benchmarks.large_photos",
     "target": "wakewise_benchmarks.target_finding",
     "worlds": "wakewise_paper.world_study.bench",
 }

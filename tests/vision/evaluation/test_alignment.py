@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.geometry import matrix_from_quat, quat_from_rotvec
 from wakewise.vision.evaluation import refine_icp, robust_similarity, umeyama
+from wakewise.vision.evaluation.alignment import nearest_m, neighbour_tree
 
 
 def rotation(*rotvec):
@@ -166,3 +168,15 @@ def test_icp_that_fits_no_better_moves_nothing(monkeypatch, back, accepted):
     assert found.accepted is accepted
     np.testing.assert_allclose(found.apply(cloud), cloud + (back * shift if accepted else 0.0), atol=1e-12)
     assert found.displacement_mm == pytest.approx(1.0 if accepted else 0.0)
+
+
+def test_one_tree_gives_exact_distances_and_normals_for_the_residual():
+    """Distances are SciPy's bit by bit, and without normals the residual is that along the plane through neighbours."""
+    rng = np.random.default_rng(0)
+    surface, normals = bumpy(4000, rng)
+    cloud = bumpy(2000, rng)[0] + np.array([0.001, 0.0, 0.0])
+    tree = neighbour_tree(surface)
+    np.testing.assert_array_equal(nearest_m(tree, surface, cloud), cKDTree(surface).query(cloud)[0])
+    known, without = (refine_icp(cloud, surface, given, tree=tree) for given in (normals, None))
+    assert without.residual_mm == pytest.approx(known.residual_mm, rel=0.2, abs=0.05)
+    np.testing.assert_array_equal(known.R, without.R)

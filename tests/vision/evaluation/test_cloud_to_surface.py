@@ -2,6 +2,7 @@
 
 import dataclasses
 import os
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,13 +14,14 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.vision.evaluation import (
     SURFACE_DEFINITIONS,
     Crop,
+    ScaleError,
     SurfaceScore,
+    check_extent,
     compare_surface,
     count_views,
     error_colours,
     evaluate_surface,
     sample_surface,
-    suspicious_scale,
     voxel_downsample,
 )
 
@@ -160,8 +162,8 @@ def test_a_reference_in_other_units_is_told(factor):
     """Millimetres or inches taken for metres end as one line with both extents; a factor of three does not."""
     cloud = shell(2000, RADIUS, np.random.default_rng(0))
     other = ball(factor * RADIUS)
-    assert suspicious_scale(cloud, ball(3 * RADIUS)) is None
-    with pytest.raises(StageError, match="suspicious scale") as caught:
+    check_extent(cloud, ball(3 * RADIUS).vertices_m)
+    with pytest.raises(ScaleError, match="suspicious scale") as caught:
         evaluate_surface(cloud, other)
     assert "metres" in str(caught.value) and "\n" not in str(caught.value)
 
@@ -171,8 +173,8 @@ def test_a_scale_is_suspicious_beyond_a_factor_of_twenty(factor, told):
     """Of the whole extent, which is told from the middle nine tenths so that stray points do not count."""
     line = np.linspace(-RADIUS, RADIUS, 1001)[:, None] * np.ones(3) / np.sqrt(3.0)
     stray = np.array([[9.0, 9.0, 9.0]])
-    truth = SimpleNamespace(vertices_m=line, faces=np.array([[0, 1, 2]]))
-    assert (suspicious_scale(np.concatenate([factor * line, stray]), truth) is not None) == told
+    with pytest.raises(ScaleError) if told else nullcontext():
+        check_extent(np.concatenate([factor * line, stray]), line)
 
 
 def test_each_point_has_its_error_and_its_colour():

@@ -11,8 +11,10 @@ die: every task that a dying worker *has been assigned* is suspected, and after 
 from __future__ import annotations
 
 import gc
+import math
 import os
 import platform
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -117,8 +119,9 @@ SETTINGS = {
     "distributed.logging": {"distributed": "critical", "distributed.nanny": "critical"},
 }
 """Of the cluster that is made here; docs/campaigns.md says how one is started elsewhere."""
-CONNECT_S, WORKERS_S = 10.0, 60.0
-"""How long a scheduler may take to answer, and to have its first worker."""
+CONNECT_S, WORKERS_S, SIZE_S = 10.0, 60.0, 1.0
+"""How long a scheduler may take to answer, and to have its first worker; how long its number of workers is believed, as
+it tells of every one."""
 
 
 @dataclass(frozen=True)
@@ -155,10 +158,16 @@ class DaskExecutor:
             each = min(threads_each(there, on_host[host]) for host, there, _ in told)
             executor = client.get_executor(retries=0, pure=False)
 
+            asked, known_size = -math.inf, 1
+
             def size() -> int:
+                nonlocal asked, known_size
+                if time.monotonic() - asked < SIZE_S:
+                    return known_size
                 known = client.scheduler_info(n_workers=-1).get("workers", {}).values()  # {} where it went away
                 there = sum(int(worker["nthreads"]) for worker in known)
-                return max(1, min(there, self.workers or there))
+                asked, known_size = time.monotonic(), max(1, min(there, self.workers or there))
+                return known_size
 
             def check() -> None:
                 if client.status != "running":

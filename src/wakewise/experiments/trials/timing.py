@@ -23,7 +23,7 @@ class BenchOptions:
     switched one by one, None for none; `models`, seeds from 1 for which a scan and its model are made; `judge`, seeds
     that are flown in the lattice as well; `bound`, seeds whose optimum is worked out; `fresh` flies anew what is known;
     `workers` side by side; `store` keeps flights, the user's cache folder if None. `only`: parts of a bench by name,
-    None for all.
+    None for all. `photographs`: numbers of photographs of which models are made, each at least 3.
     """
 
     data: Path | None = None
@@ -41,6 +41,7 @@ class BenchOptions:
     workers: int = 2
     store: Path | None = None
     only: tuple[str, ...] | None = None
+    photographs: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         for name, value, most in (("seeds", self.seeds, 1000), ("workers", self.workers, 64)):
@@ -49,6 +50,9 @@ class BenchOptions:
         for name, value in (("models", self.models), ("judge", self.judge), ("bound", self.bound)):
             if not 0 <= value <= 1000:
                 raise InputError(f"{name}: {value}, allowed 0 to 1000")
+        for count in self.photographs or ():
+            if not 3 <= count <= 5000:
+                raise InputError(f"photographs: {count}, allowed 3 to 5000")
 
 
 def timed_us(work: Callable[[], Any], repeats: int) -> dict[str, float]:

@@ -11,7 +11,7 @@ from wakewise.core.arrays import Array, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.jit.njit import njit, prange
 
-_LEAF = 4
+_LEAF = 8
 
 
 @njit(inline="always")

@@ -148,6 +148,10 @@ def evaluate(
                 cloud, points, reference, cameras, bed_z, unit_m, thresholds, not no_icp
             )
         except StageError as fault:
+            from wakewise.vision.evaluation import ScaleError
+
+            if isinstance(fault, ScaleError):
+                raise InputError(f"{fault} (--unit-m)") from None
             hint = "; if the model holds the bed that the object stands on, say where: --bed-z" if bed_z is None else ""
             raise StageError(f"{fault}{hint}") from None
         if colours is not None:
@@ -272,9 +276,7 @@ def _against_reference(
         extent_m,
         mesh_faults,
         read_thresholds,
-        suspicious_scale,
     )
-    from wakewise.vision.evaluation.cloud_to_surface import suspicious_extent
     from wakewise.vision.reconstruction import read_cloud, read_reference_cameras
 
     mesh = None
@@ -287,17 +289,12 @@ def _against_reference(
         if cameras is not None:
             raise InputError(f"--cameras: what they saw of {reference} is not known, it has no faces")
         truth = unit_m * read_cloud(reference).points_m
-        if (words := suspicious_extent(points, truth)) is not None:
-            raise InputError(f"{words} (--unit-m)")
         wanted = read_thresholds(thresholds, 1e3 * extent_m(truth))
         found = compare_clouds(points, truth, wanted, bed_z_m=bed_z, icp=icp)
         figures = dataclasses.asdict(found.score) | {"shares": [dataclasses.asdict(one) for one in found.shares]}
         return figures, CLOUD_DEFINITIONS, found.points_W_m, found.error_mm
     if unit_m != 1.0:
         mesh = dataclasses.replace(mesh, vertices_m=unit_m * mesh.vertices_m)
-    suspicion = suspicious_scale(points, mesh)
-    if suspicion is not None:
-        raise InputError(f"{suspicion} (--unit-m)")
     centres = np.array(list(read_reference_cameras(cameras).values())) if cameras else None
     extent_mm = 1e3 * extent_m(mesh.vertices_m)
     wanted = read_thresholds(thresholds, extent_mm)

@@ -19,10 +19,12 @@ if TYPE_CHECKING:
     from wakewise.vision.evaluation.cloud_to_surface import (
         Crop,
         MeshFaults,
+        ScaleError,
         SurfaceComparison,
         SurfaceSamples,
         SurfaceScore,
         ThresholdScore,
+        check_extent,
         compare_surface,
         count_views,
         error_colours,
@@ -31,7 +33,6 @@ if TYPE_CHECKING:
         read_thresholds,
         sample_surface,
         shares,
-        suspicious_scale,
         voxel_downsample,
     )
     from wakewise.vision.evaluation.definitions import MESH_REFERENCE as MESH_REFERENCE_DEFINITIONS
@@ -67,6 +68,7 @@ __all__ = [
     "GaussianSplats",
     "IcpRefinement",
     "MeshFaults",
+    "ScaleError",
     "Similarity",
     "SurfaceComparison",
     "SurfaceSamples",
@@ -74,6 +76,7 @@ __all__ = [
     "ThresholdScore",
     "ViewScores",
     "attitude_rmse_deg",
+    "check_extent",
     "compare_clouds",
     "compare_depths",
     "compare_surface",
@@ -93,7 +96,6 @@ __all__ = [
     "sample_surface",
     "score_views",
     "shares",
-    "suspicious_scale",
     "umeyama",
     "voxel_downsample",
 ]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.spatial import KDTree
 
-from wakewise.core.arrays import Array, BoolArray, freeze
+from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.optional_dependencies import need
 
@@ -110,8 +111,26 @@ def _near(similarity: Similarity, points_B: Array, points_A: Array) -> BoolArray
     return np.asarray(error <= max(_CHI3_999 * float(np.median(error)) / _CHI3_MEDIAN, floor))
 
 
-SPACED = 500
-"""Samples of the truth by which their spacing is judged."""
+SPACED, ICP_NEIGHBOURS, NORMAL_NEIGHBOURS = 500, 10, 20
+"""Samples of the truth by which their spacing is judged; neighbours through which ICP lays its planes, and those of the
+residual where no normals are known."""
+THREADS = os.cpu_count() or 1
+
+
+def neighbour_tree(points_m: Array) -> Any:
+    """Tree of small_gicp over points, shape (n, 3), for `nearest_m` and `refine_icp`."""
+    need("distances between clouds", "photos", only=("small_gicp",))
+    import small_gicp
+
+    return small_gicp.KdTree(np.asarray(points_m, dtype=np.float64), num_threads=THREADS)
+
+
+def nearest_m(tree: Any, points_m: Array, from_m: Array) -> Array:
+    """Distance in m from each of `from_m`, shape (k, 3), to the nearest of the tree's points, shape (n, 3)."""
+    rows = np.asarray(tree.batch_knn_search(from_m, 1, num_threads=THREADS)[0])[:, 0].astype(np.int64)
+    # The tree's own squares are summed in another order, and so differ in the last bit.
+    off = (from_m - points_m[rows]) ** 2
+    return np.asarray(np.sqrt(off[:, 0] + off[:, 1] + off[:, 2]))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -138,14 +157,23 @@ class IcpRefinement:
         return np.asarray(points_m) @ self.R.T + self.t_m
 
 
+def _plane_normals(tree: Any, points_m: Array, at: IntArray) -> Array:
+    """Normals of planes through the neighbours of some of the tree's points, shape (k,) to (k, 3)."""
+    rows, back = np.unique(at, return_inverse=True)
+    near = tree.batch_knn_search(points_m[rows], NORMAL_NEIGHBOURS, num_threads=THREADS)[0].astype(np.int64)
+    off = points_m[near] - points_m[near].mean(axis=1, keepdims=True)
+    return np.asarray(np.linalg.eigh(np.einsum("nki,nkj->nij", off, off))[1][back, :, 0])
+
+
 def refine_icp(
     cloud_m: Array,
     surface_m: Array,
-    normals: Array,
+    normals: Array | None = None,
     distances_m: tuple[float, ...] = (0.008, 0.004),
     voxel_m: float = 0.002,
     limit_m: float = 0.02,
     least_matched_pct: float = 50.0,
+    tree: Any = None,
 ) -> IcpRefinement:
     """Rigid point-to-plane ICP of a cloud onto samples of the true surface, coarse to fine.
 
@@ -153,24 +181,24 @@ def refine_icp(
     10(3), 1992, doi 10.1016/0262-8856(92)90066-C. Scale is left alone: a model of the wrong size must stay wrong.
 
     `cloud_m` has shape (n, 3). `surface_m`, `normals`, shape (k, 3): samples of the true surface and their unit
-    normals. `distances_m`: largest distance of a match in each round; more where samples lie farther apart than half of
-    the last. `limit_m`: largest mean displacement that counts
-    as a refinement. `least_matched_pct`: share of the cloud that must lie within the last distance in the end. Raises
-    StageError if too few points match or the cloud would move farther than `limit_m`: the alignment before it was
-    wrong, or this is no model of that surface.
+    normals, which the residual is along; those of planes through neighbours if not given. `distances_m`: largest
+    distance of a match in each round; more where samples lie farther apart than half of the last. `limit_m`: largest
+    mean displacement that counts as a refinement. `least_matched_pct`: share of the cloud that must lie within the last
+    distance in the end. `tree`: `neighbour_tree` of the samples, where it is there already. Raises StageError if too
+    few points match or the cloud would move farther than `limit_m`: the alignment before it was wrong, or this is no
+    model of that surface.
     """
     need("registration (ICP)", "photos", only=("small_gicp",))
     import small_gicp
 
-    some = np.asarray(surface_m)[:: max(1, len(surface_m) // SPACED)]
-    spacing_m = float(np.median(np.asarray(KDTree(surface_m).query(some, k=2)[0])[:, 1]))
+    target = small_gicp.PointCloud(np.asarray(surface_m, dtype=np.float64))
+    tree = neighbour_tree(surface_m) if tree is None else tree
+    some = np.asarray(surface_m, dtype=np.float64)[:: max(1, len(surface_m) // SPACED)]
+    spacing_m = float(np.median(np.sqrt(tree.batch_knn_search(some, 2)[1][:, 1])))
     wider = max(1.0, 2.0 * spacing_m / distances_m[-1])
     distances_m = tuple(wider * distance for distance in distances_m)
-    target = small_gicp.PointCloud(np.asarray(surface_m, dtype=np.float64))
-    # Estimating makes room for normals; the true ones then take their place.
-    small_gicp.estimate_normals(target, num_neighbors=10, num_threads=2)
-    target.normals()[:, :3] = normals
-    tree = small_gicp.KdTree(target, num_threads=1)
+    # small_gicp takes no normals from outside: `normals()` is a copy.
+    small_gicp.estimate_normals(target, tree, num_neighbors=ICP_NEIGHBOURS, num_threads=THREADS)
     source = small_gicp.voxelgrid_sampling(np.asarray(cloud_m, dtype=np.float64), voxel_m, num_threads=1)
     if source.size() < 50:
         raise StageError(f"ICP: {source.size()} points after thinning to {voxel_m * 1e3:g} mm, needs at least 50")
@@ -207,7 +235,8 @@ def refine_icp(
     if not accepted:
         T, moved, displacement, index, squared = np.eye(4), points, 0.0, before_index, before
     turn = float(np.degrees(np.arccos(np.clip((np.trace(T[:3, :3]) - 1) / 2, -1, 1))))
-    offset = np.einsum("ij,ij->i", moved - np.asarray(surface_m)[index], np.asarray(normals)[index])
+    across = _plane_normals(tree, surface_m, index) if normals is None else np.asarray(normals)[index]
+    offset = np.einsum("ij,ij->i", moved - np.asarray(surface_m)[index], across)
     near = np.asarray(squared) < distances_m[-1] ** 2
     matched_pct = 100.0 * float(near.mean())
     if matched_pct < least_matched_pct:

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
+from scipy.spatial import cKDTree
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError, StageError
-from wakewise.vision.evaluation.alignment import IcpRefinement, refine_icp
+from wakewise.vision.evaluation.alignment import nearest_m, neighbour_tree, refine_icp
 from wakewise.vision.evaluation.cloud_to_surface import (
     Crop,
     ThresholdScore,
+    check_extent,
     shares,
-    suspicious_extent,
     voxel_downsample,
 )
 from wakewise.vision.evaluation.definitions import DTU, TANKS_AND_TEMPLES
@@ -25,7 +25,6 @@ ICP_SHARES, ICP_LIMIT, ICP_CELL = (0.04, 0.02), 0.1, 0.005
 defaults of `refine_icp` are to a coral of 0.2 m."""
 MARGIN, MOST_CLEARANCE = 0.1, 0.05
 """Growth of the reference's box, and most that is left out above the bed, in the same."""
-NORMAL_NEIGHBOURS = 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,15 +105,15 @@ def compare_clouds(
     near it, its scale is suspicious, or ICP fails.
     """
     whole = extent_m(reference_W_m)
-    suspicion = suspicious_extent(cloud_W_m, reference_W_m)
-    if suspicion is not None:
-        raise StageError(suspicion)
+    check_extent(cloud_W_m, reference_W_m)
     crop = Crop(bed_z_m=bed_z_m, clearance_m=min(0.010, MOST_CLEARANCE * whole), margin_m=MARGIN * whole)
     truth = np.asarray(reference_W_m, dtype=np.float64)
     truth = truth[crop.above_bed(truth)]
     if len(truth) < LEAST_POINTS:
         raise InputError(f"reference cloud: {len(truth)} of its points count, needs at least {LEAST_POINTS}")
-    spacing = float(np.median(np.asarray(KDTree(truth).query(_some(truth), k=2)[0])[:, 1]))
+    # For few questions a tree that is fast to build.
+    quick = cKDTree(truth, leafsize=32, balanced_tree=False, compact_nodes=False)
+    spacing = float(np.median(np.asarray(quick.query(_some(truth), k=2)[0])[:, 1]))
     cell = max(0.5e-3 * min(thresholds_mm), spacing)
     even_truth = voxel_downsample(truth, cell)
     low, high = truth.min(axis=0), truth.max(axis=0)
@@ -122,13 +121,18 @@ def compare_clouds(
     kept = cloud[crop.keeps(cloud, low, high)]
     if len(kept) < LEAST_POINTS:
         raise StageError(f"model: {len(kept)} of its {len(cloud)} points lie about the truth, needs at least 100")
-    refinement = _refined(kept, even_truth, whole) if icp else None
-    if refinement is not None:
+    tree = neighbour_tree(even_truth)
+    refinement = None
+    if icp:  # onto planes through the neighbours of the reference's points
+        reaches, cell_m, limit_m = [share * whole for share in ICP_SHARES], ICP_CELL * whole, ICP_LIMIT * whole
+        refinement = refine_icp(
+            kept, even_truth, distances_m=tuple(reaches), voxel_m=cell_m, limit_m=limit_m, tree=tree
+        )
         moved = refinement.apply(cloud)
         kept = moved[crop.keeps(moved, low, high)]
     even = voxel_downsample(kept, cell)
-    to_truth = 1e3 * np.asarray(KDTree(even_truth).query(even, workers=-1)[0])
-    to_model = 1e3 * np.asarray(KDTree(even).query(even_truth, workers=-1)[0])
+    to_truth = 1e3 * nearest_m(tree, even_truth, even)
+    to_model = 1e3 * nearest_m(neighbour_tree(even), even, even_truth)
     score = CloudScore(
         accuracy_mean_mm=float(to_truth.mean()),
         accuracy_median_mm=float(np.median(to_truth)),
@@ -146,19 +150,6 @@ def compare_clouds(
     )
     found = shares(to_truth, to_model, thresholds_mm)
     return CloudComparison(score=score, shares=found, points_W_m=even, error_mm=to_truth)
-
-
-def _refined(kept: Array, truth: Array, whole_m: float) -> IcpRefinement:
-    """ICP with reaches that suit the reference's size, onto planes through the neighbours of its points."""
-    import small_gicp
-
-    target = small_gicp.PointCloud(truth)
-    small_gicp.estimate_normals(target, num_neighbors=NORMAL_NEIGHBOURS, num_threads=2)
-    normals = np.array(target.normals())[:, :3]
-    first, last = (share * whole_m for share in ICP_SHARES)
-    return refine_icp(
-        kept, truth, normals, distances_m=(first, last), voxel_m=ICP_CELL * whole_m, limit_m=ICP_LIMIT * whole_m
-    )
 
 
 def _some(points: Array, most: int = 5000) -> Array:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.spatial import KDTree
+from scipy.spatial import cKDTree
 
 from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.core.checks import boolean
@@ -276,9 +276,7 @@ def compare_surface(
     belong together.
     """
     icp = boolean(icp, "icp")
-    suspicion = suspicious_scale(cloud_W_m, mesh)
-    if suspicion is not None:
-        raise StageError(suspicion)
+    check_extent(cloud_W_m, np.asarray(mesh.vertices_m))
     crop = crop or Crop()
     rng = rng or np.random.default_rng(0)
     surface = sample_surface(mesh, crop, rng, samples)
@@ -295,7 +293,7 @@ def compare_surface(
     even = voxel_downsample(kept, voxel_m)
     distance = distance or MeshDistance(mesh.vertices_m, mesh.faces)
     to_truth_mm = 1e3 * distance(even)
-    to_cloud_mm = 1e3 * np.asarray(KDTree(even).query(surface.points_m, workers=-1)[0])
+    to_cloud_mm = 1e3 * _to_cloud_m(surface.points_m, even)
     seen = None
     if camera_centres_W_m is not None:
         seen = count_views(surface, mesh, camera_centres_W_m, enough=visible_views) >= visible_views
@@ -332,35 +330,39 @@ def compare_surface(
         fine, near = to_truth_mm, to_cloud_mm
         if 0.5e-3 * min(thresholds_mm) < voxel_m:
             finer = voxel_downsample(kept, 0.5e-3 * min(thresholds_mm))
-            fine, near = 1e3 * distance(finer), 1e3 * np.asarray(KDTree(finer).query(surface.points_m, workers=-1)[0])
+            fine, near = 1e3 * distance(finer), 1e3 * _to_cloud_m(surface.points_m, finer)
         found = shares(fine, near, thresholds_mm)
     return SurfaceComparison(score=score, points_W_m=even, error_mm=to_truth_mm, shares=found)
 
 
-def suspicious_scale(cloud_m: Array, mesh: MeshArrays) -> str | None:
-    """A sentence if cloud and mesh differ so much in extent that one of them is hardly in metres; else None.
+def _to_cloud_m(points_m: Array, cloud_m: Array) -> Array:
+    """Distance of few points, shape (n, 3), to the nearest of many, shape (k, 3)."""
+    tree = cKDTree(cloud_m, leafsize=32, balanced_tree=False, compact_nodes=False)  # fast to build
+    return np.asarray(tree.query(points_m, workers=-1)[0])
+
+
+class ScaleError(StageError):
+    """Two things that differ so much in extent that one of them is hardly in metres."""
+
+
+def check_extent(cloud_m: Array, truth_m: Array) -> None:
+    """Check that cloud, shape (n, 3), and truth, shape (k, 3), do not differ so much that one is hardly in metres.
 
     A cloud may hold more than the truth or a part of it only, so that a factor of ten either way proves nothing.
+    Raises ScaleError.
     """
-    return suspicious_extent(cloud_m, np.asarray(mesh.vertices_m))
-
-
-def suspicious_extent(cloud_m: Array, truth_m: Array) -> str | None:
-    """The same of a truth that is points, shape (n, 3)."""
     cloud = np.asarray(cloud_m, dtype=np.float64).reshape(-1, 3)
     if len(cloud) < 2 or len(truth_m) == 0:
-        return None
+        return
     # The middle nine tenths: a stray point must not enlarge the cloud.
     low, high = np.percentile(cloud, (5.0, 95.0), axis=0)
     extent = float(np.linalg.norm(high - low)) / 0.9
     length = float(np.linalg.norm(np.ptp(truth_m, axis=0)))
-    if extent <= 0.0 or length <= 0.0 or 1.0 / MAX_SCALE_RATIO < extent / length < MAX_SCALE_RATIO:
-        return None
-    ratio = extent / length
-    return (
-        f"reference: {length:.3g} m across while the cloud is {extent:.3g} m, a suspicious scale (ratio {ratio:.3g}); "
-        "are both in metres?"
-    )
+    if extent > 0.0 and length > 0.0 and not 1.0 / MAX_SCALE_RATIO < extent / length < MAX_SCALE_RATIO:
+        raise ScaleError(
+            f"reference: {length:.3g} m across while the cloud is {extent:.3g} m, a suspicious scale (ratio "
+            f"{extent / length:.3g}); are both in metres?"
+        )
 
 
 def error_colours(error_mm: Array, top_mm: float = 3.0) -> Array:
@@ -430,12 +432,19 @@ class MeshFaults:
 
 def mesh_faults(mesh: MeshArrays) -> MeshFaults:
     """Count the faults of a mesh."""
-    _, number = np.unique(np.asarray(mesh.vertices_m), axis=0, return_inverse=True)
-    faces = np.sort(number.reshape(-1)[np.asarray(mesh.faces)], axis=1)
-    flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2])
-    once = np.unique(faces[~flat], axis=0)
-    edges = np.concatenate([once[:, [0, 1]], once[:, [1, 2]], once[:, [0, 2]]])
-    count = np.unique(edges, axis=0, return_counts=True)[1] if len(edges) else np.zeros(0, dtype=np.int64)
+    vertices = np.asarray(mesh.vertices_m)
+    order = np.lexsort(vertices.T)
+    new = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
+    number = np.empty(len(vertices), dtype=np.int64)
+    number[order] = np.concatenate([[0], np.cumsum(new)])
+    a, b, c = np.sort(number[np.asarray(mesh.faces)], axis=1).T
+    flat = (a == b) | (b == c)
+    # One whole number for each pair of corners, and one for a pair and a corner: sorted far faster than rows.
+    n = len(vertices)
+    _, pair = np.unique((a * n + b)[~flat], return_inverse=True)
+    _, once = np.unique(pair * n + c[~flat], return_index=True)
+    a, b, c = (corner[~flat][once] for corner in (a, b, c))
+    count = np.unique(np.concatenate([a * n + b, b * n + c, a * n + c]), return_counts=True)[1]
     return MeshFaults(
         duplicate_faces=int((~flat).sum()) - len(once),
         crowded_edges=int((count > 2).sum()),

@@ -164,7 +164,6 @@ class _Rough:
         self._some = np.concatenate([B.points_m[row[:: max(1, len(row) // ROUGH_POINTS)]] for row in rows])
         self._target = small_gicp.PointCloud(np.asarray(A.points_m))
         small_gicp.estimate_normals(self._target, num_neighbors=10, num_threads=1)
-        self._target.normals()[:, :3] = A.normals
         self._search = small_gicp.KdTree(self._target, num_threads=1)
 
     def fit(self, start: Similarity, shares: tuple[float, ...]) -> Similarity:

@@ -118,8 +118,9 @@ T = TypeVar("T")
 FEW_FEATURES = 150
 FISHEYE_FOCAL = 0.4
 """Where a fisheye's focal length is unknown: this much of the longer side, which is 180 deg across a 4:3 diagonal."""
-BYTES_PER_PX, ROOM_BYTES = 60.0, 6e9
-"""What the scales of a photo take for each of its pixels (43 to 54 measured), and those of all threads in all."""
+BYTES_PER_PX, BYTES_DECODED, ROOM_BYTES = 72.0, 4.0, 6e9
+"""What the scales of a photo take for each pixel that is looked at (71 measured), what the photo itself takes for each
+of its pixels, and the room of all threads."""
 EXTRACTION_BATCHES, MATCHING_BATCHES, LEAST_PAIRS = 12, 8, 120
 """Parts that the work is done in, for progress; descriptors are indexed anew in each, so few pairs are few parts."""
 
@@ -234,7 +235,9 @@ def _extract(
 def threads_for(settings: ReconstructionSettings, width: int, height: int) -> int:
     """Threads of feature extraction for photos of this size, within `ROOM_BYTES` of memory."""
     doubled = 4 if settings.first_octave == -1 else 1
-    return max(1, min(settings.threads, int(ROOM_BYTES / (BYTES_PER_PX * doubled * width * height))))
+    shrink = min(1.0, MAX_DOUBLED_PX / max(width, height))  # COLMAP looks at no larger ones either
+    each = (BYTES_PER_PX * doubled * shrink**2 + BYTES_DECODED) * width * height
+    return max(1, min(settings.threads, int(ROOM_BYTES / each)))
 
 
 def _by_opencv(
