@@ -331,7 +331,7 @@ def by_hand(sea: SurveySea, start_W_m: Array, heading_rad: float, seed: int, len
     return wash
 
 
-def by_survey(sea: SurveySea, seed: int, length_m: float = LINE_M) -> BedWash:
+def by_survey(sea: SurveySea, seed: int, length_m: float = LINE_M, *, allocates: bool = False) -> BedWash:
     """`wakewise link transect` flies one line; raises WakewiseError where it is not flown to its end."""
     from wakewise.core.errors import WakewiseError
     from wakewise_ardusub.physics.surface import FreeWater
@@ -345,6 +345,7 @@ def by_survey(sea: SurveySea, seed: int, length_m: float = LINE_M) -> BedWash:
         seed=seed,
         heading_rad=sea.heading_rad,
         depth_m=DEPTH_M,
+        allocates=allocates,
     )
     found: list[BedWash] = []
     body = harness.flight.body
