@@ -89,7 +89,7 @@ class SurveyHarness:
             sensors=self.sensors,
             firmware=firmware,
         )
-        self._allocates = allocates
+        self.allocates = allocates
         self.options = options or TransectOptions()
         self.receive_blocked = self.send_blocked = self.stopped = False
         """Faults: nothing reaches it, nothing of it reaches others, its program has died."""
@@ -166,7 +166,7 @@ class SurveyHarness:
         self.flight.run(0.3)
         self.flight.arm(True)
         self.flight.set_mode(ALT_HOLD)
-        if self._allocates:
+        if self.allocates:
             self.flight.set(ENABLE_PARAMETER, 1.0)
         self._run_until(lambda: self.session.state == "ready", 10.0)
         return self
@@ -259,13 +259,17 @@ BY_TIME_OUT = ("nobody hears the program", "the cable is cut", "the program dies
 
 
 def seconds_to_hold(harness: SurveyHarness, fault: Callable[[SurveyHarness], None]) -> float:
-    """Seconds from a fault until no target moves the vehicle: another mode, disarmed, or the target lapsed."""
+    """Seconds from a fault until no target moves the vehicle: another mode, disarmed, or the target lapsed.
+
+    Of allocated thrusts: until the script drives no output.
+    """
     autopilot, began_s = harness.flight.autopilot, harness.flight.now_s
     fault(harness)
     while harness.flight.now_s - began_s < 2.0 * LAPSE_S:
         target = autopilot.target
-        still = target is None or not (math.hypot(*target.velocity_W_m_s) > 0.0 and target.lapses)
-        if autopilot.mode != GUIDED or not autopilot.armed or still:
+        moves = target is not None and math.hypot(*target.velocity_W_m_s) > 0.0 and target.lapses
+        guided = autopilot.mode == GUIDED and autopilot.armed and moves
+        if not (autopilot.overridden if harness.allocates else guided):
             return harness.flight.now_s - began_s
         harness.flight.run(0.02)
     return math.inf

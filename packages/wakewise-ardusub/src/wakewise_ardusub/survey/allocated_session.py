@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import Vehicle
 from wakewise_ardusub.link.engagement_fsm import EngagementLimits
 from wakewise_ardusub.link.message_state import LinkState, MavlinkMessage
@@ -36,6 +37,9 @@ from wakewise_ardusub.survey.transect_session import (
 
 RELEASED_S = 0.5
 """How long the script may take to say that no thrust acts any more, before POSHOLD is requested all the same."""
+BANDWIDTH_RAD_S = 0.5
+"""Of the depth target: at 1 rad/s it follows the rangefinder's noise, and the bed is blown at half as hard again."""
+HEAVY_N = 0.5
 DEEPEST_M = 300.0
 TILT_RAD = math.radians(30.0)
 _NOT_ENABLED = 1
@@ -58,8 +62,6 @@ class AllocatedTransectSession(TransectSession):
     ------
     InputError
         If the vehicle has more thrusters than the script drives, or no stable gains.
-    StageError
-        If this computer is too slow for the controller.
     """
 
     def __init__(
@@ -95,15 +97,20 @@ class AllocatedTransectSession(TransectSession):
             clock=clock,
         )
         self._controller = SurveyController(vehicle)
-        self.step_s = self._controller.rehearse()
         self._looped_s = -math.inf
         self._heading_rad = 0.0
+        self.weight_N: float | None = None
         self.gate.begin()
+
+    def rehearse(self) -> None:
+        """Compile the controller; raises StageError if this computer is too slow for it."""
+        self._write("rehearsed", step_ms=1e3 * self._controller.rehearse())
 
     def tick(self) -> None:
         """Judge, and send what is due; to be called at 20 Hz or more."""
         now_s = self._clock()
-        if self._place is not None and now_s - self._looped_s >= PERIOD_S - 1e-3:
+        heard = self._place is not None and math.isfinite(sum(self.known.attitude))
+        if heard and now_s - self._looped_s >= PERIOD_S - 1e-3:
             self._looped_s = now_s
             self.gate.estimated(self._state_now(now_s))
         super().tick()
@@ -122,6 +129,30 @@ class AllocatedTransectSession(TransectSession):
         self._settle(now_s)
         return "begun"
 
+    def _settle(self, now_s: float) -> None:
+        super()._settle(now_s)
+        if self._depth is not None:
+            self._depth = replace(self._depth, bandwidth_rad_s=BANDWIDTH_RAD_S)
+
+    def _begin(self, now_s: float) -> None:
+        """The plan, and a warning of the weight that vertical thrusters held while it settled."""
+        super()._begin(now_s)
+        self.weight_N = self._controller.weight_N
+        if self.weight_N > HEAVY_N:
+            heavy = f"the vehicle weighs {self.weight_N:.1f} N in water, and lifting it blows at the bed: add buoyancy"
+            self.warning = "; ".join(filter(None, (self.warning, heavy)))
+        self._write("weight", weight_N=self.weight_N, warning=self.warning)
+
+    def line(self) -> str:
+        """One line of how it stands."""
+        if self.state != "ready":
+            return super().line()
+        return f"ready  {'; '.join(filter(None, (self.ended_by, 'Enter begins, the vehicle stays in ALT_HOLD')))}"
+
+    def figures(self) -> dict[str, Any]:
+        """As of `TransectSession`, with the weight in water."""
+        return {**super().figures(), "weight_N": self.weight_N}
+
     def _consented_by_mode(self, _now_s: float) -> bool:
         return False
 
@@ -138,7 +169,7 @@ class AllocatedTransectSession(TransectSession):
             return "the script is not enabled; the pilot sets WKW_ENABLE to 1"
         return lacks or ("" if gate.engagement.state == "ready" else gate.engagement.why)
 
-    def _state_now(self, now_s: float) -> Any:
+    def _state_now(self, now_s: float) -> BodyState:
         assert self._place is not None  # nobody asks before a position was heard
         place, velocity = self._place
         return state_of_filter(
