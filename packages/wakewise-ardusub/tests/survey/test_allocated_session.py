@@ -113,14 +113,21 @@ def test_no_thrust_acts_before_consent() -> None:
 
 
 def test_only_alt_hold_is_flown_in() -> None:
-    """Ready in ALT_HOLD alone: MANUAL and POSHOLD are refused with the reason."""
+    """Modes that hold a place are refused with the reason; from MANUAL it asks for ALT_HOLD on consent."""
     survey = harness().ready()
-    for mode, name in ((MANUAL, "MANUAL"), (POSHOLD, "POSHOLD")):
+    for mode, name in ((GUIDED, "GUIDED"), (POSHOLD, "POSHOLD")):
         survey.flight.set_mode(mode)
         survey.flight.run(2.0)
         assert survey.session.state == "waiting"
         assert survey.session.why == f"mode {name}, allowed are ALT_HOLD"
         assert survey.session.consent().startswith("not begun: ")
+    survey.flight.set_mode(MANUAL)
+    survey.flight.run(3.0)
+    assert survey.session.state == "ready"
+    assert survey.session.consent() == "ALT_HOLD requested"
+    survey.flight.run(1.0)
+    assert (survey.session.state, survey.flight.autopilot.mode) == ("settling", ALT_HOLD)
+    assert survey.flight.autopilot.overridden
 
 
 def test_an_allocated_survey_pauses_and_goes_on() -> None:

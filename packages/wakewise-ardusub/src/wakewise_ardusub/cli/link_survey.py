@@ -16,8 +16,8 @@ from wakewise.ui.cli.console import end_status_line, format_value, print_json, s
 
 if TYPE_CHECKING:
     from wakewise_ardusub.link.transports import MavlinkCodec
-    from wakewise_ardusub.survey.survey_plan import SurveyPace
-    from wakewise_ardusub.survey.transect_session import MakeLines, TransectSession
+    from wakewise_ardusub.survey.survey_plan import MakeLines, SurveyPace
+    from wakewise_ardusub.survey.transect_session import TransectSession
 
 DEFAULT_CONNECTION, DEFAULT_VEHICLE = "udpin:127.0.0.1:14560", "bluerov2-heavy"
 LOOP_S, LINE_S, LINE_PIPED_S, ENDS_S = 0.02, 0.2, 5.0, 3.0

@@ -12,7 +12,7 @@ from wakewise.ui.cli.options import Json
 from wakewise_ardusub.cli import link_survey
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.survey.transect_session import MakeLines
+    from wakewise_ardusub.survey.survey_plan import MakeLines
 
 
 def transect(

@@ -28,8 +28,8 @@ from wakewise_ardusub.sitl.inprocess_session import InProcessSession, MavlinkSen
 from wakewise_ardusub.sitl.modes import GUIDED
 from wakewise_ardusub.sitl.sea_sensors import Relief, SeaSensors, SensorErrors
 from wakewise_ardusub.survey.allocated_session import AllocatedTransectSession
-from wakewise_ardusub.survey.survey_plan import parallel_lines
-from wakewise_ardusub.survey.transect_session import PERIOD_S, MakeLines, TransectOptions, TransectSession
+from wakewise_ardusub.survey.survey_plan import MakeLines, parallel_lines
+from wakewise_ardusub.survey.transect_session import PERIOD_S, TransectOptions, TransectSession
 
 TICK_LOOPS = 2
 _OFFSET_S = 1000.0

@@ -1,9 +1,9 @@
 """Session of a survey that allocates thrusts by the script on the autopilot: the same plan, without GUIDED.
 
-The vehicle stays in ALT_HOLD. The operator's consent engages the output gate, and from then on the thrusts of
-`survey_control` act through the script. All that ends a survey by GUIDED targets ends this one as well
-(`survey_safety.fault_of`), and so does every fault of the gate (`engagement_fsm`): the gate releases the motors, the
-script has the autopilot enter ALT_HOLD anew, and then POSHOLD is requested where there is a position.
+On the operator's consent ALT_HOLD is requested where it is not there, and the output gate is engaged. From then on the
+thrusts of `survey_control` act through the script, and the mode stays. All that ends a survey by GUIDED targets ends
+this one as well (`survey_safety.fault_of`), and so does every fault of the gate (`engagement_fsm`): the gate releases
+the motors, the script has the autopilot enter ALT_HOLD anew, and then POSHOLD is requested where there is a position.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ import numpy as np
 
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import Vehicle
-from wakewise_ardusub.link.engagement_fsm import EngagementLimits
+from wakewise_ardusub.link.engagement_fsm import EngagementLimits, faults
 from wakewise_ardusub.link.message_state import LinkState, MavlinkMessage
 from wakewise_ardusub.link.output_gate import OutputGate
-from wakewise_ardusub.link.protocol import ENGAGED_NAME, REASON_NAME, STABILIZE
+from wakewise_ardusub.link.protocol import ENGAGED_NAME, MANUAL, REASON_NAME, STABILIZE
 from wakewise_ardusub.link.session_log import SessionLog
 from wakewise_ardusub.survey.guided_messages import SurveyTarget
 from wakewise_ardusub.survey.survey_control import SurveyController, state_of_filter
+from wakewise_ardusub.survey.survey_plan import MakeLines
 from wakewise_ardusub.survey.survey_safety import ALT_HOLD, SurveyFacts, SurveyLimits
 from wakewise_ardusub.survey.transect_session import (
     ASK_S,
     ASKS_FOR_S,
     ENGAGED,
     PERIOD_S,
-    MakeLines,
     TransectOptions,
     TransectSession,
 )
@@ -120,17 +120,14 @@ class AllocatedTransectSession(TransectSession):
         self.gate.take(said)
         return self.gate.known
 
-    def _take_over(self, now_s: float) -> str:
+    def _engage(self, now_s: float) -> str:
         said = self.gate.press()
-        if self.gate.entry is None:
-            return said
-        self._heading_rad = self.known.attitude[2]
-        self._controller.begin()
-        self._settle(now_s)
-        return "begun"
+        return super()._engage(now_s) if self.gate.entry is not None else said
 
     def _settle(self, now_s: float) -> None:
         super()._settle(now_s)
+        self._heading_rad = self.known.attitude[2]
+        self._controller.begin()
         if self._depth is not None:
             self._depth = replace(self._depth, bandwidth_rad_s=BANDWIDTH_RAD_S)
 
@@ -147,27 +144,34 @@ class AllocatedTransectSession(TransectSession):
         """One line of how it stands."""
         if self.state != "ready":
             return super().line()
-        return f"ready  {'; '.join(filter(None, (self.ended_by, 'Enter begins, the vehicle stays in ALT_HOLD')))}"
+        return f"ready  {'; '.join(filter(None, (self.ended_by, 'Enter begins, in ALT_HOLD')))}"
 
     def figures(self) -> dict[str, Any]:
         """As of `TransectSession`, with the weight in water."""
         return {**super().figures(), "weight_N": self.weight_N}
 
     def _consented_by_mode(self, _now_s: float) -> bool:
-        return False
+        """No mode is consent; but once ALT_HOLD is there that was asked for on consent, the gate is engaged."""
+        there = self.state == "asked" and self.known.mode == ALT_HOLD and self.gate.engagement.state == "ready"
+        return there and self.gate.press() == "engaged"
 
     def _amiss(self, facts: SurveyFacts) -> str:
         """What the survey lacks, which the gate is told; else what the gate found."""
         gate = self.gate
         lacks = gate.survey_fault = super()._amiss(facts)
         if self.state in ENGAGED:
-            return lacks or ("" if gate.entry is not None else gate.engagement.why)
+            return lacks or ("" if gate.entry is not None or self.state == "asked" else gate.engagement.why)
         if self._place is not None:
             gate.target_W_m = self._place[0]
         reason, age_s = self.known.named_value(REASON_NAME, self._clock())
         if not lacks and age_s < gate.limits.script_s and round(reason) == _NOT_ENABLED:
             return "the script is not enabled; the pilot sets WKW_ENABLE to 1"
-        return lacks or ("" if gate.engagement.state == "ready" else gate.engagement.why)
+        asks = self.known.mode in (MANUAL, STABILIZE)  # on consent ALT_HOLD is requested
+        found = faults(gate.facts(), gate.limits, engaged=False)
+        words = [fault.text for fault in found if not (asks and fault.kind == "mode")]
+        if gate.engagement.state == "refused":
+            words.append(gate.engagement.why)
+        return lacks or next(iter(words), "")
 
     def _state_now(self, now_s: float) -> BodyState:
         assert self._place is not None  # nobody asks before a position was heard

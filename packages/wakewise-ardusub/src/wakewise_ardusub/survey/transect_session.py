@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -43,14 +43,15 @@ from wakewise_ardusub.link.protocol import (
     parameter_request,
 )
 from wakewise_ardusub.link.session_log import SessionLog
+from wakewise_ardusub.logs.channels import MODES
 from wakewise_ardusub.survey.bed_following import BedTrack, DepthShaper
 from wakewise_ardusub.survey.guided_messages import SurveyTarget
 from wakewise_ardusub.survey.hold_current import current_of_hold
 from wakewise_ardusub.survey.map_files import GeoAnchor
 from wakewise_ardusub.survey.survey_figures import SurveyRow, errors_of
 from wakewise_ardusub.survey.survey_plan import (
+    MakeLines,
     PlanProgress,
-    SurveyLeg,
     SurveyPace,
     SurveyPlan,
     advance,
@@ -74,8 +75,7 @@ from wakewise_ardusub.survey.survey_safety import (
 
 State = Literal["waiting", "ready", "asked", "settling", "flying", "paused", "holding", "ended"]
 ENGAGED = ("asked", "settling", "flying", "paused")
-PERIOD_S = 0.1
-ASK_S, ASKS_FOR_S = 0.2, 2.0
+PERIOD_S, ASK_S, ASKS_FOR_S = 0.1, 0.2, 2.0
 READY_S = 1.0
 """GUIDED set sooner than this after the session is ready is no consent: the pilot could not know that it was."""
 GIVES_WAY_S = 0.5
@@ -95,9 +95,6 @@ ACCELERATION_FROM = 4 << 24 | 8 << 16
 _RATES_HZ = {0: 5.0, 30: 20.0, 32: 20.0, 33: 2.0, 36: 5.0, 74: 5.0, 132: 10.0, 193: 5.0}
 _HORIZONTAL, _CONSTANT = 0x08 | 0x10, 0x80
 _ONBOARD, _NO_AUTOPILOT, _ACTIVE = 18, 8, 4
-
-MakeLines = Callable[[Array, float, Array, GeoAnchor | None], Sequence[Array | SurveyLeg]]
-"""Lines, shape (2, 2) or legs, from place (2,), heading, current (2,) and anchor; raises InputError without any."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,12 +241,16 @@ class TransectSession:
         return self._take_over(now_s)
 
     def _take_over(self, now_s: float) -> str:
-        if self.known.mode == GUIDED:
-            self._settle(now_s)
-            return "begun"
-        self._turn("asked", "GUIDED requested")
-        self._request(GUIDED, now_s)
-        return "GUIDED requested"
+        mode = self.options.limits.mode
+        if self.known.mode == mode:
+            return self._engage(now_s)
+        self._turn("asked", f"{MODES[mode]} requested")
+        self._request(mode, now_s)
+        return self.why
+
+    def _engage(self, now_s: float) -> str:
+        self._settle(now_s)
+        return "begun"
 
     def pause(self) -> str:
         """Brake by the plan's bound and hold the place until `consent`."""
@@ -291,7 +292,7 @@ class TransectSession:
             self._settle(now_s)
         self._mode_before = self.known.mode
         if self.state == "asked" and now_s - self._since_s > ASKS_FOR_S:
-            self._turn("waiting", "GUIDED was refused")
+            self._turn("waiting", f"{MODES[self.options.limits.mode]} was refused")
         elif self.state == "holding":
             self._hold_on(now_s)
         if self.state in ENGAGED[1:] and now_s - self._came["told"] >= PERIOD_S - 1e-3:
@@ -314,7 +315,7 @@ class TransectSession:
         sticks = known.sticks
         return SurveyFacts(
             armed=known.armed,
-            mode=GUIDED if self.state == "asked" else known.mode,
+            mode=self.options.limits.mode if self.state == "asked" else known.mode,
             mode_name=known.mode_name,
             telemetry_s=now_s - max(known.attitude_s, came["position"]),
             position_s=now_s - came["position"],
@@ -536,9 +537,8 @@ class TransectSession:
             self._came["beat"] = now_s
             fields = {"type": _ONBOARD, "autopilot": _NO_AUTOPILOT, "base_mode": 0, "system_status": _ACTIVE}
             self._post("heartbeat", {**fields, "custom_mode": self.known.session})
-        heard = math.isfinite(self.known.heartbeat_s)  # before that nobody is there, or no address is known
-        if not heard or self.state in ("flying", "paused"):
-            return
+        if math.isinf(self.known.heartbeat_s) or self.state in ("flying", "paused"):
+            return  # nobody is there, or no address is known
         unknown = [name for name in self._motors.needs if name not in self.known.parameters]
         if unknown and now_s - self._came["parameters"] >= PARAMETERS_S:
             self._came["parameters"] = now_s
