@@ -91,6 +91,7 @@ def fly_survey(
     from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
     from wakewise_ardusub.link.transports import MavlinkCodec, open_transport
     from wakewise_ardusub.survey.allocated_session import AllocatedTransectSession
+    from wakewise_ardusub.survey.survey_control import SurveyController
     from wakewise_ardusub.survey.survey_safety import SurveyLimits
     from wakewise_ardusub.survey.transect_session import TransectOptions, TransectSession
 
@@ -120,6 +121,9 @@ def fly_survey(
     folder = given.out or Path("runs") / f"{given.name}-{time.strftime('%Y%m%d-%H%M%S', time.gmtime())}"
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {folder}: a file is there, a folder is needed")
+    if given.allocate:  # before the first message is queued, or its age would be taken for the autopilot's clock
+        typer.echo("prepares the controller; the first time it compiles for a minute", err=True)
+        SurveyController(chosen).rehearse()
     with ExitStack() as stack:
         transport = open_transport(vehicle_at)
         stack.callback(transport.close)
@@ -139,8 +143,6 @@ def fly_survey(
         )
         if isinstance(session, AllocatedTransectSession):
             stack.callback(session.gate.end, "the program ends")
-            typer.echo("prepares the controller; the first time it compiles for a minute", err=True)
-            session.rehearse()
         typer.echo(f"listening at {vehicle_at.words}; journal: {folder / JOURNAL_FILE}", err=True)
         try:
             _fly(session, codec, consent=given.consent, wait_s=given.wait)

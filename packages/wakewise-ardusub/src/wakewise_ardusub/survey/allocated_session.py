@@ -46,8 +46,13 @@ _NOT_ENABLED = 1
 
 
 def gate_limits(limits: SurveyLimits) -> EngagementLimits:
-    """Limits of the output gate on a survey: ALT_HOLD alone, and the distance from the target place."""
+    """Limits of the output gate on a survey: ALT_HOLD alone, and the distance from the target place.
+
+    Place and sticks may be older than beside a pilot who flies: the vehicle is slow, and the bound to the hold is 1 s.
+    """
     return EngagementLimits(
+        pose_s=0.4,
+        operator_s=0.4,
         modes=frozenset({ALT_HOLD}),
         depth_m=(limits.least_depth_m, DEEPEST_M),
         distance_m=limits.off_m,
@@ -101,10 +106,6 @@ class AllocatedTransectSession(TransectSession):
         self._heading_rad = 0.0
         self.weight_N: float | None = None
         self.gate.begin()
-
-    def rehearse(self) -> None:
-        """Compile the controller; raises StageError if this computer is too slow for it."""
-        self._write("rehearsed", step_ms=1e3 * self._controller.rehearse())
 
     def tick(self) -> None:
         """Judge, and send what is due; to be called at 20 Hz or more."""

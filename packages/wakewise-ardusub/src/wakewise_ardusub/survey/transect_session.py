@@ -218,7 +218,7 @@ class TransectSession:
         distance, came_s = self.known.ranges.get(LOOKS_DOWN, (math.nan, -math.inf))
         at_s = now_s - self.options.delay_s
         before = [one for one in self._history if one[0] <= at_s]
-        if came_s != now_s or not before:
+        if came_s < now_s or not before:
             return
         _, depth, upright = before[-1]
         after = self.track.take(at_s, depth + distance * upright)
