@@ -41,7 +41,7 @@ BANDWIDTH_RAD_S = 0.5
 """Of the depth target: at 1 rad/s it follows the rangefinder's noise, and the bed is blown at half as hard again."""
 HEAVY_N = 0.5
 DEEPEST_M = 300.0
-TILT_RAD = math.radians(30.0)
+MOST_TILT_RAD = math.radians(30.0)
 _NOT_ENABLED = 1
 
 
@@ -56,7 +56,7 @@ def gate_limits(limits: SurveyLimits) -> EngagementLimits:
         modes=frozenset({ALT_HOLD}),
         depth_m=(limits.least_depth_m, DEEPEST_M),
         distance_m=limits.off_m,
-        tilt_rad=TILT_RAD,
+        tilt_rad=MOST_TILT_RAD,
     )
 
 
@@ -109,13 +109,13 @@ class AllocatedTransectSession(TransectSession):
 
     def tick(self) -> None:
         """Judge, and send what is due; to be called at 20 Hz or more."""
+        self.gate.tick()  # a program that stood still lets go before it decides anything
         now_s = self._clock()
         heard = self._place is not None and math.isfinite(sum(self.known.attitude))
         if heard and now_s - self._looped_s >= PERIOD_S - 1e-3:
             self._looped_s = now_s
             self.gate.estimated(self._state_now(now_s))
         super().tick()
-        self.gate.tick()
 
     def _heard(self, said: MavlinkMessage, _now_s: float) -> LinkState:
         self.gate.take(said)
@@ -191,7 +191,7 @@ class AllocatedTransectSession(TransectSession):
         entry = self.gate.entry
         if entry is None or self._place is None:
             return
-        if self.plan is None:  # as it settles, the bow stays where it was
+        if self.state == "settling":  # the bow stays where it was on consent
             target = replace(target, heading_rad=self._heading_rad)
         estimate, bed = self._state_now(now_s), self.track.bed(now_s)
         way_rad = target.heading_rad

@@ -37,8 +37,9 @@ TILT_RAD = math.radians(10.0)
 """How far level thrusters may tilt the hull before vertical ones hold against it."""
 LONGEST_SHARE = 0.5
 """Share of a control period that a step may take on this computer; receiving and judging need the rest."""
-_STEPS = 24
 MEAN_S = 2.0
+"""Time over which the weight is averaged."""
+_STEPS = 24
 _OTHERS = [0, 1, 2, 5]
 """Forces, and the moment about yaw."""
 
