@@ -101,7 +101,8 @@ def pair(seed: int) -> dict[str, Any]:
     """Wash of the survey 30 % of the person's, in whatever water."""
     person = dict.fromkeys(survey_by_hand.FIGURES, 100.0 + seed)
     less = {name: 0.3 * value for name, value in person.items()}
-    return {"seed": seed, "person": person, "survey": less, **dict.fromkeys(survey_by_hand.REASONS, less)}
+    others = dict.fromkeys(("allocated", *survey_by_hand.REASONS), less)
+    return {"seed": seed, "person": person, "survey": less, **others}
 
 
 def test_a_reduction_is_met_by_its_interval_alone() -> None:

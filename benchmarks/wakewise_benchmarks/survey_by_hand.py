@@ -18,6 +18,8 @@ Written down before the figures were known:
   ignored, and a practised hand knows which push gives which force, dead zone of the thrusters included. Slower climbs
   and turns than the dead zones of these sticks allow (half and a quarter of the stick at 20 %) are made by nudges.
 
+`allocated` was added later: the same line by `wakewise link transect --allocate`, against GUIDED targets.
+
 `REASONS` was added after the first flights, which showed no reduction: on `REASON_PAIRS` seeds the survey's wash
 without weight in water, without the pitching moment of the level thrusters, and over a level bed.
 """
@@ -331,7 +333,7 @@ def by_hand(sea: SurveySea, start_W_m: Array, heading_rad: float, seed: int, len
     return wash
 
 
-def by_survey(sea: SurveySea, seed: int, length_m: float = LINE_M) -> BedWash:
+def by_survey(sea: SurveySea, seed: int, length_m: float = LINE_M, *, allocates: bool = False) -> BedWash:
     """`wakewise link transect` flies one line; raises WakewiseError where it is not flown to its end."""
     from wakewise.core.errors import WakewiseError
     from wakewise_ardusub.physics.surface import FreeWater
@@ -345,6 +347,7 @@ def by_survey(sea: SurveySea, seed: int, length_m: float = LINE_M) -> BedWash:
         seed=seed,
         heading_rad=sea.heading_rad,
         depth_m=DEPTH_M,
+        allocates=allocates,
     )
     found: list[BedWash] = []
     body = harness.flight.body
@@ -368,12 +371,15 @@ def by_survey(sea: SurveySea, seed: int, length_m: float = LINE_M) -> BedWash:
 
 
 def pair_figures(vehicle: Vehicle, seed: int, length_m: float = LINE_M) -> dict[str, Any]:
-    """One line of one sea by the survey and by a person; on the first seeds by the survey without what causes wash."""
+    """One line of one sea by the survey, with allocated thrusts and by a person; on the first seeds by the survey
+    without what causes wash.
+    """
     sea = SurveySea.drawn(vehicle, seed)
     survey = by_survey(sea, seed, length_m)
     heading = math.atan2(survey.way[1], survey.way[0])
     told: dict[str, Any] = {"seed": seed, "relief": sea.relief.shape, "trim_N": sea.trim_N}
     told |= {"current_m_s": float(np.linalg.norm(sea.current(20.0))), "survey": survey.figures()}
+    told["allocated"] = by_survey(sea, seed, length_m, allocates=True).figures()
     told["person"] = by_hand(sea, survey.start_W_m, heading, seed, length_m).figures()
     for name, without in REASONS.items() if seed < REASON_PAIRS else ():
         told[name] = by_survey(without(sea), seed, length_m).figures()
@@ -430,9 +436,11 @@ def hand_summary(pairs: Sequence[dict[str, Any]]) -> dict[str, Any]:
         told[f"{kind}_pct"] = _reduction(pairs, "person", "survey", f"{kind}_mm_s")
     low = told["wash_pct"]["low"]
     told["wash_pct"]["met"] = None if low is None else low >= LEAST_PCT
+    for kind in ("wash", "carried"):
+        told[f"allocated_{kind}_pct"] = _reduction(pairs, "survey", "allocated", f"{kind}_mm_s")
     looked_into = [pair for pair in pairs if pair["seed"] < REASON_PAIRS]
     told["reasons"] = {name: _reduction(looked_into, "survey", name, "wash_mm_s") for name in REASONS}
-    for who in ("survey", "person", *REASONS):
+    for who in ("survey", "allocated", "person", *REASONS):
         own = [pair[who] for pair in pairs if who in pair]
         told[who] = {name: _mean([one[name] for one in own]) for name in FIGURES}
     return told
@@ -454,7 +462,9 @@ def show_by_hand(told: dict[str, Any]) -> None:
     """Reductions and figures, one a row."""
     typer.echo(f"by hand at {100.0 * told['gain']:.0f} % pilot gain: {told['pairs']} pairs")
     rows = {f"{kind}, reduction": (told[f"{kind}_pct"], "%") for kind in KINDS}
-    rows |= {f"{who}: {name}": (told[who][name], "") for who in ("survey", "person") for name in FIGURES}
+    for kind in ("wash", "carried"):
+        rows[f"allocated thrusts against the survey: {kind}, reduction"] = (told[f"allocated_{kind}_pct"], "%")
+    rows |= {f"{who}: {name}": (told[who][name], "") for who in ("survey", "allocated", "person") for name in FIGURES}
     rows |= {f"survey, {name}: wash, reduction": (one, "%") for name, one in told["reasons"].items()}
     for name, (one, unit) in rows.items():
         ends = "" if one["low"] is None else f" [{one['low']:.1f}, {one['high']:.1f}]"

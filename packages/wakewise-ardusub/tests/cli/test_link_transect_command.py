@@ -22,7 +22,7 @@ from wakewise.ui.cli.main import run
 from wakewise_ardusub.link.protocol import ALT_HOLD, POSHOLD
 from wakewise_ardusub.physics.physics import PulseTable
 from wakewise_ardusub.physics.surface import FreeWater
-from wakewise_ardusub.sitl.inprocess_session import ScriptedGroundStation, route_messages
+from wakewise_ardusub.sitl.inprocess_session import ScriptedGroundStation, route_messages, shipped_script
 from wakewise_ardusub.sitl.sea_sensors import Relief, SeaSensors, SensorErrors
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics, UdpEndpoint
@@ -31,14 +31,15 @@ from wakewise_ardusub.sitl.udp_endpoints import run as run_stand_in
 Capture = pytest.CaptureFixture[str]
 
 
-@pytest.fixture
-def sea() -> Iterator[tuple[SimulatedAutopilot, str]]:
+@pytest.fixture(params=[False], ids=["no script"])
+def sea(request: pytest.FixtureRequest) -> Iterator[tuple[SimulatedAutopilot, str]]:
     """A stand-in with a pilot above a flat bed, in ALT_HOLD 0.9 m above it, and where it speaks to."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     sensors = SeaSensors(Relief(), SensorErrors(gaps_per_min=0.0), np.random.default_rng(0))
-    autopilot = SimulatedAutopilot({"SCR_ENABLE": 0.0}, loop_hz=50.0, sensors=sensors)
+    values, scripts = ({}, shipped_script()) if request.param else ({"SCR_ENABLE": 0.0}, None)
+    autopilot = SimulatedAutopilot(values, loop_hz=50.0, sensors=sensors, scripts=scripts)
     autopilot.set_mode(ALT_HOLD)
     vehicle = load_vehicle("bluerov2-heavy")
     start = BodyState(X_WB=Pose(np.array([0.0, 0.0, 4.1]), np.array([1.0, 0.0, 0.0, 0.0])))
@@ -72,6 +73,41 @@ def test_a_short_line_is_flown_over_loopback(
     assert autopilot.mode == POSHOLD
     assert autopilot.photographs == told["photographs"] == 2
     assert (tmp_path / "journal.jsonl").stat().st_size > 200
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sea", [True], indirect=True, ids=["script"])
+def test_a_short_line_of_allocated_thrusts_is_flown_over_loopback(
+    sea: tuple[SimulatedAutopilot, str], tmp_path: Path, capsys: Capture
+) -> None:
+    """1 m at 30 cm/s with `--allocate`: it ends in POSHOLD, no output is driven any more, with the weight felt."""
+    autopilot, connection = sea
+    line = ["--allocate", "--length", "1", "--speed", "0.3", "--every", "0.5", "--gap", "3"]
+    code = run(["link", "transect", "--connection", connection, *line, "--consent", "--out", str(tmp_path), "--json"])
+    out, err = capsys.readouterr()
+    assert not autopilot.overridden
+    if any(words in err for words in ("stood still", "no thrusts from", "no position for", "no attitude")):
+        pytest.skip(f"this computer stalled, which ends the flight as it must: {err.strip().splitlines()[-1]}")
+    assert code == 0, err
+    told = json.loads(out)
+    assert told["finished"]
+    assert told["flown_m"] == pytest.approx(1.0, abs=0.02)
+    assert told["weight_N"] == pytest.approx(1.0, abs=0.4)
+    assert autopilot.mode == POSHOLD
+    assert autopilot.photographs == told["photographs"] == 2
+
+
+def test_allocated_thrusts_need_somebody_who_consents(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a terminal and without `--consent` nobody could: exit code 2 and one line, before anything is sent."""
+    monkeypatch.setattr("sys.stdin", None)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    where = ["--connection", f"udpin:127.0.0.1:{port}", "--out", str(tmp_path)]
+    assert run(["link", "transect", "--allocate", *where]) == 2
+    assert "--allocate: there is no terminal" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -54,6 +54,7 @@ AMISS = {
     "script": {"script_s": 1.6},
     "parameters": {"parameters": "MOT_1_DIRECTION: 0, must be 1 or -1"},
     "late": {"thrusts_s": 0.26},
+    "survey": {"survey": "no distance of the rangefinder"},
     "depth": {"depth_m": 60.0},
     "distance": {"distance_m": 5.1},
     "tilt": {"tilt_rad": math.radians(50.0)},

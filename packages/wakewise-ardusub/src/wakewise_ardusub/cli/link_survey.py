@@ -16,8 +16,8 @@ from wakewise.ui.cli.console import end_status_line, format_value, print_json, s
 
 if TYPE_CHECKING:
     from wakewise_ardusub.link.transports import MavlinkCodec
-    from wakewise_ardusub.survey.survey_plan import SurveyPace
-    from wakewise_ardusub.survey.transect_session import MakeLines, TransectSession
+    from wakewise_ardusub.survey.survey_plan import MakeLines, SurveyPace
+    from wakewise_ardusub.survey.transect_session import TransectSession
 
 DEFAULT_CONNECTION, DEFAULT_VEHICLE = "udpin:127.0.0.1:14560", "bluerov2-heavy"
 LOOP_S, LINE_S, LINE_PIPED_S, ENDS_S = 0.02, 0.2, 5.0, 3.0
@@ -73,6 +73,7 @@ class SurveyCommand:
     wait: float
     out: Path | None
     json: bool
+    allocate: bool = False
 
 
 def fly_survey(
@@ -89,6 +90,8 @@ def fly_survey(
     from wakewise_ardusub.link.connection import parse_connection
     from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
     from wakewise_ardusub.link.transports import MavlinkCodec, open_transport
+    from wakewise_ardusub.survey.allocated_session import AllocatedTransectSession
+    from wakewise_ardusub.survey.survey_control import SurveyController
     from wakewise_ardusub.survey.survey_safety import SurveyLimits
     from wakewise_ardusub.survey.transect_session import TransectOptions, TransectSession
 
@@ -118,13 +121,17 @@ def fly_survey(
     folder = given.out or Path("runs") / f"{given.name}-{time.strftime('%Y%m%d-%H%M%S', time.gmtime())}"
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {folder}: a file is there, a folder is needed")
+    if given.allocate:  # before the first message is queued, or its age would be taken for the autopilot's clock
+        typer.echo("prepares the controller; the first time it compiles for a minute", err=True)
+        SurveyController(chosen).rehearse()
     with ExitStack() as stack:
         transport = open_transport(vehicle_at)
         stack.callback(transport.close)
         codec = MavlinkCodec(transport, given.system)
         journal = SessionLog(folder / JOURNAL_FILE)
         stack.callback(journal.close)
-        session = TransectSession(
+        make = AllocatedTransectSession if given.allocate else TransectSession
+        session = make(
             send=codec.send,
             lines=lines,
             vehicle=chosen,
@@ -134,6 +141,8 @@ def fly_survey(
             system=given.system,
             session=secrets.randbelow(2**31) + 1,
         )
+        if isinstance(session, AllocatedTransectSession):
+            stack.callback(session.gate.end, "the program ends")
         typer.echo(f"listening at {vehicle_at.words}; journal: {folder / JOURNAL_FILE}", err=True)
         try:
             _fly(session, codec, consent=given.consent, wait_s=given.wait)
@@ -167,8 +176,11 @@ def _print(figures: dict[str, Any]) -> None:
 def _fly(session: TransectSession, codec: MavlinkCodec, *, consent: bool, wait_s: float) -> None:
     """Receive, judge and send until it is over; Ctrl-C ends it in the firmware's hold."""
     from wakewise.core.errors import InputError
+    from wakewise_ardusub.survey.survey_safety import GUIDED
 
     keys = sys.stdin if sys.stdin is not None and sys.stdin.isatty() else None
+    if keys is None and not consent and session.options.limits.mode != GUIDED:
+        raise InputError("--allocate: there is no terminal, so Enter is not heard; give --consent beforehand")
     if keys is None and not consent:
         typer.echo("no terminal: Enter is not heard; the pilot's GUIDED begins, or --consent beforehand", err=True)
     began_s = told_s = time.monotonic()

@@ -12,7 +12,7 @@ from wakewise.ui.cli.options import Json
 from wakewise_ardusub.cli import link_survey
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.survey.transect_session import MakeLines
+    from wakewise_ardusub.survey.survey_plan import MakeLines
 
 
 def transect(
@@ -43,6 +43,14 @@ def transect(
     range_delay: link_survey.RangeDelay = 0.3,
     gap: link_survey.Gap = 0.8,
     fence: link_survey.Fence = 200.0,
+    allocate: Annotated[
+        bool,
+        typer.Option(
+            "--allocate",
+            help="In ALT_HOLD by thrusts through the script on the autopilot (`wakewise link install-script`), which "
+            "are chosen to spare the bed below and ahead; without it by GUIDED targets.",
+        ),
+    ] = False,
     vehicle: link_survey.VehicleName = link_survey.DEFAULT_VEHICLE,
     system: link_survey.System = 1,
     consent: link_survey.Consent = False,
@@ -50,10 +58,11 @@ def transect(
     out: link_survey.Out = None,
     json: Json = False,
 ) -> None:
-    """Fly slow lines at an altitude above the bed on stock ArduSub: GUIDED targets, no motor override, no script.
+    """Fly slow lines at an altitude above the bed on stock ArduSub: GUIDED targets, no script; or --allocate.
 
     The pilot arms and keeps the sticks. Enter (or setting GUIDED) consents; Enter pauses and goes on, q and Enter or
-    Ctrl-C ends. Any stick, mode change or loss ends it in POSHOLD; if this program dies, ArduSub stops after 3 s.
+    Ctrl-C ends. Any stick, mode change or loss ends it in POSHOLD; if this program dies, ArduSub stops after 3 s, with
+    --allocate after 0.3 s in ALT_HOLD.
     """
     from wakewise_ardusub.survey.survey_plan import SurveyPace
 
@@ -62,6 +71,7 @@ def transect(
     given = link_survey.SurveyCommand(
         name="transect", connection=connection, every=every, camera=camera, current=current, range_delay=range_delay,
         gap=gap, fence=fence, vehicle=vehicle, system=system, consent=consent, wait=wait, out=out, json=json,
+        allocate=allocate,
     )  # fmt: skip
     link_survey.fly_survey(given, pace, lines)
 

@@ -21,11 +21,11 @@ from wakewise_ardusub.logs.channels import MODES
 State = Literal["off", "listening", "ready", "engaged", "refused"]
 Kind = Literal[
     "duplicate", "clock", "stopped", "disarmed", "mode", "takeover", "heartbeat", "telemetry", "pose", "operator",
-    "script", "parameters", "late", "depth", "distance", "tilt", "speed", "battery",
+    "script", "parameters", "late", "survey", "depth", "distance", "tilt", "speed", "battery",
 ]  # fmt: skip
 FAULTS: tuple[Kind, ...] = (
     "duplicate", "clock", "stopped", "disarmed", "mode", "takeover", "heartbeat", "telemetry", "pose", "operator",
-    "script", "parameters", "late", "depth", "distance", "tilt", "speed", "battery",
+    "script", "parameters", "late", "survey", "depth", "distance", "tilt", "speed", "battery",
 )  # fmt: skip
 """What can be amiss, the gravest first."""
 REST_S = 1.0
@@ -83,9 +83,10 @@ class EngagementInputs:
         How long it has been engaged.
     standstill_s : float
         Longest gap between two watches of late: a process that slept knows nothing of that time.
-    duplicate, clock, takeover, parameters : str
+    duplicate, clock, takeover, parameters, survey : str
         In words, what was heard of another sender of thrusts, of a clock that jumped, of a ground station that took
-        over, and what the autopilot is set to that does not fit the vehicle; empty where nothing was.
+        over, what the autopilot is set to that does not fit the vehicle, and what a survey lacks (rangefinder, Doppler
+        log); empty where nothing was.
     depth_m, distance_m, tilt_rad, speed_m_s, battery_V : float
         As estimated; the distance is to the target.
     """
@@ -111,6 +112,7 @@ class EngagementInputs:
     clock: str = ""
     takeover: str = ""
     parameters: str = ""
+    survey: str = ""
     depth_m: float = math.nan
     distance_m: float = math.nan
     tilt_rad: float = math.nan
@@ -142,6 +144,7 @@ def faults(facts: EngagementInputs, limits: EngagementLimits, *, engaged: bool) 
     f, m, found = facts, limits, dict[Kind, str]()
     told: tuple[tuple[Kind, str], ...] = (
         ("duplicate", f.duplicate), ("clock", f.clock), ("takeover", f.takeover), ("parameters", f.parameters),
+        ("survey", f.survey),
     )  # fmt: skip
     found |= {kind: words for kind, words in told if words}
     if not f.armed:

@@ -188,6 +188,8 @@ class OutputGate:
             EngagementState(),
         )
         self.target_W_m: Array | None = None
+        self.survey_fault = ""
+        """What a survey lacks, in words, as it last judged."""
         self.figures: dict[str, float] = {}
         self._estimate: BodyState | None = None
         self._slots: Array | None = None
@@ -262,6 +264,7 @@ class OutputGate:
                 duplicate=known.duplicate if now_s - known.duplicate_s < REMEMBERED_S else "",
                 takeover=known.takeover if now_s - known.takeover_s < REMEMBERED_S else "",
                 parameters=self._set_up(),
+                survey=self.survey_fault,
                 clock=held.jump if now_s - held.jump_s < REMEMBERED_S else "",
                 depth_m=known.depth_m,
                 distance_m=away,

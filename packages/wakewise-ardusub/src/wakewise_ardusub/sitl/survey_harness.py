@@ -19,7 +19,7 @@ from wakewise.core.errors import WakewiseError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import Vehicle
-from wakewise_ardusub.link.protocol import ALT_HOLD, COMPANION_COMPONENT, STICKS_MIDDLE
+from wakewise_ardusub.link.protocol import ALT_HOLD, COMPANION_COMPONENT, ENABLE_PARAMETER, STICKS_MIDDLE
 from wakewise_ardusub.link.session_log import SessionLog
 from wakewise_ardusub.link.transports import MavlinkCodec
 from wakewise_ardusub.physics.surface import FreeWater
@@ -27,8 +27,9 @@ from wakewise_ardusub.sitl.guided import LAPSE_S
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession, MavlinkSender
 from wakewise_ardusub.sitl.modes import GUIDED
 from wakewise_ardusub.sitl.sea_sensors import Relief, SeaSensors, SensorErrors
-from wakewise_ardusub.survey.survey_plan import parallel_lines
-from wakewise_ardusub.survey.transect_session import PERIOD_S, MakeLines, TransectOptions, TransectSession
+from wakewise_ardusub.survey.allocated_session import AllocatedTransectSession
+from wakewise_ardusub.survey.survey_plan import MakeLines, parallel_lines
+from wakewise_ardusub.survey.transect_session import PERIOD_S, TransectOptions, TransectSession
 
 TICK_LOOPS = 2
 _OFFSET_S = 1000.0
@@ -55,6 +56,8 @@ class SurveyHarness:
         Where the vehicle starts to hold its depth.
     doppler : bool
         Whether a Doppler log's driver speaks on the link (VISION_POSITION_DELTA).
+    allocates : bool
+        By thrusts through the script (`AllocatedTransectSession`) in place of GUIDED targets.
     """
 
     def __init__(
@@ -72,20 +75,28 @@ class SurveyHarness:
         doppler: bool = True,
         firmware: tuple[int, int, int] = (4, 5, 3),
         journal: SessionLog | None = None,
+        allocates: bool = False,
     ) -> None:
         self.relief = relief or Relief()
         self.sensors = SeaSensors(self.relief, errors or SensorErrors(), np.random.default_rng(seed))
         start = BodyState(X_WB=Pose(np.array([0.0, 0.0, depth_m]), quat_from_euler(0.0, 0.0, heading_rad)))
         body = FreeWater(vehicle, start, current)
         self.flight = InProcessSession(
-            vehicle, loop_hz=50.0, scripts={}, body=body, sensors=self.sensors, firmware=firmware
+            vehicle,
+            loop_hz=50.0,
+            scripts=None if allocates else {},
+            body=body,
+            sensors=self.sensors,
+            firmware=firmware,
         )
+        self.allocates = allocates
         self.options = options or TransectOptions()
         self.receive_blocked = self.send_blocked = self.stopped = False
         """Faults: nothing reaches it, nothing of it reaches others, its program has died."""
         self._waiting: deque[bytes] = deque(maxlen=4096)
         self._codec = MavlinkCodec(self, self.flight.autopilot.system)
-        self.session = TransectSession(
+        make = AllocatedTransectSession if allocates else TransectSession
+        self.session = make(
             send=self._codec.send,
             lines=lines or straight_line(20.0),
             vehicle=vehicle,
@@ -155,6 +166,8 @@ class SurveyHarness:
         self.flight.run(0.3)
         self.flight.arm(True)
         self.flight.set_mode(ALT_HOLD)
+        if self.allocates:
+            self.flight.set(ENABLE_PARAMETER, 1.0)
         self._run_until(lambda: self.session.state == "ready", 10.0)
         return self
 
@@ -246,13 +259,17 @@ BY_TIME_OUT = ("nobody hears the program", "the cable is cut", "the program dies
 
 
 def seconds_to_hold(harness: SurveyHarness, fault: Callable[[SurveyHarness], None]) -> float:
-    """Seconds from a fault until no target moves the vehicle: another mode, disarmed, or the target lapsed."""
+    """Seconds from a fault until no target moves the vehicle: another mode, disarmed, or the target lapsed.
+
+    Of allocated thrusts: until the script drives no output.
+    """
     autopilot, began_s = harness.flight.autopilot, harness.flight.now_s
     fault(harness)
     while harness.flight.now_s - began_s < 2.0 * LAPSE_S:
         target = autopilot.target
-        still = target is None or not (math.hypot(*target.velocity_W_m_s) > 0.0 and target.lapses)
-        if autopilot.mode != GUIDED or not autopilot.armed or still:
+        moves = target is not None and math.hypot(*target.velocity_W_m_s) > 0.0 and target.lapses
+        guided = autopilot.mode == GUIDED and autopilot.armed and moves
+        if not (autopilot.overridden if harness.allocates else guided):
             return harness.flight.now_s - began_s
         harness.flight.run(0.02)
     return math.inf

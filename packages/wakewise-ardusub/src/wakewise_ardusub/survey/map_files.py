@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -24,6 +25,16 @@ LARGEST_B = 4_000_000
 _A_M, _E2 = 6_378_137.0, 6.694379990141e-3
 """Semi-major axis and squared eccentricity of WGS 84."""
 _WGS_84 = ("CRS84", "EPSG::4326", "EPSG:4326")
+
+
+@dataclass(frozen=True, kw_only=True)
+class GeoAnchor:
+    """Latitude and longitude (deg) of a place, shape (2,), of the autopilot's local frame."""
+
+    latitude_deg: float
+    longitude_deg: float
+    north_m: float
+    east_m: float
 
 
 def read_map(path: Path) -> Array:

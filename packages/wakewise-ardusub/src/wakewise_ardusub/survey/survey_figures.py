@@ -28,6 +28,7 @@ FIGURE_MEANINGS = {
     "photographs": "triggered",
     "interruptions": "times that it was paused by the pilot or a loss",
     "outliers": "distances of the rangefinder that were refused",
+    "weight_N": "of the vehicle in water, as its vertical thrusters held it, N",
 }
 
 

@@ -17,13 +17,14 @@ A current that follows a line faster than the vehicle's speed makes it brake: th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
+from wakewise_ardusub.survey.map_files import GeoAnchor
 
 SPEEDS_M_S = (0.05, 0.30)
 ALTITUDES_M = (0.4, 10.0)
@@ -125,6 +126,10 @@ class SurveyLeg:
             return []
         way = SurveyLeg(start_W_m=place_W_m, end_W_m=self.start_W_m, heading_rad=heading_rad, line=False)
         return [replace(way, altitude_m=self.altitude_m)]
+
+
+MakeLines = Callable[[Array, float, Array, GeoAnchor | None], Sequence[Array | SurveyLeg]]
+"""Lines, shape (2, 2) or legs, from place (2,), heading, current (2,) and anchor; raises InputError without any."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

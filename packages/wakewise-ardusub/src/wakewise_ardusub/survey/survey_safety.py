@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from wakewise_ardusub.logs.channels import MODES
+
 GUIDED, POSHOLD, ALT_HOLD = 4, 16, 2
 """Modes of ArduSub (ArduSub/mode.h)."""
 BEHIND_S = 0.5
@@ -20,7 +22,8 @@ class SurveyLimits:
     """Ages (s) above which something is lost, and bounds (m) of the flight.
 
     `range_s` is the longest drop-out of the rangefinder that is flown through at a held depth. `off_m` is the distance
-    from the target place, `near_share` the share of the altitude below which the bed is too near.
+    from the target place, `near_share` the share of the altitude below which the bed is too near. `mode` is the flight
+    mode that it is flown in.
     """
 
     telemetry_s: float = 0.7
@@ -33,6 +36,7 @@ class SurveyLimits:
     near_share: float = 0.25
     least_depth_m: float = 0.3
     fence_m: float = 200.0
+    mode: int = GUIDED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +100,7 @@ def fault_of(facts: SurveyFacts, limits: SurveyLimits, altitude_m: float) -> str
         (bool(facts.rival), facts.rival),
         (facts.telemetry_s > limits.telemetry_s, "nothing is heard from the autopilot"),
         (facts.armed is False, "disarmed"),
-        (facts.mode != GUIDED, f"mode {facts.mode_name or facts.mode}: no longer GUIDED"),
+        (facts.mode != limits.mode, f"mode {facts.mode_name or facts.mode}: no longer {MODES.get(limits.mode)}"),
         (facts.position_s > limits.position_s, "no position"),
         (not facts.placed, "the autopilot's filter has no horizontal position"),
         (facts.doppler_s > limits.doppler_s, "no velocity of the Doppler log (DVL)"),

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -43,13 +43,15 @@ from wakewise_ardusub.link.protocol import (
     parameter_request,
 )
 from wakewise_ardusub.link.session_log import SessionLog
+from wakewise_ardusub.logs.channels import MODES
 from wakewise_ardusub.survey.bed_following import BedTrack, DepthShaper
 from wakewise_ardusub.survey.guided_messages import SurveyTarget
 from wakewise_ardusub.survey.hold_current import current_of_hold
+from wakewise_ardusub.survey.map_files import GeoAnchor
 from wakewise_ardusub.survey.survey_figures import SurveyRow, errors_of
 from wakewise_ardusub.survey.survey_plan import (
+    MakeLines,
     PlanProgress,
-    SurveyLeg,
     SurveyPace,
     SurveyPlan,
     advance,
@@ -73,8 +75,7 @@ from wakewise_ardusub.survey.survey_safety import (
 
 State = Literal["waiting", "ready", "asked", "settling", "flying", "paused", "holding", "ended"]
 ENGAGED = ("asked", "settling", "flying", "paused")
-PERIOD_S = 0.1
-ASK_S, ASKS_FOR_S = 0.2, 2.0
+PERIOD_S, ASK_S, ASKS_FOR_S = 0.1, 0.2, 2.0
 READY_S = 1.0
 """GUIDED set sooner than this after the session is ready is no consent: the pilot could not know that it was."""
 GIVES_WAY_S = 0.5
@@ -94,19 +95,6 @@ ACCELERATION_FROM = 4 << 24 | 8 << 16
 _RATES_HZ = {0: 5.0, 30: 20.0, 32: 20.0, 33: 2.0, 36: 5.0, 74: 5.0, 132: 10.0, 193: 5.0}
 _HORIZONTAL, _CONSTANT = 0x08 | 0x10, 0x80
 _ONBOARD, _NO_AUTOPILOT, _ACTIVE = 18, 8, 4
-
-MakeLines = Callable[[Array, float, Array, "GeoAnchor | None"], Sequence[Array | SurveyLeg]]
-"""Lines, shape (2, 2) or legs, from place (2,), heading, current (2,) and anchor; raises InputError without any."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class GeoAnchor:
-    """Latitude and longitude (deg) of a place, shape (2,), of the autopilot's local frame."""
-
-    latitude_deg: float
-    longitude_deg: float
-    north_m: float
-    east_m: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,7 +178,7 @@ class TransectSession:
     def take(self, said: MavlinkMessage) -> None:
         """A message of anybody on the link."""
         now_s = self._clock()
-        self.known = update_link_state(self.known, said, now_s)
+        self.known = self._heard(said, now_s)
         if said.system != self.known.system:
             return
         if said.name == "VISION_POSITION_DELTA":  # what a Doppler log's driver sends, whatever its component
@@ -202,6 +190,9 @@ class TransectSession:
                 self._from_autopilot(said.name, said.fields, now_s)
             except (KeyError, TypeError, ValueError):
                 self.known = self.known.noise()
+
+    def _heard(self, said: MavlinkMessage, now_s: float) -> LinkState:
+        return update_link_state(self.known, said, now_s)
 
     def _from_autopilot(self, name: str, get: Mapping[str, Any], now_s: float) -> None:
         if name == "LOCAL_POSITION_NED":
@@ -227,7 +218,7 @@ class TransectSession:
         distance, came_s = self.known.ranges.get(LOOKS_DOWN, (math.nan, -math.inf))
         at_s = now_s - self.options.delay_s
         before = [one for one in self._history if one[0] <= at_s]
-        if came_s != now_s or not before:
+        if came_s < now_s or not before:
             return
         _, depth, upright = before[-1]
         after = self.track.take(at_s, depth + distance * upright)
@@ -247,12 +238,19 @@ class TransectSession:
         if self.state != "ready":
             return f"not begun: {self.why or self.state}"
         self.ended_by = ""
-        if self.known.mode == GUIDED:
-            self._settle(now_s)
-            return "begun"
-        self._turn("asked", "GUIDED requested")
-        self._request(GUIDED, now_s)
-        return "GUIDED requested"
+        return self._take_over(now_s)
+
+    def _take_over(self, now_s: float) -> str:
+        mode = self.options.limits.mode
+        if self.known.mode == mode:
+            return self._engage(now_s)
+        self._turn("asked", f"{MODES[mode]} requested")
+        self._request(mode, now_s)
+        return self.why
+
+    def _engage(self, now_s: float) -> str:
+        self._settle(now_s)
+        return "begun"
 
     def pause(self) -> str:
         """Brake by the plan's bound and hold the place until `consent`."""
@@ -290,19 +288,21 @@ class TransectSession:
         self._beat(now_s)
         self._judge(now_s)
         self._came["turn"] = now_s
-        entered = self.known.mode == GUIDED and self._mode_before not in (None, GUIDED)
-        meant = self.state == "ready" and now_s - self._since_s >= READY_S
-        if entered and (meant or self.state == "asked"):
+        if self._consented_by_mode(now_s):
             self._settle(now_s)
         self._mode_before = self.known.mode
         if self.state == "asked" and now_s - self._since_s > ASKS_FOR_S:
-            self._turn("waiting", "GUIDED was refused")
+            self._turn("waiting", f"{MODES[self.options.limits.mode]} was refused")
         elif self.state == "holding":
             self._hold_on(now_s)
         if self.state in ENGAGED[1:] and now_s - self._came["told"] >= PERIOD_S - 1e-3:
             dt_s = min(now_s - self._came["told"], 2.0 * PERIOD_S)
             self._came["told"] = now_s
             self._stream(now_s, dt_s)
+
+    def _consented_by_mode(self, now_s: float) -> bool:
+        entered = self.known.mode == GUIDED and self._mode_before not in (None, GUIDED)
+        return entered and (self.state == "asked" or (self.state == "ready" and now_s - self._since_s >= READY_S))
 
     def facts(self, now_s: float) -> SurveyFacts:
         """What is known now, as it is judged."""
@@ -315,7 +315,7 @@ class TransectSession:
         sticks = known.sticks
         return SurveyFacts(
             armed=known.armed,
-            mode=GUIDED if self.state == "asked" else known.mode,
+            mode=self.options.limits.mode if self.state == "asked" else known.mode,
             mode_name=known.mode_name,
             telemetry_s=now_s - max(known.attitude_s, came["position"]),
             position_s=now_s - came["position"],
@@ -341,17 +341,21 @@ class TransectSession:
         return float(math.dist(place[:2], target_of(self.plan, self.at)[0]))
 
     def _judge(self, now_s: float) -> None:
-        facts = self._facts = self.facts(now_s)
+        self._facts = self.facts(now_s)
+        lacks = self._amiss(self._facts)
         if self.state in ENGAGED:
-            fault = fault_of(facts, self.options.limits, self._least_m)
-            if fault:
-                self._let_go(fault, now_s)
+            if lacks:
+                self._let_go(lacks, now_s)
         elif self.state in ("waiting", "ready"):
-            lacks = missing(facts, self.options.limits) or self._no_water(facts)
             if lacks and (self.state == "ready" or lacks != self.why):
                 self._turn("waiting", lacks)
             elif not lacks and self.state == "waiting":
                 self._turn("ready", "")
+
+    def _amiss(self, facts: SurveyFacts) -> str:
+        if self.state in ENGAGED:
+            return fault_of(facts, self.options.limits, self._least_m)
+        return missing(facts, self.options.limits) or self._no_water(facts)
 
     def _no_water(self, facts: SurveyFacts) -> str:
         highest = max(self.options.pace.altitude_m, *self.options.layers_m, 0.0)
@@ -400,8 +404,8 @@ class TransectSession:
         """Whether the vehicle is not at rest where it is to hold."""
         if self._place is None:
             return True
-        p, v = self._place
-        return math.dist(p[:2], self._hold[:2]) > STILL_M or math.hypot(*v[:2]) > STILL_M_S
+        (p, v), hold = self._place, self._hold
+        return math.dist(p[:2], hold[:2]) > STILL_M or math.hypot(*v[:2]) > STILL_M_S
 
     def _felt(self, heading: float) -> Array | None:
         if len(self._pulses) < 5:
@@ -452,13 +456,17 @@ class TransectSession:
             turn_rad_s=turn,
         )
         if self.state in ENGAGED:
-            fields = target.message(self._place, takes_acceleration=self._takes_acceleration)
-            if fields is None:
-                self._let_go("a target that is not a number", now_s)
-            else:
-                self._post("set_position_target_local_ned", fields | self._aim())
+            self._drive(target, now_s, dt_s)
         if self.finished and self.state == "flying":
             self._let_go("finished", now_s)
+
+    def _drive(self, target: SurveyTarget, now_s: float, _dt_s: float) -> None:
+        fields = target.message(self._place, takes_acceleration=self._takes_acceleration)
+        if fields is None:
+            self._let_go("a target that is not a number", now_s)
+        else:
+            aim = {"target_system": self.known.system, "target_component": AUTOPILOT_COMPONENT}
+            self._post("set_position_target_local_ned", fields | aim)
 
     def _noted(self, now_s: float) -> None:
         plan, at = self.plan, self.at
@@ -480,15 +488,13 @@ class TransectSession:
         every, at, plan = self.options.every_m, self.at, self.plan
         if every <= 0.0 or at is None or plan is None or self.state != "flying" or not self._reached:
             return
-        on_line = at.leg < len(plan.legs) and plan.legs[at.leg].line
-        if not on_line or at.flown_m < self.photographs * every:
+        if at.leg >= len(plan.legs) or not plan.legs[at.leg].line or at.flown_m < self.photographs * every:
             return
         self.photographs += 1
         digicam = self.options.camera == "digicam"
         numbers = (0, 0, 0, 0, 1, self.photographs, 0) if digicam else (0, 0, 1, self.photographs, 0, 0, 0)
         self._command(DIGICAM_CONTROL if digicam else IMAGE_START_CAPTURE, *map(float, numbers), component=0)
-        place = None if self._place is None else self._place[0]
-        self._write("photograph", number=self.photographs, flown_m=at.flown_m, place=place)
+        self._write("photograph", number=self.photographs, flown_m=at.flown_m, place=self._place and self._place[0])
 
     # How it ends.
 
@@ -497,12 +503,12 @@ class TransectSession:
         if why != "finished":
             self.interruptions, self.ended_by = self.interruptions + 1, why
         self._hold_mode = hold_mode(self._facts, self.options.limits)
-        guided = self.known.armed is not False and (self.known.mode == GUIDED or self.state == "asked")
-        self._turn("holding" if guided else "waiting", why)
-        if guided and not self._facts.takeover:
-            self._request(self._hold_mode, now_s)
-        elif guided:
-            self._came["mode"] = now_s + GIVES_WAY_S
+        flown = self.state == "asked" or self.known.mode == self.options.limits.mode
+        flown = flown and self.known.armed is not False
+        self._turn("holding" if flown else "waiting", why)
+        if flown:
+            self._came["mode"] = now_s + GIVES_WAY_S if self._facts.takeover else -math.inf
+            self._hold_on(now_s)
 
     def _hold_on(self, now_s: float) -> None:
         """Ask until the mode has changed; what POSHOLD refuses, ALT_HOLD may give."""
@@ -531,9 +537,8 @@ class TransectSession:
             self._came["beat"] = now_s
             fields = {"type": _ONBOARD, "autopilot": _NO_AUTOPILOT, "base_mode": 0, "system_status": _ACTIVE}
             self._post("heartbeat", {**fields, "custom_mode": self.known.session})
-        heard = math.isfinite(self.known.heartbeat_s)  # before that nobody is there, or no address is known
-        if not heard or self.state in ("flying", "paused"):
-            return
+        if math.isinf(self.known.heartbeat_s) or self.state in ("flying", "paused"):
+            return  # nobody is there, or no address is known
         unknown = [name for name in self._motors.needs if name not in self.known.parameters]
         if unknown and now_s - self._came["parameters"] >= PARAMETERS_S:
             self._came["parameters"] = now_s
@@ -549,9 +554,6 @@ class TransectSession:
         filled = (*params, *[0.0] * (7 - len(params)))
         fields = {"command": number, "confirmation": 0, **{f"param{i + 1}": value for i, value in enumerate(filled)}}
         self._post("command_long", {**fields, "target_system": self.known.system, "target_component": component})
-
-    def _aim(self) -> dict[str, int]:
-        return {"target_system": self.known.system, "target_component": AUTOPILOT_COMPONENT}
 
     def _post(self, name: str, fields: Mapping[str, Any]) -> None:
         try:
@@ -572,15 +574,13 @@ class TransectSession:
     def line(self) -> str:
         """One line of how it stands."""
         if self.state in ("flying", "paused") and self.plan is not None and self.at is not None:
-            left = self.time_left_s()
             waits = "" if self._reached else ", on the way to its altitude"
             return (
-                f"{self.state}  {self.at.flown_m:.1f} of {self.plan.line_m:.1f} m, {left / 60.0:.1f} min left, "
-                f"{self._facts.altitude_m:.2f} m above the bed, {self.photographs} photographs{waits}"
+                f"{self.state}  {self.at.flown_m:.1f} of {self.plan.line_m:.1f} m, {self.time_left_s() / 60.0:.1f} min "
+                f"left, {self._facts.altitude_m:.2f} m above the bed, {self.photographs} photographs{waits}"
             )
         begins = {"settling": "holds its place and measures the current", "ready": "Enter or the pilot's GUIDED begins"}
-        words = (self.why or self.ended_by, begins.get(self.state, ""))
-        return f"{self.state}  {'; '.join(filter(None, words))}"
+        return f"{self.state}  {'; '.join(filter(None, (self.why or self.ended_by, begins.get(self.state, ''))))}"
 
     def figures(self) -> dict[str, Any]:
         """Figures by the autopilot's own position, heading and rangefinder; None where nothing was flown."""
