@@ -81,6 +81,16 @@ def test_loss_of_a_coral_is_told_as_loss(before: Mesh) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("grown_m", [-0.006, 0.006])
+def test_a_large_change_all_over_does_not_turn_the_colony(grown_m: float, before: Mesh) -> None:
+    """Surfaces 6 mm apart fit worse in the true turn than where they cross; the true turn is found all the same."""
+    found = compare(before, turned(grown_coral(grown_m, np.random.default_rng(4)), TURN, SHIFT))
+    R = found.registration.similarity.R_AB @ Rotation.from_rotvec(TURN).as_matrix()
+    assert np.degrees(Rotation.from_matrix(R).magnitude()) < 2.0
+    assert found.figures["change_mm"] == pytest.approx(1e3 * grown_m, rel=0.1)
+
+
+@pytest.mark.slow
 def test_growth_at_the_top_alone_is_told_there(before: Mesh) -> None:
     """The rest of the colony holds the registration."""
     height = np.asarray(smooth_coral().vertices)[:, 2]
