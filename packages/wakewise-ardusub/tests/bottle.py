@@ -1,4 +1,4 @@
-"""A vehicle in a bottle: a warden, a clock that only we move, and the messages that an ArduSub would send."""
+"""A vehicle in a bottle: an output gate, a clock that only we move, and the messages that an ArduSub would send."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Bottle:
         self.say("PARAM_VALUE", param_id=name, param_value=value, param_type=9, param_count=900, param_index=1)
 
     def parameters(self) -> None:
-        """All that the warden asks for: the motor as it should be, and no button of the autopilot's."""
+        """All that the output gate asks for: the motor as it should be, and no button of the autopilot's."""
         self.parameter("MOT_1_DIRECTION", 1.0)
         for name in BUTTON_PARAMETERS:
             self.parameter(name, 0.0)

@@ -11,7 +11,7 @@ from wakewise_ardusub.session.link_join import EARLY, ArduSubPlant
 
 @dataclass
 class Around:
-    """A warden and a flight's clock that began at 100 s; waiting takes what is asked for."""
+    """An output gate and a flight's clock that began at 100 s; waiting takes what is asked for."""
 
     now_s: float = 100.0
     sent: list = field(default_factory=list)
@@ -52,7 +52,7 @@ def test_measurements_come_shortly_before_the_next_decision_is_due():
     assert all(seconds > 0.0 for seconds in around.waited)
 
 
-def test_thrusts_go_to_the_warden_only_in_an_engagement():
+def test_thrusts_go_to_the_output_gate_only_in_an_engagement():
     """With the engagement that they were decided in; none without one."""
     around = Around()
     plant(around).step(np.full(8, 2.0), 0.1)

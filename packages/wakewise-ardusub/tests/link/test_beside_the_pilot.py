@@ -1,4 +1,4 @@
-"""Warden and shipped script together against the stand-in: after any fault the outputs are the pilot's in time."""
+"""Output gate and shipped script together against the stand-in: after any fault the outputs are the pilot's in time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WIDE = EngagementLimits(depth_m=(-1.0, 100.0), distance_m=100.0, tilt_rad=4.0, s
 
 
 def aboard(journal: SessionLog | None = None, **flight) -> CompanionHarness:
-    """A warden beside the stand-in, at the pace of its own watch."""
+    """An output gate beside the stand-in, at the pace of its own watch."""
     made = InProcessSession(HEAVY, loop_hz=50.0, **flight)
     return CompanionHarness(made, limits=WIDE, journal=journal, thrusts_N=np.tile([6.0, -6.0], 4))
 

@@ -90,7 +90,7 @@ def test_hand_back_does_not_jump_in_any_mode_that_is_allowed():
 
 
 def test_modes_that_hold_a_place_are_not_allowed():
-    """POSHOLD would go back to its place, so neither script nor warden drives in it."""
+    """POSHOLD would go back to its place, so neither script nor output gate drives in it."""
     assert POSHOLD not in EngagementLimits().modes
     bottle = Bottle(mode=POSHOLD)
     assert bottle.engage() == "not engaged: mode POSHOLD, allowed are MANUAL, ALT_HOLD, STABILIZE"

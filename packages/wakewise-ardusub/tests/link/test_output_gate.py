@@ -24,7 +24,7 @@ LIMITS = EngagementLimits()
 
 
 def engaged(**more) -> Bottle:
-    """A bottle whose warden drives."""
+    """A bottle whose output gate drives."""
     bottle = Bottle(**more)
     assert bottle.engage() == "engaged"
     bottle.run(1.0)
@@ -53,7 +53,7 @@ def test_times_of_thrusts_only_grow():
 
 
 def test_two_companions_on_one_clock_are_two_senders():
-    """Their times begin further apart than any message may be ahead, so script and warden tell them apart."""
+    """Their times begin further apart than any message may be ahead, so script and output gate tell them apart."""
     times = []
     for session in np.random.default_rng(1).integers(1, 2**31, 2):
         bottle = engaged(session=int(session))

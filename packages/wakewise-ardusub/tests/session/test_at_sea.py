@@ -35,7 +35,7 @@ MISSION = {
 
 
 def aboard(journal: SessionLog | None = None) -> CompanionHarness:
-    """A warden beside the stand-in whose thrusts are the flight's alone."""
+    """An output gate beside the stand-in whose thrusts are the flight's alone."""
     made = CompanionHarness(InProcessSession(load_vehicle("bluerov2-heavy"), loop_hz=50.0), journal=journal)
     made.decides = False
     return made
@@ -188,7 +188,7 @@ def test_depth_is_held_while_engaged_in_alt_hold_and_after_hand_back():
 
 
 class Deaf:
-    """A connection on which nothing comes: the warden is told by hand."""
+    """A connection on which nothing comes: the output gate is told by hand."""
 
     def receive(self, timeout_s):
         time.sleep(timeout_s)

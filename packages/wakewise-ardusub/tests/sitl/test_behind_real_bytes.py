@@ -61,8 +61,8 @@ FIRST_S = 90.0
 class Ashore:
     """Pilot and companion at one socket: heartbeats and sticks go out by themselves, what comes is kept by kind.
 
-    It has what `CompanionHarness` needs of a rehearsal, so the shipped warden can be the companion, by the clock on the
-    wall.
+    It has what `CompanionHarness` needs of a rehearsal, so the shipped output gate can be the companion, by the clock
+    on the wall.
     """
 
     vehicle, autopilot = HEAVY, SimpleNamespace(system=1)
@@ -347,7 +347,7 @@ def test_sticks_move_the_vehicle_as_the_frame_means(ashore: Ashore) -> None:
     ashore.arm(False)
 
 
-def test_the_warden_drives_by_consent_and_lets_go_when_the_sticks_fall_silent(ashore: Ashore) -> None:
+def test_the_output_gate_drives_by_consent_and_lets_go_when_the_sticks_fall_silent(ashore: Ashore) -> None:
     """The whole companion but its controller: what it asks for, the position it needs, consent, loss, silence."""
     wide = EngagementLimits(depth_m=(-10.0, 100.0), distance_m=1000.0, tilt_rad=4.0, speed_m_s=10.0)
     session: Any = ashore  # has what the harness needs of an InProcessSession
@@ -356,7 +356,7 @@ def test_the_warden_drives_by_consent_and_lets_go_when_the_sticks_fall_silent(as
     ashore.arm(True)
 
     def drives() -> bool:
-        """Consent is given whenever it may be: a computer that is busy elsewhere makes the warden let go."""
+        """Consent is given whenever it may be: a computer that is busy elsewhere makes the output gate let go."""
         if aboard.gate.engagement.state == "ready":
             aboard.gate.press()
         return all(abs(pulse - 1500) > 28 for pulse in ashore.pulses)

@@ -19,7 +19,7 @@ from wakewise_ardusub.survey.guided_messages import SurveyTarget
 from wakewise_ardusub.survey.moving_region import AHEAD_M, ASIDE_M, MovingRegionAllocator, bed_frame, bed_region
 from wakewise_ardusub.survey.survey_control import (
     TILT_RAD,
-    RightedTracking,
+    PassiveTiltPid,
     SurveyController,
     goal_of,
     settings_of,
@@ -54,9 +54,7 @@ def test_thrusts_are_the_same_wherever_the_line_is() -> None:
     wrench, found = np.array([3.0, 0.5, -2.0, 0.0, 0.1, 0.1]), []
     for place, bed, way in (([0.0, 0.0, 4.2], 5.0, 0.0), ([40.0, -7.0, 9.2], 10.0, 2.1), ([0.0, 0.0, 3.0], 5.0, 0.0)):
         moving = MovingRegionAllocator(inner=Allocator(layout=context.layout, context=context), bed_m=bed, way_rad=way)
-        empty = Pipeline(
-            name="none", layout=moving.layout, motion=RightedTracking.of(HEAVY, settings, TILT_RAD)
-        ).blank()
+        empty = Pipeline(name="none", layout=moving.layout, motion=PassiveTiltPid.of(HEAVY, settings, TILT_RAD)).blank()
         _, allocation = moving.allocate(empty, wrench, at(place, way, 0.1), 0.1)
         assert allocation is not None
         assert HEAVY.allocation_matrix @ allocation.thrusts_N == pytest.approx(wrench, abs=1e-6)
@@ -71,7 +69,7 @@ def test_vertical_thrusters_do_not_hold_against_the_level_ones_below_the_tilt_al
     push_m: float, at_rest: bool
 ) -> None:
     """A push whose moment tilts the hull by less than 10 deg is left to it; of a harder one only that much is."""
-    tracking = RightedTracking.of(HEAVY, settings_of(), TILT_RAD)
+    tracking = PassiveTiltPid.of(HEAVY, settings_of(), TILT_RAD)
     assert tracking.most_Nm == pytest.approx(1.3 * math.sin(TILT_RAD), rel=0.1)
     empty = Pipeline(name="none", layout=SurveyController(HEAVY)._pipeline.layout, motion=tracking).blank()
     here, goal = at([0.0, 0.0, 4.0], 0.0), Goal(X_WB=at([push_m, 0.0, 4.0], 0.0).X_WB)
@@ -106,7 +104,7 @@ def test_a_computer_that_is_too_slow_is_refused(monkeypatch: pytest.MonkeyPatch)
     """A step that takes longer than half a control period: said with both times, before anything moves."""
     controller = SurveyController(HEAVY)
     monkeypatch.setattr(survey_control, "LONGEST_SHARE", 100.0)
-    assert controller.rehearse() > 0.0
+    assert controller.warm_up() > 0.0
     monkeypatch.setattr(survey_control, "LONGEST_SHARE", 0.0)
     with pytest.raises(StageError, match=r"a control step takes .* ms on this computer, must be at most 0 ms"):
-        controller.rehearse()
+        controller.warm_up()

@@ -123,7 +123,7 @@ def fly_survey(
         raise InputError(f"--out {folder}: a file is there, a folder is needed")
     if given.allocate:  # before the first message is queued, or its age would be taken for the autopilot's clock
         typer.echo("prepares the controller; the first time it compiles for a minute", err=True)
-        SurveyController(chosen).rehearse()
+        SurveyController(chosen).warm_up()
     with ExitStack() as stack:
         transport = open_transport(vehicle_at)
         stack.callback(transport.close)

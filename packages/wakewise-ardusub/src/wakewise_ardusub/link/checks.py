@@ -287,7 +287,7 @@ class ReceivedTelemetry:
 class CheckInputs:
     """All that is looked at; `heard` is None without a connection, `results` where no motor was tested.
 
-    `buttons` are those of the pilot's sticks that are to mean something here, as of `Warden`.
+    `buttons` are those of the pilot's sticks that are to mean something here, as of `OutputGate`.
     """
 
     vehicle: Vehicle

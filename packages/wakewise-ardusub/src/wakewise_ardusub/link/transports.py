@@ -195,7 +195,7 @@ class StreamTransport:
 
     def receive(self, timeout_s: float) -> bytes:
         """Whole packets, and what is none, that came."""
-        if self._gone:  # silence is what the warden judges
+        if self._gone:  # silence is what the output gate judges
             time.sleep(max(timeout_s, 0.0))
             return b""
         if not select.select([self._handle], [], [], max(timeout_s, 0.0))[0]:

@@ -50,7 +50,7 @@ class CameraDriver(Protocol):
 
 
 MakeCamera = Callable[[OutputGate, Path, SessionLog], CameraDriver]
-"""Makes the camera of a session: its warden, its folder and its journal."""
+"""Makes the camera of a session: its output gate, its folder and its journal."""
 
 
 def photo_name(number: int) -> str:
@@ -84,7 +84,7 @@ def parse_camera(words: str) -> MakeCamera:
 
 @dataclass(eq=False)
 class MavlinkCamera:
-    """A camera of the vehicle that takes MAVLink's commands; what it answers is the warden's to hear."""
+    """A camera of the vehicle that takes MAVLink's commands; what it answers is the output gate's to hear."""
 
     gate: OutputGate
     digicam: bool = False

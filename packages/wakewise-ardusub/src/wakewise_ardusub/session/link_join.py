@@ -49,7 +49,7 @@ EARLY = 0.1
 
 
 class FlightClock(Protocol):
-    """When moments of a flight are by the computer's clock, which is also the warden's."""
+    """When moments of a flight are by the computer's clock, which is also the output gate's."""
 
     def due_s(self, time_s: float) -> float:
         """The computer's time at which `time_s` of the flight has come."""
@@ -58,11 +58,11 @@ class FlightClock(Protocol):
 
 @dataclass(kw_only=True, eq=False)
 class ArduSubPlant:
-    """The vehicle of a warden; implements `wakewise.core.interfaces.Plant`.
+    """The vehicle of an output gate; implements `wakewise.core.interfaces.Plant`.
 
     Parameters
     ----------
-    warden : OutputGate
+    gate : OutputGate
     clock : FlightClock
     wait : callable
         Waits so many seconds, or less where there is nothing to wait for any more.
@@ -119,7 +119,7 @@ class MessageReceiver(Protocol):
 
 
 class LinkThread:
-    """Runs until it is stopped; what breaks it is kept in `fault`, after the warden has let go.
+    """Runs until it is stopped; what breaks it is kept in `fault`, after the output gate has let go.
 
     `heard` is called with each message after the gate has taken it; must be quick.
     """
@@ -372,7 +372,7 @@ SEA = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VehicleFlight:
-    """What flies at sea: the parts, what reckons the figures, the desk, and the parts without their warden."""
+    """What flies at sea: the parts, what reckons the figures, the desk, and the parts without their output gate."""
 
     parts: Parts
     bare: Parts
@@ -421,13 +421,13 @@ def join_vehicle(
     flown_N: Callable[[], Array],
     photographed: Callable[[], None],
 ) -> VehicleFlight:
-    """Join a scenario's parts to the vehicle of a warden.
+    """Join a scenario's parts to the vehicle of an output gate.
 
     Parameters
     ----------
     scenario : Scenario
         Vehicle, method and settings; its tank and world are not flown in.
-    warden : OutputGate
+    gate : OutputGate
     start : BodyState
         Where the vehicle is now.
     target : Target

@@ -133,8 +133,8 @@ class VehicleSession:
     spare : ProtectedRegion
     session : int
         Number of this program's heartbeats.
-    wardens : mapping
-        What else the warden takes: limits, buttons, listen_only.
+    gate_options : mapping
+        What else the output gate takes: limits, buttons, listen_only.
     camera : callable, optional
         Makes what takes the photographs; without it they are noted and not taken.
     box : tuple of float, optional

@@ -41,7 +41,7 @@ _OFFSET_S = 1000.0
 
 
 class CompanionHarness:
-    """A warden on a rehearsal's links; implements `wakewise_ardusub.link.transports.Transport`.
+    """An output gate on a rehearsal's links; implements `wakewise_ardusub.link.transports.Transport`.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ class CompanionHarness:
         Raises
         ------
         WakewiseError
-            Saying what keeps the warden from it.
+            Saying what keeps the output gate from it.
         """
         flight = self.flight
         flight.run(0.5)

@@ -1,7 +1,7 @@
 """Controller of a survey that allocates thrusts: from a target of the plan to thrusts that spare the bed.
 
 The state is the autopilot's own: place and velocity of its filter (LOCAL_POSITION_NED), carried on over their age,
-attitude and rates. `RightedTracking` gives the wrench, null-space allocation for the region of `moving_region` the
+attitude and rates. `PassiveTiltPid` gives the wrench, null-space allocation for the region of `moving_region` the
 thrusts, with the failsafe and the thruster model that all flights have.
 
 What makes a survey blow at the bed is vertical thrust, which allocation alone cannot take away. So roll and pitch are
@@ -50,7 +50,7 @@ def settings_of() -> ControlSettings:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RightedTracking(MotionStage):
+class PassiveTiltPid(MotionStage):
     """PID whose moments about roll and pitch are left to the hull's righting moment, as far as that tilts it little.
 
     Level thrusters that push below or above the origin pitch the hull. To hold it upright, vertical thrusters blow at
@@ -63,7 +63,7 @@ class RightedTracking(MotionStage):
     most_Nm: Array
 
     @classmethod
-    def of(cls, vehicle: Vehicle, settings: ControlSettings, most_rad: float) -> RightedTracking:
+    def of(cls, vehicle: Vehicle, settings: ControlSettings, most_rad: float) -> PassiveTiltPid:
         """For a vehicle; `most_rad` is the tilt at which its righting moment equals the largest moment left to it."""
         B, body = vehicle.allocation_matrix, compile_body(vehicle)
         tilts = [quat_from_euler(most_rad, 0.0, 0.0), quat_from_euler(0.0, most_rad, 0.0)]
@@ -103,7 +103,7 @@ class SurveyController:
         pipeline = Pipeline(
             name="survey",
             layout=context.layout,
-            motion=RightedTracking.of(vehicle, chosen, TILT_RAD),
+            motion=PassiveTiltPid.of(vehicle, chosen, TILT_RAD),
             allocator=self._allocator,
         )
         self._pipeline = with_pwm(with_failsafe(pipeline, vehicle, chosen), vehicle, chosen.pulse_s)
@@ -125,7 +125,7 @@ class SurveyController:
         self.weight_N += min(dt_s / MEAN_S, 1.0) * (lift_N - self.weight_N)
         return command.thrusts_N
 
-    def rehearse(self) -> float:
+    def warm_up(self) -> float:
         """Compile what is needed; the median time of the last steps in s.
 
         Raises
