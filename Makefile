@@ -40,8 +40,7 @@ $(STAMP): requirements.lock pyproject.toml $(wildcard packages/*/pyproject.toml)
 	@$(BIN)/python tools/check_libraries.py
 	@touch $@
 
-# Kernels run as the Python that they are written in for the second run, so that their lines count. A test that fails
-# here fails in `make test` too: what counts is what was run.
+# Kernels run as the Python that they are written in for the second run, so that their lines count.
 INTERPRETED := tests/allocation tests/estimation
 PARALLEL := --dist loadfile --no-loadscope-reorder
 SELECTED := -m "not slow" --hypothesis-profile=ci

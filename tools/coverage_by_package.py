@@ -58,11 +58,8 @@ def main() -> int:
     if not data.get_data().measured_files():
         print("no coverage data: run make coverage", file=sys.stderr)
         return 2
-    floors = (
-        tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
-        .get("wakewise", {})
-        .get("coverage", {})
-    )
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    floors = project["tool"]["wakewise"]["coverage"]
     percent = {}
     print(f"{'package':<28}{'statements':>12}{'covered %':>12}{'floor %':>10}")
     for name, (run, whole) in covered(data).items():
