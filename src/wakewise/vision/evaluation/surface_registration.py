@@ -117,8 +117,8 @@ def register(A: DatedSurface, B: DatedSurface, with_scale: bool = False) -> Regi
     alike, same = 0.5 < ratio < 2.0, abs(ratio - 1.0) <= 0.1
     scales = (1.0,) if same else (1.0, ratio) if alike else (ratio,)
     begun = [rough.improved(start, (0.3, 0.1)) for scale in scales for start in _starts(A, B, scale)]
-    finer = sorted(begun, key=rough.misfit)[:FINE_STARTS]
-    best = min((rough.improved(one, (0.05, 0.02)) for one in finer), key=rough.misfit)
+    finer = sorted(begun, key=lambda fitted: fitted[0])[:FINE_STARTS]
+    best = min((rough.improved(one, (0.05, 0.02)) for _, one in finer), key=lambda fitted: fitted[0])[1]
     free = _reweighted(A, B, tree, facing_m, best, with_scale=True)
     if with_scale or not alike:
         found = free
@@ -182,9 +182,10 @@ class _Rough:
         turn = T[:3, :3]
         return Similarity(scale=start.scale, R_AB=turn @ start.R_AB, t_A_m=turn @ start.t_A_m + T[:3, 3])
 
-    def improved(self, start: Similarity, shares: tuple[float, ...]) -> Similarity:
-        """The fit, or where it began if that is better: growth all over draws ICP to one side."""
-        return min((start, self.fit(start, shares)), key=self.misfit)
+    def improved(self, start: Similarity, shares: tuple[float, ...]) -> tuple[float, Similarity]:
+        """Misfit and the fit, or where it began if that is better: growth all over draws ICP to one side."""
+        both = ((self.misfit(one), one) for one in (start, self.fit(start, shares)))
+        return min(both, key=lambda fitted: fitted[0])
 
     def misfit(self, similarity: Similarity) -> float:
         """Mean distance from A, along its normals where near; another scale must fit twice as well.
