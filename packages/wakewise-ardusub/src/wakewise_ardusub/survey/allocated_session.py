@@ -151,10 +151,10 @@ class AllocatedTransectSession(TransectSession):
         """As of `TransectSession`, with the weight in water."""
         return {**super().figures(), "weight_N": self.weight_N}
 
-    def _consented_by_mode(self, _now_s: float) -> bool:
+    def _begin_by_mode(self, now_s: float) -> None:
         """No mode is consent; but once ALT_HOLD is there that was asked for on consent, the gate is engaged."""
-        there = self.state == "asked" and self.known.mode == ALT_HOLD and self.gate.engagement.state == "ready"
-        return there and self.gate.press() == "engaged"
+        if self.state == "asked" and self.known.mode == ALT_HOLD and self.gate.engagement.state == "ready":
+            self._engage(now_s)
 
     def _amiss(self, facts: SurveyFacts) -> str:
         """What the survey lacks, which the gate is told; else what the gate found."""

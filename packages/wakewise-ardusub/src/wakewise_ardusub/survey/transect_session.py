@@ -288,8 +288,7 @@ class TransectSession:
         self._beat(now_s)
         self._judge(now_s)
         self._came["turn"] = now_s
-        if self._consented_by_mode(now_s):
-            self._settle(now_s)
+        self._begin_by_mode(now_s)
         self._mode_before = self.known.mode
         if self.state == "asked" and now_s - self._since_s > ASKS_FOR_S:
             self._turn("waiting", f"{MODES[self.options.limits.mode]} was refused")
@@ -300,9 +299,10 @@ class TransectSession:
             self._came["told"] = now_s
             self._stream(now_s, dt_s)
 
-    def _consented_by_mode(self, now_s: float) -> bool:
+    def _begin_by_mode(self, now_s: float) -> None:
         entered = self.known.mode == GUIDED and self._mode_before not in (None, GUIDED)
-        return entered and (self.state == "asked" or (self.state == "ready" and now_s - self._since_s >= READY_S))
+        if entered and (self.state == "asked" or (self.state == "ready" and now_s - self._since_s >= READY_S)):
+            self._settle(now_s)
 
     def facts(self, now_s: float) -> SurveyFacts:
         """What is known now, as it is judged."""
