@@ -12,6 +12,7 @@ class Without:
         if name.partition(".")[0] == sys.argv[1]:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 sys.meta_path.insert(0, Without())
+sys.modules.pop(sys.argv[1], None)  # what measures coverage has imported it
 """
 PLAIN = """
 import numpy as np

@@ -15,7 +15,8 @@ from wakewise.operation.teleop.input.controls import apply_dead_zone
 @given(st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=9))
 def test_shaped_axes_are_always_within_full_stick(raw: list[float]) -> None:
     """Whatever a device says, the axes are five numbers from -1 to 1."""
-    Controls(axes=apply_dead_zone(raw))
+    axes = Controls(axes=apply_dead_zone(raw)).axes
+    assert len(axes) == 5 and all(-1.0 <= axis <= 1.0 for axis in axes)
 
 
 def test_dead_zone_is_taken_out_and_the_rest_is_stretched() -> None:
