@@ -5,7 +5,7 @@ import json
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.campaigns.flights import scenario_of
+from wakewise.experiments.campaigns.flights import FLY, scenario_of
 from wakewise.experiments.campaigns.study import StudyResult
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.ui.cli.main import run
@@ -111,6 +111,24 @@ def test_a_model_that_was_not_made_counts_as_the_worst_in_differences():
     told = bench.against(ours, theirs)
     assert (told["rmse_mm_more"], told["rmse_mm_more_pairs"]) == (pytest.approx((-1.0 + 18.0 + 18.0) / 3.0), 3)
     assert bench.model_figures(ours)["rmse_mm"] == 1.0
+
+
+def test_silt_is_told_of_flights_without_models(capsys):
+    """Such a trial is a flight; its part has ratios of silt over the first method, and no success."""
+    cases, methods = cases_of("silt"), ("dp", "wake-aware")
+    trials = bench.planned({"silt": cases}, methods, 3)
+    assert {trial.task.work for trial in trials.values()} == {FLY}
+    clouded = {"dp": 0.4, "wake-aware": 0.6}
+    rows = {
+        key: {"ray_optical_depth": clouded[key[2]] * (1.0 + 0.1 * (key[3] % 3)), "silt_lifted_g": 50.0}
+        for key in trials
+    }
+    part = bench.part_figures("silt", cases, methods, StudyResult(rows, {}, frozenset()))
+    first, second = part["rows"][:2]
+    assert first["flights"] == 3 and "success_pct" not in first and "ray_optical_depth_ratio" not in first
+    assert second["ray_optical_depth_ratio"] == pytest.approx(1.5) and "rmse_mm_more" not in second
+    show_models({"parts": {"silt": part}, "flights": 6, "failed": 0, "failures": []})
+    assert "1.50" in capsys.readouterr().out
 
 
 def test_doses_are_drawn_and_shown(tmp_path, capsys):

@@ -22,11 +22,25 @@ _COLUMNS = (
     ("position_rmse_mm", "place mm", 1.0),
     ("energy_kJ", "kJ", 1.0),
 )
+_SILT_COLUMNS = (
+    ("ray_optical_depth", "rays", 1.0),
+    ("turbidity_mean_per_m", "round the target 1/m", 1.0),
+    ("silt_lifted_g", "lifted g", 1.0),
+    ("bed_over_threshold_s", "grains s", 1.0),
+    ("target_speed_mean_m_s", "wash mm/s", 1e3),
+    ("energy_kJ", "kJ", 1.0),
+)
 
 
 def show_models(result: Mapping[str, Any]) -> None:
-    """A table per part, a row per case and method; last, RMSE beside the base's with its interval."""
+    """A table per part, a row per case and method; last, RMSE beside the base's with its interval.
+
+    Of flights without models silt is told, and last the attenuation along the rays over the base's.
+    """
     for part in result["parts"].values():
+        if not part["models"]:
+            _show_silt(part)
+            continue
         rows = []
         for row in part["rows"]:
             more = row.get("rmse_mm_more")
@@ -38,6 +52,21 @@ def show_models(result: Mapping[str, Any]) -> None:
         print_table("ttn", columns, rows, part["title"])
     typer.echo(f"{result['flights']} scans, {result['failed']} failed")
     show_failures(result)
+
+
+def _show_silt(part: Mapping[str, Any]) -> None:
+    rows = [
+        (row["title"], row["method"], row["flights"], *scaled(row, _SILT_COLUMNS), _over_base(row))
+        for row in part["rows"]
+    ]
+    columns = ("case", "method", "flights", *(title for _, title, _ in _SILT_COLUMNS), "rays over the base's")
+    print_table("ttn", columns, rows, part["title"])
+
+
+def _over_base(row: Mapping[str, Any]) -> str:
+    if row.get("ray_optical_depth_ratio") is None:
+        return ""
+    return f"{row['ray_optical_depth_ratio']:.2f} ({_ends(row, 'ray_optical_depth_ratio')})"
 
 
 def show_front(result: Mapping[str, Any]) -> None:

@@ -35,6 +35,8 @@ FIGURES = (
     "shifted_mm",
     "bed_over_threshold_s",
     "exposure_optical_depth",
+    "ray_optical_depth",
+    "turbidity_mean_per_m",
     "silt_lifted_g",
     "position_rmse_mm",
     "roll_pitch_rms_deg",
@@ -45,6 +47,8 @@ DIFFERENCES = ("rmse_mm", "completeness_pct", "completeness_1mm_pct", "sway_abou
 """Of these the difference to the base is told, seed by seed."""
 RATIOS = ("target_speed_mean_m_s", "energy_kJ", "sway_wash_mm")
 """Of these the ratio to the base is told, seed by seed."""
+SILT_RATIOS = ("ray_optical_depth", "turbidity_mean_per_m", "silt_lifted_g", "bed_over_threshold_s")
+"""Of these, too, where a part has flights without models."""
 
 ModelKey = tuple[str, str, str, int]
 """Part, case, method and seed."""
@@ -103,9 +107,10 @@ def part_figures(
             base = base_of(cases, case)
             own, others = (_of(made, part, *which) for which in ((case.name, method), base))
             row = {"case": case.name, "title": case.title, "method": method, "doses": case.doses}
-            rows.append(row | model_figures(own) | ({} if base == (case.name, method) else against(own, others)))
+            row |= model_figures(own) if file.models else mean_figures(filter(None, own.values()), FIGURES)
+            rows.append(row | ({} if base == (case.name, method) else against(own, others, models=file.models)))
     axes = {name: {"title": axis.title, "unit": axis.unit} for name, axis in file.axes.items()}
-    return {"title": file.title, "rows": rows, "axes": axes}
+    return {"title": file.title, "models": file.models, "rows": rows, "axes": axes}
 
 
 def base_of(cases: Sequence[Case], case: Case) -> tuple[str, str]:
@@ -124,16 +129,19 @@ def model_figures(rows: Mapping[int, Row | None]) -> dict[str, Any]:
     return told
 
 
-def against(ours: Mapping[int, Row | None], theirs: Mapping[int, Row | None]) -> dict[str, Any]:
-    """Differences and ratios of pairs of one seed, each with its interval and the number of pairs."""
+def against(ours: Mapping[int, Row | None], theirs: Mapping[int, Row | None], *, models: bool = True) -> dict[str, Any]:
+    """Differences and ratios of pairs of one seed, each with its interval and the number of pairs.
+
+    Without models there are ratios only, and those of silt beside them.
+    """
     told: dict[str, Any] = {}
     mine, others = _judged(ours), _judged(theirs)
-    for figure in DIFFERENCES:
+    for figure in DIFFERENCES if models else ():
         more = [own - other for other, own, _ in pairs_of(others, mine, figure, {})]
         name = f"{figure}_more"
         told[name], told[f"{name}_interval"] = mean_interval(more) if more else (None, None)
         told[f"{name}_pairs"] = len(more)
-    for figure in RATIOS:
+    for figure in RATIOS if models else (*RATIOS, *SILT_RATIOS):
         name = f"{figure}_ratio"
         told[name], told[f"{name}_interval"], told[f"{name}_pairs"] = paired_ratio(mine, others, figure)
     return told

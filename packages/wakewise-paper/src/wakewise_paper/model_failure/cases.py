@@ -14,7 +14,7 @@ from wakewise.core.safe_yaml import read_yaml
 from wakewise.core.settings import Settings
 from wakewise.experiments.campaigns.definition import MODEL_SOURCES, PlannedTrial
 from wakewise.experiments.campaigns.flights import MODEL
-from wakewise.experiments.campaigns.study import study_trial
+from wakewise.experiments.campaigns.study import flight_trial, study_trial
 from wakewise.experiments.campaigns.task import Task
 from wakewise_paper.reproduction.table_trials import METHOD_PLACES
 
@@ -57,6 +57,7 @@ class PartFile(Settings):
     title: str
     first_seed: int = Field(..., ge=1)
     seeds: int = Field(..., ge=1)
+    models: bool = Field(True, description="whether photographs and a model are made of each flight")
     methods: tuple[str, ...] = Field(..., min_length=1)
     fields: dict[str, Any]
     cases: dict[str, CaseFile] = Field({})
@@ -82,8 +83,18 @@ class Case:
     doses: dict[str, float]
 
     def trial(self, method: str, seed: int) -> PlannedTrial:
-        """A whole quick scan and its model."""
+        """A whole quick scan, and its model where the part has models."""
         fields = {"method": METHOD_PLACES.get(method, method), **self.fields, "seed": seed}
+        if not load_parts()[self.part].models:
+            return flight_trial(
+                str(fields["world"]),
+                method,
+                seed,
+                fields,
+                setup=self.setup,
+                sources=SOURCES,
+                variation=f"{self.part}/{self.name}",
+            )
         settings = {"scenario": fields, "preset": "quick", "keep": "figures", "setup": self.setup}
         name = f"{self.part}/{self.name}/{method}/{seed}"
         task = Task(name=name, work=MODEL, settings=settings, sources=SOURCES)
