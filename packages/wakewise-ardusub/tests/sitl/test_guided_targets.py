@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,10 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from wakewise.core.errors import InputError
-from wakewise.core.geometry import euler_from_quat
+from wakewise.core.geometry import euler_from_quat, quat_from_euler
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.protocol import ALT_HOLD, POSHOLD
+from wakewise_ardusub.physics.datagrams import PhysicsState
 from wakewise_ardusub.physics.surface import FreeWater
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 from wakewise_ardusub.sitl.modes import GUIDED
@@ -156,6 +158,31 @@ def test_the_rangefinder_is_late_and_silent_in_a_drop_out() -> None:
     flight.set_mode(POSHOLD)
     assert flight.run(0.1).autopilot.mode == GUIDED
     assert flight.texts()[-1] == "Mode change failed: POSHOLD requires position"
+
+
+@pytest.mark.parametrize("pitch_deg", [-10.0, 0.0, 10.0])
+def test_a_tilted_rangefinder_sees_the_bed_along_its_own_axis(pitch_deg: float) -> None:
+    """On a face of slope 0.25, 0.9 m below, the law of sines gives the range; it is not the depth over the cosine."""
+    relief = Relief(shape="trapezoid", depth_m=5.0, height_m=0.6, slope=0.25, phase=0.3)
+    sensors = SeaSensors(relief, SensorErrors(range_noise_m=0.0, outlier_share=0.0), np.random.default_rng(0))
+    place = np.array([0.5, 0.0, relief.bed_m(0.5, 0.0) - 0.9])
+    rises = (relief.bed_m(0.5, 0.0) - relief.bed_m(0.6, 0.0)) / 0.1
+    assert abs(rises) == pytest.approx(0.25)
+    tilt, face = np.radians(pitch_deg), np.arctan(rises)
+    # pitched up, the body's z axis points ahead: towards a face that rises ahead
+    expected = 0.9 * np.cos(face) / np.cos(tilt - face)
+    motion = PhysicsState(
+        time_s=0.0,
+        p_WB_m=place,
+        q_WB=quat_from_euler(0.0, tilt, 0.0),
+        v_W_m_s=np.zeros(3),
+        omega_B_rad_s=np.zeros(3),
+        force_B_m_s2=np.zeros(3),
+    )
+    sensors.estimate(motion)
+    assert sensors.distance_cm(0.3) == pytest.approx(100.0 * expected, abs=0.51)
+    sensors.estimate(replace(motion, time_s=1.0, q_WB=quat_from_euler(0.0, np.radians(95.0), 0.0)))
+    assert sensors.distance_cm(1.4) is None
 
 
 def test_a_current_carries_a_vehicle_that_does_nothing() -> None:

@@ -18,11 +18,13 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-from wakewise.core.geometry import euler_from_quat
+from wakewise.core.geometry import matrix_from_quat
 from wakewise_ardusub.physics.datagrams import PhysicsState
 
 Shape = Literal["flat", "trapezoid", "sawtooth"]
 SHAPES: tuple[Shape, ...] = ("flat", "trapezoid", "sawtooth")
+_STEP_M, _HALVINGS = 0.05, 12
+"""Steps in which a ray is followed to the bed, and how often the last one is halved: to 12 micrometres."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,11 +134,11 @@ class SeaSensors:
         return self.log_lost or now_s < self._gap_until["log"]
 
     def distance_cm(self, now_s: float) -> int | None:
-        """The distance that DISTANCE_SENSOR tells now, in whole cm; None in a drop-out."""
+        """The distance that DISTANCE_SENSOR tells now, in whole cm; None in a drop-out, and where it meets no bed."""
         if self.range_lost or now_s < self._gap_until["range"]:
             return None
         old = [distance for at_s, distance in self._ranges if at_s <= now_s - self.errors.delay_s]
-        if not old:
+        if not old or not math.isfinite(old[-1]):
             return None
         told = old[-1] + self.errors.range_noise_m * self._rng.normal()
         if self._rng.random() < self.errors.outlier_share:
@@ -144,9 +146,26 @@ class SeaSensors:
         return round(100.0 * told)
 
     def _range_m(self, motion: PhysicsState) -> float:
-        roll, pitch, _ = euler_from_quat(motion.q_WB)
-        north, east, down = motion.p_WB_m
-        return (self.relief.bed_m(float(north), float(east)) - float(down)) / max(math.cos(roll) * math.cos(pitch), 0.1)
+        """To where the body's z axis first meets the bed; infinite where it is within 6 deg of level or looks up."""
+        way = matrix_from_quat(motion.q_WB)[:, 2]
+        if way[2] < 0.1:
+            return math.inf
+        start = motion.p_WB_m
+
+        def above_m(along_m: float) -> float:
+            at = start + along_m * way
+            return self.relief.bed_m(float(at[0]), float(at[1])) - float(at[2])
+
+        deepest, highest = self.relief.depth_m, self.relief.depth_m - self.relief.height_m
+        near = max((highest - float(start[2])) / float(way[2]), 0.0)
+        last = (deepest - float(start[2])) / float(way[2])
+        far = near
+        while above_m(far) > 0.0 and far < last:
+            near, far = far, far + _STEP_M
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (near + far)
+            near, far = (middle, far) if above_m(middle) > 0.0 else (near, middle)
+        return 0.5 * (near + far)
 
 
 def drawn_current(rng: np.random.Generator, speed_m_s: float, gust_m_s: float = 0.01) -> Callable[[float], Array]:
