@@ -22,6 +22,9 @@ GATE_M = 0.25
 AGREE_M, AGREE = 0.15, 4
 _HUBER_M = 0.02
 _ROUNDS = 3
+SLOWEST_RAD_S, FASTEST_RAD_S = 1.0, 2.5
+LAG_M = 0.1
+"""Way over the bed in one time constant of the depth target."""
 _BRAKES = 0.8
 """Share of the largest acceleration that a way is planned to end with."""
 
@@ -80,7 +83,16 @@ class DepthShaper:
     acceleration_m_s2: float = 0.0
     fastest_m_s: float = 0.25
     most_m_s2: float = 0.15
-    bandwidth_rad_s: float = 1.0
+    bandwidth_rad_s: float = SLOWEST_RAD_S
+
+    @classmethod
+    def at(cls, depth_m: float, pace_m_s: float) -> DepthShaper:
+        """At rest at a depth. The bandwidth grows with the vehicle's speed, which meets a face of the bed sooner.
+
+        At 0.1 m/s and below it is 1 rad/s: a faster target follows the rangefinder's noise, and the thrusters blow at
+        the bed.
+        """
+        return cls(depth_m=depth_m, bandwidth_rad_s=min(max(pace_m_s / LAG_M, SLOWEST_RAD_S), FASTEST_RAD_S))
 
     def towards(self, depth_m: float, speed_m_s: float, dt_s: float) -> DepthShaper:
         """The target one step later, on its way to a depth that moves with a speed."""

@@ -369,7 +369,7 @@ class TransectSession:
             return
         place = self._place[0].copy()
         self._hold, self._pulses, self._reached, self._least_m = place, [], False, 0.0
-        self._depth = DepthShaper(depth_m=float(place[2]))
+        self._depth = DepthShaper.at(float(place[2]), self.options.pace.speed_m_s)
         self._came["told"], self._settled_s = -math.inf, now_s
         self._turn("settling", "")
 
