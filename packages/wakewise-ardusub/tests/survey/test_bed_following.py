@@ -71,7 +71,7 @@ def test_the_depth_target_keeps_its_bounds_and_follows_a_slope_without_lag() -> 
 
 
 def test_a_faster_vehicle_makes_up_for_an_altitude_sooner() -> None:
-    """5 cm off, at 0.3 m/s it is within 1 cm in less than 0.6 of the time at 0.1 m/s; slower than that nothing changes."""
+    """5 cm off, at 0.3 m/s it is within 1 cm in less than 0.6 of the time at 0.1 m/s; below that nothing changes."""
     steps = []
     for pace_m_s in (0.1, 0.3):
         shaper = DepthShaper.at(3.0, pace_m_s)
