@@ -80,6 +80,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     told |= {"losses": losses, "flights": flights, "wash_pct": by_hand["wash_pct"], "by_hand": by_hand}
     told |= {name: told["all"][name]["mean"] for name in ("speed_rms_cm_s", "altitude_rms_cm", "cross_track_rms_cm")}
     told["wash_reduction_vs_manual20_pct"] = by_hand["wash_pct"]["mean"]
+    told["allocated_wash_reduction_vs_manual20_pct"] = by_hand["allocated_against_person_wash_pct"]["mean"]
     told["hold_after_loss_s_max"] = max(row["seconds"] for row in losses.values())
     return told | repeat_figures(options.progress)
 

@@ -18,7 +18,7 @@ Written down before the figures were known:
   ignored, and a practised hand knows which push gives which force, dead zone of the thrusters included. Slower climbs
   and turns than the dead zones of these sticks allow (half and a quarter of the stick at 20 %) are made by nudges.
 
-`allocated` was added later: the same line by `wakewise link transect --allocate`, against GUIDED targets.
+`allocated` was added later: the same line by `wakewise link transect --allocate`, against GUIDED targets and the person.
 
 `REASONS` was added after the first flights, which showed no reduction: on `REASON_PAIRS` seeds the survey's wash
 without weight in water, without the pitching moment of the level thrusters, and over a level bed.
@@ -438,6 +438,7 @@ def hand_summary(pairs: Sequence[dict[str, Any]]) -> dict[str, Any]:
     told["wash_pct"]["met"] = None if low is None else low >= LEAST_PCT
     for kind in ("wash", "carried"):
         told[f"allocated_{kind}_pct"] = _reduction(pairs, "survey", "allocated", f"{kind}_mm_s")
+        told[f"allocated_against_person_{kind}_pct"] = _reduction(pairs, "person", "allocated", f"{kind}_mm_s")
     looked_into = [pair for pair in pairs if pair["seed"] < REASON_PAIRS]
     told["reasons"] = {name: _reduction(looked_into, "survey", name, "wash_mm_s") for name in REASONS}
     for who in ("survey", "allocated", "person", *REASONS):
@@ -464,6 +465,8 @@ def show_by_hand(told: dict[str, Any]) -> None:
     rows = {f"{kind}, reduction": (told[f"{kind}_pct"], "%") for kind in KINDS}
     for kind in ("wash", "carried"):
         rows[f"allocated thrusts against the survey: {kind}, reduction"] = (told[f"allocated_{kind}_pct"], "%")
+        against = told[f"allocated_against_person_{kind}_pct"]
+        rows[f"allocated thrusts against the person: {kind}, reduction"] = (against, "%")
     rows |= {f"{who}: {name}": (told[who][name], "") for who in ("survey", "allocated", "person") for name in FIGURES}
     rows |= {f"survey, {name}: wash, reduction": (one, "%") for name, one in told["reasons"].items()}
     for name, (one, unit) in rows.items():
