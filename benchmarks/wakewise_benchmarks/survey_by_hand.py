@@ -18,7 +18,7 @@ Written down before the figures were known:
   ignored, and a practised hand knows which push gives which force, dead zone of the thrusters included. Slower climbs
   and turns than the dead zones of these sticks allow (half and a quarter of the stick at 20 %) are made by nudges.
 
-`allocated` was added later: the same line by `wakewise link transect --allocate`, against GUIDED targets and the person.
+`allocated` was added later: the same line by `wakewise link transect --allocate`, beside both.
 
 `REASONS` was added after the first flights, which showed no reduction: on `REASON_PAIRS` seeds the survey's wash
 without weight in water, without the pitching moment of the level thrusters, and over a level bed.
