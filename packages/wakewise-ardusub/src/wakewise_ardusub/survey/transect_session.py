@@ -82,8 +82,6 @@ GIVES_WAY_S = 0.5
 """How long an order of the pilot is given to act before a hold is asked for."""
 LOOKS_DOWN = 25
 """MAV_SENSOR_ROTATION_PITCH_270."""
-LEAD_S = 0.2
-"""How far ahead the bed is looked for: the time in which a target becomes motion."""
 REACHED_M = 0.05
 LOW, BRAKE_M_S2 = 0.8, 0.05
 """Share of the altitude below which the way ahead stops, by this deceleration, until the altitude is there again."""
@@ -427,7 +425,7 @@ class TransectSession:
         place, velocity, acceleration = self._hold[:2], np.zeros(2), np.zeros(2)
         heading, turn = self.known.attitude[2] if self.at is None else self.at.heading_rad, 0.0
         if self.state in ("flying", "paused") and self.plan is not None and self.at is not None:
-            bed = self.track.bed(now_s + LEAD_S)
+            bed = self.track.bed(now_s)
             if bed is None or self._facts.range_s > 0.5 * self.options.limits.range_s:
                 self._depth = self._depth.resting(dt_s)
             else:
