@@ -151,6 +151,9 @@ def test_an_altitude_without_a_rangefinder_is_refused(
         (["--area", "4"], "must be WIDTHxLENGTH"),
         (["--area", "4x20", "--length", "3"], "give one of them"),
         (["--area", "4x20", "--spacing", "0"], "--spacing 0"),
+        (["--length", "300"], "--fence 200: the lines reach 300 m from the start"),
+        (["--length", "3", "--spacing", "1"], "--spacing: is of the lines of --area"),
+        (["--out", "flown"], "--out flown: holds the journal of another survey"),
         (["--heading", "up"], "--heading 'up': must be degrees"),
         (["--current", "fast"], "--current 'fast'"),
         (["--camera", "film"], "must be mavlink or digicam"),
@@ -168,6 +171,8 @@ def test_bad_input_is_refused_in_one_line(
     monkeypatch.chdir(tmp_path)
     line = {"type": "LineString", "coordinates": [[500000.0, 3740000.0], [500010.0, 3740000.0]]}
     (tmp_path / "utm.geojson").write_text(json.dumps(line))
+    (tmp_path / "flown").mkdir()
+    (tmp_path / "flown" / "journal.jsonl").write_text("{}\n")
     assert run(["link", "transect", *options]) == 2
     said = capsys.readouterr().err.strip()
     assert words in said

@@ -42,6 +42,27 @@ def test_kml_and_geojson_of_the_same_line_agree(tmp_path: Path) -> None:
     assert read_map(written(tmp_path, kml, "line.kml")) == pytest.approx(np.array(LINE)[:, ::-1])
 
 
+def test_places_drawn_twice_count_once_and_a_byte_order_mark_is_no_letter(tmp_path: Path) -> None:
+    """As a double click and some editors leave them."""
+    path = tmp_path / "line.geojson"
+    line = {"type": "LineString", "coordinates": [LINE[0], *LINE, LINE[2]]}
+    path.write_text(json.dumps(line), encoding="utf-8-sig")
+    assert read_map(path) == pytest.approx(np.array(LINE)[:, ::-1])
+    path.write_bytes(json.dumps({"name": "B\u00e4r", **line}, ensure_ascii=False).encode("latin-1"))
+    with pytest.raises(InputError, match="save it as UTF-8"):
+        read_map(path)
+    with pytest.raises(InputError, match="is a folder"):
+        read_map(tmp_path)
+
+
+def test_a_line_across_the_antimeridian_is_as_short_as_it_is() -> None:
+    """0.0002 degrees of longitude at 17 S are 21 m, whichever side they are said from."""
+    places = np.array([[-17.0, 179.9999], [-17.0, -179.9999]])
+    for k in (0, 1):
+        metres = local_m(places, *places[k])
+        assert np.hypot(*(metres[1] - metres[0])) == pytest.approx(21.3, abs=0.1)
+
+
 def test_metres_are_those_of_the_ellipsoid() -> None:
     """A thousandth of a degree at 33.8 N: 110.92 m of latitude, 92.58 m of longitude (WGS 84), within 2 cm."""
     metres = local_m(np.array(LINE)[:, ::-1], 33.8, -118.4)
@@ -58,7 +79,10 @@ def test_metres_are_those_of_the_ellipsoid() -> None:
         ("a.geojson", '{"type": "LineString", "coordinates": [[NaN, 1], [2, 3]]}', "finite numbers"),
         ("a.geojson", {"type": "LineString", "coordinates": [["x", 1], [2, 3]]}, "is not longitude, latitude"),
         ("a.geojson", {"type": "MultiLineString", "coordinates": [LINE, LINE]}, "2 lines, must hold one"),
-        ("a.geojson", {"type": "Point", "coordinates": LINE[0]}, "0 lines, must hold one"),
+        ("a.geojson", {"type": "Point", "coordinates": LINE[0]}, "no line but Point, must hold one"),
+        ("a.kml", "<kml><Polygon><LinearRing/></Polygon></kml>", "no line but LinearRing, Polygon"),
+        ("a.geojson", {"type": "LineString", "coordinates": [LINE[0], LINE[0]]}, "all places lie within 0.1 m"),
+        ("a.geojson", {"type": "LineString", "coordinates": [[0, 0], [0, 20]]}, "metres in place of degrees"),
         ("a.geojson", "{", "is no JSON"),
         ("a.kml", "<kml>", "is no XML"),
         ("a.kml", '<!DOCTYPE kml [<!ENTITY a "b">]><kml/>', "entities"),

@@ -14,6 +14,8 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError, WakewiseError
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.protocol import ALT_HOLD, POSHOLD
 from wakewise_ardusub.link.session_log import SessionLog, read_journal
@@ -189,13 +191,30 @@ def test_a_steep_face_is_climbed_before_it_is_passed() -> None:
     assert min(row[2] for row in survey.rows) > 0.25
 
 
-def test_lines_out_of_the_fence_are_refused_before_anything_moves_far() -> None:
-    """A line of 20 m with a fence of 5 m: the session ends with the reason, at its place."""
+def test_lines_out_of_the_fence_are_told_before_anybody_consents() -> None:
+    """A line of 20 m with a fence of 5 m: the session waits with the reason, and no mode is asked for."""
     options = TransectOptions(limits=replace(SurveyLimits(), fence_m=5.0))
     survey = harness(options=options)
+    with pytest.raises(WakewiseError, match="20 m from here, --fence is 5 m"):
+        survey.ready()
+    assert (survey.session.state, survey.session.why) == ("waiting", "survey: 20 m from here, --fence is 5 m")
+    survey.session.consent()
+    survey.flight.run(1.0)
+    assert survey.flight.autopilot.mode == ALT_HOLD
+
+
+def test_lines_that_the_current_makes_impossible_are_refused_in_the_hold() -> None:
+    """It is known after the hold alone: the session ends with the reason, at its place."""
+
+    def lines(place: Array, heading: float, current: Array, anchor: object) -> list[Array]:
+        if current.any():
+            raise InputError("survey: not in a current")
+        return list(straight_line(20.0)(place, heading, current, None))
+
+    survey = harness(lines=lines)
     survey.ready().session.consent()
     survey.to_the_end()
-    assert survey.session.refused == "survey: 20 m from here, --fence is 5 m"
+    assert survey.session.refused == "survey: not in a current"
     assert survey.session.state == "ended"
     assert float(np.hypot(*survey.flight.autopilot.motion.p_WB_m[:2])) < 1.0
 

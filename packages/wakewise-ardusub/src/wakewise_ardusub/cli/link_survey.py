@@ -121,6 +121,8 @@ def fly_survey(
     folder = given.out or Path("runs") / f"{given.name}-{time.strftime('%Y%m%d-%H%M%S', time.gmtime())}"
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {folder}: a file is there, a folder is needed")
+    if (folder / JOURNAL_FILE).exists():
+        raise InputError(f"--out {folder}: holds the journal of another survey, choose a new folder")
     if given.allocate:  # before the first message is queued, or its age would be taken for the autopilot's clock
         typer.echo("prepares the controller; the first time it compiles for a minute", err=True)
         SurveyController(chosen).warm_up()

@@ -24,7 +24,9 @@ def transect(
     area: Annotated[
         str | None, typer.Option(metavar="WIDTHxLENGTH", help="A lawnmower from here, m: lines of LENGTH side by side.")
     ] = None,
-    spacing: Annotated[float, typer.Option(metavar="M", help="Between two lines of --area.")] = 0.5,
+    spacing: Annotated[
+        float | None, typer.Option(metavar="M", help="Between two lines of --area; 0.5 if not given.")
+    ] = None,
     map_file: Annotated[
         Path | None,
         typer.Option("--map", help="GeoJSON or KML file with one LineString in WGS 84 (longitude, latitude)."),
@@ -67,7 +69,7 @@ def transect(
     from wakewise_ardusub.survey.survey_plan import SurveyPace
 
     pace = SurveyPace(speed_m_s=speed, altitude_m=altitude)
-    lines = _lines(length, area, spacing, map_file, heading)
+    lines = _lines(length, area, spacing, map_file, heading, fence)
     given = link_survey.SurveyCommand(
         name="transect", connection=connection, every=every, camera=camera, current=current, range_delay=range_delay,
         gap=gap, fence=fence, vehicle=vehicle, system=system, consent=consent, wait=wait, out=out, json=json,
@@ -76,7 +78,9 @@ def transect(
     link_survey.fly_survey(given, pace, lines)
 
 
-def _lines(length: float | None, area: str | None, spacing: float, map_file: Path | None, heading: str) -> MakeLines:
+def _lines(
+    length: float | None, area: str | None, spacing: float | None, map_file: Path | None, heading: str, fence_m: float
+) -> MakeLines:
     """What makes the lines once the vehicle's place, heading and the current are known."""
     import numpy as np
 
@@ -85,14 +89,20 @@ def _lines(length: float | None, area: str | None, spacing: float, map_file: Pat
 
     if sum((length is not None, area is not None, map_file is not None)) > 1:
         raise InputError("--length, --area, --map: give one of them")
+    if spacing is not None and area is None:
+        raise InputError("--spacing: is of the lines of --area, which is not given")
     if map_file is not None:
         if heading != "here":
             raise InputError("--heading: the map has it")
         return _map_lines(map_file)
     width_m, length_m = (SHORTEST_M, 20.0 if length is None else length) if area is None else _area(area)
-    apart_m = spacing if area is not None else 2.0 * SHORTEST_M
+    apart_m = 2.0 * SHORTEST_M if area is None else 0.5 if spacing is None else spacing
     given = None if heading in ("here", "current") else _degrees(heading)
-    parallel_lines(np.zeros(2), 0.0, width_m, length_m, apart_m, 1)  # refuses sizes before anything is connected
+    # Refuses sizes before anything is connected.
+    corners = np.concatenate(parallel_lines(np.zeros(2), 0.0, width_m, length_m, apart_m, 1))
+    away_m = float(np.hypot(*corners.T).max())
+    if away_m > fence_m:
+        raise InputError(f"--fence {fence_m:g}: the lines reach {away_m:.0f} m from the start")
 
     def make(place: Any, here_rad: float, current: Any, _anchor: Any) -> list[Any]:
         along = here_rad if given is None else given
@@ -113,7 +123,6 @@ def _map_lines(path: Path) -> MakeLines:
     from wakewise_ardusub.survey.survey_plan import ordered
 
     corners = read_map(path)
-    local_m(corners, *corners[0])  # refuses what is too far apart before anything is connected
 
     def make(_place: Any, _heading: float, current: Any, anchor: Any) -> list[Any]:
         if anchor is None:

@@ -20,10 +20,12 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 
-FARTHEST_M = 2000.0
+FARTHEST_M, APART_M = 2000.0, 0.1
+"""Farthest place from the first; places nearer to the one before are that one, as a double click draws it twice."""
 LARGEST_B = 4_000_000
 _A_M, _E2 = 6_378_137.0, 6.694379990141e-3
 """Semi-major axis and squared eccentricity of WGS 84."""
+_KML_OTHERS = ("Point", "Polygon", "LinearRing", "Track", "GroundOverlay", "Model")
 _WGS_84 = ("CRS84", "EPSG::4326", "EPSG:4326")
 
 
@@ -43,27 +45,36 @@ def read_map(path: Path) -> Array:
     Raises
     ------
     InputError
-        If it cannot be read, holds no line or several, is in another projection, or a coordinate is no place.
+        If it cannot be read, holds no line or several, is in another projection, a coordinate is no place, or places
+        lie too far apart.
     """
     try:
         size = path.stat().st_size
-        text = path.read_text(encoding="utf-8") if size <= LARGEST_B else ""
+        text = path.read_text(encoding="utf-8-sig") if size <= LARGEST_B else ""
     except FileNotFoundError:
         raise InputError(f"{path}: no such file, a GeoJSON or KML file with one LineString is needed") from None
-    except (OSError, UnicodeDecodeError) as fault:
-        raise InputError(f"{path}: {getattr(fault, 'strerror', None) or 'is no text'}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder, a GeoJSON or KML file with one LineString is needed") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is no text in UTF-8; save it as UTF-8") from None
+    except OSError as fault:
+        raise InputError(f"{path}: {fault.strerror}") from None
     if size > LARGEST_B:
         raise InputError(f"{path}: {size} bytes, at most {LARGEST_B}")
     ending = path.suffix.lower()
     if ending not in (".geojson", ".json", ".kml"):
         raise InputError(f"{path}: ending '{ending}', must be .geojson, .json or .kml")
-    lines = _kml_lines(path, text) if ending == ".kml" else _geojson_lines(path, text)
-    if len(lines) != 1:
-        raise InputError(f"{path}: {len(lines)} lines, must hold one LineString")
+    lines, others = _kml_lines(path, text) if ending == ".kml" else _geojson_lines(path, text)
+    if len(lines) > 1:
+        raise InputError(f"{path}: {len(lines)} lines, must hold one LineString: save each in a file of its own")
+    if not lines:
+        beside = f" but {', '.join(sorted(others))}" if others else ""
+        raise InputError(f"{path}: no line{beside}, must hold one LineString")
     return _checked(path, lines[0])
 
 
-def _geojson_lines(path: Path, text: str) -> list[Any]:
+def _geojson_lines(path: Path, text: str) -> tuple[list[Any], set[str]]:
+    """Lines, and the kinds of what else there is."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError) as fault:
@@ -73,10 +84,19 @@ def _geojson_lines(path: Path, text: str) -> list[Any]:
     crs = found.get("crs")
     if crs is not None and not any(name in json.dumps(crs) for name in _WGS_84):
         raise InputError(f"{path}: crs {json.dumps(crs)[:80]}, must be WGS 84 (longitude, latitude; no crs member)")
-    return list(_geometries(found))
+    lines, others = [], set[str]()
+    for kind, places in _geometries(found):
+        if kind == "LineString":
+            lines.append(places)
+        elif kind == "MultiLineString":
+            lines += places or []
+        else:
+            others.add(kind)
+    return lines, others
 
 
-def _geometries(node: Any) -> Iterator[Any]:
+def _geometries(node: Any) -> Iterator[tuple[str, Any]]:
+    """Kind and coordinates of each geometry."""
     if not isinstance(node, dict):
         return
     kind = node.get("type")
@@ -85,25 +105,29 @@ def _geometries(node: Any) -> Iterator[Any]:
             yield from _geometries(feature)
     elif kind == "Feature":
         yield from _geometries(node.get("geometry"))
-    elif kind == "LineString":
-        yield node.get("coordinates")
-    elif kind == "MultiLineString":
-        yield from node.get("coordinates") or []
+    elif kind == "GeometryCollection":
+        for geometry in node.get("geometries") or []:
+            yield from _geometries(geometry)
+    elif isinstance(kind, str):
+        yield kind, node.get("coordinates")
 
 
-def _kml_lines(path: Path, text: str) -> list[Any]:
+def _kml_lines(path: Path, text: str) -> tuple[list[Any], set[str]]:
+    """Lines, and the kinds of what else there is."""
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError(f"{path}: declares entities, which KML does not need")
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as fault:
         raise InputError(f"{path}: is no XML ({fault})") from None
-    found = []
+    found, others = [], set[str]()
     for node in root.iter():
-        if node.tag.rpartition("}")[2] == "LineString":
+        kind = node.tag.rpartition("}")[2]
+        others |= {kind} & set(_KML_OTHERS)
+        if kind == "LineString":
             places = [child.text or "" for child in node.iter() if child.tag.rpartition("}")[2] == "coordinates"]
             found.append([place.split(",") for place in " ".join(places).split()])
-    return found
+    return found, others
 
 
 def _checked(path: Path, line: Any) -> Array:
@@ -116,7 +140,18 @@ def _checked(path: Path, line: Any) -> Array:
     if (np.abs(lon_lat) > [180.0, 90.0]).any():
         far = lon_lat[(np.abs(lon_lat) > [180.0, 90.0]).any(axis=1)][0]
         raise InputError(f"{path}: {far[0]:g}, {far[1]:g} is no longitude, latitude in degrees: another projection")
-    return lon_lat[:, ::-1]
+    places = lon_lat[:, ::-1]
+    try:
+        metres = local_m(places, *places[0])
+    except InputError as fault:
+        raise InputError(f"{path}: {fault}") from None
+    kept = [0]
+    for k in range(1, len(places)):
+        if math.dist(metres[k], metres[kept[-1]]) >= APART_M:
+            kept.append(k)
+    if len(kept) < 2:
+        raise InputError(f"{path}: all places lie within {APART_M:g} m, a line is needed")
+    return places[kept]
 
 
 def local_m(lat_lon_deg: Array, latitude_deg: float, longitude_deg: float) -> Array:
@@ -130,12 +165,16 @@ def local_m(lat_lon_deg: Array, latitude_deg: float, longitude_deg: float) -> Ar
     first = lat_lon_deg[0]
     sine = math.sin(math.radians(first[0]))
     if abs(sine) > math.sin(math.radians(85.0)):
-        raise InputError(f"map: latitude {first[0]:.1f}, must be within 85 degrees of the equator")
+        raise InputError(f"latitude {first[0]:.1f}, must be within 85 degrees of the equator")
     bend = 1.0 - _E2 * sine * sine
     north_m = _A_M * (1.0 - _E2) / bend**1.5
     east_m = _A_M / math.sqrt(bend) * math.cos(math.radians(first[0]))
-    metres = np.radians(lat_lon_deg - [latitude_deg, longitude_deg]) * [north_m, east_m]
+    off_deg = lat_lon_deg - [latitude_deg, longitude_deg]
+    off_deg[:, 1] = (off_deg[:, 1] + 180.0) % 360.0 - 180.0  # a line may cross the antimeridian
+    metres = np.radians(off_deg) * [north_m, east_m]
     away = float(np.hypot(*(metres - metres[0]).T).max())
     if away > FARTHEST_M:
-        raise InputError(f"map: a place {away:.0f} m from the first one, at most {FARTHEST_M:g}")
+        raise InputError(
+            f"a place {away:.0f} m from the first one, at most {FARTHEST_M:g}: metres in place of degrees?"
+        )
     return metres

@@ -275,7 +275,9 @@ def parallel_lines(
     """
     for name, value in (("width", width_m), ("length", length_m)):
         if not SHORTEST_M <= value <= LONGEST_M:
-            raise InputError(f"--area: a {name} of {value:g} m, must be from {SHORTEST_M:g} to {LONGEST_M:g} m")
+            raise InputError(
+                f"--length, --area: a {name} of {value:g} m, must be from {SHORTEST_M:g} to {LONGEST_M:g} m"
+            )
     if not SHORTEST_M <= spacing_m <= LONGEST_M:
         raise InputError(f"--spacing {spacing_m:g}: must be from {SHORTEST_M:g} to {LONGEST_M:g} m")
     count = math.floor(width_m / spacing_m + 1e-9) + 1
@@ -334,6 +336,30 @@ def plan_survey(
     if total > LONGEST_M:
         raise InputError(f"survey: {total:.0f} m with the way to its start, at most {LONGEST_M:g} m")
     return SurveyPlan(legs=tuple(legs), pace=pace)
+
+
+def made_plan(
+    make: MakeLines,
+    place_W_m: Array,
+    heading_rad: float,
+    current_W_m_s: Array,
+    anchor: GeoAnchor | None,
+    *,
+    pace: SurveyPace,
+    fence_m: float,
+) -> SurveyPlan:
+    """The plan of the lines as they are made from a place, shape (2,).
+
+    Raises
+    ------
+    InputError
+        As `plan_survey`, and if it reaches farther than the fence from the place.
+    """
+    plan = plan_survey(make(place_W_m, heading_rad, current_W_m_s, anchor), place_W_m, pace, current_W_m_s)
+    away = plan.farthest_m(place_W_m)
+    if away > fence_m:
+        raise InputError(f"survey: {away:.0f} m from here, --fence is {fence_m:g} m")
+    return plan
 
 
 def resumed(plan: SurveyPlan, at: PlanProgress, place_W_m: Array) -> tuple[SurveyPlan, PlanProgress]:

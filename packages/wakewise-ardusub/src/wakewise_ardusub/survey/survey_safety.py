@@ -66,8 +66,11 @@ class SurveyFacts:
     turn_s: float = 0.0
 
 
-def missing(facts: SurveyFacts, limits: SurveyLimits) -> str:
-    """What a survey cannot begin without, in words; empty where nothing is missing."""
+def missing(facts: SurveyFacts, limits: SurveyLimits, highest_m: float = 0.0) -> str:
+    """What a survey cannot begin without, in words; empty where nothing is missing.
+
+    `highest_m` is the greatest altitude that is asked for: it must lie below the surface.
+    """
     if facts.telemetry_s > limits.telemetry_s or facts.armed is None:
         return "nothing is heard from the autopilot"
     if facts.position_s > limits.position_s or not facts.placed:
@@ -88,6 +91,9 @@ def missing(facts: SurveyFacts, limits: SurveyLimits) -> str:
         return "the vehicle is disarmed; the pilot arms it"
     if facts.depth_m < limits.least_depth_m:
         return f"the vehicle is {facts.depth_m:.1f} m deep, {limits.least_depth_m:g} m is needed"
+    bed_m = facts.depth_m + facts.altitude_m
+    if bed_m - highest_m < limits.least_depth_m:
+        return f"the bed is {bed_m:.1f} m deep: {highest_m:g} m above it is the surface"
     return ""
 
 

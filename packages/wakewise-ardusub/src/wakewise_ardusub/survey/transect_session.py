@@ -15,6 +15,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -55,7 +56,7 @@ from wakewise_ardusub.survey.survey_plan import (
     SurveyPace,
     SurveyPlan,
     advance,
-    plan_survey,
+    made_plan,
     resumed,
     target_of,
     time_left_s,
@@ -144,11 +145,12 @@ class TransectSession:
         system: int = 1,
         session: int = 1,
     ) -> None:
-        self._send, self._lines, self.options, self._clock = send, lines, options, clock
+        self._send, self.options, self._clock = send, options, clock
+        self._plan_from = partial(made_plan, lines, pace=options.pace, fence_m=options.limits.fence_m)
         self._vehicle, self._motors, self._journal = vehicle, VehicleMotors(vehicle), journal
         self.known = LinkState(system=system, session=session)
         self.state: State = "waiting"
-        self.why = self.warning = self.ended_by = self.refused = ""
+        self.why = self.warning = self.ended_by = self.refused = self._lines_fault = ""
         """Why it is in its state; what the current does; the fault that ended it last; what is wrong with the lines."""
         self.plan: SurveyPlan | None = None
         self.at: PlanProgress | None = None
@@ -161,7 +163,7 @@ class TransectSession:
         """Whether it is at its leg's altitude; the lowest altitude asked for, 0 until one was reached."""
         self._place: tuple[Array, Array] | None = None
         self._came = dict.fromkeys(
-            ("position", "doppler", "range", "turn", "beat", "asked", "parameters", "mode", "told"), -math.inf
+            ("position", "doppler", "range", "turn", "beat", "asked", "parameters", "mode", "told", "looked"), -math.inf
         )
         self._history: deque[tuple[float, float, float]] = deque(maxlen=200)
         self._placed, self._takes_acceleration, self._facts = True, False, SurveyFacts(armed=None, mode=None)
@@ -353,14 +355,18 @@ class TransectSession:
     def _amiss(self, facts: SurveyFacts) -> str:
         if self.state in ENGAGED:
             return fault_of(facts, self.options.limits, self._least_m)
-        return missing(facts, self.options.limits) or self._no_water(facts)
+        highest_m = max(self.options.pace.altitude_m, *self.options.layers_m, 0.0)
+        return missing(facts, self.options.limits, highest_m) or self._no_way(self._clock())
 
-    def _no_water(self, facts: SurveyFacts) -> str:
-        highest = max(self.options.pace.altitude_m, *self.options.layers_m, 0.0)
-        bed_m = facts.depth_m + facts.altitude_m
-        if not bed_m - highest < self.options.limits.least_depth_m:
-            return ""
-        return f"the bed is {bed_m:.1f} m deep: {highest:g} m above it is the surface"
+    def _no_way(self, now_s: float) -> str:
+        """Once a second: what is wrong with the lines from here, so that it is told before anybody consents."""
+        if self._place is not None and now_s - self._came["looked"] >= 1.0:
+            self._came["looked"], self._lines_fault = now_s, ""
+            try:
+                self._plan_from(self._place[0][:2], self.known.attitude[2], np.zeros(2), self._anchor)
+            except InputError as fault:
+                self._lines_fault = str(fault)
+        return "" if self.plan is not None and not self.finished else self._lines_fault
 
     def _settle(self, now_s: float) -> None:
         if self._place is None:
@@ -382,11 +388,7 @@ class TransectSession:
             self.current_W_m_s = np.array(given) if given is not None else self._felt(heading)
             current = np.zeros(2) if self.current_W_m_s is None else self.current_W_m_s
             try:
-                lines = self._lines(place, heading, current, self._anchor)
-                plan = plan_survey(lines, place, self.options.pace, current)
-                away = plan.farthest_m(place)
-                if away > self.options.limits.fence_m:
-                    raise InputError(f"survey: {away:.0f} m from here, --fence is {self.options.limits.fence_m:g} m")
+                plan = self._plan_from(place, heading, current, self._anchor)
             except InputError as fault:
                 self.refused = str(fault)
                 self._let_go(self.refused, now_s)
