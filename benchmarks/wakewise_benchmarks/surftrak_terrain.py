@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from wakewise.core.arrays import Array
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.sitl.sea_sensors import Relief, SensorErrors
 
@@ -38,6 +39,10 @@ class ReplayedTerrain(Relief):
         del east_m
         times, heights = np.array(self.corners).T
         return self.depth_m - float(np.interp(north_m / SPEED_M_S % times[-1], times, heights))
+
+    def range_m(self, place_W_m: Array, way_W: Array) -> float:
+        """That of the bed straight below: theirs was replayed in time, whatever the vehicle's tilt."""
+        return (self.bed_m(float(place_W_m[0]), float(place_W_m[1])) - float(place_W_m[2])) / max(float(way_W[2]), 0.1)
 
 
 def surftrak_figures(name: str, length_m: float = LENGTH_M) -> dict[str, Any]:

@@ -70,6 +70,29 @@ class Relief:
             up = min(max((x - flat_m) / face_m, 0.0), 1.0, max((self.period_m - x) / face_m, 0.0))
         return self.depth_m - self.height_m * up
 
+    def range_m(self, place_W_m: Array, way_W: Array) -> float:
+        """Way from a place along a direction, shape (3,) each, to where it first meets the bed.
+
+        Infinite where the direction is within 6 deg of level or points up.
+        """
+        if way_W[2] < 0.1:
+            return math.inf
+
+        def above_m(along_m: float) -> float:
+            at = place_W_m + along_m * way_W
+            return self.bed_m(float(at[0]), float(at[1])) - float(at[2])
+
+        deepest, highest = self.depth_m, self.depth_m - self.height_m
+        near = max((highest - float(place_W_m[2])) / float(way_W[2]), 0.0)
+        last = (deepest - float(place_W_m[2])) / float(way_W[2])
+        far = near
+        while above_m(far) > 0.0 and far < last:
+            near, far = far, far + _STEP_M
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (near + far)
+            near, far = (middle, far) if above_m(middle) > 0.0 else (near, middle)
+        return 0.5 * (near + far)
+
 
 @dataclass(frozen=True, kw_only=True)
 class SensorErrors:
@@ -114,7 +137,8 @@ class SeaSensors:
         """What the autopilot's filter makes of a motion: position and velocity with the log's errors; takes a range."""
         dt_s = 0.0 if self._last_s is None else motion.time_s - self._last_s
         self._last_s = motion.time_s
-        self._ranges.append((motion.time_s, self._range_m(motion)))
+        range_m = self.relief.range_m(motion.p_WB_m, matrix_from_quat(motion.q_WB)[:, 2])
+        self._ranges.append((motion.time_s, range_m))
         draw, errors = self._rng, self.errors
         chance = errors.gaps_per_min / 60.0 * dt_s
         for name in self._gap_until:
@@ -144,28 +168,6 @@ class SeaSensors:
         if self._rng.random() < self.errors.outlier_share:
             told = self._rng.uniform(self.errors.least_m, self.errors.most_m)
         return round(100.0 * told)
-
-    def _range_m(self, motion: PhysicsState) -> float:
-        """To where the body's z axis first meets the bed; infinite where it is within 6 deg of level or looks up."""
-        way = matrix_from_quat(motion.q_WB)[:, 2]
-        if way[2] < 0.1:
-            return math.inf
-        start = motion.p_WB_m
-
-        def above_m(along_m: float) -> float:
-            at = start + along_m * way
-            return self.relief.bed_m(float(at[0]), float(at[1])) - float(at[2])
-
-        deepest, highest = self.relief.depth_m, self.relief.depth_m - self.relief.height_m
-        near = max((highest - float(start[2])) / float(way[2]), 0.0)
-        last = (deepest - float(start[2])) / float(way[2])
-        far = near
-        while above_m(far) > 0.0 and far < last:
-            near, far = far, far + _STEP_M
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (near + far)
-            near, far = (middle, far) if above_m(middle) > 0.0 else (near, middle)
-        return 0.5 * (near + far)
 
 
 def drawn_current(rng: np.random.Generator, speed_m_s: float, gust_m_s: float = 0.01) -> Callable[[float], Array]:
