@@ -169,6 +169,4 @@ class WallModel:
         """Before bounce-back and step: change what leaves towards walls so that they take the stress, no more."""
         flat = now.reshape(-1)
         _speeds(flat, self._stride, self._cells, self._velocity)
-        _exchange(
-            flat, self._stride, self._cells, self._normals, self._whole, self._velocity, self._viscosity
-        )
+        _exchange(flat, self._stride, self._cells, self._normals, self._whole, self._velocity, self._viscosity)
