@@ -6,7 +6,7 @@ from the cube's front face downstream, y up from the floor and z across from the
 order of axes is x, z, y: along, across, up. All results are in units of H and of the bulk velocity.
 
 The bulk velocity is the mean over the channel's height of the measured profile at x/H = -3, z/H = 0, zero on both
-walls. That profile is also what flows in. Walls are without slip (half-way bounce-back) and without a wall function;
+walls. That profile is also what flows in. The floor, the ceiling and the cube take the stress of the law of the wall;
 the sides are periodic.
 """
 
@@ -156,16 +156,14 @@ class ChannelCase:
     high_x: float = 9.0
     width: float = 7.0
     develop: float = 15.0
-    average: float = 25.0
-    # Of the molecular viscosity; as in `LatticeCase`: at that of the measurement noise of single cells grows.
-    reynolds: float = 1.0e4
+    average: float = 50.0
+    reynolds: float = REYNOLDS  # of the molecular viscosity
     smagorinsky: float = 0.12  # the package's own, as in `LatticeCase`
     speed: float = 0.14  # bulk velocity in cells per step; the fastest water has 0.2, as in `forced_lattice`
     entry: float = 0.5  # behind the inflow, in which viscosity falls: without it noise of single cells grows there
     sponge: float = 1.0  # before the open end, in which viscosity grows
     every: int = 10  # steps between samples of the average
-    # Of the water in the law of the wall (`WallModel`); None: walls without slip.
-    wall_reynolds: float | None = REYNOLDS
+    wall_law: bool = True  # whether walls take the stress of the law of the wall (`WallModel`), else without slip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -202,10 +200,8 @@ class ChannelMeans:
                 else:
                     square, mean = seconds[quantity]
                     values = (column[square] - column[mean] ** 2) / self.bulk**2
-                ratio = None
-                if case.wall_reynolds is not None and quantity in ("mu_", "mw_"):
-                    ratio = case.wall_reynolds
-                part = _along_column(values, self.solid[a, b], n, y_H, ratio)
+                law = case.reynolds if case.wall_law and quantity in ("mu_", "mw_") else None
+                part = _along_column(values, self.solid[a, b], n, y_H, law)
                 out += (1 - abs(i - a)) * (1 - abs(j - b)) * part
         return out
 
@@ -226,21 +222,21 @@ class ChannelMeans:
         return float((k + 0.5 + u[k] / (u[k] - u[k + 1])) / n)
 
 
-def _along_column(values: Array, solid: BoolArray, n: int, y_H: Array, wall_reynolds: float | None) -> Array:
+def _along_column(values: Array, solid: BoolArray, n: int, y_H: Array, reynolds: float | None) -> Array:
     """Values of a column of cells at heights, zero on the walls and in the cube, shape (k,).
 
-    `wall_reynolds`: of the water beside walls, for a velocity along them that follows the law of the wall there.
+    `reynolds`: for a velocity along walls that follows the law of the wall from the cell beside them on.
     """
     first = int(np.count_nonzero(solid))  # the cube stands on the floor
     top = len(values) / n
     nodes = np.concatenate([[first / n], (np.arange(first, len(values)) + 0.5) / n, [top]])
     out = np.interp(y_H, nodes, np.concatenate([[0.0], values[first:], [0.0]]), left=0.0)
-    if wall_reynolds is not None:
+    if reynolds is not None:
         for height, value in ((y_H - first / n, values[first]), (top - y_H, values[-1])):
             beside = (height > 0.0) & (height < 0.5 / n)
-            friction = math.sqrt(wall_stress(abs(value), 1 / wall_reynolds, 1 / n))
+            friction = math.sqrt(wall_stress(abs(value), 1 / reynolds, 1 / n))
             if friction > 0.0:
-                lengths = wall_reynolds * friction
+                lengths = reynolds * friction
                 law = law_of_the_wall(lengths * np.append(height[beside], 0.5 / n))
                 out[beside] = value * law[:-1] / law[-1]
     return out
@@ -266,8 +262,8 @@ class ChannelRun:
         self._cube = BounceBackLinks(self.solid)
         self._faces = np.array([PERIODIC, OPEN, PERIODIC, PERIODIC, WALL, WALL])
         self._wall_model = None
-        if case.wall_reynolds is not None:
-            self._wall_model = WallModel(self.solid, self._faces, case.speed * n / case.wall_reynolds)
+        if case.wall_law:
+            self._wall_model = WallModel(self.solid, self._faces, case.speed * n / case.reynolds)
         self._wrapped = np.array([OPEN, OPEN, PERIODIC, PERIODIC, WALL, WALL])
         self._eddies = smagorinsky_factor(case.smagorinsky)
         # In the sponges the viscosity rises to that of a mixing layer, as in `wakewise_paper.lattice_reference.run`.

@@ -7,7 +7,8 @@ Turbulent Shear Flows, 155):
 
     u+ = y+ up to y+ = 11.81, u+ = A (y+)^B above, A = 8.3, B = 1/7
 
-integrated over the cell, so that the stress follows from the cell's mean speed without iteration.
+integrated over the cell, so that the stress follows from the cell's mean speed without iteration. The law holds for a
+boundary layer in equilibrium. Werner and Wengle use it where the flow is separated, too, for want of another.
 
 It is imposed as a flux of momentum, as Malaspinas and Sagaut (2014, doi:10.1016/j.jcp.2014.06.020) do with other means.
 Of the populations that slant towards a wall along its tangent t, those along n + t and n - t carry tangential momentum
@@ -109,7 +110,7 @@ def _exchange(
                 taken = 0.5 * over * (u if t == 0 else v)
                 a, b = SLANTING[n, t, 0] * stride + cells[k], SLANTING[n, t, 1] * stride + cells[k]
                 along, against = flat[a], flat[b]
-                # Bounce-back makes of what leaves along n + t what comes along t - n reversed, that is -n - t.
+                # Bounce-back returns along -n - t what leaves along n + t.
                 flat[a], flat[b] = against + taken, along - taken
 
 
