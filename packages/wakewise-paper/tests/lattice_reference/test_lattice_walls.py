@@ -214,7 +214,7 @@ def test_a_laminar_channel_has_the_parabola():
 def test_the_shear_of_a_turbulent_channel_is_deans():
     """At Reynolds number 40,000 on 16 cells the friction velocity is within 20 % of Dean's correlation.
 
-    Dean 1978, doi:10.1115/1.3448633: cf = 0.073 Re^(-1/4), of bulk velocity and full height. Walls without slip take
+    Dean 1978, J. Fluids Eng. 100, 215: cf = 0.073 Re^(-1/4), of bulk velocity and full height. Walls without slip take
     more than five times that stress on these cells.
     """
     cells, bulk, reynolds = (48, 24, 16), 0.1, 40_000.0

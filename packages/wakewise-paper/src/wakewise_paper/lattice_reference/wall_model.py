@@ -10,11 +10,14 @@ Turbulent Shear Flows, 155):
 integrated over the cell, so that the stress follows from the cell's mean speed without iteration. The law holds for a
 boundary layer in equilibrium. Werner and Wengle use it where the flow is separated, too, for want of another.
 
-It is imposed as a flux of momentum, as Malaspinas and Sagaut (2014, doi:10.1016/j.jcp.2014.06.020) do with other means.
-Of the populations that slant towards a wall along its tangent t, those along n + t and n - t carry tangential momentum
-f(n + t) - f(n - t) into the wall in a step. Bounce-back returns it with the opposite sign. `WallModel.impose` exchanges
-the two before bounce-back, so that the momentum returns unchanged, less the stress: mass and normal momentum are those
-of bounce-back, and the tangential momentum that the wall takes is the stress exactly.
+It is imposed as a flux of momentum, by a velocity of slip in bounce-back (Asmuth et al. 2021, Phys. Fluids 33, 105111).
+Of the populations that slant towards a wall along its tangent t, those along n + t and n - t carry the tangential
+momentum f(n + t) - f(n - t) into the wall in a step. Bounce-back returns it with the opposite sign. `WallModel.impose`
+exchanges the two before bounce-back, so that the momentum returns unchanged, less the stress. Mass and normal momentum
+are those of bounce-back, and the tangential momentum that the wall takes is the stress exactly.
+
+In a turbulent channel on 16 cells the friction velocity is some 10 % below Dean's correlation: the speed is taken from
+the cell beside the wall, which coarse cells make too slow against those above it.
 """
 
 from __future__ import annotations
