@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -125,6 +126,25 @@ def test_a_computed_field_is_read_at_measured_places() -> None:
         means.at("fuv", 4.0, 0.0, y)
 
 
+def test_below_the_first_cell_the_velocity_follows_the_law_of_the_wall() -> None:
+    """At a high Reynolds number it is steep at floor, roof and ceiling; without the law, and for stresses, straight."""
+    fast = replace(TINY, reynolds=40_000.0)
+    y = np.array([0.01, 0.05, 0.125, 0.375])
+    even = np.ones((50, 12, 8))
+    law = made_means(even, fast)
+    for floor, x_H in ((0.0, 4.0), (1.0, 0.5)):
+        u = law.at("mu_", x_H, 0.0, floor + y)
+        assert u[2:] == pytest.approx([1.0, 1.0])
+        # The power 1/7 of the law.
+        assert u[1] / u[0] == pytest.approx(5 ** (1 / 7), rel=1e-6)
+        assert u[0] > 0.65
+    assert law.at("mu_", 4.0, 0.0, 2.0 - y) == pytest.approx(law.at("mu_", 4.0, 0.0, y))
+    straight = [0.08, 0.4, 1.0, 1.0]
+    assert made_means(even, replace(fast, wall_law=False)).at("mu_", 4.0, 0.0, y) == pytest.approx(straight)
+    assert law.at("fuu", 4.0, 0.0, y) == pytest.approx(0.04 * np.array(straight))
+    assert made_means(-even, fast).at("mu_", 4.0, 0.0, y) == pytest.approx(-law.at("mu_", 4.0, 0.0, y))
+
+
 def test_the_reattachment_is_where_the_flow_on_the_floor_turns() -> None:
     """A velocity that changes sign 2 H behind the rear face reattaches there; one that never does has none."""
     x = TINY.low_x + (np.arange(50) + 0.5) / 4
@@ -141,6 +161,8 @@ def test_a_small_run_keeps_its_flow_and_tells_all_figures(channel: Path, tmp_pat
     assert computed["points"] == 75
     assert all(np.isfinite(value) for key, value in computed.items() if "_rms_" in key)
     assert computed["reynolds_effective"] < computed["reynolds"] == 500.0
+    without = truth.cube_figures(channel, no_progress, replace(TINY, wall_law=False))
+    assert without["u_rms_rel"] != computed["u_rms_rel"]
     draw_cube({"cube": computed}, tmp_path / "cube.svg")
     assert (tmp_path / "cube.svg").read_text().startswith("<?xml")
     with pytest.raises(InputError, match="was not computed"):

@@ -174,8 +174,8 @@ def bench(
 
     A figure that needs reference data which is not there is null, with the reason in `why`. `gentle` flies all of its
     scenarios and worlds for more than an hour on two free cores, some minutes with `--scenarios orbit/paper`; a run
-    that was stopped goes on where it was. `truth` takes about 7 minutes of one core, most of it for the lattice round a
-    cube and for photographs; `--only` chooses.
+    that was stopped goes on where it was. `truth` takes about 10 minutes of one core, most of it for the lattice round
+    a cube and for photographs; `--only` chooses.
     """
     from wakewise.core.errors import STRICT, InputError
     from wakewise.core.optional_dependencies import need

@@ -6,7 +6,7 @@ from the cube's front face downstream, y up from the floor and z across from the
 order of axes is x, z, y: along, across, up. All results are in units of H and of the bulk velocity.
 
 The bulk velocity is the mean over the channel's height of the measured profile at x/H = -3, z/H = 0, zero on both
-walls. That profile is also what flows in. Walls are without slip (half-way bounce-back) and without a wall function;
+walls. That profile is also what flows in. The floor, the ceiling and the cube take the stress of the law of the wall;
 the sides are periodic.
 """
 
@@ -38,6 +38,7 @@ from wakewise.simulation.lattice.stencil import (
     still_water,
 )
 from wakewise_paper.lattice_reference.engines import MOMENTS, BounceBackLinks, accumulate
+from wakewise_paper.lattice_reference.wall_model import WallModel, law_of_the_wall, wall_stress
 
 HEIGHT_MM = 25.0
 """Height of the measured cube, H."""
@@ -155,14 +156,14 @@ class ChannelCase:
     high_x: float = 9.0
     width: float = 7.0
     develop: float = 15.0
-    average: float = 25.0
-    # Of the molecular viscosity; as in `LatticeCase`: at that of the measurement noise of single cells grows.
-    reynolds: float = 1.0e4
+    average: float = 50.0
+    reynolds: float = REYNOLDS  # of the molecular viscosity
     smagorinsky: float = 0.12  # the package's own, as in `LatticeCase`
     speed: float = 0.14  # bulk velocity in cells per step; the fastest water has 0.2, as in `forced_lattice`
     entry: float = 0.5  # behind the inflow, in which viscosity falls: without it noise of single cells grows there
     sponge: float = 1.0  # before the open end, in which viscosity grows
     every: int = 10  # steps between samples of the average
+    wall_law: bool = True  # whether walls take the stress of the law of the wall (`WallModel`), else without slip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -179,7 +180,8 @@ class ChannelMeans:
     def at(self, quantity: str, x_H: float, z_H: float, y_H: Array) -> Array:
         """A mean velocity ("mu_", "mv_", "mw_") or a resolved normal stress ("fuu", "fvv", "fww") at heights y_H.
 
-        Linear between the middles of cells, and from the cell beside a wall to zero on the wall.
+        Linear between the middles of cells. From the cell beside a wall to zero on the wall, velocities along it follow
+        the law of the wall if the run has one; else, and other quantities, linear.
 
         Raises InputError for another quantity.
         """
@@ -198,7 +200,9 @@ class ChannelMeans:
                 else:
                     square, mean = seconds[quantity]
                     values = (column[square] - column[mean] ** 2) / self.bulk**2
-                out += (1 - abs(i - a)) * (1 - abs(j - b)) * _along_column(values, self.solid[a, b], n, y_H)
+                law = case.reynolds if case.wall_law and quantity in ("mu_", "mw_") else None
+                part = _along_column(values, self.solid[a, b], n, y_H, law)
+                out += (1 - abs(i - a)) * (1 - abs(j - b)) * part
         return out
 
     def reattachment_H(self) -> float | None:
@@ -218,11 +222,24 @@ class ChannelMeans:
         return float((k + 0.5 + u[k] / (u[k] - u[k + 1])) / n)
 
 
-def _along_column(values: Array, solid: BoolArray, n: int, y_H: Array) -> Array:
-    """Values of a column of cells at heights, zero on the walls and in the cube, shape (k,)."""
+def _along_column(values: Array, solid: BoolArray, n: int, y_H: Array, reynolds: float | None) -> Array:
+    """Values of a column of cells at heights, zero on the walls and in the cube, shape (k,).
+
+    `reynolds`: for a velocity along walls that follows the law of the wall from the cell beside them on.
+    """
     first = int(np.count_nonzero(solid))  # the cube stands on the floor
-    nodes = np.concatenate([[first / n], (np.arange(first, len(values)) + 0.5) / n, [len(values) / n]])
-    return np.interp(y_H, nodes, np.concatenate([[0.0], values[first:], [0.0]]), left=0.0)
+    top = len(values) / n
+    nodes = np.concatenate([[first / n], (np.arange(first, len(values)) + 0.5) / n, [top]])
+    out = np.interp(y_H, nodes, np.concatenate([[0.0], values[first:], [0.0]]), left=0.0)
+    if reynolds is not None:
+        for height, value in ((y_H - first / n, values[first]), (top - y_H, values[-1])):
+            beside = (height > 0.0) & (height < 0.5 / n)
+            friction = math.sqrt(wall_stress(abs(value), 1 / reynolds, 1 / n))
+            if friction > 0.0:
+                lengths = reynolds * friction
+                law = law_of_the_wall(lengths * np.append(height[beside], 0.5 / n))
+                out[beside] = value * law[:-1] / law[-1]
+    return out
 
 
 class ChannelRun:
@@ -244,6 +261,9 @@ class ChannelRun:
         self.solid[x0 : x0 + n, z0 : z0 + n, :n] = True
         self._cube = BounceBackLinks(self.solid)
         self._faces = np.array([PERIODIC, OPEN, PERIODIC, PERIODIC, WALL, WALL])
+        self._wall_model = None
+        if case.wall_law:
+            self._wall_model = WallModel(self.solid, self._faces, case.speed * n / case.reynolds)
         self._wrapped = np.array([OPEN, OPEN, PERIODIC, PERIODIC, WALL, WALL])
         self._eddies = smagorinsky_factor(case.smagorinsky)
         # In the sponges the viscosity rises to that of a mixing layer, as in `wakewise_paper.lattice_reference.run`.
@@ -287,6 +307,8 @@ class ChannelRun:
             # What comes in is fixed but for its pressure, which follows the water's slowly: waves of sound leave.
             self._excess += 0.002 * (float(water[:, 1, 1:-1, 1:-1].sum(0).mean()) - self._excess)
             water[:, 0] = (self._enters + WEIGHTS[:, None] * self._excess)[:, None, :]
+            if self._wall_model:
+                self._wall_model.impose(self._now)
             self._cube.turn_back(self._now)
             step(self._now, self._next, nz, ny, self._tau_x, self._tau_yz, self._eddies, self._faces)
             self._cube.empty(self._next)
