@@ -145,6 +145,9 @@ def fly_survey(
         )
         if isinstance(session, AllocatedTransectSession):
             stack.callback(session.gate.end, "the program ends")
+        if len(layers_m) > 1:  # a comma may have been meant as a decimal point
+            told = ", ".join(f"{layer:g} m" for layer in layers_m)
+            typer.echo(f"{len(layers_m)} layers, above the bed: {told}", err=True)
         typer.echo(f"listening at {vehicle_at.words}; journal: {folder / JOURNAL_FILE}", err=True)
         try:
             _fly(session, codec, consent=given.consent, wait_s=given.wait)
