@@ -132,6 +132,15 @@ def test_growth_is_shown_in_a_picture_and_told_in_a_line(tmp_path: Path, capsys:
         assert picture.format == "PNG" and min(picture.size) > 500
 
 
+def test_a_wrong_scale_is_told_beside_growth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of bare meshes, whose scale is not known: a warning, and a word in the verdict."""
+    first, second = colony(tmp_path / "a.ply"), colony(tmp_path / "b.ply", 1.12, seed=1)
+    assert run(["compare-models", str(first), str(second), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["scale_found"] == pytest.approx(1.0 / 1.12, rel=0.02)
+    assert "would explain it, too" in found["verdict"] and "give both models their scale" in found["warnings"][0]
+
+
 @pytest.mark.slow
 def test_the_same_model_twice_has_not_changed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The table ends with the verdict, and says that bare meshes do not know their scale."""

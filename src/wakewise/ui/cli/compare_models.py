@@ -71,9 +71,11 @@ def compare_models(
             np.random.default_rng(0),
             eyes=(models[0].eyes_m, models[1].eyes_m),
             scale_sigma_pct=float(np.hypot(sigmas[0], sigmas[1])),
+            scale_known=all(model.scale_sigma_pct is not None for model in models),
             align_scale=align_scale,
         )
-    figures = _figures(found, models, align_scale) | {"warnings": _warnings(models)}
+    doubts = [] if found.scale_warning is None else [f"warning: {found.scale_warning}"]
+    figures = _figures(found, models, align_scale) | {"warnings": [*doubts, *_warnings(models)]}
     if out is not None:
         from wakewise.ui.reports.change_map import write_change_map
 
