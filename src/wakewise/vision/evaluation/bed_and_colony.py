@@ -140,7 +140,9 @@ def in_box(mesh: Mesh, low_m: Array, high_m: Array) -> Mesh:
     Raises InputError if the box is empty or nothing of the mesh lies in it.
     """
     if not (np.isfinite([low_m, high_m]).all() and (np.asarray(low_m) < np.asarray(high_m)).all()):
-        raise InputError(f"--box: from {list(low_m)} to {list(high_m)}, each of X0 Y0 Z0 must be below X1 Y1 Z1")
+        raise InputError(
+            f"--box: from {np.array(low_m).tolist()} to {np.array(high_m).tolist()}, each of X0 Y0 Z0 must be below X1 Y1 Z1"
+        )
     cut = mesh
     for k in range(3):
         for side, at in ((1.0, low_m), (-1.0, high_m)):
@@ -178,7 +180,11 @@ def colony_faces(mesh: Mesh, bed: BedFit, cut_m: float, middle_m: Array | None =
     in_plane = bed.to_plane(mesh.vertices_m)
     above = (in_plane[:, 2] > cut_m)[mesh.faces].any(axis=1)
     if not (in_plane[mesh.faces[above], 2] > 2.0 * cut_m).any():
-        raise InputError(f"colony: nothing stands more than {2e3 * cut_m:.1f} mm above the bed")
+        below = -float(in_plane[:, 2].min())
+        turned = (
+            f"; {1e3 * below:.0f} mm lie below it, its normal (--bed) may point down" if below > 2.0 * cut_m else ""
+        )
+        raise InputError(f"colony: nothing stands more than {2e3 * cut_m:.1f} mm above the bed{turned}")
     piece = pieces(mesh.faces[above], len(mesh.vertices_m))
     area = mesh.face_areas_m2[above]
     place = in_plane[mesh.faces[above]].mean(axis=1)[:, :2]
