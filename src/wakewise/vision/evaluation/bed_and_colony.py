@@ -140,9 +140,8 @@ def in_box(mesh: Mesh, low_m: Array, high_m: Array) -> Mesh:
     Raises InputError if the box is empty or nothing of the mesh lies in it.
     """
     if not (np.isfinite([low_m, high_m]).all() and (np.asarray(low_m) < np.asarray(high_m)).all()):
-        raise InputError(
-            f"--box: from {np.array(low_m).tolist()} to {np.array(high_m).tolist()}, each of X0 Y0 Z0 must be below X1 Y1 Z1"
-        )
+        corners = f"from {np.array(low_m).tolist()} to {np.array(high_m).tolist()}"
+        raise InputError(f"--box: {corners}, each of X0 Y0 Z0 must be below X1 Y1 Z1")
     cut = mesh
     for k in range(3):
         for side, at in ((1.0, low_m), (-1.0, high_m)):
