@@ -173,6 +173,18 @@ def test_a_spike_that_sets_the_height_is_told() -> None:
             assert any("the height rests on" in line for line in lines) is told
 
 
+def test_a_wild_vertex_does_not_turn_the_bed() -> None:
+    """One vertex of the bed 40 m above it: up and the size of the colony stay, and a warning counts triangles."""
+    mesh = joined(hemisphere(), bed())
+    vertices = mesh.vertices_m.copy()
+    vertices[len(hemisphere().vertices_m) + 500] += 40.0 * UP
+    wild = Mesh(vertices, mesh.faces)
+    found, plane, _ = measure(wild, MeasuringRule(), np.random.default_rng(0))
+    assert "triangles reach to" in measuring_warnings(wild, MeasuringRule(), found, plane)[0]
+    assert float(plane.axes[2] @ UP) > 0.9999
+    assert found.volume_cm3 == pytest.approx(size(mesh).volume_cm3, rel=0.01)
+
+
 @pytest.mark.slow
 def test_a_bed_of_little_share_is_found_whatever_is_drawn() -> None:
     """A sixth of the surface, below a rough dome: the same plane with each of thirty generators."""

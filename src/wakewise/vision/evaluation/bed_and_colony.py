@@ -18,6 +18,9 @@ from wakewise.vision.evaluation.cloud_to_surface import Crop, sample_surface
 SAMPLES = 6000
 REACH_SHARE = 0.02
 """Farthest that a point of the bed lies from its plane, of the diagonal of the model's box."""
+FEW_PCT, MOST_LARGER, WILD = 1.0, 1.5, 10.0
+"""Vertices at either end that do not set the size of a model's box, where it is so much larger with them; those that
+lie so many diagonals outside it are wild."""
 LEAST_BED_PCT, MOST_BELOW_PCT = 15.0, 10.0
 TRIALS = math.ceil(math.log(1e-3) / math.log(1.0 - (0.01 * LEAST_BED_PCT) ** 3))
 """With so many, three points of a bed of the least share are drawn once with a chance of 99.9 %."""
@@ -77,8 +80,9 @@ def fit_bed(mesh: Mesh, rng: np.random.Generator, eyes_m: Array | None = None) -
     `eyes_m`, shape (k, 3): cameras, which are above the bed; without them the side that most of the model is on is
     above. Raises InputError if less than 15 % of the surface lies on one plane with the rest above it.
     """
-    points = sample_surface(mesh, Crop(), rng, SAMPLES).points_m
-    reach = REACH_SHARE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    points = sample_surface(without_wild(mesh), Crop(), rng, SAMPLES).points_m
+    most = MOST_LARGER * _middle_box(mesh.vertices_m)[2]
+    reach = REACH_SHARE * min(float(np.linalg.norm(np.ptp(points, axis=0))), most)
     best, least = None, np.inf
     for _ in range(TRIALS):
         a, b, c = points[rng.choice(len(points), 3, replace=False)]
@@ -117,6 +121,23 @@ def fit_bed(mesh: Mesh, rng: np.random.Generator, eyes_m: Array | None = None) -
             f"are {LEAST_BED_PCT:g} % or more and {MOST_BELOW_PCT:g} % or less; give it: --bed NX NY NZ D"
         )
     return BedFit(origin_m=origin, axes=_axes(up), sigma_m=float(height[near].std()), share_pct=share_pct)
+
+
+def _middle_box(vertices_m: Array) -> tuple[Array, Array, float]:
+    """Corners and diagonal, m, of the box of vertices, shape (n, 3), but for a few at each end."""
+    low, high = np.percentile(vertices_m, (FEW_PCT, 100.0 - FEW_PCT), axis=0)
+    return low, high, float(np.linalg.norm(high - low))
+
+
+def without_wild(mesh: Mesh) -> Mesh:
+    """The mesh less its faces with a vertex far outside the rest, which is wrong and outweighs it by area."""
+    low, high, diagonal = _middle_box(mesh.vertices_m)
+    beyond = np.maximum(low - mesh.vertices_m, mesh.vertices_m - high).max(axis=1)
+    tame = beyond <= WILD * diagonal
+    if bool(tame.all()):
+        return mesh
+    number = np.cumsum(tame) - 1
+    return Mesh(mesh.vertices_m[tame], number[mesh.faces[tame[mesh.faces].all(axis=1)]])
 
 
 def _towards(height: Array, reach: float, eyes: Array | None) -> float:

@@ -27,6 +27,7 @@ from wakewise.vision.evaluation.bed_and_colony import (
     median_edge_m,
     open_edges_m,
     pieces,
+    without_wild,
 )
 
 # key: (unit, power of the scale, definition)
@@ -91,6 +92,7 @@ def measure(mesh: Mesh, rule: MeasuringRule, rng: np.random.Generator) -> tuple[
     included, and what lies below the plane counts against the volume. Raises InputError if there is no bed, no colony,
     or nothing in the box.
     """
+    mesh = without_wild(mesh)
     bed = rule.bed or fit_bed(mesh, rng, rule.eyes_m)
     part = mesh if rule.box is None else in_box(mesh, *rule.box)
     if not rule.colony:
@@ -120,6 +122,10 @@ def measuring_warnings(mesh: Mesh, rule: MeasuringRule, size: ColonySize, bed: B
         out.append(f"length of {1e-3 * size.length_mm:.3g} m: is the model in metres? --unit-m 0.001 reads millimetres")
     if rule.bed is None and bed.share_pct < LEAST_BED_SHARE_PCT:
         out.append(f"only {bed.share_pct:.0f} % of the surface lies on the bed plane, another may be right: --bed")
+    tame = without_wild(mesh)
+    if wild := len(mesh.faces) - len(tame.faces):
+        out.append(f"{wild} triangles reach to vertices far outside the rest and are left out: clean the model")
+    mesh = tame
     part = mesh if rule.box is None else in_box(mesh, *rule.box)
     if not rule.colony:
         return out + _behind(part, bed)
@@ -226,6 +232,8 @@ def _size(sections: list[_Section], cut_m: float) -> ColonySize:
         two, three = sections[1:]
         keys = ("area", "planar", "foot")
         down = {key: 3.0 * (getattr(one, key) - getattr(two, key)) + getattr(three, key) for key in keys}
+        if one.planar <= 0.0:
+            raise InputError("colony: seen from above it has no area: a spike; give --box with --colony")
         wider = float(np.sqrt(max(down["planar"] / one.planar, 0.0)))
         down |= {key: wider * getattr(one, key) for key in ("length", "width", "extent")}
         # The integral of the cross-section from the bed to the cut, less the column that the section has counted.
