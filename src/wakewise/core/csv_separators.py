@@ -29,7 +29,8 @@ def csv_rows(path: Path, columns: Sequence[str], needed: str) -> Iterator[tuple[
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
-            names = reader.fieldnames or ()
+            # Blanks after the commas belong to no name.
+            names = reader.fieldnames = [name.strip() for name in reader.fieldnames or ()]
             missing = [name for name in columns if name not in names]
             if missing:
                 raise InputError(f"{path}: no column {', '.join(missing)}{other_separator(names)}; needed is {needed}")

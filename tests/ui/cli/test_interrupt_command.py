@@ -44,6 +44,17 @@ def test_an_error_made_of_ctrl_c_is_exit_130(swallowed: bool, monkeypatch: Any, 
     assert "stopped" in said[0]
 
 
+@pytest.mark.parametrize(("words", "kept"), [(["photos", "pick"], False), (["measure"], False), (["scan"], True)])
+def test_only_commands_that_keep_what_was_finished_say_so(
+    words: list[str], kept: bool, monkeypatch: Any, capsys: Any
+) -> None:
+    """A command that writes at its end begins anew."""
+    monkeypatch.setattr(main, "_commands", lambda: lambda **_: _raise(KeyboardInterrupt(), None))
+    assert main.run(words) == 130
+    said = capsys.readouterr().err
+    assert ("is kept" in said) is kept and ("begins anew" in said) is not kept
+
+
 def test_without_ctrl_c_an_error_stays_what_it_is(monkeypatch: Any, capsys: Any) -> None:
     """A fault that nobody foresaw is raised; bad input is exit 2, also in a command that was told to stop."""
     monkeypatch.setattr(main, "_commands", lambda: lambda **_: _raise(RuntimeError("a fault"), None))

@@ -61,6 +61,7 @@ def bad_inputs(base: Path) -> dict[str, tuple[list[str], str]]:
     ball = base / "ball.ply"
     trimesh.creation.icosphere(3, 0.05).export(ball)
     (base / "empty").mkdir()
+    (base / "as.json").mkdir()
     unscaled = folder(base / "unscaled", scale=None)
     colony(unscaled / "mesh.ply")
     broken = base / "broken.ply"
@@ -86,12 +87,15 @@ def bad_inputs(base: Path) -> dict[str, tuple[list[str], str]]:
         "scale": (["compare-models", good, str(colony(base / "inches.ply", 39.37))], "different scale"),
         "picture": (["compare-models", good, good, "--out", str(base / "a.jpg")], ".png"),
         "second": (["compare-models", good, str(points)], "without faces"),
+        "folder out": (["measure", good, "--out", str(base / "empty")], "empty: is a folder"),
+        "folder json": (["compare-models", good, good, "--out", str(base / "as.png")], "as.json: is a folder"),
+        "down": (["measure", good, "--bed", "0", "0", "-1", "0.001"], "may point down"),
     }
 
 
 NAMES = (
     "none", "points", "folder", "no mesh", "no scale", "no bed", "box", "nan box", "nan", "cut", "unit", "direction",
-    "scale", "picture", "second",
+    "scale", "picture", "second", "folder out", "folder json", "down",
 )  # fmt: skip
 
 
@@ -132,6 +136,15 @@ def test_growth_is_shown_in_a_picture_and_told_in_a_line(tmp_path: Path, capsys:
         assert picture.format == "PNG" and min(picture.size) > 500
 
 
+def test_a_wrong_scale_is_told_beside_growth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of bare meshes, whose scale is not known: a warning, and a word in the verdict."""
+    first, second = colony(tmp_path / "a.ply"), colony(tmp_path / "b.ply", 1.12, seed=1)
+    assert run(["compare-models", str(first), str(second), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["scale_found"] == pytest.approx(1.0 / 1.12, rel=0.02)
+    assert "would explain it, too" in found["verdict"] and "give both models their scale" in found["warnings"][0]
+
+
 @pytest.mark.slow
 def test_the_same_model_twice_has_not_changed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The table ends with the verdict, and says that bare meshes do not know their scale."""
@@ -156,6 +169,19 @@ def test_doubtful_figures_have_a_warning(tmp_path: Path, capsys: pytest.CaptureF
     half = whole.faces[(whole.triangles_center[:, 0] > 0.0)]
     trimesh.Trimesh(whole.vertices, half, process=False).export(tmp_path / "half.ply")
     assert "open edges" in warned(tmp_path / "half.ply", capsys)
+
+
+def test_a_colony_behind_the_faces_has_a_warning_and_up_is_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A pit, and a dome whose faces are turned; a dome that is upside down as a whole has none."""
+    dome = trimesh.load(colony(tmp_path / "dome.ply"), process=False)
+    for name, sides, faces, warns in (("pit", -1, 1, True), ("turned", 1, -1, True), ("down", -1, -1, False)):
+        path = tmp_path / f"{name}.ply"
+        trimesh.Trimesh(dome.vertices * [1, 1, sides], dome.faces[:, ::faces], process=False).export(path)
+        assert ("behind the faces" in warned(path, capsys)) is warns, name
+        assert run(["measure", str(path)]) == 0
+        assert f"0 0 {sides}" in " ".join(capsys.readouterr().out.split())
 
 
 def test_two_colonies_that_touch_have_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -110,8 +110,8 @@ def test_box_counts_the_bed_too() -> None:
     [((9.0, 9.0, 9.0), (10.0, 10.0, 10.0)), ((0.1, 0.0, 0.0), (0.0, 0.1, 0.1)), ((np.nan, 0.0, 0.0), (1.0, 1.0, 1.0))],
 )
 def test_a_box_outside_the_model_or_turned_over_or_of_nan_is_refused(low: Array, high: Array) -> None:
-    """The error names --box."""
-    with pytest.raises(InputError, match="--box"):
+    """The error names --box, and corners as plain numbers."""
+    with pytest.raises(InputError, match=r"--box: (?!.*np\.float)"):
         in_box(bed(), np.array(low), np.array(high))
 
 
@@ -171,6 +171,18 @@ def test_a_spike_that_sets_the_height_is_told() -> None:
             size, plane, _ = measure(mesh, MeasuringRule(), rng)
             lines = measuring_warnings(mesh, MeasuringRule(), size, plane)
             assert any("the height rests on" in line for line in lines) is told
+
+
+def test_a_wild_vertex_does_not_turn_the_bed() -> None:
+    """One vertex of the bed 40 m above it: up and the size of the colony stay, and a warning counts triangles."""
+    mesh = joined(hemisphere(), bed())
+    vertices = mesh.vertices_m.copy()
+    vertices[len(hemisphere().vertices_m) + 500] += 40.0 * UP
+    wild = Mesh(vertices, mesh.faces)
+    found, plane, _ = measure(wild, MeasuringRule(), np.random.default_rng(0))
+    assert "triangles reach to" in measuring_warnings(wild, MeasuringRule(), found, plane)[0]
+    assert float(plane.axes[2] @ UP) > 0.9999
+    assert found.volume_cm3 == pytest.approx(size(mesh).volume_cm3, rel=0.01)
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import pytest
 from made_dive import dive, write_photos
 
 from wakewise.core.errors import InputError
-from wakewise.core.geometry import quat_from_euler
+from wakewise.core.geometry import euler_from_quat, quat_from_euler
 from wakewise.vision.photo_selection.clock_offset import find_offset, predict_motion
 from wakewise.vision.photo_selection.dive_track import DiveTrack, mounted_camera
 from wakewise.vision.photo_selection.pick import PickRequest, pick_photos
@@ -58,6 +58,26 @@ def test_a_motion_that_repeats_is_ambiguous() -> None:
     assert found.ambiguous is not None and "another offset" in found.ambiguous
     assert found.second_offset_s is not None
     assert abs(abs(found.second_offset_s - found.offset_s) - 60.0) < 0.5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_log_with_z_up_is_refused_where_pitch_counts_as_much_as_climb(seed: int) -> None:
+    """The correlation of its whole scale does not tell it; the true log, with depths 1 cm off, is not refused."""
+    made = dive(seed, 100.0).track
+    angles = euler_from_quat(made.q_WB) * [1.0, 6.0, 1.0]
+    rng = np.random.default_rng(seed)
+    true = replace(made, q_WB=quat_from_euler(*angles.T), altitude_m=1.0 + 0.0 * made.altitude_m)
+    at = np.arange(3.0, 97.0)
+    motion, _ = predict_motion(true, DOWN, 1.0).between(at[:-1], at[1:])
+    motion = motion + rng.normal(scale=0.004, size=motion.shape)
+    noise = np.column_stack([np.zeros((len(made.time_s), 2)), rng.normal(scale=0.01, size=len(made.time_s))])
+    told = []
+    for sign in (1.0, -1.0):
+        log = replace(true, position_W_m=(true.position_W_m + noise) * [1.0, 1.0, sign])
+        found = find_offset(predict_motion(log, DOWN, 1.0), at, motion, (-5.0, 5.0))
+        told.append(found.ambiguous)
+    assert found.correlation["scale"] > -0.4
+    assert told[0] is None and told[1] is not None and "z_m must rise with depth" in told[1]
 
 
 def test_clocks_that_do_not_overlap_are_told_in_one_line(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import json
 import shutil
 import struct
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -218,6 +219,39 @@ def _bad_tables(here: Path) -> None:
         (here / f"{name}.csv").write_text("\n".join([",".join(header), *lines]))
 
 
+def test_positions_in_another_unit_have_a_warning(here: Path, made: Dive) -> None:
+    """Feet make a field of view of 122 deg of 59; a stated one must agree; steps that no photograph fills are told."""
+    feet = replace(made.track, position_W_m=3.2808 * made.track.position_W_m)
+    for track, request, told in (
+        (made.track, PickRequest(), []),
+        (made.track, PickRequest(field_of_view_deg=60.0), []),
+        (made.track, PickRequest(field_of_view_deg=100.0), ["--fov states 100 deg"]),
+        (feet, PickRequest(), ["in another unit"]),
+        (feet, PickRequest(field_of_view_deg=60.0, every_m=0.5), ["--fov states 60 deg", "steps apart (median)"]),
+        (replace(feet, altitude_m=np.nan * feet.altitude_m), PickRequest(), []),
+    ):
+        found = pick_photos(here / "PHOTOS", track, request).figures["warnings"]
+        assert len(found) == len(told) and all(map(str.__contains__, found, told)), (told, found)
+
+
+def test_photographs_of_a_kind_that_is_not_read_are_counted(
+    here: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """HEIC and RAW beside JPEG are left out by name; a folder that holds nothing else says what to do."""
+    (tmp_path / "phone").mkdir()
+    (tmp_path / "raw").mkdir()
+    for path in (here / "PHOTOS").iterdir():
+        (tmp_path / "phone" / path.name).symlink_to(path)
+    for name in ("phone/a.HEIC", "phone/b.HEIC", "phone/c.dng", "phone/notes.txt", "raw/d.CR2"):
+        (tmp_path / name).write_bytes(b"")
+    figures = pick_photos(tmp_path / "phone", read_track(here / "dive.csv"), PickRequest()).figures
+    assert figures["counts"]["not_read"] == 3
+    assert figures["counts"]["photos"] == len(list((here / "PHOTOS").iterdir())) + 3
+    assert {"name": "a.HEIC", "why": "not read"} in figures["left_out"]
+    assert "2 .HEIC are not read: convert them to JPEG" in figures["warnings"]
+    assert "1 .CR2 are not read: convert them to JPEG" in _refused(capsys, str(tmp_path / "raw"), "--log", "dive.csv")
+
+
 @pytest.mark.slow
 def test_a_clock_that_was_set_in_the_dive_is_named(here: Path, made: Dive, capsys: pytest.CaptureFixture[str]) -> None:
     """Summer time begins in the photographs' names: a warning counts those outside the log, and says since when."""
@@ -273,6 +307,8 @@ def test_a_table_of_poses_may_state_its_uncertainty(tmp_path: Path, made: Dive) 
     assert track.started_s is not None
     (tmp_path / "bare.csv").write_text("\n".join([lines[0], *(f"{k},{k},0,0,0,0,0," for k in range(3))]))
     assert read_track(tmp_path / "bare.csv").started_s is None
+    (tmp_path / "blanks.csv").write_text("\n".join([lines[0].replace(",", ", "), *lines[1:]]))
+    assert np.array_equal(read_track(tmp_path / "blanks.csv").position_W_m, track.position_W_m)
     (tmp_path / "back.csv").write_text("\n".join([lines[0], "1,0,0,0,0,0,0,", "0,0,0,0,0,0,0,"]))
     with pytest.raises(InputError, match=r"line 3: time_s 0 after 1: times must rise"):
         read_track(tmp_path / "back.csv")

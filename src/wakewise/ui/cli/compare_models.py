@@ -10,7 +10,7 @@ import typer
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import ProgressBars, answer, print_table, write_page
-from wakewise.ui.cli.options import Json
+from wakewise.ui.cli.options import Json, refuse_folder
 
 if TYPE_CHECKING:
     from wakewise.vision.evaluation.surface_change import SurfaceChange
@@ -62,6 +62,8 @@ def compare_models(
         need("the picture of wakewise compare-models", "reports")
         if out.suffix.lower() != ".png":
             raise InputError(f"--out {out}: must end in .png")
+        for path in (out, out.with_suffix(".json")):
+            refuse_folder(path)
     models = [read_model(path, unit_m) for path in (first, second)]
     sigmas = [model.scale_sigma_pct or 0.0 for model in models]
     with ProgressBars().stage("compare"):
@@ -71,9 +73,11 @@ def compare_models(
             np.random.default_rng(0),
             eyes=(models[0].eyes_m, models[1].eyes_m),
             scale_sigma_pct=float(np.hypot(sigmas[0], sigmas[1])),
+            scale_known=all(model.scale_sigma_pct is not None for model in models),
             align_scale=align_scale,
         )
-    figures = _figures(found, models, align_scale) | {"warnings": _warnings(models)}
+    doubts = [] if found.scale_warning is None else [f"warning: {found.scale_warning}"]
+    figures = _figures(found, models, align_scale) | {"warnings": [*doubts, *_warnings(models)]}
     if out is not None:
         from wakewise.ui.reports.change_map import write_change_map
 

@@ -108,6 +108,8 @@ _NEXT_STEP = (
     "`wakewise COMMAND -h` explains a command."
 )
 _STOPPED = "stopped; what was finished is kept, run the same command again to go on"
+_BEGIN_ANEW = {"photos", "measure", "compare-models", "evaluate", "calibrate", "film", "target", "vehicle", "allocate"}
+"""Commands that write at their end and keep nothing of a run that was stopped."""
 
 
 def _show_version(value: bool) -> None:
@@ -149,18 +151,18 @@ def run(arguments: Sequence[str] | None = None) -> int:
             code = _commands()(args=rest, standalone_mode=False)
         sys.stdout.flush()
         if code == EXIT_INTERRUPTED:  # Ctrl-C inside a command
-            return _stopped()
+            return _stopped(rest)
         return code if isinstance(code, int) else 0
     except (KeyboardInterrupt, typer.Abort):
-        return _stopped()
+        return _stopped(rest)
     except Exception as fault:
         if _made_of_interrupt(fault):
-            return _stopped()
+            return _stopped(rest)
         code = _refused(fault)
         if code is not None:
             return code
         if INTERRUPTED.is_set():  # swallowed on its way by a library, which then failed at what it had left undone
-            return _stopped()
+            return _stopped(rest)
         raise
 
 
@@ -219,8 +221,8 @@ def _say(message: str) -> None:
         print(f"wakewise: {line}", file=sys.stderr)
 
 
-def _stopped() -> int:
-    _say(_STOPPED)
+def _stopped(words: Sequence[str]) -> int:
+    _say("stopped; the same command begins anew" if words and words[0] in _BEGIN_ANEW else _STOPPED)
     return exit_code()
 
 

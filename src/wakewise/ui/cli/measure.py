@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.ui.cli.console import ProgressBars, answer, interval, print_table
-from wakewise.ui.cli.options import Json
+from wakewise.ui.cli.options import Json, refuse_folder
 
 if TYPE_CHECKING:
     from wakewise.vision.reconstruction.quality.finished_models import FinishedModel
@@ -62,6 +62,7 @@ def measure(
     from wakewise.core.optional_dependencies import need
 
     need("wakewise measure", "photos")
+    refuse_folder(out)
     import numpy as np
 
     from wakewise.core.files import write_json
@@ -82,10 +83,12 @@ def measure(
     figures = _figures(read, found)
     if out is not None:
         write_json(out, figures)
-    rows = [
+    rows: list[tuple[str, object, str, str, str]] = [
         (key, one.value, interval(one.low, one.high, "—"), figures["units"][key], figures["definitions"][key])
         for key, one in found.intervals.items()
     ]
+    up = " ".join(f"{round(value, 2) + 0.0:g}" for value in found.bed.axes[2])
+    rows.append(("up", up, "", "", "the bed's upward normal in the model's frame"))
     table = partial(print_table, "tnttt", ("figure", "value", "95 % interval", "unit", "what it is"), rows, str(model))
     answer(json, figures, table, *_remarks(read, found))
 

@@ -104,6 +104,14 @@ def pairs(option: str, form: str, given: list[str] | None) -> dict[str, str]:
     return found
 
 
+def refuse_folder(path: Path | None, option: str = "--out") -> None:
+    """Refuse a folder where a file is to be written, before any work; raises InputError."""
+    from wakewise.core.errors import InputError
+
+    if path is not None and path.is_dir():
+        raise InputError(f"{option} {path}: is a folder, must be a file")
+
+
 def listed(text: str | None) -> tuple[str, ...]:
     """Words between commas."""
     return tuple(word.strip() for word in (text or "").split(",") if word.strip())

@@ -182,7 +182,8 @@ def _lines(figures: dict[str, Any]) -> list[str]:
     if outside:
         said += f"\nwarning: {outside} photos lie outside the log; the longest pause of their clock is "
         said += f"{figures['longest_pause_s']:.0f} s after {figures['longest_pause_after']} (was it set in the dive?)"
-    lines = [said, f"positions from {figures['positions_from']}, times from {figures['times_from']}"]
+    lines = [said, *(f"warning: {text}" for text in figures["warnings"])]
+    lines += [f"positions from {figures['positions_from']}, times from {figures['times_from']}"]
     if figures["spacing_median_m"] is not None:
         lines.append(
             f"{figures['counts']['picked']} photos along {figures['way_m']:.1f} m: {figures['spacing_median_m']:.2f} m "

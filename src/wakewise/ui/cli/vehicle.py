@@ -17,6 +17,7 @@ from wakewise.ui.cli.options import (
     VehicleFrame,
     XacroArguments,
     XacroPackages,
+    refuse_folder,
 )
 from wakewise.ui.cli.vehicle_import import foreign_vehicle
 
@@ -73,9 +74,8 @@ def show(
 
     draft = foreign_vehicle(vehicle, frame, thrust_direction, package, arg, skip_missing, rows)
     facts = describe(draft)
-    for option, path in (("--out", out), ("--drawing", drawing)):
-        if path is not None and path.is_dir():
-            raise InputError(f"{option} {path}: is a folder, must be a file")
+    refuse_folder(out)
+    refuse_folder(drawing, "--drawing")
     if out is not None:
         if out.suffix not in (".svg", ".html"):
             raise InputError(f"--out {out}: allowed are files that end in .svg or .html")

@@ -19,6 +19,7 @@ from wakewise.ui.cli.options import (
     XacroArguments,
     XacroPackages,
     pairs,
+    refuse_folder,
 )
 
 if TYPE_CHECKING:
@@ -65,8 +66,7 @@ def import_file(
     from wakewise.robot.vehicles.mixing import compare_matrix
 
     if out is not None:
-        if out.is_dir():
-            raise InputError(f"--out {out}: is a folder, must be a file")
+        refuse_folder(out)
         if out.suffix not in (".yaml", ".yml"):
             raise InputError(f"--out {out}: must end in .yaml, by which a vehicle file is known")
     draft = foreign_vehicle(str(file), frame, thrust_direction, package, arg, skip_missing, rows, matrix)

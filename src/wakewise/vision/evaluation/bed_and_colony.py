@@ -18,6 +18,9 @@ from wakewise.vision.evaluation.cloud_to_surface import Crop, sample_surface
 SAMPLES = 6000
 REACH_SHARE = 0.02
 """Farthest that a point of the bed lies from its plane, of the diagonal of the model's box."""
+FEW_PCT, MOST_LARGER, WILD = 1.0, 1.5, 10.0
+"""Vertices at either end that do not set the size of a model's box, where it is so much larger with them; those that
+lie so many diagonals outside it are wild."""
 LEAST_BED_PCT, MOST_BELOW_PCT = 15.0, 10.0
 TRIALS = math.ceil(math.log(1e-3) / math.log(1.0 - (0.01 * LEAST_BED_PCT) ** 3))
 """With so many, three points of a bed of the least share are drawn once with a chance of 99.9 %."""
@@ -77,8 +80,9 @@ def fit_bed(mesh: Mesh, rng: np.random.Generator, eyes_m: Array | None = None) -
     `eyes_m`, shape (k, 3): cameras, which are above the bed; without them the side that most of the model is on is
     above. Raises InputError if less than 15 % of the surface lies on one plane with the rest above it.
     """
-    points = sample_surface(mesh, Crop(), rng, SAMPLES).points_m
-    reach = REACH_SHARE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    points = sample_surface(without_wild(mesh), Crop(), rng, SAMPLES).points_m
+    most = MOST_LARGER * _middle_box(mesh.vertices_m)[2]
+    reach = REACH_SHARE * min(float(np.linalg.norm(np.ptp(points, axis=0))), most)
     best, least = None, np.inf
     for _ in range(TRIALS):
         a, b, c = points[rng.choice(len(points), 3, replace=False)]
@@ -119,6 +123,23 @@ def fit_bed(mesh: Mesh, rng: np.random.Generator, eyes_m: Array | None = None) -
     return BedFit(origin_m=origin, axes=_axes(up), sigma_m=float(height[near].std()), share_pct=share_pct)
 
 
+def _middle_box(vertices_m: Array) -> tuple[Array, Array, float]:
+    """Corners and diagonal, m, of the box of vertices, shape (n, 3), but for a few at each end."""
+    low, high = np.percentile(vertices_m, (FEW_PCT, 100.0 - FEW_PCT), axis=0)
+    return low, high, float(np.linalg.norm(high - low))
+
+
+def without_wild(mesh: Mesh) -> Mesh:
+    """The mesh less its faces with a vertex far outside the rest, which is wrong and outweighs it by area."""
+    low, high, diagonal = _middle_box(mesh.vertices_m)
+    beyond = np.maximum(low - mesh.vertices_m, mesh.vertices_m - high).max(axis=1)
+    tame = beyond <= WILD * diagonal
+    if bool(tame.all()):
+        return mesh
+    number = np.cumsum(tame) - 1
+    return Mesh(mesh.vertices_m[tame], number[mesh.faces[tame[mesh.faces].all(axis=1)]])
+
+
 def _towards(height: Array, reach: float, eyes: Array | None) -> float:
     """Above 0 where up is on the side of the cameras, or else of most of what is off the plane."""
     if eyes is not None and len(eyes):
@@ -140,7 +161,8 @@ def in_box(mesh: Mesh, low_m: Array, high_m: Array) -> Mesh:
     Raises InputError if the box is empty or nothing of the mesh lies in it.
     """
     if not (np.isfinite([low_m, high_m]).all() and (np.asarray(low_m) < np.asarray(high_m)).all()):
-        raise InputError(f"--box: from {list(low_m)} to {list(high_m)}, each of X0 Y0 Z0 must be below X1 Y1 Z1")
+        corners = f"from {np.array(low_m).tolist()} to {np.array(high_m).tolist()}"
+        raise InputError(f"--box: {corners}, each of X0 Y0 Z0 must be below X1 Y1 Z1")
     cut = mesh
     for k in range(3):
         for side, at in ((1.0, low_m), (-1.0, high_m)):
@@ -178,7 +200,11 @@ def colony_faces(mesh: Mesh, bed: BedFit, cut_m: float, middle_m: Array | None =
     in_plane = bed.to_plane(mesh.vertices_m)
     above = (in_plane[:, 2] > cut_m)[mesh.faces].any(axis=1)
     if not (in_plane[mesh.faces[above], 2] > 2.0 * cut_m).any():
-        raise InputError(f"colony: nothing stands more than {2e3 * cut_m:.1f} mm above the bed")
+        below = -float(in_plane[:, 2].min())
+        turned = (
+            f"; {1e3 * below:.0f} mm lie below it, its normal (--bed) may point down" if below > 2.0 * cut_m else ""
+        )
+        raise InputError(f"colony: nothing stands more than {2e3 * cut_m:.1f} mm above the bed{turned}")
     piece = pieces(mesh.faces[above], len(mesh.vertices_m))
     area = mesh.face_areas_m2[above]
     place = in_plane[mesh.faces[above]].mean(axis=1)[:, :2]

@@ -27,6 +27,7 @@ from wakewise.vision.evaluation.bed_and_colony import (
     median_edge_m,
     open_edges_m,
     pieces,
+    without_wild,
 )
 
 # key: (unit, power of the scale, definition)
@@ -43,6 +44,8 @@ DEFINITIONS: dict[str, tuple[str, int, str]] = {
 LEAST_BED_SHARE_PCT, MOST_OPEN, LEAST_LEFT, MOST_UNSEEN_PCT = 25.0, 0.1, 0.75, 10.0
 """Bounds of `measuring_warnings`: share of the bed; open edges, and the length one clearance further up, in lengths of
 the colony; share of the surface without dense points."""
+LEAST_BEHIND = 0.01
+"""Share of a surface's area that must face down in all, for the colony to lie behind the faces."""
 TOP, LEAST_TOP_FACES = 0.1, 10
 """Fewer triangles than this in the uppermost tenth of the height are a spike or a stray one."""
 SHORTEST_MM, LONGEST_MM = 5.0, 20_000.0
@@ -89,6 +92,7 @@ def measure(mesh: Mesh, rule: MeasuringRule, rng: np.random.Generator) -> tuple[
     included, and what lies below the plane counts against the volume. Raises InputError if there is no bed, no colony,
     or nothing in the box.
     """
+    mesh = without_wild(mesh)
     bed = rule.bed or fit_bed(mesh, rng, rule.eyes_m)
     part = mesh if rule.box is None else in_box(mesh, *rule.box)
     if not rule.colony:
@@ -112,19 +116,24 @@ def measure(mesh: Mesh, rule: MeasuringRule, rng: np.random.Generator) -> tuple[
 
 
 def measuring_warnings(mesh: Mesh, rule: MeasuringRule, size: ColonySize, bed: BedFit) -> list[str]:
-    """What makes figures of `measure` doubtful, in lines: unit, bed, holes, a foot that is joined."""
+    """What makes figures of `measure` doubtful, in lines: unit, bed, sides of faces, holes, a foot that is joined."""
     out: list[str] = []
     if not SHORTEST_MM <= size.length_mm <= LONGEST_MM:
         out.append(f"length of {1e-3 * size.length_mm:.3g} m: is the model in metres? --unit-m 0.001 reads millimetres")
     if rule.bed is None and bed.share_pct < LEAST_BED_SHARE_PCT:
         out.append(f"only {bed.share_pct:.0f} % of the surface lies on the bed plane, another may be right: --bed")
-    if not rule.colony:
-        return out
+    tame = without_wild(mesh)
+    if wild := len(mesh.faces) - len(tame.faces):
+        out.append(f"{wild} triangles reach to vertices far outside the rest and are left out: clean the model")
+    mesh = tame
     part = mesh if rule.box is None else in_box(mesh, *rule.box)
+    if not rule.colony:
+        return out + _behind(part, bed)
     cut_m = bed_clearance_m(part, bed)
     middle = None if rule.box is None else 0.5 * (np.asarray(rule.box[0]) + np.asarray(rule.box[1]))
     faces = colony_faces(part, bed, cut_m, middle)
     colony = Mesh(part.vertices_m, part.faces[faces])
+    out += _behind(colony, bed)
     length = [0.0, 0.0]
     for k in range(2):
         cut = cut_above(colony, bed.axes[2], bed.origin_m + (k + 1) * cut_m * bed.axes[2])
@@ -153,6 +162,16 @@ def measuring_warnings(mesh: Mesh, rule: MeasuringRule, size: ColonySize, bed: B
             "has holes; what is missing is not in the figures"
         )
     return out
+
+
+def _behind(surface: Mesh, bed: BedFit) -> list[str]:
+    """A warning where up is behind the faces: what is closed but at its foot has the foot's area along its outside."""
+    vectors = surface.area_vectors_m2
+    # A slab that is closed below, too, has none.
+    if float((vectors @ bed.axes[2]).sum()) >= -LEAST_BEHIND * float(np.linalg.norm(vectors, axis=1).sum()):
+        return []
+    up = " ".join(f"{value + 0.0:.2f}" for value in np.round(bed.axes[2], 2))
+    return [f"the colony lies behind the faces: a pit, or faces turned; up is {up} here; --bed says which way is up"]
 
 
 def unseen_pct(surface: Mesh, dense_m: Array) -> float:
@@ -213,6 +232,8 @@ def _size(sections: list[_Section], cut_m: float) -> ColonySize:
         two, three = sections[1:]
         keys = ("area", "planar", "foot")
         down = {key: 3.0 * (getattr(one, key) - getattr(two, key)) + getattr(three, key) for key in keys}
+        if one.planar <= 0.0:
+            raise InputError("colony: seen from above it has no area: a spike; give --box with --colony")
         wider = float(np.sqrt(max(down["planar"] / one.planar, 0.0)))
         down |= {key: wider * getattr(one, key) for key in ("length", "width", "extent")}
         # The integral of the cross-section from the bed to the cut, less the column that the section has counted.

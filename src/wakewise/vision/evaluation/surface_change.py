@@ -8,7 +8,7 @@ alike, since a cylinder through a twig meets both its sides.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -32,6 +32,8 @@ LEAST_EDGES = 1.5
 """Smallest change that is ever claimed, in edges of the coarser mesh: finer shape is that of the smoothing."""
 MOST_SCALE_PCT = 20.0
 """Largest difference of scale that may still be growth all over."""
+LEAST_SCALE_PCT = 1.0
+"""Smallest difference of a scale that is not known which is told: models of one scale differ by a few per mille."""
 
 # key: (unit, definition)
 DEFINITIONS: dict[str, tuple[str, str]] = {
@@ -109,6 +111,7 @@ class SurfaceChange:
     second: Distances
     colony: BoolArray
     bed: BedFit | None
+    scale_warning: str | None = None
 
 
 def compare_models(
@@ -118,11 +121,13 @@ def compare_models(
     *,
     eyes: tuple[Array | None, Array | None] = (None, None),
     scale_sigma_pct: float = 0.0,
+    scale_known: bool = True,
     align_scale: bool = False,
 ) -> SurfaceChange:
     """Growth and loss of the colony of a model between two dates; meshes in m, each in a frame of its own.
 
     `eyes`: cameras of each, shape (k, 3). `scale_sigma_pct`: standard deviation of the ratio of their scales.
+    `scale_known`: whether both state their scale; else it is said where another one would look like the change.
     `align_scale`: fit the scale of the second, too. Raises InputError if their scales differ by more than 20 %;
     StageError if they do not fit each other.
     """
@@ -139,7 +144,17 @@ def compare_models(
     disc_m = DISC_SPACINGS * float(np.sqrt(max(A.cell_m2, there.cell_m2)))
     old, new = distances(A, there, disc_m, 1.0), distances(there, A, disc_m, -1.0)
     edge_m = max(median_edge_m(first), found.similarity.scale * median_edge_m(second))
-    return _judge(old, new, found, A.bed, near, disc_m, 0.01 * scale_sigma_pct, LEAST_EDGES * edge_m)
+    change = _judge(old, new, found, A.bed, near, disc_m, 0.01 * scale_sigma_pct, LEAST_EDGES * edge_m)
+    scale = found.free_scale
+    if align_scale or scale_known or abs(scale - 1.0) <= 0.01 * LEAST_SCALE_PCT:
+        return change
+    told = "" if change.change_low_mm is None else f"; a scale of {scale:.3g} would explain it, too"
+    return replace(
+        change,
+        verdict=change.verdict + told,
+        scale_warning=f"the scale of a model is not known, and the second fits best at {scale:.3g} times its size: "
+        "a wrong scale looks like growth or loss; give both models their scale (--bar, --fixes)",
+    )
 
 
 def _surfaces(

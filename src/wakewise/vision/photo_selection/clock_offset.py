@@ -61,7 +61,10 @@ class ClockOffset:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PredictedMotion:
-    """Integrals of the four rates, and the number of gaps, on a grid of `GRID_S` from `first_s` of the log: (n, 5)."""
+    """Integrals on a grid of `GRID_S` from `first_s` of the log, shape (n, 6).
+
+    They are of the four rates, of the number of gaps, and of the part of the scale that changes of the depth make.
+    """
 
     first_s: float
     integral: Array
@@ -76,6 +79,10 @@ class PredictedMotion:
         begin, known_begin = self._at(first_s)
         end, known_end = self._at(last_s)
         return end[..., :4] - begin[..., :4], known_begin & known_end & (end[..., 4] - begin[..., 4] < 0.5)
+
+    def climbed(self, first_s: Array, last_s: Array) -> Array:
+        """Part of the scale that changes of the depth make, from one time to another of the log."""
+        return self._at(last_s)[0][..., 5] - self._at(first_s)[0][..., 5]
 
     def _at(self, time_s: Array) -> tuple[Array, BoolArray]:
         place = (time_s - self.first_s) / GRID_S
@@ -101,9 +108,10 @@ def predict_motion(track: DiveTrack, X_BC: Pose, distance_m: float) -> Predicted
         [-step[:, 0] / depth - turn[:, 1], -step[:, 1] / depth + turn[:, 0], -turn[:, 2], step[:, 2] / depth]
     )
     gap = ~(poses.known[:-1] & poses.known[1:])
-    steps[gap] = 0.0
-    whole = np.cumsum(np.column_stack([steps, gap]), axis=0)
-    return PredictedMotion(first_s=float(time_s[0]), integral=np.vstack([np.zeros(5), whole]))
+    climb = R_WC[:-1, 2, 2] * np.diff(poses.position_W_m[:, 2]) / depth
+    steps[gap] = climb[gap] = 0.0
+    whole = np.cumsum(np.column_stack([steps, gap, climb]), axis=0)
+    return PredictedMotion(first_s=float(time_s[0]), integral=np.vstack([np.zeros(6), whole]))
 
 
 def find_offset(
@@ -153,6 +161,7 @@ def find_offset(
     share = max(float(score[second] / score[at]), 0.0) if second is not None and score[at] > 0.0 else 0.0
     evidence = (1.0 - share) * float(score[at]) if len(pairs.first_s) >= LEAST_PAIRS else 0.0
     told = {name: float(value) for name, value in zip(_QUANTITIES, correlation[0], strict=True)}
+    climb = _climb_correlation(predicted, pairs, best)
     sigma_s = _jackknife(predicted, pairs, best)
     half = pairs.first_s > np.median(pairs.first_s)
     begin, end = (_refined(predicted, pairs.part(side), best, 4.0 * MOST_DRIFT_S) for side in (~half, half))
@@ -167,13 +176,14 @@ def find_offset(
         second_offset_s=None if second is None else float(offsets[second]),
         second_share=share,
         focal_widths=_residuals(predicted, pairs, best)[2],
-        ambiguous=_doubt(told, share, evidence, len(pairs.first_s)) or (drift if drifts else None),
+        ambiguous=_doubt(told | {"climb": climb}, share, evidence, len(pairs.first_s)) or (drift if drifts else None),
     )
 
 
 def _doubt(correlation: dict[str, float], share: float, evidence: float, count: int) -> str | None:
-    best = max(correlation.values())
-    for quantity, wrong in (("rotation", "heading must rise clockwise"), ("scale", "z_m must rise with depth")):
+    best = max(correlation[name] for name in _QUANTITIES)
+    up = "z_m must rise with depth"
+    for quantity, wrong in (("rotation", "heading must rise clockwise"), ("scale", up), ("climb", up)):
         if correlation[quantity] < -max(LEAST_CORRELATION, 4.0 / math.sqrt(max(count, 1))):  # four sigmas of chance
             return (
                 f"the {quantity} of the photos is against the log's (correlation {correlation[quantity]:.2f}); {wrong}"
@@ -237,6 +247,22 @@ def _correlations(predicted: PredictedMotion, pairs: _Pairs, offsets: Array) -> 
         moved = (spread_a > 1e-8) & (spread_b > 1e-8)
         columns.append(np.where(moved, size / np.sqrt(np.where(moved, spread_a * spread_b, 1.0)), 0.0))
     return np.clip(np.column_stack(columns), -0.9999, 0.9999), count
+
+
+def _climb_correlation(predicted: PredictedMotion, pairs: _Pairs, offset_s: float) -> float:
+    """Partial correlation of the measured scale with the log's climb, given the rest of the predicted scale.
+
+    The rest is speed times pitch. With both of a size, that of the whole scale is near 0 in a log whose z is up.
+    """
+    first_s, last_s = offset_s + pairs.first_s, offset_s + pairs.last_s
+    expected, known = predicted.between(first_s, last_s)
+    climb = predicted.climbed(first_s, last_s)
+    rest = np.column_stack([np.ones(len(climb)), expected[:, 3] - climb])[known]
+    left = np.column_stack([climb, pairs.motion[:, 3]])[known]
+    left = left - rest @ np.linalg.lstsq(rest, left, rcond=None)[0]
+    spread = np.sqrt((left**2).mean(axis=0))
+    # Below a thousandth nothing climbed.
+    return float((left[:, 0] * left[:, 1]).mean() / (spread[0] * spread[1])) if spread.min() > 1e-3 else 0.0
 
 
 def _scores(predicted: PredictedMotion, pairs: _Pairs, offsets: Array, progress: Progress = no_progress) -> Array:

@@ -27,7 +27,7 @@ from wakewise.vision.photo_selection.dive_track import (
 from wakewise.vision.photo_selection.photo_times import PhotoTime, name_time, photo_times
 from wakewise.vision.photo_selection.picture_statistics import PictureStatistics, film_statistics, photo_statistics
 from wakewise.vision.photo_selection.spacing import choose_spaced, path_length
-from wakewise.vision.reconstruction.photos.photo_folder import SUFFIXES, photo_files
+from wakewise.vision.reconstruction.photos.photo_folder import SUFFIXES, photo_files, unread_photos
 from wakewise.vision.reconstruction.photos.video_frames import is_film, write_frames
 
 PHOTOS, CAMERAS, FIGURES, PICTURE = "photos", "cameras.csv", "picked.json", "track.png"
@@ -39,6 +39,12 @@ DEPTH_SIGMA_M, ATTITUDE_SIGMA_DEG = 0.05, 1.0
 """Standard deviations that are assumed of a pressure gauge, and of roll, pitch and heading."""
 RULER_SHARE, WAY_STEP_S = 0.1, 0.2
 """Length of the ruler that the way is measured with, of a step; steps of time along the way."""
+NOT_READ = "not read"
+LEAST_TOLD = 0.5
+"""Least correlation of the shift with which the field of view is known from motion."""
+MOST_FOCAL_RATIO, NARROWEST_DEG, WIDEST_DEG, MOST_STEPS = 1.5, 25.0, 110.0, 1.5
+"""Bounds of the warnings: focal length by motion over the stated one; field of view by motion where none is stated;
+median of the picked photographs' spacing, in steps."""
 _COLUMNS = (
     "name", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "roll_deg", "pitch_deg", "heading_deg", "sigma_x_m",
     "sigma_y_m", "sigma_z_m", "sigma_attitude_deg", "time_s", "altitude_m", "way_m", "sharpness",
@@ -202,6 +208,13 @@ def pick_photos(
         for one, known, is_dark, is_uniform in zip(pictures.times, poses.known, dark, uniform, strict=True)
         if (why := "outside the log" if not known else "dark" if is_dark else "uniform" if is_uniform else "")
     ]
+    warnings = _not_read([name for name, why in left_out if why == NOT_READ]) + _units(request, track, offset)
+    steps = float(np.median(np.diff(unit[chosen]))) / step
+    if steps > MOST_STEPS:
+        warnings.append(
+            f"the picked photos are {steps:.1f} steps apart (median): fewer usable ones were taken than are asked for, "
+            "or positions are in another unit than metres"
+        )
     inside = np.flatnonzero(poses.known)
     gaps = np.diff(way_of[chosen])
     jump = int(np.argmax(np.diff(log_s))) if len(log_s) > 1 else 0
@@ -220,6 +233,7 @@ def pick_photos(
             "usable": int(usable.sum()),
             "picked": len(chosen),
         },
+        "warnings": warnings,
         "longest_pause_s": float(np.diff(log_s).max()),
         "longest_pause_after": pictures.times[jump].name,
         "spacing_median_m": float(np.median(gaps)) if len(gaps) else None,
@@ -279,15 +293,42 @@ def _read_pictures(photos: Path, request: PickRequest, threads: int, progress: P
     if not photos.is_dir():
         raise InputError(f"{photos}: is no folder of photos ({', '.join(SUFFIXES)}) and no film")
     files = photo_files(photos)
+    others = unread_photos(photos)
     if len(files) < 2:
-        raise InputError(f"{photos}: holds {len(files)} photos ({', '.join(SUFFIXES)}), at least 2 are needed")
+        rest = "; ".join(["", *_not_read([path.name for path in others])])
+        raise InputError(f"{photos}: holds {len(files)} photos ({', '.join(SUFFIXES)}), at least 2 are needed{rest}")
     times, missing = photo_times(photos, files, request.interval_s)
     statistics, read = photo_statistics([photos / one.name for one in times], threads, progress)
     if len(read) < 2:
         raise InputError(f"{photos}: {len(read)} of {len(files)} photos can be read, at least 2 are needed")
     unread = [(one.name, "unreadable") for k, one in enumerate(times) if k not in set(read)]
-    left_out = [(name, "without time") for name in missing] + unread
+    left_out = [(path.relative_to(photos).as_posix(), NOT_READ) for path in others]
+    left_out += [(name, "without time") for name in missing] + unread
     return _Pictures(times=[times[k] for k in read], statistics=statistics, film=False, left_out=left_out)
+
+
+def _not_read(names: list[str]) -> list[str]:
+    """What to do about photographs of a kind that is not read, in lines by kind."""
+    kinds = Counter(Path(name).suffix for name in names)
+    return [f"{count} {kind} are not read: convert them to JPEG" for kind, count in sorted(kinds.items())]
+
+
+def _units(request: PickRequest, track: DiveTrack, offset: ClockOffset | None) -> list[str]:
+    """A warning where the field of view by motion cannot be that of the camera: shift is speed over distance."""
+    known = request.distance_m is not None or bool(np.isfinite(track.altitude_m).any())
+    if not known or offset is None or offset.correlation["shift"] < LEAST_TOLD or offset.focal_widths <= 0.0:
+        return []
+    found_deg = 2.0 * math.degrees(math.atan(0.5 / offset.focal_widths))
+    said = f"the field of view by motion is {found_deg:.0f} deg"
+    ask = "are positions or altitudes in another unit than metres?"
+    stated_deg = request.field_of_view_deg
+    if stated_deg is not None:
+        ratio = offset.focal_widths * 2.0 * math.tan(math.radians(stated_deg / 2.0))
+        if max(ratio, 1.0 / ratio) > MOST_FOCAL_RATIO:
+            return [f"{said}, --fov states {stated_deg:g} deg: {ask}"]
+    elif not NARROWEST_DEG <= found_deg <= WIDEST_DEG:
+        return [f"{said}, that of a camera is {NARROWEST_DEG:g} to {WIDEST_DEG:g}: {ask}"]
+    return []
 
 
 def _told_offset(offset: ClockOffset | None, offset_s: float, sigma_s: float, *, calendar: bool) -> dict[str, Any]:
@@ -309,7 +350,7 @@ def _in_footprints(
     """The way, shape (n,), in units of the ground that the picture's shorter side shows."""
     if request.field_of_view_deg is not None:
         focal_widths = 0.5 / math.tan(math.radians(request.field_of_view_deg / 2.0))
-    elif offset is not None and offset.correlation["shift"] > 0.5:
+    elif offset is not None and offset.correlation["shift"] > LEAST_TOLD:
         focal_widths = offset.focal_widths
     else:
         raise InputError("--overlap: the field of view is not known from motion; state it with --fov DEG, in water")

@@ -178,11 +178,21 @@ def unsupported_files(folder: Path) -> dict[str, int]:
 
     In the folder itself, and in those in it where the photographs lie in them.
     """
-    photographs = any(path.suffix.lower() in SUFFIXES for path in _files(folder))
-    folders = [folder] if photographs else [folder, *_folders(folder)]
-    suffixes = [path.suffix.lower() for one in folders for path in _files(one)]
-    counts = {kind: sum(suffix in wanted for suffix in suffixes) for kind, wanted in _OTHERS.items()}
+    found = _beside(folder)
+    counts = {kind: sum(path.suffix.lower() in wanted for path in found) for kind, wanted in _OTHERS.items()}
     return {kind: count for kind, count in counts.items() if count}
+
+
+def unread_photos(folder: Path) -> list[Path]:
+    """Files beside the photographs that hold pictures of a kind that is not read, but for videos."""
+    wanted = {suffix for kind, suffixes in _OTHERS.items() if kind != "video" for suffix in suffixes}
+    return [path for path in _beside(folder) if path.suffix.lower() in wanted]
+
+
+def _beside(folder: Path) -> list[Path]:
+    """Files of a folder, and of those in it where the photographs lie in them."""
+    photographs = any(path.suffix.lower() in SUFFIXES for path in _files(folder))
+    return [path for one in ([folder] if photographs else [folder, *_folders(folder)]) for path in _files(one)]
 
 
 def _read_photo(folder: Path, path: Path, store: PhotoStore | None) -> Photo:
