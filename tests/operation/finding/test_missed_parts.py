@@ -391,6 +391,14 @@ def test_an_orbit_that_is_clear_nowhere_is_as_high_as_is_tried() -> None:
         assert AHEAD.clear_elevation_deg(target, 40.0) == (80.0, "the target")
 
 
+@pytest.mark.parametrize("surface", [None, np.zeros((0, 3))])
+def test_of_a_target_that_is_not_mapped_yet_its_ball_counts(surface: Array | None) -> None:
+    """A small swaying target is accepted with no point of a surface or a region; the orbit keeps clear of its ball."""
+    empty = replace(region_alone(np.zeros((0, 3))), surface_W_m=surface, towards_W=surface)
+    assert AHEAD.clear_elevation_deg(replace(empty, radius_m=0.05), 40.0) == (40.0, "")
+    assert AHEAD.clear_elevation_deg(replace(empty, radius_m=MISSION.standoff_m), 40.0)[1] == "the target"
+
+
 def region_alone(points_W_m: Array) -> TargetEstimate:
     """An estimate without a mapped surface."""
     n = len(points_W_m)

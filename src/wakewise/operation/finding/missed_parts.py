@@ -25,7 +25,7 @@ from wakewise.scene.missions import (
     find_coverage_gaps,
     reachable_views,
 )
-from wakewise.scene.missions.clearance import gaps_of
+from wakewise.scene.missions.clearance import gaps_of, hull_corners
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise.scene.missions.point_surface import LEAST_POINTS, MAPPED_CRITERIA, patches_of_points
 from wakewise.scene.missions.route import rest_to_rest
@@ -123,9 +123,12 @@ class ViewChooser:
     def clear_elevation_deg(self, target: TargetEstimate, wished_deg: float) -> tuple[float, str]:
         """Lowest elevation from the wished one on at which the orbit keeps the clearance, and what is below it.
 
-        What is below is "" where the wished one is clear. The bounds are known, the target as far as it is mapped.
+        What is below is "" where the wished one is clear. The bounds are known, the target as far as it is mapped, else
+        as a ball.
         """
-        solid = target.points_W_m if target.surface_W_m is None else target.surface_W_m
+        ball = target.centre_W_m + hull_corners(np.full(3, 2.0 * target.radius_m / math.sqrt(3.0)))
+        known = (target.surface_W_m, target.points_W_m, ball)
+        solid = next(points for points in known if points is not None and len(points))
         clearance_m, elevation_deg, below = self.mission.clearance_m, wished_deg, ""
         # Higher up, the surface and the walls are no farther.
         least = {"the floor": clearance_m, "the target": clearance_m + MAPPED_MARGIN_M}

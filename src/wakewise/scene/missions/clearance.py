@@ -40,7 +40,7 @@ def box_distance(points_B_m: Array, size_m: Array) -> Array:
 def gaps_of(X_WB: Pose, size_m: Array, bounds: TankBounds, target_W_m: Array) -> dict[str, float]:
     """How far a hull at a pose is, in metres, from the floor, the water surface, a wall and the target, by name.
 
-    Parameters are those of `check_clearance`; of the target some 4000 points are looked at.
+    Parameters are those of `check_clearance`; of the target some 4000 points are looked at. Infinite where it has none.
     """
     near = target_W_m[:: max(1, len(target_W_m) // 4000)]
     hull_W = X_WB.apply(hull_corners(size_m))
@@ -50,7 +50,7 @@ def gaps_of(X_WB: Pose, size_m: Array, bounds: TankBounds, target_W_m: Array) ->
         "a wall": min(
             float((hull_W[:, :2] - bounds.low_W_m[:2]).min()), float((bounds.high_W_m[:2] - hull_W[:, :2]).min())
         ),
-        "the target": float(box_distance(X_WB.inverse().apply(near), size_m).min()),
+        "the target": float(box_distance(X_WB.inverse().apply(near), size_m).min(initial=np.inf)),
     }
 
 
