@@ -23,16 +23,9 @@ from wakewise.simulation.lattice.stencil import (
 from wakewise_paper.lattice_reference.numpy_step import equilibrium, twin_step
 from wakewise_paper.lattice_reference.run import LatticeRun
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 EDDIES = smagorinsky_factor(0.12)
-
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    """Small lattices on one thread: on a busy machine threads that wait for one another cost more than they save."""
-    before = numba.get_num_threads()
-    numba.set_num_threads(1)
-    yield
-    numba.set_num_threads(before)
 
 
 def _random(cells, rng, size=1e-2):

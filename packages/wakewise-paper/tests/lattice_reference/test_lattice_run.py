@@ -8,7 +8,6 @@ Slow laws (four to five cells per diameter, far from resolved, so only what does
 import math
 from dataclasses import replace
 
-import numba
 import numpy as np
 import pytest
 
@@ -18,6 +17,8 @@ from wakewise_paper.lattice_reference.crossing_jets import crossing_figures
 from wakewise_paper.lattice_reference.mean_field import compute_mean_field, compute_run, momentum_flux
 from wakewise_paper.lattice_reference.reference_cases import find_case
 from wakewise_paper.lattice_reference.run import Disk, LatticeRun
+
+pytestmark = pytest.mark.usefixtures("one_thread")
 
 SMALL = LatticeCase(
     name="small",
@@ -29,15 +30,6 @@ SMALL = LatticeCase(
     develop=1.0,
     average=2.0,
 )
-
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    """Small lattices on one thread: on a busy machine threads that wait for one another cost more than they save."""
-    before = numba.get_num_threads()
-    numba.set_num_threads(1)
-    yield
-    numba.set_num_threads(before)
 
 
 def test_disk_pushes_with_its_thrust_and_torque_on_every_grid():

@@ -2,7 +2,6 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 
@@ -22,17 +21,10 @@ from wakewise_paper.lattice_reference.engines import BounceBackLinks
 from wakewise_paper.lattice_reference.numpy_step import equilibrium
 from wakewise_paper.lattice_reference.wall_model import SUBLAYER, WallModel, law_of_the_wall, wall_stress
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 ALONG = np.array([PERIODIC, PERIODIC, PERIODIC, PERIODIC, WALL, WALL])
 NU = 1e-4
-
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    """Small lattices on one thread: threads that wait for one another cost more than they save."""
-    before = numba.get_num_threads()
-    numba.set_num_threads(1)
-    yield
-    numba.set_num_threads(before)
 
 
 def _water(cells, u):

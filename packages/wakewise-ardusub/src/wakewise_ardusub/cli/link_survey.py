@@ -52,7 +52,7 @@ Consent = Annotated[
     typer.Option("--consent", help="Begin as soon as all is well: giving it is the consent, as Enter otherwise is."),
 ]
 Wait = Annotated[float, typer.Option(metavar="S", min=1.0, help="How long to wait until all is well.")]
-Out = Annotated[Path | None, typer.Option(help="Folder for the journal; runs/NAME-TIME if not given.")]
+Out = Annotated[Path | None, typer.Option(help="A new folder for the journal; runs/NAME-TIME if not given.")]
 
 
 @dataclass(frozen=True, kw_only=True)
