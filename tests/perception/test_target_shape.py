@@ -14,12 +14,14 @@ from wakewise.perception.target_shape import (
     LEAST_POINTS,
     VOXEL_M,
     TargetShape,
+    averaged,
     ball,
     bodies,
     completed,
     in_company,
     middle_depth,
     protected_region,
+    seen_round_rad,
     shape_of,
     thinned,
     view_sectors,
@@ -114,6 +116,30 @@ def test_from_all_round_the_centre_is_that_of_the_box(seed: int) -> None:
     assert off(found) < 0.03
     assert len(found.surface_W_m) <= 1.01 * found.seen
     assert 0.9 * RADIUS_M < found.radius_m < 1.5 * RADIUS_M
+
+
+def test_what_was_guessed_from_one_side_tells_nothing_of_what_was_seen_all_round() -> None:
+    """The first centre from all round is taken as it is, and further ones are averaged with it."""
+    rng = np.random.default_rng(5)
+    cameras = CENTRE + np.array([[math.cos(a), math.sin(a), -0.3] for a in np.linspace(0.0, 6.0, 40)])
+    one_side = shape_of(near_side(300, rng, 0.0), BED, cameras[:1])
+    whole = shape_of(sphere(1000, rng), BED, cameras)
+    assert (one_side.all_round, whole.all_round) == (False, True)
+    first = averaged(one_side, whole)
+    assert np.array_equal(first.centre_W_m, whole.centre_W_m)
+    moved = shape_of(sphere(1000, rng) + np.array([0.02, 0.0, 0.0]), BED, cameras)
+    share = (averaged(first, moved).centre_W_m - first.centre_W_m)[0] / (moved.centre_W_m - first.centre_W_m)[0]
+    assert 0.02 < share < 0.5
+
+
+@pytest.mark.parametrize("apart_deg", [0.0, 20.0, 90.0, 180.0])
+def test_how_far_round_a_place_was_seen_is_the_widest_angle_between_cameras(apart_deg: float) -> None:
+    """Height and distance of the cameras do not count, nor those between."""
+    ends = np.radians([-90.0, -90.0 + 0.4 * apart_deg, -90.0 + apart_deg])
+    far = np.array([0.4, 1.3, 0.8])
+    cameras = CENTRE + np.stack([far * np.cos(ends), far * np.sin(ends), -far], axis=1)
+    assert seen_round_rad(cameras, CENTRE) == pytest.approx(math.radians(apart_deg), abs=1e-6)
+    assert seen_round_rad(cameras[:1], CENTRE) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_the_uncertainty_is_along_the_view() -> None:

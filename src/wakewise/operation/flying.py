@@ -354,7 +354,7 @@ def fly_trial(
 
         write_found(parts, folder)
         pilot: Any = parts.pilot
-        if pilot.found_s is None:
+        if pilot.accepted_s is None:
             raise StageError("find: no target was found, so nothing was photographed")
         if made != pilot.planned:
             raise StageError(f"{parts.scenario.pilot}: {made} of {pilot.planned} exposures were made")

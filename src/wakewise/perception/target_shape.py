@@ -42,11 +42,10 @@ WORST = 2.0
 """Largest standard deviation of a body's points over the lower quartile of theirs."""
 SHARED = 4.0
 """Shapes of one body share most of their points: so many of them tell as much as one."""
-CENTRE_WALK_M = 0.008
-"""Random walk of the centre from one shape to the next: more of the target is seen."""
-LEAST_APART_RAD = math.radians(15.0)
+CENTRE_WALK_M, ROUND_WALK_M = 0.008, 0.002
+"""Random walk of the centre from one shape to the next: more of the target is seen; and once all of it was seen."""
 RECENT = 100
-"""A target was seen from two sides if of so many last places of the camera two lie this far apart in azimuth."""
+"""How far round a target was seen is told by so many last places of the camera."""
 LONELY = 2.5
 """Points whose third neighbour is farther off than this many times the median are outliers."""
 TALLEST_M = 2.0
@@ -54,7 +53,8 @@ SECTOR_RAD = math.radians(15.0)
 """Views within one sector in azimuth count once."""
 ALL_ROUND_RAD = math.radians(225.0)
 """Seen from so far round, a target has no side that was not seen."""
-BOX_TAIL = 0.005
+BOX_TAIL, TOP_TAIL = 0.01, 0.005
+"""As `TAIL`, of the box round a body that was seen from all round, and of its top: thin tips are seen by few points."""
 VOXEL_M = 0.008
 FILL = 12
 """Samples of the water per point of the region."""
@@ -67,6 +67,7 @@ class TargetShape:
     """Centre (middle of the box above the bed), shape (3,), its covariance, (3, 3), radius, and surface points, (n, 3).
 
     The surface is thinned to one point in `VOXEL_M`, those of the side that was seen first, `seen` of them.
+    `all_round`: whether it was seen from all round.
     """
 
     centre_W_m: Array
@@ -74,6 +75,7 @@ class TargetShape:
     radius_m: float
     surface_W_m: Array
     seen: int
+    all_round: bool = False
 
     def __post_init__(self) -> None:
         freeze(self, centre_W_m=(3,), covariance=(3, 3), surface_W_m=(None, 3))
@@ -130,13 +132,14 @@ def shape_of(points_W_m: Array, bed: BedPlane, cameras_W_m: Array, place_std_m: 
         rows += [across, view]
         values += [0.5 * (low + high), depth]
         weights += [1.0 / math.hypot(ACROSS_STD_M, half * CORRELATED / len(points_W_m)), 1.0 / depth_std]
-    if len(views) * SECTOR_RAD >= ALL_ROUND_RAD:  # the box round all that stands there, by its own axes
+    all_round = len(views) * SECTOR_RAD >= ALL_ROUND_RAD
+    if all_round:  # the box round all that stands there, by its own axes
         low_W, high_W = np.quantile(points_W_m[:, :2], (BOX_TAIL, 1.0 - BOX_TAIL), axis=0)
         rows, values, weights = list(np.eye(2)), list(0.5 * (low_W + high_W)), [1.0 / ACROSS_STD_M] * 2
     W = np.array(weights)
     N = (np.array(rows) * W[:, None]).T @ (np.array(rows) * W[:, None])
     plan = np.linalg.solve(N, (np.array(rows) * W[:, None]).T @ (np.array(values) * W))
-    top = float(np.quantile(points_W_m[:, 2], BOX_TAIL))  # thin tips are seen by few points
+    top = float(np.quantile(points_W_m[:, 2], TOP_TAIL))
     foot = float(bed.below(np.append(plan, top))[2])
     centre = np.append(plan, 0.5 * (top + foot))
     covariance = np.zeros((3, 3))
@@ -147,7 +150,12 @@ def shape_of(points_W_m: Array, bed: BedPlane, cameras_W_m: Array, place_std_m: 
     radius = float(np.quantile(np.linalg.norm(surface - centre, axis=1), 1.0 - TAIL))
     least = max(*halves, 0.5 * (foot - top))
     return TargetShape(
-        centre_W_m=centre, covariance=covariance, radius_m=max(radius, least), surface_W_m=surface, seen=seen
+        centre_W_m=centre,
+        covariance=covariance,
+        radius_m=max(radius, least),
+        surface_W_m=surface,
+        seen=seen,
+        all_round=all_round,
     )
 
 
@@ -186,20 +194,23 @@ def best_known(std_m: Array) -> BoolArray:
 
 
 def averaged(before: TargetShape | None, now: TargetShape) -> TargetShape:
-    """The shape of now, its centre averaged with that of before by their covariances (Kalman filter)."""
-    if before is None or not before.seen:
+    """The shape of now, its centre averaged with that of before by their covariances (Kalman filter).
+
+    The first shape that was seen from all round is taken as it is: what was guessed before tells nothing more.
+    """
+    if before is None or not before.seen or now.all_round > before.all_round:
         return now
-    P = before.covariance + CENTRE_WALK_M**2 * np.eye(3)
+    P = before.covariance + (ROUND_WALK_M if now.all_round else CENTRE_WALK_M) ** 2 * np.eye(3)
     gain = P @ np.linalg.inv(P + SHARED * now.covariance)
     centre = before.centre_W_m + gain @ (now.centre_W_m - before.centre_W_m)
     return replace(now, centre_W_m=centre, covariance=(np.eye(3) - gain) @ P)
 
 
-def seen_from_two_sides(cameras_W_m: Array, about_W_m: Array) -> bool:
-    """Whether a place was seen from two sides, by the places of the camera, shape (k, 3)."""
+def seen_round_rad(cameras_W_m: Array, about_W_m: Array) -> float:
+    """Largest angle in azimuth between two of the places, shape (k, 3), from which a place was seen."""
     level = cameras_W_m[-RECENT:, :2] - about_W_m[:2]
     level = level / np.maximum(np.linalg.norm(level, axis=1, keepdims=True), 1e-9)
-    return bool((level @ level.T).min(initial=1.0) <= math.cos(LEAST_APART_RAD))
+    return math.acos(max(-1.0, min(1.0, float((level @ level.T).min(initial=1.0)))))
 
 
 def thinned(points_W_m: Array, voxel_m: float = VOXEL_M) -> IntArray:

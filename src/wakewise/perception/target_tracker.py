@@ -58,7 +58,7 @@ from wakewise.perception.target_shape import (
     bodies,
     in_company,
     protected_region,
-    seen_from_two_sides,
+    seen_round_rad,
     shape_of,
     thinned,
 )
@@ -88,9 +88,10 @@ LEAST_MOVED_M = 0.002
 """A region that moved by less is the same one."""
 LEAST_MEMBERS = 25
 """Fewer points, and a target is not accepted by time alone."""
-MOST_CENTRE_STD_M = 0.0125
-"""A target whose centre is less sure is accepted by time alone only after `PATIENT` times as long."""
-PATIENT = 3.0
+LEAST_ROUND_RAD, AMPLE_ROUND_RAD = math.radians(15.0), math.radians(55.0)
+"""A target seen from places less far apart is not accepted by time; one between them after `PATIENT` times as long: the
+depth of what was seen from one side is a guess."""
+PATIENT = 8.0
 DETECTED_S = 5.0
 """A detector's box in which no body is mapped for so long is dropped, and the detector asked again."""
 BED_REACH_M = 0.35
@@ -469,8 +470,9 @@ class TargetTracker:
         near = np.asarray(KDTree(kept).query(points.points_W_m[which], distance_upper_bound=VOXEL_M)[0]) < np.inf
         members = points.ids[which[near]]
         proposed_s = min(state.proposed_s, time_s)
-        enough = len(members) >= LEAST_MEMBERS and seen_from_two_sides(state.cameras_W_m, shape.centre_W_m)
-        wait_s = self.settings.accept_s * (1.0 if shape.centre_std_m <= MOST_CENTRE_STD_M else PATIENT)
+        round_rad = seen_round_rad(state.cameras_W_m, shape.centre_W_m)
+        enough = len(members) >= LEAST_MEMBERS and round_rad >= LEAST_ROUND_RAD
+        wait_s = self.settings.accept_s * (1.0 if round_rad >= AMPLE_ROUND_RAD else PATIENT)
         accepted = state.accepted or (enough and time_s - proposed_s >= wait_s)
         state = replace(
             state,

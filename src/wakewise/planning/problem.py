@@ -77,11 +77,6 @@ class PlanSettings(Settings):
     )
     iterations: int = Field(default=5, description="most iterations per plan; 1 is the fast mode", ge=1, le=50)
 
-    @property
-    def horizon_s(self) -> float:
-        """T, in seconds."""
-        return self.stages * self.stage_s
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlanProblem:

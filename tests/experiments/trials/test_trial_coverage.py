@@ -9,7 +9,6 @@ from wakewise.experiments.trials.coverage import (
     agreement_with,
     coverage_figures,
     coverage_of,
-    measure_cost,
     measure_coverage,
     shots_of,
 )
@@ -88,10 +87,3 @@ def test_what_is_no_trial_with_a_model_is_refused(tmp_path) -> None:
     """The file that is missing is named."""
     with pytest.raises(InputError, match=r"has no scenario\.yaml"):
         measure_coverage(tmp_path)
-
-
-def test_a_photograph_costs_the_guide_little(parts: Parts) -> None:
-    """Thread CPU of a photograph stays under 20 ms, with the mission's own viewpoints, which cover nine tenths."""
-    cost = measure_cost(parts)
-    assert cost["coverage_predicted_pct"] > 90.0
-    assert cost["coverage_ms_per_photo"] < 20.0

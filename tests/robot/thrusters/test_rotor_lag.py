@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from wakewise.core.errors import InputError
 from wakewise.robot.thrusters import thruster_lag
-from wakewise.robot.thrusters.rotor_lag import FirstOrderLag, LagModel, RotorLag, SecondOrderLag, SplitLag, delay_step
+from wakewise.robot.thrusters.rotor_lag import FirstOrderLag, LagModel, RotorLag, SecondOrderLag, SplitLag
 
 MODELS: list[LagModel] = [
     FirstOrderLag(time_constant_s=0.07),
@@ -88,15 +88,6 @@ def test_a_reversing_rotor_passes_through_zero_slowly() -> None:
     assert math.isclose(
         float(rotor.thrust(rotor.step(rotor.rest([-4.0]), [4.0], 0.1 * math.log(2.0)))[0]), 0.0, abs_tol=1e-12
     )
-
-
-def test_a_delay_line_gives_back_what_went_in() -> None:
-    line, out = np.zeros((3, 2)), []
-    for k in range(1, 7):
-        line, delayed = delay_step(line, [float(k), -float(k)])
-        out.append(delayed.tolist())
-    assert out == [[0.0, 0.0]] * 3 + [[1.0, -1.0], [2.0, -2.0], [3.0, -3.0]]
-    assert delay_step(np.zeros((0, 2)), [7.0, 8.0])[1].tolist() == [7.0, 8.0]
 
 
 def test_lags_without_time_are_refused() -> None:

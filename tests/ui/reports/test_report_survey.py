@@ -11,7 +11,7 @@ from wakewise.ui.reports.media import found_html
 def test_a_survey_tells_its_orbits_and_not_that_no_target_was_found(tmp_path: Path) -> None:
     """A survey has no single target: the parts that got an orbit are told, and what was seen well."""
     seen = {"seen_well_pct": 97.0, "unseen_pct": 1.0, "poorly_pct": 1.0, "seldom_pct": 1.0, "photographs": 100.0}
-    told = {"found_s": 0.0, "centre_W_m": None, "radius_m": None, "centre_std_m": None}
+    told = {"found_s": 0.0, "accepted_s": 0.0, "centre_W_m": None, "radius_m": None, "centre_std_m": None}
     trial = cast("Any", SimpleNamespace(folder=tmp_path))
     (tmp_path / "found.json").write_text(json.dumps(told), encoding="utf-8")
     assert "No target was found" in found_html(trial)

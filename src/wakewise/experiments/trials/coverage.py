@@ -197,17 +197,3 @@ def _costs(spent_ms: list[float]) -> dict[str, float]:
         "coverage_ms_per_photo": float(np.median(later_ms)),
         "coverage_ms_per_photo_max": float(np.max(later_ms)),
     }
-
-
-def measure_cost(parts: Parts) -> dict[str, float]:
-    """What the guide costs on a mission's own viewpoints, for benches without a trial: no flight, no photograph.
-
-    Returns coverage_predicted_pct of the planned viewpoints, coverage_ms_per_photo and coverage_ms_per_photo_max
-    (thread CPU; the first, which loads kernels, left out). Raises InputError if the mission plans no photograph.
-    """
-    spent_ms: list[float] = []
-    shots: list[Shot] = [(X_WC, None) for X_WC in parts.route.X_WC_planned]
-    coverage = coverage_of(parts.surveyed_target, parts.camera, shots, spent_ms)
-    if not spent_ms:
-        raise InputError("mission: plans no photograph, the guide needs at least one")
-    return {"coverage_predicted_pct": 100.0 * coverage.share, **_costs(spent_ms)}

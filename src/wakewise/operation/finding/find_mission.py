@@ -68,6 +68,7 @@ class FindPilot:
         self._last_s = 0.0
         self._phase = _Phase(name="look", route=self._look(), since_s=0.0)
         self.found_s: float | None = None
+        self.accepted_s: float | None = None
         self.photographed: PhotographedSurface | None = None
         self._camera, self._taken_from, self._further = self._start, list[Pose](), 0
         self._tilt = 0.0
@@ -91,7 +92,8 @@ class FindPilot:
         scan = plan_route(self.centre_W_m, self._mission)
         mission = self._mission
         view_s = math.pi * mission.standoff_m / mission.speed_m_s + mission.speed_m_s / mission.acceleration_m_s2
-        approach_s = self._assumed_m / mission.speed_m_s + view_s
+        approach_m = self._assumed_m * (1.0 + math.radians(self._find.round_deg))
+        approach_s = approach_m / mission.speed_m_s + view_s
         before_s = self._find.give_up_s + 2.0 * self._phase.route.duration_s + approach_s + self._find.hold_s
         return before_s + scan.duration_s + self._find.further_views * view_s
 
@@ -126,11 +128,11 @@ class FindPilot:
         return opens_s + since_s
 
     def _look(self) -> Route:
-        """Settle, then arcs to one side, to the other and back, about what is in view."""
+        """Settle, then arcs to one side and to the other, about what is in view."""
         azimuth, elevation, distance = self._here
         side = math.radians(self._find.look_deg)
         legs, starts, clock_s, here = [], [], self._find.settle_s, self._here
-        for name, turn in (("look left", -side), ("look right", side), ("look back", 0.0)):
+        for name, turn in (("look left", -side), ("look right", side)):
             end = np.array([azimuth + turn, elevation, distance])
             leg = rest_to_rest(name, here, end, self._mission.speed_m_s, self._mission.acceleration_m_s2)
             legs.append(leg)
@@ -155,11 +157,13 @@ class FindPilot:
         """Begin the next phase where the present one is over."""
         phase, into_s = self._phase, time_s - self._phase.since_s
         known = target is not None and target.status in ("tracked", "lost")
-        if self.found_s is None and known:
+        if self.found_s is None and target is not None and target.status != "assumed":
             self.found_s = time_s
+        if self.accepted_s is None and known:
+            self.accepted_s = time_s
         if phase.name == "done":
             return
-        if self.found_s is None and time_s >= self._find.give_up_s:
+        if self.accepted_s is None and time_s >= self._find.give_up_s:
             self._begin("done", open_route(self.centre_W_m, 1.0, "done", self._at(time_s)), time_s)
         elif into_s < phase.route.duration_s:
             return
@@ -200,14 +204,15 @@ class FindPilot:
         return self._phase.route.on_sphere(time_s - self._phase.since_s)[0]
 
     def _approach(self) -> Route:
-        """From where the look ended to the standoff at the first orbit's elevation, aside as far as it looked.
+        """From where the look ended to the standoff at the first orbit's elevation, and round the target meanwhile.
 
-        A straight way to the target would show it from one side, and leave its distance as unsure as before.
+        A straight way would show it from one side. The depth of what was seen from one side only is a guess; from a
+        quarter of a circle each view's depth is measured across another view.
         """
         here = self._phase.route.legs[-1].end
         end = np.array(
             [
-                here[0] + math.radians(self._find.look_deg),
+                here[0] + math.radians(self._find.round_deg),
                 math.radians(self._mission.elevations_deg[0]),
                 self._mission.standoff_m,
             ]

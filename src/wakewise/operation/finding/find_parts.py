@@ -113,14 +113,15 @@ def write_found(parts: Parts, folder: Path) -> None:
     pilot, estimator = parts.pilot, parts.estimator
     if not isinstance(pilot, FindPilot | SurveyPilot) or not isinstance(estimator, CameraEstimator):
         return
-    told: dict[str, Any] = {"found_s": pilot.found_s, "centre_W_m": None, "radius_m": None, "centre_std_m": None}
+    told: dict[str, Any] = dict.fromkeys(("centre_W_m", "radius_m", "centre_std_m"))
+    told |= {"found_s": pilot.found_s, "accepted_s": pilot.accepted_s}
     seen = estimator.seen
     if isinstance(pilot, SurveyPilot):
         told |= {
             "orbits": [[*orbit.centre_W_m.tolist(), math.degrees(orbit.elevation_rad)] for orbit in pilot.parts],
             "replanned_ms": pilot.replanned_ms,
         }
-    elif seen.target is not None and pilot.found_s is not None:
+    elif seen.target is not None and pilot.accepted_s is not None:
         target = seen.target
         told |= {
             "centre_W_m": target.centre_W_m.tolist(),

@@ -122,6 +122,7 @@ class SurveyPilot:
     """
 
     found_s: float | None = 0.0
+    accepted_s: float | None = 0.0
 
     def __init__(
         self, bed_z_m: float, aim: CameraAim, mission: MissionSettings, survey: SurveySettings, chooser: ViewChooser

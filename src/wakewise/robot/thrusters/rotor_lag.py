@@ -1,7 +1,7 @@
 """How delivered thrust follows commanded thrust: four lag models, each with its exact step for a constant command.
 
 A state has shape (order, n) for n thrusters, so that a plant steps all its thrusters at once. Commands are commanded
-thrusts, or anything that steady thrust is proportional to. Dead time is kept apart: see `delay_step`.
+thrusts, or anything that steady thrust is proportional to. Dead time is kept apart.
 """
 
 from __future__ import annotations
@@ -202,16 +202,6 @@ class SplitLag(FirstOrderLag):
         lagged = super().response(commands, dt_s)
         direct = np.append(commands[:1], commands[:-1])
         return np.asarray(self.direct_share * direct + (1.0 - self.direct_share) * lagged)
-
-
-def delay_step(line: Array, commands: ArrayLike) -> tuple[Array, Array]:
-    """Push commands, shape (n,), into a delay of m steps and take out those of m steps ago.
-
-    `line`, shape (m, n): commands on their way, oldest first; m = round(delay / step). No rows means no delay. Returns
-    the line after the step, shape (m, n), and the delayed commands, shape (n,).
-    """
-    queue = np.concatenate([line, np.asarray(commands, dtype=np.float64)[None, :]])
-    return queue[1:], queue[0]
 
 
 def _filtered(numerator: list[float], denominator: list[float], values: Array) -> Array:

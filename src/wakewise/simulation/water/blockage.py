@@ -2,7 +2,7 @@
 
 *Potential flow* (J. L. Hess and A. M. O. Smith 1967, Prog. Aerosp. Sci. 8, 1, doi 10.1016/0376-0421(67)90003-6): a few
 smooth sources below the surface, of zero total strength, minimise the mean square normal velocity at points on the
-surface. Shapes finer than the distance between sources are blocked in part only; `leakage` is the share that passes.
+surface. Shapes finer than the distance between sources are blocked in part only.
 Not modelled: boundary layer, separation, wake.
 
 *Jets round a body.* In potential flow parcels would stop at stagnation points and accumulate impulse without bound. A
@@ -146,13 +146,6 @@ class Blockage:
         points = np.ascontiguousarray(points_W_m, dtype=np.float64)
         cost = len(points) * self.rows.sources.shape[1] // 4
         over_points(lambda some, result: add_body(self.rows, some, strengths_m3_s, result), points, out, cost)
-
-    def leakage(self, undisturbed_m_s: Array) -> float:
-        """Root mean square velocity across the surface with the body's answer, over that without it."""
-        answer = self.velocity(self.points_m, self.strengths_m3_s(undisturbed_m_s))
-        before = np.einsum("ni,ni->n", undisturbed_m_s, self.normals)
-        after = before + np.einsum("ni,ni->n", answer, self.normals)
-        return float(np.sqrt(np.mean(after**2) / max(np.mean(before**2), 1e-30)))
 
 
 @njit(apart=True, nogil=True)
