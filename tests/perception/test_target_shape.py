@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from wakewise.core.arrays import Array
+from wakewise.core.arrays import Array, IntArray
 from wakewise.perception.bed_plane import BedPlane, level_plane
 from wakewise.perception.target_shape import (
     LEAST_POINTS,
@@ -325,6 +325,11 @@ def test_a_ball_stands_for_what_is_not_known() -> None:
     np.testing.assert_allclose(shape.covariance, 0.05**2 * np.eye(3))
 
 
+def sure_bodies(points_W_m: Array) -> list[IntArray]:
+    """Bodies of points whose places are known."""
+    return bodies(points_W_m, BED, np.zeros(len(points_W_m)))
+
+
 def test_bodies_on_the_bed_are_told_apart() -> None:
     """Two spheres apart are two bodies, the larger first; the bed, strays and what floats high are none."""
     rng = np.random.default_rng(14)
@@ -332,17 +337,21 @@ def test_bodies_on_the_bed_are_told_apart() -> None:
     large = sphere(500, rng)
     sand = rng.uniform([-0.5, -1.0, 1.49], [1.2, 0.6, 1.51], (600, 3))
     stray, high = np.array([[1.5, 1.5, 1.2]]), CENTRE - [0.0, 0.0, 3.0] + 0.01 * rng.normal(size=(50, 3))
-    found = bodies(np.concatenate([sand, small, stray, large, high]), BED)
+    found = sure_bodies(np.concatenate([sand, small, stray, large, high]))
     assert len(found) == 2
     start = len(sand) + len(small) + 1
     np.testing.assert_array_equal(found[0], np.arange(start, start + len(large)))
     np.testing.assert_array_equal(found[1], np.arange(len(sand), len(sand) + len(small)))
-    assert bodies(sand, BED) == []
-    assert bodies(large[: LEAST_POINTS - 1], BED) == []
-    assert bodies(np.zeros((0, 3)), BED) == []
+    assert sure_bodies(sand) == []
+    assert sure_bodies(large[: LEAST_POINTS - 1]) == []
+    assert sure_bodies(np.zeros((0, 3))) == []
 
 
 def test_points_too_far_apart_are_no_body() -> None:
-    """Points of which no two are near each other make none."""
+    """Points of which no two are near each other make none, unless they are not known better than to a decimetre."""
     scattered = np.stack(np.meshgrid([0.0, 0.1, 0.2], [0.0, 0.1, 0.2], [1.2, 1.3, 1.4]), axis=-1).reshape(-1, 3)
-    assert bodies(scattered, BED) == []
+    assert sure_bodies(scattered) == []
+    unsure = np.full(len(scattered), 0.07)
+    assert [len(body) for body in bodies(scattered, BED, unsure)] == [len(scattered)]
+    unsure[1:] = 0.04  # half of both is less than the gap
+    assert bodies(scattered, BED, unsure) == []

@@ -24,8 +24,8 @@ from wakewise.scene.targets.region import DECAY_M, SHELL_M, SURFACE_SHARE, Regio
 ABOVE_BED_M = 0.02
 """Points higher above the bed are of what stands on it: more than ripples and small stones."""
 JOINED_M = 0.04
-"""Points no farther apart are of one body."""
-LEAST_POINTS = 8
+"""Points no farther apart are of one body; what is not known of their places comes on top."""
+LEAST_POINTS = 6
 TAIL = 0.02
 """Share of the points beyond each end of an extent: outliers."""
 ACROSS_STD_M = 0.004
@@ -86,16 +86,16 @@ class TargetShape:
         return math.sqrt(float(np.trace(self.covariance)))
 
 
-def bodies(points_W_m: Array, bed: BedPlane) -> list[IntArray]:
-    """Indices of the points of each body that stands on the bed, largest body first."""
+def bodies(points_W_m: Array, bed: BedPlane, std_m: Array) -> list[IntArray]:
+    """Indices of the points of each body that stands on the bed, largest body first; `std_m`, shape (n,): of points."""
     height = bed.height_m(points_W_m)
     above = np.flatnonzero((height > ABOVE_BED_M) & (height < TALLEST_M))
     if not len(above):
         return []
-    tree = KDTree(points_W_m[above])
-    pairs = tree.query_pairs(JOINED_M, output_type="ndarray")
-    graph = np.zeros((0, 2), np.int64) if not len(pairs) else pairs
-    n = len(above)
+    places, unsure, n = points_W_m[above], std_m[above], len(above)
+    pairs = KDTree(places).query_pairs(JOINED_M + float(unsure.max()), output_type="ndarray")
+    apart = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
+    graph = pairs[apart <= JOINED_M + 0.5 * unsure[pairs].sum(axis=1)]
     joined = coo_array((np.ones(len(graph)), (graph[:, 0], graph[:, 1])), shape=(n, n))
     count, label = connected_components(joined, directed=False)
     groups = [above[label == k] for k in range(count)]

@@ -452,7 +452,7 @@ class TargetTracker:
         if bed is not None:
             best_first = np.argsort(std_m, kind="stable")
             few = best_first[thinned(places_W_m[best_first])]
-            groups = [few[group] for group in bodies(places_W_m[few], bed)]
+            groups = [few[group] for group in bodies(places_W_m[few], bed, std_m[few])]
             chosen = choose_body(
                 places_W_m, groups, state.shape, state.designation, state.camera, X_WC, LEAST_SEEN, state.refused
             )
