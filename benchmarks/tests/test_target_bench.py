@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wakewise_benchmarks.target_finding import consistent, figures_of, holding, planned, wash_kept
+from wakewise_benchmarks.target_finding import (
+    consistent,
+    coverage_figures,
+    figures_of,
+    holding,
+    planned,
+    planned_scan,
+    wash_kept,
+)
 
 ROW = {
     "found_s": 6.0, "accepted_s": 19.0, "centre_first_mm": 12.0, "centre_after_orbit_mm": 4.0, "hold_rmse_mm": 1.0,
@@ -57,3 +65,28 @@ def test_flights_are_told_apart_by_their_keys() -> None:
         for seed in (4201, 4202)
     }
     assert len(keys) == 12
+
+
+def test_coverage_is_told_of_each_kind_of_scan_and_of_all() -> None:
+    """The mean over all scans has the weight of each; flights count for nothing, a scan without a model neither."""
+    rows = {
+        ("payload", "whole", 1): {"coverage_agreement_pct": 100.0, "rmse_mm": 1.0},
+        ("payload", "whole", 2): {"coverage_agreement_pct": None},
+        ("payload", "least-overlap", 1): {"coverage_agreement_pct": 70.0},
+        ("payload", "found", 1): ROW,
+    }
+    told = coverage_figures(rows)
+    assert told["coverage_agreement_pct"] == pytest.approx(85.0)
+    assert [told["scans"][name]["scans"] for name in ("whole", "least-overlap")] == [2, 1]
+    assert told["scans"]["least-overlap"]["coverage_agreement_pct"] == pytest.approx(70.0)
+    assert told["scans"]["whole"]["rmse_mm"] == pytest.approx(1.0)
+    assert coverage_figures({})["coverage_agreement_pct"] is None
+
+
+def test_scans_fly_without_optical_tracking_and_find_their_target() -> None:
+    """Both kinds differ in views alone, and each has a key of its own."""
+    scans = [planned_scan(name, 4201).task for name in ("whole", "least-overlap")]
+    fields = [dict(scan.settings["scenario"]) for scan in scans]
+    assert scans[0].key != scans[1].key
+    assert all(each["pilot"] == "find" and each["tank.sensors.tracking_rate_hz"] == 0.0 for each in fields)
+    assert set(fields[1]) - set(fields[0]) == {"mission.elevations_deg", "mission.views", "find.further_views"}

@@ -116,7 +116,9 @@ def bench(
     models: Annotated[
         int,
         typer.Option(
-            help="worlds: seeds for which a whole scan is made and its model judged; reef: patches.", min=0, max=1000
+            help="target, worlds: seeds for which whole scans are made and models judged; reef: patches.",
+            min=0,
+            max=1000,
         ),
     ] = 1,
     judge: Annotated[

@@ -11,6 +11,9 @@ Written down before the flights:
 - While holding, from `SETTLED_S` on, the position is judged by its distance from its mean, and the attitude as well.
   The estimate's mean error, the offset between the map's frame and the world's, is stated beside it
   (`hold_mean_error_mm`); the NEES is that of the error without it.
+- Whole scans with models (`--models`, in `SCAN_WORLD`): what the coverage of the mapped surface said of the
+  photographs against what the model has, patch by patch. `whole` is the preset's scan; `least-overlap` has one ring
+  of `LEAST_VIEWS`, and no further photographs.
 - Wash is the mean over approach, hold and orbit, with the region found, with that of the surveyed target, and of `dp`
   on the same mission; kept is the share of the reduction against `dp` that the found region keeps.
 """
@@ -32,8 +35,8 @@ from wakewise.control import make_controller
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.core.interfaces import TruthProvider
-from wakewise.experiments.campaigns.definition import FLIGHT_SOURCES, PlannedTrial
-from wakewise.experiments.campaigns.flights import scenario_of
+from wakewise.experiments.campaigns.definition import FLIGHT_SOURCES, MODEL_SOURCES, PlannedTrial
+from wakewise.experiments.campaigns.flights import MODEL, scenario_of
 from wakewise.experiments.campaigns.statistics import Interval, geometric_ratio, mean_interval, share_interval
 from wakewise.experiments.campaigns.study import Row, run_study, selected, store_folder, study_trial
 from wakewise.experiments.campaigns.task import Figures, Task, WorkProgress
@@ -62,6 +65,13 @@ ARMS: dict[str, dict[str, Any]] = {
 AGES_S = (0.05, 0.3)
 """Ages of the region beside the default of 0.1 s, flown in `AGE_WORLD` alone."""
 AGE_WORLD = "payload"
+SCAN_WORLD, LEAST_VIEWS = "payload", 16
+SCANS: dict[str, dict[str, Any]] = {
+    "whole": {},
+    "least-overlap": {"mission.elevations_deg": (30.0,), "mission.views": (LEAST_VIEWS,), "find.further_views": 0},
+}
+"""Fields of a scenario by name, of scans of which models are made."""
+SCAN_FIGURES = ("coverage_agreement_pct", "coverage_predicted_pct", "completeness_visible_pct", "rmse_mm")
 LEAST_WASH_M_S = 0.005
 """Where `dp` leaves less, there is no wash to reduce, and its reduction says nothing."""
 SOURCES = (*FLIGHT_SOURCES, "perception", "vision/imaging", "wakewise_benchmarks:target_finding.py")
@@ -81,6 +91,9 @@ def run(options: BenchOptions) -> dict[str, Any]:
         for age_s in AGES_S:
             name = f"found/{1e3 * age_s:.0f}ms"
             trials |= {(AGE_WORLD, name, seed): planned(AGE_WORLD, name, seed, {"latency_s": age_s}) for seed in seeds}
+    if SCAN_WORLD in worlds and "found" in arms:
+        models = range(FIRST_SEED, FIRST_SEED + options.models)
+        trials |= {(SCAN_WORLD, name, seed): planned_scan(name, seed) for seed in models for name in SCANS}
     made = run_study("target", trials, options.store or store_folder("target"), options)
     rows = {world: {key[1:]: row for key, row in made.rows.items() if key[0] == world} for world in worlds}
     every = {(world, *key): row for world in worlds for key, row in rows[world].items()}
@@ -93,6 +106,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
             )
             for world in worlds
         },
+        **coverage_figures(made.rows),
         "ages": {f"{1e3 * age_s:.0f}": wash_kept(every, f"found/{1e3 * age_s:.0f}ms") for age_s in AGES_S},
         **made.counts,
         "wall_s": time.monotonic() - began,
@@ -116,6 +130,22 @@ def planned(world: str, arm: str, seed: int, more: Mapping[str, Any]) -> Planned
     settings = {"scenario": fields, "preset": "quick", "known_region": bool(more.get("known_region", False))}
     task = Task(name=f"{world}/{arm}/{seed}", work=STAGE, settings=settings, sources=SOURCES)
     return study_trial(world, arm, seed, task)
+
+
+def planned_scan(name: str, seed: int) -> PlannedTrial:
+    """One whole scan and its model."""
+    fields = {
+        "tank.sensors.tracking_rate_hz": 0.0,
+        **WORLDS[SCAN_WORLD],
+        **SCANS[name],
+        "seed": seed,
+        "pilot": "find",
+    }
+    settings = {"scenario": fields, "preset": "quick", "keep": "figures"}
+    sources = (*MODEL_SOURCES, *SOURCES)
+    return study_trial(
+        SCAN_WORLD, name, seed, Task(name=f"{name}/{seed}", work=MODEL, settings=settings, sources=sources)
+    )
 
 
 @dataclass(kw_only=True, eq=False)
@@ -245,6 +275,19 @@ def figures_of(rows: Mapping[tuple[str, str, int], Row], failed: int) -> dict[st
     return told | {"wash_reduction_kept_pct": None, **wash_kept(rows, "found")}
 
 
+def coverage_figures(rows: Mapping[tuple[str, str, int], Row]) -> dict[str, Any]:
+    """Agreement of coverage and model over all scans, and figures of each kind of scan, with intervals of 95 %."""
+    told: dict[str, Any] = {"scans": {}}
+    for name in SCANS:
+        own = [row for key, row in rows.items() if key[1] == name]
+        told["scans"][name] = {"scans": len(own)}
+        for key in SCAN_FIGURES:
+            told["scans"][name][key], told["scans"][name][f"{key}_interval"] = _mean([row.get(key) for row in own])
+    key = SCAN_FIGURES[0]
+    told[key], told[f"{key}_interval"] = _mean([row.get(key) for k, row in rows.items() if k[1] in SCANS])
+    return told
+
+
 def _mean(values: Sequence[float | None]) -> tuple[float | None, Interval | None]:
     known = [float(value) for value in values if value is not None]
     if not known:
@@ -315,5 +358,8 @@ def show_target(result: Mapping[str, Any]) -> None:
         typer.echo(
             f"a region {age} ms old keeps {format_value(kept.get('wash_reduction_kept_pct'))} % of the reduction"
         )
+    scans = [(name, *(row.get(key) for key in ("scans", *SCAN_FIGURES))) for name, row in result["scans"].items()]
+    titles = ("scan", "models", "coverage agrees %", "said %", "modelled %", "RMSE mm")
+    print_table("t" + "n" * (len(titles) - 1), titles, scans, "coverage held against the model")
     typer.echo(f"{result['flights']} flights, {result['failed']} failed")
     show_failures(result)
