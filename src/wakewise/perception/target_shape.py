@@ -87,18 +87,26 @@ class TargetShape:
 
 
 def bodies(points_W_m: Array, bed: BedPlane, std_m: Array) -> list[IntArray]:
-    """Indices of the points of each body that stands on the bed, largest body first; `std_m`, shape (n,): of points."""
+    """Indices of the points of each body that stands on the bed, largest body first; `std_m`, shape (n,): of points.
+
+    Points in one cell of half of `JOINED_M` are of one body; cells are joined by the middles of their points.
+    """
     height = bed.height_m(points_W_m)
     above = np.flatnonzero((height > ABOVE_BED_M) & (height < TALLEST_M))
     if not len(above):
         return []
-    places, unsure, n = points_W_m[above], std_m[above], len(above)
-    pairs = KDTree(places).query_pairs(JOINED_M + float(unsure.max()), output_type="ndarray")
-    apart = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
+    cells, cell = np.unique(
+        np.floor(points_W_m[above] / (0.5 * JOINED_M)).astype(np.int64), axis=0, return_inverse=True
+    )
+    n, held = len(cells), np.bincount(cell)
+    middles = np.stack([np.bincount(cell, along) for along in points_W_m[above].T], axis=1) / held[:, None]
+    unsure = np.bincount(cell, std_m[above]) / held
+    pairs = KDTree(middles).query_pairs(JOINED_M + float(unsure.max()), output_type="ndarray")
+    apart = np.linalg.norm(middles[pairs[:, 0]] - middles[pairs[:, 1]], axis=1)
     graph = pairs[apart <= JOINED_M + 0.5 * unsure[pairs].sum(axis=1)]
     joined = coo_array((np.ones(len(graph)), (graph[:, 0], graph[:, 1])), shape=(n, n))
     count, label = connected_components(joined, directed=False)
-    groups = [above[label == k] for k in range(count)]
+    groups = [above[label[cell] == k] for k in range(count)]
     return sorted((group for group in groups if len(group) >= LEAST_POINTS), key=len, reverse=True)
 
 

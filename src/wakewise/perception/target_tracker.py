@@ -228,12 +228,14 @@ class TargetTracker:
             last_s=time_s,
             trouble="" if len(tracks) >= LEAST_MAPPED // 2 else "few features",
         )
+        adjusted_s = state.adjusted_s
         state = self._adjusted(self._kept(state, X_WC, time_s, prior or guess, std))
         if found is not None:
             in_view = self.settings.protect == "view"
             state = with_sweep_step(state, time_s, self.settings.view_distance_m if in_view else None)
         state = self._followed(state, X_WC, time_s)
-        if time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6:
+        # Both in one picture would take too long.
+        if time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6 and state.adjusted_s == adjusted_s:
             state = self._reshaped(state, X_WC, time_s)
         return state, found
 
