@@ -98,6 +98,7 @@ def bodies(points_W_m: Array, bed: BedPlane, std_m: Array) -> list[IntArray]:
     cells, cell = np.unique(
         np.floor(points_W_m[above] / (0.5 * JOINED_M)).astype(np.int64), axis=0, return_inverse=True
     )
+    cell = cell.reshape(-1)  # NumPy 2.0 gave it another shape than later ones
     n, held = len(cells), np.bincount(cell)
     middles = np.stack([np.bincount(cell, along) for along in points_W_m[above].T], axis=1) / held[:, None]
     unsure = np.bincount(cell, std_m[above]) / held
