@@ -32,7 +32,7 @@ class PerceptionSettings(Settings):
     view_distance_m: float = Field(1.5, description="view: what is farther off is not protected", gt=0.1, le=20.0)
     accept_s: float = Field(
         2.0,
-        description="a proposed target is accepted after this time, once it was mapped from two sides",
+        description="a proposed target is accepted after this time, once it was seen from a sixth of a circle",
         ge=0.0,
         le=600.0,
     )
