@@ -157,11 +157,11 @@ def _aim(server: viser.ViserServer, trial: Trial) -> None:
 
 
 def _bed(server: viser.ViserServer, trial: Trial) -> None:
-    # North runs up the scene, so the tank's length is the grid's height.
+    # North runs up the scene, so the tank's length is the grid's height. The page's own ground, light or dark, shows.
     height, width = (3.0, 3.0) if trial.settings is None else trial.settings.tank.size_m[:2]
     server.scene.add_grid(
         "/bed", width=width, height=height, plane="xy", cell_size=0.1, section_size=0.5, cell_thickness=0.6,
-        cell_color=(214, 211, 200), section_color=(186, 181, 164), plane_color=(240, 236, 222), plane_opacity=0.9,
+        cell_color=(172, 168, 152), section_color=(150, 144, 126), plane_color=(200, 190, 160), plane_opacity=0.4,
         shadow_opacity=0.25, position=(0.0, 0.0, -0.002),
     )  # fmt: skip
 
