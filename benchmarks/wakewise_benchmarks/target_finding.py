@@ -276,16 +276,15 @@ def figures_of(rows: Mapping[tuple[str, str, int], Row], failed: int) -> dict[st
 
 
 def coverage_figures(rows: Mapping[tuple[str, str, int], Row]) -> dict[str, Any]:
-    """Agreement of coverage and model over all scans, and figures of each kind of scan, with intervals of 95 %."""
+    """Agreement of coverage and model of whole scans, and figures of each kind of scan, with intervals of 95 %."""
     told: dict[str, Any] = {"scans": {}}
     for name in SCANS:
         own = [row for key, row in rows.items() if key[1] == name]
         told["scans"][name] = {"scans": len(own)}
         for key in SCAN_FIGURES:
             told["scans"][name][key], told["scans"][name][f"{key}_interval"] = _mean([row.get(key) for row in own])
-    key = SCAN_FIGURES[0]
-    told[key], told[f"{key}_interval"] = _mean([row.get(key) for k, row in rows.items() if k[1] in SCANS])
-    return told
+    whole = told["scans"]["whole"]
+    return told | {key: whole[key] for key in (SCAN_FIGURES[0], f"{SCAN_FIGURES[0]}_interval")}
 
 
 def _mean(values: Sequence[float | None]) -> tuple[float | None, Interval | None]:
