@@ -24,6 +24,8 @@ from wakewise.scene.missions.route import open_route, plan_route, rest_to_rest
 FOLLOWS_M_S = 0.03
 """Largest speed at which the legs' centre follows the estimate."""
 LOWEST_RAD = math.radians(5.0)
+ROUND_RAD = math.radians(50.0)
+"""How far round the target it flies while it comes near: with the look before, a quarter of a circle."""
 
 log = logging.getLogger(__name__)
 
@@ -92,7 +94,7 @@ class FindPilot:
         scan = plan_route(self.centre_W_m, self._mission)
         mission = self._mission
         view_s = math.pi * mission.standoff_m / mission.speed_m_s + mission.speed_m_s / mission.acceleration_m_s2
-        approach_m = self._assumed_m * (1.0 + math.radians(self._find.round_deg))
+        approach_m = self._assumed_m * (1.0 + ROUND_RAD)
         approach_s = approach_m / mission.speed_m_s + view_s
         before_s = self._find.give_up_s + 2.0 * self._phase.route.duration_s + approach_s + self._find.hold_s
         return before_s + scan.duration_s + self._find.further_views * view_s
@@ -212,7 +214,7 @@ class FindPilot:
         here = self._phase.route.legs[-1].end
         end = np.array(
             [
-                here[0] + math.radians(self._find.round_deg),
+                here[0] + ROUND_RAD,
                 math.radians(self._mission.elevations_deg[0]),
                 self._mission.standoff_m,
             ]

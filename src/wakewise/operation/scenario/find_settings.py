@@ -13,9 +13,6 @@ class FindSettings(Settings):
     """How the pilot `find` looks for the target before it is scanned."""
 
     look_deg: float = Field(20.0, ge=5.0, le=90.0, description="how far it moves to each side for the first look, deg")
-    round_deg: float = Field(
-        50.0, ge=0.0, le=180.0, description="how far round the target it flies while it comes near, deg"
-    )
     settle_s: float = Field(2.0, ge=0.0, le=60.0, description="hover before the first look")
     give_up_s: float = Field(60.0, ge=5.0, le=3600.0, description="without a target for so long the flight ends")
     hold_s: float = Field(0.0, ge=0.0, le=3600.0, description="hover at the standoff before the scan")
