@@ -355,7 +355,8 @@ def fly_trial(
         write_found(parts, folder)
         pilot: Any = parts.pilot
         if pilot.accepted_s is None:
-            raise StageError("find: no target was found, so nothing was photographed")
+            missed = "no target was found" if pilot.found_s is None else "a target was found and not accepted"
+            raise StageError(f"find: {missed}, so nothing was photographed")
         if made != pilot.planned:
             raise StageError(f"{parts.scenario.pilot}: {made} of {pilot.planned} exposures were made")
     elif made != planned:

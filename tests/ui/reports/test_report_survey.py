@@ -21,3 +21,18 @@ def test_a_survey_tells_its_orbits_and_not_that_no_target_was_found(tmp_path: Pa
     assert "No target" not in words
     assert "close orbits round 4 parts" in words
     assert "97" in words
+
+
+def test_a_target_tells_when_it_was_found_and_when_accepted(tmp_path: Path) -> None:
+    """Both times are told; of what was never accepted, or never found, just that."""
+    trial = cast("Any", SimpleNamespace(folder=tmp_path))
+    centre = {"centre_W_m": [0.0, 0.0, 1.0], "radius_m": 0.1, "centre_std_m": 0.005}
+    nothing = dict.fromkeys(centre)
+    for told, words in (
+        ({"found_s": 4.9, "accepted_s": 17.2, **centre}, "found after 4.90 s, and accepted after 17.2 s."),
+        ({"found_s": 4.9, **centre}, "found after 4.90 s."),
+        ({"found_s": 4.9, "accepted_s": None, **nothing}, "A target was found and not accepted."),
+        ({"found_s": None, "accepted_s": None, **nothing}, "No target was found."),
+    ):
+        (tmp_path / "found.json").write_text(json.dumps(told), encoding="utf-8")
+        assert words in found_html(trial)

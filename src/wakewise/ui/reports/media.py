@@ -53,15 +53,16 @@ def found_html(trial: Trial) -> str:
     if told is None:
         return ""
     orbits = told.get("orbits")  # of a survey, which has no single target
-    if orbits is None and told.get("centre_W_m") is None:
-        return str(template("trial.html").found("", "No target was found.", ""))
+    if orbits is None and (told.get("found_s") is None or told.get("centre_W_m") is None):
+        found = told.get("found_s") is not None and told.get("accepted_s", 0.0) is None
+        missed = "A target was found and not accepted." if found else "No target was found."
+        return str(template("trial.html").found("", missed, ""))
     film, path = trial.folder / "found.webp", trial.folder / "found.png"
     source = data_uri(path.read_bytes(), "image/png") if path.is_file() else ""
     if film.is_file() and film.stat().st_size <= MOST_FILM_BYTES:
         source = data_uri(film.read_bytes(), "image/webp")
     error, std = told.get("centre_error_m"), told.get("centre_std_m")
-    words = f"The target was found after {number(told['found_s'])} s"
-    # Records of earlier versions name one time, that of the acceptance.
+    words = f"The target was found after {number(told['found_s'])} s"  # before accepted_s, that of the acceptance
     words += "." if told.get("accepted_s") is None else f", and accepted after {number(told['accepted_s'])} s."
     if orbits is not None:
         words = f"Transects were flown over the patch, then close orbits round {len(orbits)} parts of it."
