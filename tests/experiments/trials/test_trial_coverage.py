@@ -87,3 +87,9 @@ def test_what_is_no_trial_with_a_model_is_refused(tmp_path) -> None:
     """The file that is missing is named."""
     with pytest.raises(InputError, match=r"has no scenario\.yaml"):
         measure_coverage(tmp_path)
+
+
+def test_the_missions_own_viewpoints_cover_nine_tenths(parts: Parts) -> None:
+    """The planned photographs show more than 90 % of the surveyed target well."""
+    shots = [(X_WC, None) for X_WC in parts.route.X_WC_planned]
+    assert coverage_of(parts.surveyed_target, parts.camera, shots).share > 0.9
