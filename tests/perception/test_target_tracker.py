@@ -12,6 +12,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.perception import PerceptionSettings, TargetTracker, TrackerState
 from wakewise.perception.common_shift import common_shift
+from wakewise.perception.target_tracker import PATIENT
 
 SETTINGS = PerceptionSettings(width_px=480, accept_s=0.3, assumed_distance_m=0.7)
 STD = (0.002, 0.002)
@@ -61,6 +62,17 @@ def test_what_stands_on_the_bed_is_found_and_accepted(arc: Pictures, after: Trac
     assert after.target.radius_m == pytest.approx(arc.target.radius_m, rel=0.35)
     assert after.bed is not None
     assert after.bed.at_W_m[2] == pytest.approx(arc.target.bed_z_m, abs=0.015)
+
+
+def test_what_was_seen_from_one_side_is_accepted_late(arc: Pictures) -> None:
+    """On an arc of 30 deg time alone accepts a proposed target only after `PATIENT` times as long."""
+    tracker, first_s = tracker_of(arc), dict[str, float]()
+    state = tracker.init()
+    for k, (picture, X_WC) in enumerate(zip(arc.pictures, arc.poses, strict=True)):
+        state, _ = tracker.step(state, picture, PERIOD_S * k, X_WC, STD)
+        if state.target is not None:
+            first_s.setdefault(state.target.status, PERIOD_S * k)
+    assert first_s["tracked"] - first_s["proposed"] >= PATIENT * SETTINGS.accept_s - 1e-6
 
 
 def test_the_protected_region_is_about_the_target_and_above_the_bed(arc: Pictures, after: TrackerState) -> None:
