@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, look_at, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
+from wakewise.perception.bundle_adjustment import BundleAdjustment, after_round
 from wakewise.perception.calibrated_camera import CalibratedCamera
 
 CAMERA = CalibratedCamera(width=640, height=480, fx=500.0, fy=500.0, cx=319.5, cy=239.5)
@@ -33,3 +34,10 @@ def disturbed(X_WC: Pose, way_m: Array, turn_rad: Array) -> Pose:
 def turn_between(X_WC: Pose, X_WD: Pose) -> Array:
     """Rotation vector, in the first frame, from the first pose to the second, shape (3,)."""
     return rotvec_from_quat(quat_multiply(quat_conjugate(X_WC.q), X_WD.q))
+
+
+def adjusted_whole(adjustment: BundleAdjustment) -> BundleAdjustment:
+    """The adjustment after as many rounds as any test's needs."""
+    for _ in range(10):
+        adjustment = after_round(adjustment)
+    return adjustment

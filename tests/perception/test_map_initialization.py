@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from perception_cases import CAMERA, disturbed, looking, pixels_of, slopes_of, turn_between
+from perception_cases import CAMERA, adjusted_whole, disturbed, looking, pixels_of, slopes_of, turn_between
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.geometry import Pose
@@ -17,7 +17,6 @@ from wakewise.perception.map_initialization import (
     MOST_KEYFRAMES,
     PARALLAX_RAD,
     adjusted_map,
-    adjusted_whole,
     moved_since,
     shift_of,
     well_crossed,

@@ -19,15 +19,12 @@ from wakewise.perception.bundle_kernels import normal_equations
 from wakewise.perception.calibrated_camera import CalibratedCamera
 from wakewise.perception.feature_tracks import Grey
 
-ROUNDS = 10
 PIXEL_STD, CAUCHY_PX = 0.3, 1.5
 """Standard deviation of a pixel, and the scale of the weights."""
 LEAST_VIEWS = 3
 MOST_POINTS = 2500
 """Points that are adjusted, those of most views: more of them add time and little else."""
 DAMPING = 1e-6
-SMALL = 1e-5
-"""A round that moves no camera by more, m or rad, is the last."""
 LENS_STD = (0.002, 0.0015, 0.0015, 0.003, 0.006, 0.00075, 0.00075)
 """Errors of a calibration, one sigma: focal length (share), principal point (share of the width), k1, k2, p1, p2.
 
@@ -76,13 +73,6 @@ class BundleAdjustment:
     pixels: Array
     information: Array
     misfit: Array
-    rounds: int = 0
-    moved: float = np.inf
-
-    @property
-    def done(self) -> bool:
-        """Whether no further round is needed."""
-        return self.rounds >= ROUNDS or self.moved < SMALL
 
     def adjusted_camera(self) -> CalibratedCamera:
         """The camera with the lens as it is now."""
@@ -169,8 +159,14 @@ def after_round(before: BundleAdjustment) -> BundleAdjustment:
         points_W_m=before.points_W_m + np.linalg.solve(V, rest[:, :, None])[:, :, 0],
         information=V,
         misfit=misfit,
-        rounds=before.rounds + 1,
-        moved=float(np.abs(turned).max()),
+    )
+
+
+def load_kernel() -> None:
+    """Run the compiled part once: else the first adjustment of a flight waits .3 s until it is loaded."""
+    one = np.zeros(1, np.int64)
+    normal_equations(
+        np.eye(3)[None], np.zeros((1, 3)), np.ones((1, 3)), np.arange(2), one, np.zeros((1, 2)), np.ones(9), np.ones(3)
     )
 
 

@@ -54,7 +54,7 @@ def normal_equations(
                 row[a] = 6 * k + a
             for a in range(13):
                 g[row[a]] += weight * (J[0, a] * u + J[1, a] * v)
-                for b in range(13):
+                for b in range(a, 13):
                     S[row[a], row[b]] += weight * (J[0, a] * J[0, b] + J[1, a] * J[1, b])
             for b in range(3):
                 h[j, b] += weight * (J[0, 13 + b] * u + J[1, 13 + b] * v)
@@ -71,7 +71,7 @@ def normal_equations(
         multiply(L[j], inverse, lens_gain)
         for a in range(7):
             g[end + a] -= dot(lens_gain[a], h[j])
-            for b in range(7):
+            for b in range(a, 7):
                 S[end + a, end + b] -= dot(lens_gain[a], L[j, b])
         for i in range(starts[j], starts[j + 1]):
             first = 6 * frame_of[i]
@@ -79,13 +79,15 @@ def normal_equations(
             for a in range(6):
                 g[first + a] -= dot(gain[a], h[j])
                 for b in range(7):
-                    cross = dot(gain[a], L[j, b])
-                    S[first + a, end + b] -= cross
-                    S[end + b, first + a] -= cross
-                for other in range(starts[j], starts[j + 1]):
+                    S[first + a, end + b] -= dot(gain[a], L[j, b])
+                # Observations of a point are in the order of their frames: these are blocks above the diagonal.
+                for other in range(i, starts[j + 1]):
                     second = 6 * frame_of[other]
                     for b in range(6):
                         S[first + a, second + b] -= dot(gain[a], W[other, b])
+    for a in range(len(S)):
+        for b in range(a):
+            S[a, b] = S[b, a]
     return S, g, V, h, W, L, misfit
 
 

@@ -16,7 +16,6 @@ from wakewise.perception.bundle_adjustment import (
     PIXEL_STD,
     BundleAdjustment,
     Keyframe,
-    after_round,
 )
 from wakewise.perception.point_map import PIXEL_STD as MAP_PIXEL_STD
 from wakewise.perception.point_map import PointMap, joined, mapped_rows, solved
@@ -25,10 +24,10 @@ PARALLAX_RAD = 0.25
 """Median parallax of the mapped points in the picture from which on the map is initialised."""
 KEYFRAME_M, MOST_KEYFRAMES = 0.025, 100
 """Keyframes are so far apart, and the last ones are kept."""
-NEW_KEYFRAMES = 3
-"""So many new keyframes, and the map is adjusted again."""
-LOCAL_KEYFRAMES, LOCAL_ROUNDS = 30, 3
-"""Then the last keyframes are adjusted, in so many rounds: they begin near the solution."""
+FIRST_ROUNDS = 4
+"""Rounds of the adjustment that initialises the map."""
+LOCAL_KEYFRAMES = 30
+"""Then at each keyframe the last ones are adjusted by one round: they begin near the solution."""
 LEAST_STD = (0.004, 0.004)
 """Least standard deviations of a pose by other sensors, m and rad: their errors last from picture to picture."""
 
@@ -46,13 +45,6 @@ def well_crossed(points: PointMap, ids: IntArray, least: int) -> bool:
     if int(mapped.sum()) < least:
         return False
     return float(np.median(points.parallax_rad[rows[mapped]])) >= PARALLAX_RAD
-
-
-def adjusted_whole(adjustment: BundleAdjustment) -> BundleAdjustment:
-    """The adjustment after as many rounds as it needs."""
-    while not adjustment.done:
-        adjustment = after_round(adjustment)
-    return adjustment
 
 
 def adjusted_map(adjustment: BundleAdjustment, before: PointMap) -> PointMap:

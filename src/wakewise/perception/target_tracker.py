@@ -26,17 +26,15 @@ from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.core.interfaces import TargetEstimate
 from wakewise.perception.bed_plane import fit_bed, near_bed
-from wakewise.perception.bundle_adjustment import LENS, Keyframe, after_round, begin_adjustment
+from wakewise.perception.bundle_adjustment import LENS, Keyframe, after_round, begin_adjustment, load_kernel
 from wakewise.perception.calibrated_camera import CalibratedCamera
 from wakewise.perception.common_shift import common_shift
 from wakewise.perception.designation import Designation, RefusedPlace, assumed_ball, choose_body, same_ball
 from wakewise.perception.feature_tracks import FeatureTracks, Grey, replenish, shows_nothing, track
 from wakewise.perception.map_initialization import (
+    FIRST_ROUNDS,
     LEAST_STD,
     LOCAL_KEYFRAMES,
-    LOCAL_ROUNDS,
-    NEW_KEYFRAMES,
-    adjusted_whole,
     well_crossed,
     with_keyframe,
 )
@@ -117,6 +115,7 @@ class TargetTracker:
 
     def init(self) -> TrackerState:
         """State before the first picture."""
+        load_kernel()
         return TrackerState(
             camera=self.camera,
             lens=np.zeros(LENS),
@@ -228,16 +227,16 @@ class TargetTracker:
             last_s=time_s,
             trouble="" if len(tracks) >= LEAST_MAPPED // 2 else "few features",
         )
-        adjusted_s = state.adjusted_s
-        state = self._adjusted(self._kept(state, X_WC, time_s, prior or guess, std))
-        if found is not None:
+        state = self._kept(state, X_WC, time_s, prior or guess, std)
+        # In a picture either the map is made better or the region computed from it: both would take too long.
+        shaped = time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6
+        if not shaped:
+            state = self._adjusted(state)
+        if found is not None and not (shaped and state.sweep is not None):
             in_view = self.settings.protect == "view"
             state = with_sweep_step(state, time_s, self.settings.view_distance_m if in_view else None)
         state = self._followed(state, X_WC, time_s)
-        # Both in one picture would take too long.
-        if time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6 and state.adjusted_s == adjusted_s:
-            state = self._reshaped(state, X_WC, time_s)
-        return state, found
+        return (self._reshaped(state, X_WC, time_s) if shaped else state), found
 
     def _waits(self, state: TrackerState, time_s: float) -> bool:
         """Whether the estimator has only just begun: its first poses jump."""
@@ -317,24 +316,20 @@ class TargetTracker:
         return replace(state, keyframes=with_keyframe(state.keyframes, seen))
 
     def _adjusted(self, state: TrackerState) -> TrackerState:
-        """The state with the map initialised, or adjusted over the last keyframes where there are enough new ones."""
-        if not state.initialized:
-            if not well_crossed(state.points, state.tracks.ids, LEAST_MAPPED):
-                return state
-            begun = begin_adjustment(state.keyframes, *state.points.known_places(), self.camera, state.lens)
-            if begun is None:
-                return state
-            return replace(with_adjustment(state, adjusted_whole(begun), empty_map()), initialized=True)
-        fresh = sum(frame.time_s > state.adjusted_s for frame in state.keyframes)
-        if fresh < NEW_KEYFRAMES:
+        """The state with the map initialised, or adjusted by one round at a new keyframe."""
+        if state.initialized:
+            frames = state.keyframes[-LOCAL_KEYFRAMES:] if state.keyframes[-1].time_s > state.adjusted_s else ()
+            rounds, before = 1, state.points
+        elif well_crossed(state.points, state.tracks.ids, LEAST_MAPPED):
+            frames, rounds, before = state.keyframes, FIRST_ROUNDS, empty_map()
+        else:
             return state
-        recent = state.keyframes[-LOCAL_KEYFRAMES:]
-        adjustment = begin_adjustment(recent, *state.points.known_places(), self.camera, state.lens)
+        adjustment = begin_adjustment(frames, *state.points.known_places(), self.camera, state.lens)
         if adjustment is None:
             return state
-        for _ in range(LOCAL_ROUNDS):
+        for _ in range(rounds):
             adjustment = after_round(adjustment)
-        return with_adjustment(state, adjustment, state.points)
+        return replace(with_adjustment(state, adjustment, before), initialized=True)
 
     def _turned(self, state: TrackerState, tracks: FeatureTracks, X_WC: Pose) -> Array:
         """Angle between the first and the present ray of each feature, shape (n,)."""
