@@ -16,11 +16,13 @@ from wakewise.scene.missions import (
     Coverage,
     SurfacePatches,
     TankBounds,
+    VisibilityCriteria,
     patches_of,
     reachable_views,
 )
 from wakewise.scene.missions.coverage import WELL
 from wakewise.scene.missions.orbit import camera_pose
+from wakewise.scene.missions.visibility import BEST, view_quality
 from wakewise.scene.targets import Mesh
 from wakewise.vision.imaging import PinholeCamera
 
@@ -105,6 +107,25 @@ def test_three_photographs_with_a_base_are_needed() -> None:
     assert taken(at(0), at(0), at(0)).share == 0.0
     assert taken(at(0), at(60), at(120)).share == 0.0
     assert taken(at(0), at(10), at(20)).share > 0.15
+
+
+def test_levels_are_those_of_a_slow_twin() -> None:
+    """A photograph pairs with another at 3 to 35 deg where both show a place well enough for that angle."""
+    shots = [at(azimuth, elevation) for azimuth, elevation in ((0, 20), (14, 20), (31, 35), (45, 20), (60, 50))]
+    need, points = VisibilityCriteria(), PATCHES.points_W_m
+    quality = np.array([view_quality(PATCHES, X_WC, CAMERA, need) for X_WC in shots]) / BEST
+    rays = np.array([X_WC.p_m - points for X_WC in shots])
+    rays /= np.linalg.norm(rays, axis=2, keepdims=True)
+    cosines = np.einsum("kni,lni->kln", rays, rays)
+    low, high = np.cos(need.apart_rad)
+    pairs = (cosines <= low) & (cosines >= high) & (quality[:, None] > 0.0) & (quality[None] > 0.0)
+    pairs &= np.minimum(quality[:, None], quality[None]) >= need.support * (1.0 - cosines)
+    most = pairs.sum(axis=1).max(axis=0)
+    slow = np.where((quality > 0.0).any(axis=0), np.minimum(most, 2) + 1, 0)
+    assert np.array_equal(taken(*shots).level, slow)
+    assert {0, 1, 2, WELL} <= set(slow.tolist())
+    strict = pairs.sum() / ((cosines <= low) & (cosines >= high) & (quality[:, None] * quality[None] > 0.0)).sum()
+    assert 0.3 < strict < 0.95
 
 
 def test_coverage_knows_no_place_and_no_direction() -> None:

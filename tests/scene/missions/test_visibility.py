@@ -12,7 +12,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.scene.missions import SurfacePatches, VisibilityCriteria, patches_of
 from wakewise.scene.missions.orbit import camera_pose
-from wakewise.scene.missions.visibility import _nearest, well_visible
+from wakewise.scene.missions.visibility import BEST, WINDOW_M, _nearest, view_quality, well_visible
 from wakewise.scene.targets import Mesh, coral, place_on_bed
 from wakewise.vision.evaluation import SurfaceSamples, count_views
 from wakewise.vision.imaging import PinholeCamera
@@ -98,6 +98,21 @@ def test_size_does_not_matter_when_the_pixel_grows_with_it() -> None:
     X_WC = at(75, 35)
     shown = well_visible(larger, Pose(2 * X_WC.p_m, X_WC.q), CAMERA, replace(NEED, pixel_m=2 * NEED.pixel_m))
     assert (shown != well_visible(PATCHES, X_WC, CAMERA, NEED)).sum() <= 1
+
+
+def test_quality_is_the_cosine_times_the_share_of_the_surroundings_that_is_shown() -> None:
+    """A slow twin gives the same for all samples; what is not shown has none, and without support all have the best."""
+    X_WC, points = at(200, 30), PATCHES.points_W_m
+    shown = well_visible(PATCHES, X_WC, CAMERA, NEED)
+    away = np.linalg.norm(points[:, None] - points[None, ::8], axis=2)
+    ways = X_WC.p_m - points[::8]
+    cosines = np.einsum("ni,ni->n", ways, PATCHES.normals[::8]) / np.linalg.norm(ways, axis=1)
+    about = np.array([shown[near < WINDOW_M].mean() for near in away.T])
+    slow = np.where(shown[::8], np.maximum(np.rint(BEST * cosines * about), 1.0), 0.0)
+    quality = view_quality(PATCHES, X_WC, CAMERA, NEED)
+    assert np.abs(quality[::8] - slow).max() <= 1.0
+    assert (slow > 0.0).sum() > 100
+    assert np.array_equal(view_quality(PATCHES, X_WC, CAMERA, replace(NEED, support=0.0)), np.where(shown, BEST, 0))
 
 
 def test_nothing_is_shown_behind_the_camera_or_from_within() -> None:

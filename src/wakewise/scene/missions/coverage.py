@@ -1,8 +1,9 @@
 """Coverage of a target: parts of its surface that photographs show well enough for reconstruction; reasons for gaps.
 
 A place is covered when three photographs show it well (`visibility`), one of which makes a stereo pair with each of the
-other two. The dense stage needs one depth map and one that agrees (`agreeing_views` 2; COLMAP's fusion has the same 2
-in `filter_min_num_consistent`). Of each photograph its pose and the samples that it shows well are kept.
+other two, at an angle that suits how well both show it. The dense stage needs one depth map and one that agrees
+(`agreeing_views` 2; COLMAP's fusion has the same 2 in `filter_min_num_consistent`). Of each photograph its pose and how
+well it shows each sample are kept.
 """
 
 from __future__ import annotations
@@ -20,7 +21,14 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.jit.njit import njit
 from wakewise.scene.missions.reachability import CandidateViews, direction_words
-from wakewise.scene.missions.visibility import CameraIntrinsics, SurfacePatches, VisibilityCriteria, well_visible
+from wakewise.scene.missions.visibility import (
+    BEST,
+    CameraIntrinsics,
+    SurfacePatches,
+    VisibilityCriteria,
+    view_quality,
+    well_visible,
+)
 
 Counts = NDArray[np.uint8]
 
@@ -41,7 +49,7 @@ class Coverage:
     patches: SurfacePatches
     need: VisibilityCriteria = field(default_factory=VisibilityCriteria)
     centres_W_m: Array  # shape (k, 3): where the photographs that count were taken from
-    shows: BoolArray  # shape (k, n): which samples each of them shows well
+    quality: Counts  # shape (k, n): how well each of them shows the samples, as `view_quality`
     partners: Counts  # shape (k, n): with how many others it makes a pair at each sample
     level: Counts  # shape (n,): how far each sample has come: 0, `SHOWN`, `PAIRED` or `WELL`
     views: CandidateViews  # from where the next photographs could be taken
@@ -62,7 +70,7 @@ class Coverage:
             patches=patches,
             need=need or VisibilityCriteria(),
             centres_W_m=np.empty((0, 3)),
-            shows=np.empty((0, n), dtype=np.bool_),
+            quality=np.empty((0, n), dtype=np.uint8),
             partners=np.empty((0, n), dtype=np.uint8),
             level=np.zeros(n, dtype=np.uint8),
             views=views,
@@ -80,32 +88,34 @@ class Coverage:
             raise InputError(f"sharpness: {sharpness!r}, allowed 0 or more, or None where it is not known")
         if sharpness is not None and sharpness < self.need.sharp * self.sharpest:
             return replace(self, photos=self.photos + 1, blurred=self.blurred + 1)
-        shown = well_visible(self.patches, X_WC, camera, self.need)
-        if not shown.any():
+        quality = view_quality(self.patches, X_WC, camera, self.need)
+        if not quality.any():
             return replace(self, photos=self.photos + 1)
+        low, high = self.need.apart_rad
+        limits = np.array([math.cos(low), math.cos(high), BEST * self.need.support])
         level, partners, own = _with_one_more(
             self.patches.points_W_m,
             self.centres_W_m,
-            self.shows,
+            self.quality,
             self.partners,
             self.level,
             X_WC.p_m,
-            shown,
-            np.cos(self.need.apart_rad),
+            quality,
+            limits,
         )
         joins = _joined(
             self.patches.points_W_m,
             self.views.points_W_m(),
-            self.views.shows,
+            self.views.quality,
             self.joins,
             X_WC.p_m,
-            shown,
-            np.cos(self.need.apart_rad),
+            quality,
+            limits,
         )
         return replace(
             self,
             centres_W_m=np.concatenate([self.centres_W_m, X_WC.p_m[None]]),
-            shows=np.concatenate([self.shows, shown[None]]),
+            quality=np.concatenate([self.quality, quality[None]]),
             partners=np.concatenate([partners, own[None]]),
             level=level,
             joins=joins,
@@ -116,7 +126,7 @@ class Coverage:
     def without_view(self, number: int) -> Coverage:
         """The same with one place fewer to go to: what is photographed twice from one place gains little."""
         kept = np.arange(len(self.views.places)) != number
-        views = replace(self.views, places=self.views.places[kept], shows=self.views.shows[kept])
+        views = replace(self.views, places=self.views.places[kept], quality=self.views.quality[kept])
         return replace(self, views=views, joins=self.joins[kept])
 
     @cached_property
@@ -153,7 +163,7 @@ class Coverage:
     @cached_property
     def gains(self) -> Array:
         """By how much a sharp photograph from each view would raise the mean score, shape (c,)."""
-        shows, level, joins = self.views.shows, self.level[None], self.joins
+        shows, level, joins = self.views.quality > 0, self.level[None], self.joins
         after = np.where(joins >= 2, WELL, np.where(joins == 1, np.minimum(level + 1, WELL), SHOWN))
         after = np.where((joins == 1) & (level < PAIRED), PAIRED, after)
         return np.asarray((shows * (np.maximum(after, level) - level.astype(np.int64))).mean(axis=1) / WELL)
@@ -180,21 +190,22 @@ class Coverage:
 
 @njit
 def _joined(
-    points: Array, places: Array, shows: BoolArray, joins: Counts, centre: Array, shown: BoolArray, cosines: Array
+    points: Array, places: Array, quality: Counts, joins: Counts, centre: Array, own_quality: Counts, limits: Array
 ) -> Counts:
     """Pairs that each view would make at each sample, now that a photograph from `centre` shows some; shape (c, n)."""
     joins = joins.copy()
     for i in range(len(points)):
-        if not shown[i]:
+        if not own_quality[i]:
             continue
         x, y, z = centre[0] - points[i, 0], centre[1] - points[i, 1], centre[2] - points[i, 2]
         squared = x * x + y * y + z * z
         for j in range(len(places)):
-            if not shows[j, i] or joins[j, i] == 255:
+            least = min(quality[j, i], own_quality[i])
+            if not least or joins[j, i] == 255:
                 continue
             a, b, c = places[j, 0] - points[i, 0], places[j, 1] - points[i, 1], places[j, 2] - points[i, 2]
             dot, lengths = x * a + y * b + z * c, math.sqrt(squared * (a * a + b * b + c * c))
-            if cosines[1] * lengths <= dot <= cosines[0] * lengths:
+            if limits[1] * lengths <= dot <= limits[0] * lengths and limits[2] * (lengths - dot) <= least * lengths:
                 joins[j, i] += 1
     return joins
 
@@ -203,30 +214,32 @@ def _joined(
 def _with_one_more(
     points: Array,
     centres: Array,
-    shows: BoolArray,
+    quality: Counts,
     partners: Counts,
     level: Counts,
     centre: Array,
-    shown: BoolArray,
-    cosines: Array,
+    own_quality: Counts,
+    limits: Array,
 ) -> tuple[Counts, Counts, Counts]:
     """Levels and partners with another photograph, and that one's own partners, shape (n,).
 
-    `cosines` are those of the least and the largest angle of a pair.
+    `limits` are the cosines of the least and the largest angle of a pair, and the quality that it needs over one minus
+    the cosine of its angle.
     """
-    k, n = shows.shape
+    k, n = quality.shape
     level, partners, own = level.copy(), partners.copy(), np.zeros(n, np.uint8)
     for i in range(n):
-        if not shown[i]:
+        if not own_quality[i]:
             continue
         x, y, z = centre[0] - points[i, 0], centre[1] - points[i, 1], centre[2] - points[i, 2]
         squared, most = x * x + y * y + z * z, 0
         for j in range(k):
-            if not shows[j, i]:
+            least = min(quality[j, i], own_quality[i])
+            if not least:
                 continue
             a, b, c = centres[j, 0] - points[i, 0], centres[j, 1] - points[i, 1], centres[j, 2] - points[i, 2]
             dot, lengths = x * a + y * b + z * c, math.sqrt(squared * (a * a + b * b + c * c))
-            if cosines[1] * lengths <= dot <= cosines[0] * lengths:
+            if limits[1] * lengths <= dot <= limits[0] * lengths and limits[2] * (lengths - dot) <= least * lengths:
                 if own[i] < 255:
                     own[i] += 1
                 if partners[j, i] < 255:

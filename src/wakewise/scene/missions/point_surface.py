@@ -14,8 +14,8 @@ from wakewise.scene.missions.visibility import CLEARANCE_M, SEED, SurfacePatches
 NEIGHBOURS, DENSITY = 24, 12
 SLACK = 6.0
 """Points hide what lies half so many spacings behind them: places and normals have errors, and triangles overlap."""
-MAPPED_CRITERIA = VisibilityCriteria(incidence_rad=math.radians(80.0))
-"""As for a surface that is known, less strict: normals of mapped points are 10 degrees unsure. Both were chosen on two
+MAPPED_CRITERIA = VisibilityCriteria(support=0.0)
+"""As for a surface that is known, less strict: normals of mapped points are 10 degrees unsure. It was chosen on two
 scans, in which they gave 67 and 90 % where the model then had 71 and 90 (docs/research-log/0088)."""
 LEAST_POINTS = 30
 CORNERS = 3

@@ -6,14 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from wakewise.core.arrays import Array, BoolArray, freeze
+from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.scene.missions.aim import CameraAim
 from wakewise.scene.missions.clearance import TankBounds, gaps_of
 from wakewise.scene.missions.orbit import camera_pose
-from wakewise.scene.missions.visibility import CameraIntrinsics, SurfacePatches, VisibilityCriteria, well_visible
+from wakewise.scene.missions.visibility import CameraIntrinsics, SurfacePatches, VisibilityCriteria, view_quality
 
 AZIMUTHS = 24
 ELEVATIONS_DEG = (10.0, 25.0, 40.0, 55.0, 70.0)
@@ -25,11 +26,11 @@ LEAST_WAY_M, LEAST_TURN_DEG = 0.03, 5.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CandidateViews:
-    """Camera places about a centre, and what a photograph from each would show well."""
+    """Camera places about a centre, and how well a photograph from each would show what."""
 
     centre_W_m: Array  # shape (3,)
     places: Array  # shape (c, 3): azimuth, elevation (rad) and range (m) of each; see `orbit.py`
-    shows: BoolArray  # shape (c, n): which samples of the patches each shows well
+    quality: NDArray[np.uint8]  # shape (c, n): how well each shows the samples of the patches, as `view_quality`
 
     def __post_init__(self) -> None:
         freeze(self, centre_W_m=(3,), places=(None, 3))
@@ -38,7 +39,7 @@ class CandidateViews:
     def none(cls, patches: SurfacePatches) -> CandidateViews:
         """No view at all: coverage is counted, but nothing can be said of where to go."""
         n = len(patches.points_W_m)
-        return cls(centre_W_m=np.zeros(3), places=np.empty((0, 3)), shows=np.empty((0, n), dtype=np.bool_))
+        return cls(centre_W_m=np.zeros(3), places=np.empty((0, 3)), quality=np.empty((0, n), dtype=np.uint8))
 
     def pose(self, number: int) -> Pose:
         """X_WC of a view, looking at the centre without roll."""
@@ -132,7 +133,7 @@ def reachable_views(
     if not all(math.isfinite(r) and r > 0.0 for r in ranges_m):
         raise InputError(f"coverage: ranges {ranges_m} m, each must be above 0")
     need = need or VisibilityCriteria()
-    places, shows = [], []
+    places, quality = [], []
     for range_m in ranges_m:
         for elevation_deg in ELEVATIONS_DEG:
             elevation = math.radians(elevation_deg)
@@ -141,7 +142,7 @@ def reachable_views(
                 X_WB = X_WC @ aim.mount(aim.tilt(-elevation)[0]).inverse()
                 if min(gaps_of(X_WB, size_m, bounds, target_W_m).values()) >= clearance_m:
                     places.append((float(azimuth), elevation, range_m))
-                    shows.append(well_visible(patches, X_WC, camera, need))
+                    quality.append(view_quality(patches, X_WC, camera, need))
     if not places:
         return CandidateViews.none(patches)
-    return CandidateViews(centre_W_m=centre_W_m, places=np.array(places), shows=np.array(shows))
+    return CandidateViews(centre_W_m=centre_W_m, places=np.array(places), quality=np.array(quality))

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
@@ -24,6 +26,10 @@ CLEARANCE_M = 0.010
 """What stands less than this above the bed does not count, as in evaluations: sand touches it."""
 REACH_M = 0.003
 """A place counts as in the model when the model comes as near as this: what `completeness_pct` is defined by."""
+WINDOW_M = 0.0075
+"""Stereo compares surroundings of about this radius: they have to be shown as well."""
+BEST = 255
+"""Quality of a sample that is faced squarely, with all of its surroundings shown."""
 NORMAL_SHARE = 0.15
 """Two samples that face opposite ways are as far apart as this share of the target's radius twice: the two sides of a
 branch become two patches."""
@@ -86,6 +92,17 @@ class SurfacePatches:
     def middles_W_m(self) -> Array:
         """Mean of each patch's samples, shape (patches, 3)."""
         return self.mean(self.points_W_m)
+
+    @cached_property
+    def _windows(self) -> tuple[IntArray, Array]:
+        """Pairs of samples within `WINDOW_M` of each other, shape (p, 2), and how many each window has, shape (n,)."""
+        pairs = KDTree(self.points_W_m).query_pairs(WINDOW_M, output_type="ndarray").astype(np.int64)
+        return pairs, np.float64(1.0) + np.bincount(pairs.ravel(), minlength=len(self.points_W_m))
+
+    def shown_about(self, shown: BoolArray) -> Array:
+        """Share of the samples within `WINDOW_M` of each, itself counted, that are shown; shape (n,)."""
+        (one, other), held, n = self._windows[0].T, self._windows[1], len(shown)
+        return np.asarray((shown + np.bincount(one, shown[other], n) + np.bincount(other, shown[one], n)) / held)
 
     def spread(self, found: BoolArray) -> BoolArray:
         """What lies within `REACH_M` of what was found, and that itself, shape (n,)."""
@@ -204,10 +221,12 @@ class CameraIntrinsics(Protocol):
 class VisibilityCriteria:
     """What a place on the surface needs to be in the model."""
 
-    # Largest angle between its normal and the way to a camera that counts. PMVS takes 60 degrees (Y. Furukawa and J.
-    # Ponce, TPAMI 32(8), 2010, doi 10.1109/TPAMI.2009.161), evaluations call visible what is seen at less than 78; of
-    # 60, 70 and 78 this one was nearest to what our dense stage made of one coral (docs/research-log/0046).
-    incidence_rad: float = math.radians(70.0)
+    # Largest angle between its normal and the way to a camera that counts.
+    incidence_rad: float = math.radians(80.0)
+    # A pair at an angle a counts where both show the place with a quality (`view_quality`) of at least this times
+    # 1 - cos a: the farther apart two cameras are, the more of a place's surroundings only one of them sees, and stereo
+    # fails. Chosen on twelve scans (docs/research-log/0097). 0: not asked.
+    support: float = 4.0
     # Largest footprint of a pixel: models are held to 3 mm, and a difference of a pixel and a half is what stereo tells
     # apart with some certainty.
     pixel_m: float = 0.002
@@ -241,6 +260,23 @@ def well_visible(patches: SurfacePatches, X_WC: Pose, lens: CameraIntrinsics, ne
     return np.asarray(
         _shown(patches.points_W_m, patches.normals, patches.shield_W_m, X_WC.p_m, R, numbers, limits, need.grid)
     )
+
+
+def view_quality(
+    patches: SurfacePatches, X_WC: Pose, lens: CameraIntrinsics, need: VisibilityCriteria
+) -> NDArray[np.uint8]:
+    """How well a sharp photograph shows each sample, shape (n,): 0 not at all, else 1 to `BEST`.
+
+    Cosine of the angle of incidence times the share of the sample's surroundings that is shown; `BEST` of whatever is
+    shown where `support` is not asked for.
+    """
+    shown = well_visible(patches, X_WC, lens, need)
+    if need.support == 0.0:
+        return np.where(shown, BEST, 0).astype(np.uint8)
+    ways = X_WC.p_m - patches.points_W_m
+    cosines = np.einsum("ni,ni->n", ways, patches.normals) / np.linalg.norm(ways, axis=1)
+    quality = np.rint(BEST * cosines * patches.shown_about(shown))
+    return np.where(shown, np.maximum(quality, 1.0), 0.0).astype(np.uint8)
 
 
 @njit
