@@ -73,12 +73,11 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     sys.modules.pop("outside_detectors", None)
 
 
-def test_box_and_area_are_those_of_the_mask():
-    """Right and bottom are exclusive; an empty mask has no area and a box of zeros."""
+def test_the_box_is_that_of_the_mask():
+    """Right and bottom are exclusive; an empty mask has a box of zeros."""
     assert square().box == (5, 3, 9, 7)
-    assert square().area_px == 16
     empty = Detection(mask=np.zeros((4, 4), dtype=bool), score=0.1)
-    assert (empty.box, empty.area_px) == ((0, 0, 0, 0), 0)
+    assert (empty.box, empty.mask.any()) == ((0, 0, 0, 0), False)
 
 
 def test_a_right_answer_is_given_best_first():

@@ -47,11 +47,6 @@ class Detection:
             return 0, 0, 0, 0
         return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
-    @cached_property
-    def area_px(self) -> int:
-        """Number of pixels of the mask."""
-        return int(np.count_nonzero(self.mask))
-
 
 class Detector(Protocol):
     """Object detector of single pictures."""
