@@ -77,6 +77,7 @@ def test_what_cannot_be_cancelled_runs_apart_and_says_why_it_fails(tmp_path):
             colmap.call_in_process("mesh", "set_random_seed", 1)
 
 
+@pytest.mark.slow
 def test_ctrl_c_at_random_moments_of_the_command_is_exit_130_and_one_line(relief_photos, tmp_path):
     """In starting, features, matching or mapping: exit code 130, one line, and no file that is half-done."""
     folder, _ = relief_photos

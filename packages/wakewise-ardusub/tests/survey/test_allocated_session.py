@@ -144,6 +144,7 @@ def test_an_allocated_survey_pauses_and_goes_on() -> None:
     assert survey.session.at.flown_m > flown + 0.1
 
 
+@pytest.mark.slow
 def test_an_allocated_survey_that_a_stick_ended_is_resumed() -> None:
     """The pilot flies away in POSHOLD, sets ALT_HOLD and lets go; consent finishes the line, counted once."""
     survey = harness(lines=straight_line(2.0)).flying(5.0)
