@@ -115,6 +115,18 @@ def test_quality_is_the_cosine_times_the_share_of_the_surroundings_that_is_shown
     assert np.array_equal(view_quality(PATCHES, X_WC, CAMERA, replace(NEED, support=0.0)), np.where(shown, BEST, 0))
 
 
+def test_quality_knows_no_size_where_the_target_is_small() -> None:
+    """Balls of 32 and of 16 mm, from places as much nearer, are shown equally well but for rounding."""
+    qualities = []
+    for share in (0.016, 0.008):
+        ball = trimesh.creation.icosphere(subdivisions=3, radius=share)
+        patches = patches_of(Mesh(ball.vertices, ball.faces), count=200, per_patch=10)
+        X_WC = camera_pose(np.zeros(3), 0.3, 0.4, 10.0 * share)
+        qualities.append(view_quality(patches, X_WC, CAMERA, replace(NEED, pixel_m=1.0)))
+    assert (np.abs(qualities[0].astype(int) - qualities[1]) > 1).mean() < 0.01
+    assert qualities[0].max() > 0.9 * BEST
+
+
 def test_nothing_is_shown_behind_the_camera_or_from_within() -> None:
     """A camera that looks away shows nothing; nor does one from which pixels are too large."""
     X_WC = at(0, 20)

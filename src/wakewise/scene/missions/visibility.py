@@ -26,8 +26,9 @@ CLEARANCE_M = 0.010
 """What stands less than this above the bed does not count, as in evaluations: sand touches it."""
 REACH_M = 0.003
 """A place counts as in the model when the model comes as near as this: what `completeness_pct` is defined by."""
-WINDOW_M = 0.0075
-"""Stereo compares surroundings of about this radius: they have to be shown as well."""
+WINDOW_M, WINDOW_SPACINGS = 0.0075, 5.0
+"""Stereo compares surroundings of about this radius: they have to be shown as well. On smaller targets, which are
+photographed from nearer, it is so many distances of samples."""
 BEST = 255
 """Quality of a sample that is faced squarely, with all of its surroundings shown."""
 NORMAL_SHARE = 0.15
@@ -95,12 +96,14 @@ class SurfacePatches:
 
     @cached_property
     def _windows(self) -> tuple[IntArray, Array]:
-        """Pairs of samples within `WINDOW_M` of each other, shape (p, 2), and how many each window has, shape (n,)."""
-        pairs = KDTree(self.points_W_m).query_pairs(WINDOW_M, output_type="ndarray").astype(np.int64)
-        return pairs, np.float64(1.0) + np.bincount(pairs.ravel(), minlength=len(self.points_W_m))
+        """Pairs of samples within the window of each other, shape (p, 2), and how many each window has, shape (n,)."""
+        n = len(self.points_W_m)
+        reach_m = min(WINDOW_M, WINDOW_SPACINGS * math.sqrt(self.area_m2 / n))
+        pairs = KDTree(self.points_W_m).query_pairs(reach_m, output_type="ndarray").astype(np.int64)
+        return pairs, np.float64(1.0) + np.bincount(pairs.ravel(), minlength=n)
 
     def shown_about(self, shown: BoolArray) -> Array:
-        """Share of the samples within `WINDOW_M` of each, itself counted, that are shown; shape (n,)."""
+        """Share of the samples in the window of each, itself counted, that are shown; shape (n,)."""
         (one, other), held, n = self._windows[0].T, self._windows[1], len(shown)
         return np.asarray((shown + np.bincount(one, shown[other], n) + np.bincount(other, shown[one], n)) / held)
 
