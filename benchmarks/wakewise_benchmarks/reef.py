@@ -67,6 +67,8 @@ DENSER = tuple(
 SAME_PCT = 0.5
 MAP_STD_M = 0.004
 VISIBLE = VisibilityCriteria(incidence_rad=math.radians(78.0), pixel_m=0.004)
+COVERED = VisibilityCriteria(incidence_rad=math.radians(70.0), support=0.0)
+"""Of a whole patch: its samples lie too far apart to tell what surrounds a place."""
 LEAST_SHOWN = 3
 PATCHES, REACH_M = 1500, 0.003
 POINTS = (100, 200, 300, 500, 700, 1000)
@@ -257,7 +259,7 @@ def shown_by(poses: Sequence[Pose], patches: SurfacePatches, parts: Parts) -> In
 
 def covered_by(poses: Sequence[Pose], patches: SurfacePatches, parts: Parts) -> BoolArray:
     """Which samples the photographs show well, shape (n,)."""
-    coverage = Coverage.begin(patches)
+    coverage = Coverage.begin(patches, need=COVERED)
     for X_WC in poses:
         coverage = coverage.seen(X_WC, parts.camera)
     return coverage.covered

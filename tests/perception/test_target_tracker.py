@@ -64,6 +64,26 @@ def test_what_stands_on_the_bed_is_found_and_accepted(arc: Pictures, after: Trac
     assert after.bed.at_W_m[2] == pytest.approx(arc.target.bed_z_m, abs=0.015)
 
 
+@pytest.mark.parametrize("period_s", [0.1, PERIOD_S, 0.5, 1.0])
+def test_map_and_region_take_turns(arc: Pictures, period_s: float) -> None:
+    """No picture adjusts the map and computes the region; every keyframe is adjusted once, by the next picture."""
+    tracker = tracker_of(arc)
+    state, adjusted, shaped, fresh = tracker.init(), 0, 0, 0
+    for k, (picture, X_WC) in enumerate(zip(arc.pictures, arc.poses, strict=True)):
+        before = state
+        state, _ = tracker.step(state, picture, period_s * k, X_WC, STD)
+        adjusts, shapes = state.adjusted_s > before.adjusted_s, state.shaped_s > before.shaped_s
+        assert not (adjusts and shapes)
+        adjusted, shaped = adjusted + adjusts, shaped + shapes
+        if state.initialized:
+            fresh = 0 if state.adjusted_s == state.keyframes[-1].time_s else fresh + 1
+            assert fresh <= 1
+            assert state.adjusted_s > before.adjusted_s or state.camera is before.camera
+    assert state.initialized
+    assert adjusted >= 3
+    assert shaped >= 3
+
+
 def test_what_was_seen_from_one_side_is_accepted_late(arc: Pictures) -> None:
     """On an arc of 30 deg time alone accepts a proposed target only after `PATIENT` times as long."""
     tracker, first_s = tracker_of(arc), dict[str, float]()

@@ -56,8 +56,8 @@ class Keyframe:
 class BundleAdjustment:
     """Keyframes and points under adjustment; `after_round` makes the next.
 
-    `frames` and `camera` are the given ones. `poses` and `lens`, shape (7,) as `LENS_STD`, are where they
-    have come to. Observations are sorted by point: `starts`, shape (m + 1,), `frame_of` (n,), `pixels` (n, 2). Points
+    `frames` and `camera` are the given ones. `poses` and `lens`, shape (7,) as `LENS_STD`, are where they have come to.
+    Observations are sorted by point, then by frame: `starts`, shape (m + 1,), `frame_of` (n,), `pixels` (n, 2). Points
     have `ids` (m,), places `points_W_m` (m, 3), and the inverse of their covariances, `information` (m, 3, 3);
     `misfit`, shape (m,), is the weighted sum of their squared misses.
     """

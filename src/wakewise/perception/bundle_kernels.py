@@ -25,7 +25,8 @@ def normal_equations(
     """Normal equations of cameras and lens with the points eliminated, and what gives the points back.
 
     - `R`, `origins`, shapes (n, 3, 3) and (n, 3): poses X_WC; `lens`: of `lens_numbers`; `limits`: standard deviation
-      of a pixel, scale of the weights, damping.
+      of a pixel, scale of the weights, damping. `frame_of` ascends within each point: only what is above the
+      diagonal is summed.
 
     Returns the Schur complement (d, d) and right side (d,), d = 6 n + 7; of points V (m, 3, 3) and h (m, 3); W (o, 6,
     3) of each observation's pose by its point and L (m, 7, 3) of the lens by the points; and misfits (m,).
@@ -80,7 +81,6 @@ def normal_equations(
                 g[first + a] -= dot(gain[a], h[j])
                 for b in range(7):
                     S[first + a, end + b] -= dot(gain[a], L[j, b])
-                # Observations of a point are in the order of their frames: these are blocks above the diagonal.
                 for other in range(i, starts[j + 1]):
                     second = 6 * frame_of[other]
                     for b in range(6):

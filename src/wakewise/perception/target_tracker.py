@@ -180,7 +180,7 @@ class TargetTracker:
 
         Returns the next state, and the camera's pose by the map; None where the map does not give one.
         """
-        trouble = self._trouble(state, picture, time_s)
+        before_s, trouble = state.last_s, self._trouble(state, picture, time_s)
         if trouble:
             return self._without(state, time_s, trouble), None
         tracks = track(state.tracks, picture, time_s - state.tracked_s, self._expected(state, guess))
@@ -228,8 +228,9 @@ class TargetTracker:
             trouble="" if len(tracks) >= LEAST_MAPPED // 2 else "few features",
         )
         state = self._kept(state, X_WC, time_s, prior or guess, std)
-        # In a picture either the map is made better or the region computed from it: both would take too long.
-        shaped = time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6
+        # In a picture either the map is adjusted or the region computed from it: both would take too long. The region
+        # is not computed in two pictures running. A sweep can only begin at a keyframe: it may do so beside the region.
+        shaped = time_s - state.shaped_s >= SHAPE_EVERY_S - 1e-6 and state.shaped_s < before_s
         if not shaped:
             state = self._adjusted(state)
         if found is not None and not (shaped and state.sweep is not None):
@@ -318,8 +319,9 @@ class TargetTracker:
     def _adjusted(self, state: TrackerState) -> TrackerState:
         """The state with the map initialised, or adjusted by one round at a new keyframe."""
         if state.initialized:
-            frames = state.keyframes[-LOCAL_KEYFRAMES:] if state.keyframes[-1].time_s > state.adjusted_s else ()
-            rounds, before = 1, state.points
+            frames, rounds, before = state.keyframes[-LOCAL_KEYFRAMES:], 1, state.points
+            if frames[-1].time_s <= state.adjusted_s:
+                return state
         elif well_crossed(state.points, state.tracks.ids, LEAST_MAPPED):
             frames, rounds, before = state.keyframes, FIRST_ROUNDS, empty_map()
         else:

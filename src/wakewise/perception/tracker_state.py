@@ -42,7 +42,7 @@ class TrackerState:
     bed: BedPlane | None = None
     surface: SurfaceMap
     sweep: PlaneSweep | None = None
-    """Under way: one more picture is compared in each picture."""
+    """Under way: one more picture is compared in each picture in which no region is computed."""
     swept_from_W_m: Array | None = None
     """Where the camera was in the last sweep."""
     cameras_W_m: Array

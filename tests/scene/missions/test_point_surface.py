@@ -98,7 +98,7 @@ def test_area_is_that_of_the_ball() -> None:
     assert BALL.area_m2 == pytest.approx(4.0 * math.pi * RADIUS**2, rel=0.003)
     assert BALL.count == pytest.approx(len(POINTS) / 10, rel=0.05)
     assert (BALL.points_W_m == POINTS).all()
-    assert np.linalg.norm(BALL.middles_W_m - CENTRE, axis=1).min() > 0.97 * RADIUS
+    assert np.linalg.norm(BALL.mean(BALL.points_W_m) - CENTRE, axis=1).min() > 0.97 * RADIUS
 
 
 @pytest.mark.parametrize(

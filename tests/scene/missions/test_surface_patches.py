@@ -25,7 +25,7 @@ def test_patches_are_many_and_of_about_one_size() -> None:
 
 def test_a_patch_is_a_small_piece_that_faces_one_way() -> None:
     """Samples of a patch lie within a centimetre or so of its middle, and nearly all face the way that it does."""
-    off = np.linalg.norm(PATCHES.points_W_m - PATCHES.middles_W_m[PATCHES.patch], axis=1)
+    off = np.linalg.norm(PATCHES.points_W_m - PATCHES.mean(PATCHES.points_W_m)[PATCHES.patch], axis=1)
     mean = PATCHES.mean(PATCHES.normals)
     along = np.einsum("ij,ij->i", PATCHES.normals, mean[PATCHES.patch]) / np.linalg.norm(mean, axis=1)[PATCHES.patch]
     assert np.percentile(off, 95) < 0.012

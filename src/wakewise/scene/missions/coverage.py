@@ -259,7 +259,7 @@ class CoverageGaps:
 
     unseen: float  # in no photograph: hidden by the target itself, facing away from all, or outside every picture
     poorly: float  # in some, but only at a slant or from too far
-    seldom: float  # shown well, but not by three that make pairs
+    seldom: float  # shown, but not well enough by three that make pairs
 
 
 def find_coverage_gaps(coverage: Coverage, taken_from: Iterable[Pose], lens: CameraIntrinsics) -> CoverageGaps:

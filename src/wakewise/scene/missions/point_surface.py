@@ -15,8 +15,8 @@ NEIGHBOURS, DENSITY = 24, 12
 SLACK = 6.0
 """Points hide what lies half so many spacings behind them: places and normals have errors, and triangles overlap."""
 MAPPED_CRITERIA = VisibilityCriteria(support=0.0)
-"""As for a surface that is known, less strict: normals of mapped points are 10 degrees unsure. It was chosen on two
-scans, in which they gave 67 and 90 % where the model then had 71 and 90 (docs/research-log/0088)."""
+"""As for a surface that is known, less strict: normals of mapped points are 10 degrees unsure, and on three scans the
+condition on pairs made the guide worse (docs/research-log/0097)."""
 LEAST_POINTS = 30
 CORNERS = 3
 COVERS = math.sqrt(2.0)

@@ -26,9 +26,9 @@ CLEARANCE_M = 0.010
 """What stands less than this above the bed does not count, as in evaluations: sand touches it."""
 REACH_M = 0.003
 """A place counts as in the model when the model comes as near as this: what `completeness_pct` is defined by."""
-WINDOW_M, WINDOW_SPACINGS = 0.0075, 5.0
-"""Stereo compares surroundings of about this radius: they have to be shown as well. On smaller targets, which are
-photographed from nearer, it is so many distances of samples."""
+WINDOW_SPACINGS = 3.0
+"""Stereo compares surroundings of about so many distances of samples, 7.5 mm on a coral of 15 cm: they have to be shown
+as well. Larger and smaller targets are taken to be photographed from as much farther and nearer."""
 BEST = 255
 """Quality of a sample that is faced squarely, with all of its surroundings shown."""
 NORMAL_SHARE = 0.15
@@ -89,16 +89,11 @@ class SurfacePatches:
         """How many samples each patch has, which is its share of the area; shape (patches,)."""
         return np.bincount(self.patch, minlength=self.count)
 
-    @property
-    def middles_W_m(self) -> Array:
-        """Mean of each patch's samples, shape (patches, 3)."""
-        return self.mean(self.points_W_m)
-
     @cached_property
     def _windows(self) -> tuple[IntArray, Array]:
         """Pairs of samples within the window of each other, shape (p, 2), and how many each window has, shape (n,)."""
         n = len(self.points_W_m)
-        reach_m = min(WINDOW_M, WINDOW_SPACINGS * math.sqrt(self.area_m2 / n))
+        reach_m = WINDOW_SPACINGS * math.sqrt(self.area_m2 / n)
         pairs = KDTree(self.points_W_m).query_pairs(reach_m, output_type="ndarray").astype(np.int64)
         return pairs, np.float64(1.0) + np.bincount(pairs.ravel(), minlength=n)
 
@@ -242,10 +237,11 @@ class VisibilityCriteria:
 
     def __post_init__(self) -> None:
         low, high = self.apart_rad
-        if not (0.0 < self.incidence_rad < 0.5 * math.pi and self.pixel_m > 0.0 and 0.0 < low < high < math.pi):
+        right = 0.0 < self.incidence_rad < 0.5 * math.pi and self.pixel_m > 0.0 and 0.0 < low < high < math.pi
+        if not (right and 0.0 <= self.support < math.inf):
             raise InputError(
                 f"coverage: incidence {self.incidence_rad:g} rad, pixel {self.pixel_m:g} m, apart {self.apart_rad} "
-                "rad; allowed 0 to pi/2, above 0, and two rising angles below pi"
+                f"rad, support {self.support:g}; allowed 0 to pi/2, above 0, two rising angles below pi, 0 or more"
             )
 
 
@@ -277,7 +273,7 @@ def view_quality(
     if need.support == 0.0:
         return np.where(shown, BEST, 0).astype(np.uint8)
     ways = X_WC.p_m - patches.points_W_m
-    cosines = np.einsum("ni,ni->n", ways, patches.normals) / np.linalg.norm(ways, axis=1)
+    cosines = np.einsum("ni,ni->n", ways, patches.normals) / np.maximum(np.linalg.norm(ways, axis=1), 1e-12)
     quality = np.rint(BEST * cosines * patches.shown_about(shown))
     return np.where(shown, np.maximum(quality, 1.0), 0.0).astype(np.uint8)
 

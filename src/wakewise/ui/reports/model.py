@@ -195,7 +195,7 @@ def _made(trial: Trial) -> str:
         for share, words in (
             (reasons.unseen, "is in no photograph: hidden, or facing away from all of them"),
             (reasons.poorly, "is only seen at a slant or from too far"),
-            (reasons.seldom, "is shown well, but not by three photographs that make pairs"),
+            (reasons.seldom, "is shown, but not well enough by three photographs that make pairs"),
         )
         if share >= 0.005
     ]
