@@ -180,7 +180,8 @@ class TargetTracker:
 
         Returns the next state, and the camera's pose by the map; None where the map does not give one.
         """
-        before_s, trouble = state.last_s, self._trouble(state, picture, time_s)
+        before_s = state.last_s if state.pictures else math.inf
+        trouble = self._trouble(state, picture, time_s)
         if trouble:
             return self._without(state, time_s, trouble), None
         tracks = track(state.tracks, picture, time_s - state.tracked_s, self._expected(state, guess))
