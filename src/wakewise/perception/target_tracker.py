@@ -542,7 +542,7 @@ class TargetTracker:
                 status = "lost"
         centre = shape.centre_W_m + state.shift_W_m
         way = centre - target.centre_W_m
-        if np.linalg.norm(way) < LEAST_MOVED_M:
+        if status == "lost" or np.linalg.norm(way) < LEAST_MOVED_M:
             return replace(state, target=replace(target, status=status, time_s=time_s))
         return replace(
             state,
