@@ -102,7 +102,6 @@ def test_a_change_far_below_a_kernel_compiles_it_anew(small_package: Path) -> No
     assert _run(small_package) == ["20.0", "0"]
 
 
-@pytest.mark.slow
 def test_a_kernel_apart_is_kept_and_compiled_anew_as_any(small_package: Path) -> None:
     """Its caller is read from disk with it; where it alone is gone from there it is compiled; a change is heard."""
     callee = small_package / "callee.py"

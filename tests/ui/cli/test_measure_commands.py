@@ -136,7 +136,6 @@ def test_growth_is_shown_in_a_picture_and_told_in_a_line(tmp_path: Path, capsys:
         assert picture.format == "PNG" and min(picture.size) > 500
 
 
-@pytest.mark.slow
 def test_a_wrong_scale_is_told_beside_growth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of bare meshes, whose scale is not known: a warning, and a word in the verdict."""
     first, second = colony(tmp_path / "a.ply"), colony(tmp_path / "b.ply", 1.12, seed=1)

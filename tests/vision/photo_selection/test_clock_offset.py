@@ -31,7 +31,6 @@ def test_the_offset_of_a_clock_in_another_time_zone_is_found_within_a_tenth_of_a
     assert offset["whole_hours"] == 3 * seed - 7
 
 
-@pytest.mark.slow
 def test_photographs_of_another_dive_are_refused(tmp_path: Path) -> None:
     """The log of another dive at the same hour gives one line that names --offset."""
     write_photos(tmp_path / "photos", dive(1), 5.0)
