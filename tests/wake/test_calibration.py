@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
+from wakewise.operation import read_scenario
 from wakewise.wake.calibration import (
     FAMILIES,
     calibrate,
     family,
     fit_figures,
-    read_wake_settings,
     split_samples,
     write_fit,
 )
@@ -149,10 +149,10 @@ def test_a_written_fit_is_read_back_as_settings(tmp_path):
     """The file of a fit holds the settings of the model that was found."""
     fit = calibrate(family("jet-fitted"), _jet("jet-fitted"), np.random.default_rng(1), bootstrap=4)
     write_fit(tmp_path / "wake.yaml", fit, "data.csv", 0.06)
-    settings = read_wake_settings(tmp_path / "wake.yaml")
+    settings = read_scenario(tmp_path / "wake.yaml").control.wake
     assert settings.model == "jet-fitted"
     assert settings.decay == pytest.approx(fit.parameters["decay"], rel=1e-5)
     assert fit_figures(fit)["parameters"]["decay"]["held"] is False
-    (tmp_path / "bad.yaml").write_text("wake:\n  model: fitted\n  decay: 3\n", encoding="utf-8")
+    (tmp_path / "bad.yaml").write_text("control:\n  wake:\n    model: fitted\n    decay: 3\n", encoding="utf-8")
     with pytest.raises(InputError, match="has no decay"):
-        read_wake_settings(tmp_path / "bad.yaml")
+        read_scenario(tmp_path / "bad.yaml")

@@ -6,7 +6,8 @@ thrusts count alike. Scores are those of held-out rows.
 Momentum check: the momentum flux through any plane across a free jet equals its thrust. Wrong units (kilograms-force
 for newtons, feet for metres) change the ratio by a factor of four and more, and no residual shows it.
 
-Calibrated wake models as files: settings that a scenario takes, with their uncertainty as comments.
+Calibrated wake models as files: settings that a scenario takes, with their uncertainty as comments. The module is long
+because fit, check and file share the record of one calibration.
 """
 
 from __future__ import annotations
@@ -17,15 +18,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 from scipy.optimize import least_squares
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
-from wakewise.core.safe_yaml import YamlError, read_yaml
-from wakewise.core.settings import describe_faults
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.models import ModelName, WakeSettings, wake_model
 from wakewise.wake.samples import JetRegion, JetSamples, WakeScores, score
@@ -471,26 +469,6 @@ def write_fit(
 ) -> None:
     """Write a calibrated model whole or not at all."""
     write_text(path, fit_yaml(fit, source, disk_diameter_m, law))
-
-
-def read_wake_settings(path: Path) -> WakeSettings:
-    """Settings of a wake model from a file of `wakewise wake fit`, with or without the heads `control:` and `wake:`.
-
-    Raises InputError if the file cannot be read or a field is wrong.
-    """
-    try:
-        tree: Any = read_yaml(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError):
-        raise InputError(f"{path}: cannot be read as text, a file of `wakewise wake fit` is needed") from None
-    except YamlError as fault:
-        raise InputError(f"{path}: not YAML ({fault})") from None
-    for head in ("control", "wake"):
-        if isinstance(tree, dict) and set(tree) == {head}:
-            tree = tree[head]
-    try:
-        return WakeSettings.model_validate(tree)
-    except ValidationError as fault:
-        raise InputError(f"{path}: {describe_faults(fault, WakeSettings, 'wake')}") from None
 
 
 def fit_figures(fit: WakeCalibration) -> dict[str, Any]:
