@@ -6,6 +6,8 @@ The command line calls the same functions. They check their arguments and call t
 `allocate`, `disturbance`, `velocity`: control allocation of one wrench; wake of the thrusts at a pose.
 `reconstruct`, `evaluate`: photographs to a model; a point cloud against the true surface.
 `load_target`, `methods`: targets and control methods by name.
+
+The module is long because each function checks its arguments and states them in full.
 """
 
 from __future__ import annotations

@@ -14,6 +14,8 @@ On an interval the concave part lies above its chord and the convex part above i
 
 Coupled directions share a thruster or an entry of G. Multistart descent along them gives local minima without proof;
 `branch_and_bound` proves the global one.
+
+The module is long because bound, search and descent share the pieces of one cost along a line.
 """
 
 from __future__ import annotations

@@ -20,6 +20,8 @@ The unmodelled force and moment are those at rest in the first attitude `rest_q`
 the current, which cannot be told from other loads there. The equations of motion add only the difference that motion
 and rotation make. In these variables hover carries no information on the current; as separate states the curvature of
 the quadratic drag would appear as information.
+
+The module is long because mean and covariance are advanced together, by derivatives of the same equations.
 """
 
 from __future__ import annotations

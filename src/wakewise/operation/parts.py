@@ -4,6 +4,7 @@ This is the one place where the controller's model and the simulated world meet.
 and its own water; the controller gets the nominal vehicle and a wake model. No module below sees both.
 
 Sampling a region takes seconds and a soft target's modes a third of one, so those of the last flights are cached.
+The module is long because each part states how it is made and what it is made from.
 """
 
 from __future__ import annotations

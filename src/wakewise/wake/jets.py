@@ -7,6 +7,8 @@ Kernels. At a point with offset e from the disk's centre, x = e . d along the je
 speed per square root of newton is f(x, r2), zero unless x > 0. Its gradient is alpha d + beta e; every derivative by
 position or attitude follows from the pair (alpha, beta). A law is `(kind, parameters)`, see `cone_parameters` and
 `jet_parameters`; `own_constants` adds the constants of each thruster's disk. SI units.
+
+The module is long because each law stands beside its kernels: they must give the same speeds.
 """
 
 from __future__ import annotations

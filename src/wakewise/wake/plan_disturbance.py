@@ -5,7 +5,7 @@ cone has no branches, and jets that miss the region are skipped. |v|^2 does not 
 in B; only the slopes by position are turned to W at the end.
 
 `PackedWakeModel` holds the wake model and the region for these kernels. `with_smooth_edge` gives a sharp cone an edge
-that has a gradient.
+that has a gradient. The module is long because one stage's kernels share their scratch memory.
 """
 
 from __future__ import annotations

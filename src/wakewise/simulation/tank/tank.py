@@ -1,6 +1,6 @@
 """Simulated tank: vehicle, water, silt and sensors on one clock, and the water's speeds at the target; as a world.
 
-Water and silt may advance on a second thread beside the vehicle.
+Water and silt may advance on a second thread beside the vehicle. The module is long because one clock moves them all.
 """
 
 from __future__ import annotations

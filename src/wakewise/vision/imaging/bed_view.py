@@ -5,6 +5,8 @@ In an ideal lens straight edges stay straight: triangles are drawn into a depth 
 pupil (Olano & Greer 1997, "Triangle scan conversion using 2D homogeneous coordinates", doi 10.1145/258694.258723),
 which needs no clipping. Through another lens, and where nothing was drawn, the pixel's ray walks over blocks of cells
 and skips those whose highest point stays below it. Position and depth are always those of the pixel's own ray.
+
+The module is long because its kernels call each other for each pixel.
 """
 
 from __future__ import annotations
