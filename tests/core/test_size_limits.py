@@ -118,7 +118,7 @@ def test_pictures_are_decoded_in_one_place():
     own = {
         "vision/image_decoding.py",
         "vision/reconstruction/photos/photo_folder.py",
-        "ui/cockpit/target_tracking.py",
+        "operation/teleop/target_tracking.py",
         "ui/film/encode.py",
         "ui/reports/views.py",
     }

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
+from wakewise.core.interfaces import TargetEstimate
 from wakewise.operation.scenario import Scenario
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.vision.imaging import PinholeCamera
@@ -25,7 +26,8 @@ from wakewise_ardusub.physics.physics import PulseTable
 from wakewise_ardusub.physics.surface import FreeWater
 from wakewise_ardusub.session.boxed_target import DISTANCE_STD, box_of, boxed_target, target_distance
 from wakewise_ardusub.session.link_join import SEA
-from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession
+from wakewise_ardusub.session.session import MOVED_M, ProtectedRegion, VehicleSession
+from wakewise_ardusub.session.video_stream import VideoSource
 from wakewise_ardusub.sitl.inprocess_session import (
     MavlinkSender,
     ScriptedGroundStation,
@@ -293,3 +295,70 @@ def test_a_box_may_be_given_as_the_session_begins(sea, port, tmp_path, distance_
     finally:
         close()
     assert session.fault is None if fault is None else fault in str(session.fault)
+
+
+def mapped(centre_W_m) -> TargetEstimate:
+    """A target of 8 cm that the camera has mapped, of 14 points."""
+    points = centre_W_m + 0.08 * np.vstack([np.eye(3), -np.eye(3), np.zeros((8, 3))])
+    return TargetEstimate(
+        time_s=0.0,
+        status="tracked",
+        centre_W_m=np.asarray(centre_W_m),
+        covariance=1e-4 * np.eye(3),
+        radius_m=0.08,
+        points_W_m=points,
+        weights=np.ones(14),
+        distance_m=np.repeat([0.0, 0.05], [6, 8]),
+    )
+
+
+def test_a_mapped_target_takes_the_place_of_its_box(sea, port, tmp_path, monkeypatch):
+    """Its region is protected; one that moved is flown by where it is now, but not while the mission flies.
+
+    One that would reach into the hull is refused, and the last one stays.
+    """
+    monkeypatch.setattr("wakewise_ardusub.session.video_stream.open_video", lambda place: None)
+    video = VideoSource(place="rtsp://127.0.0.1:9/none", delay_s=0.1)
+    session, close = session_at(port, tmp_path / "sea", box=(0.4, 0.4, 0.6, 0.6), distance_m=1.5, video=video)
+    try:
+        until(lambda: session._seen_from() is not None and session.tracking is not None, "a flight")
+        joined, pilot, protect = session.sea, session.sea.parts.pilot.inner, session.tracking._protect
+        assert session.tracking.now().status == "assumed"
+        assert "video: " in session.line()
+        methods, middle = dict(joined.methods), session._here().X_WB.p_m + np.array([1.4, 0.0, 0.1])
+
+        def protected(centre_W_m) -> bool:
+            """Whether its region is protected; its target is told of in any case."""
+            nonlocal methods
+            before, methods = methods, dict(joined.methods)
+            assert session.boxes.target.distance_from == "mapped"
+            assert session.boxes.target.centre_W_m == pytest.approx(centre_W_m)
+            return all(methods[name] is not made for name, made in before.items())
+
+        protect(mapped(middle))
+        assert protected(middle)
+        assert pilot.target_W_m == pytest.approx(middle)
+        assert "(+-0.02, mapped)" in session.line()
+        swayed = middle + np.array([0.0, 0.5 * MOVED_M, 0.0])
+        protect(mapped(swayed))
+        assert protected(swayed)
+        assert pilot.target_W_m == pytest.approx(middle)
+        joined.desk.set(mode="scan")
+        away = middle + np.array([0.0, 2.0 * MOVED_M, 0.0])
+        protect(mapped(away))
+        assert protected(away)
+        assert pilot.target_W_m == pytest.approx(middle)
+        joined.desk.set(mode="hold")
+        protect(mapped(away))
+        assert protected(away)
+        assert pilot.target_W_m == pytest.approx(away)
+        with pytest.raises(InputError, match="here: "):
+            protect(mapped(session._here().X_WB.p_m))
+        assert not protected(away)
+        assert sea.order(2010) == ACCEPTED
+        assert session.tracking.now() is None
+        assert session.boxes.target is None
+    finally:
+        close()
+    assert session.fault is None
+    assert session.figures()["picture_to_region_ms_p99"] is None

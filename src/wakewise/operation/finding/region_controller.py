@@ -57,7 +57,7 @@ class RegionController:
         target = estimate.target
         self._age_s += dt_s
         if target is not None and target.version != self._version and self._age_s >= LEAST_S:
-            region = Region(points_W_m=target.points_W_m, weights=target.weights, distance_m=target.distance_m)
+            region = Region.of_estimate(target)
             solid = near_spheres(region, estimate.X_WB.p_m) if self._in_view else ball_of(target)
             self._pipeline = replace(self._make(region, solid), incidents=self._pipeline.incidents)
             self._version, self._age_s = target.version, 0.0

@@ -37,6 +37,7 @@ from scipy.spatial.distance import cdist
 
 from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.core.errors import InputError
+from wakewise.core.interfaces import TargetEstimate
 from wakewise.core.jit.njit import njit
 from wakewise.scene.targets.distance import MeshDistance
 from wakewise.scene.targets.fragility import Fragility
@@ -239,6 +240,11 @@ class Region:
     def __post_init__(self) -> None:
         n = len(self.points_W_m)
         freeze(self, points_W_m=(n, 3), weights=(n,), distance_m=(n,))
+
+    @classmethod
+    def of_estimate(cls, found: TargetEstimate) -> Region:
+        """The region of a target that the camera has found."""
+        return cls(points_W_m=found.points_W_m, weights=found.weights, distance_m=found.distance_m)
 
     def moved(self, shift_W_m: Array) -> Region:
         """The same points about a target elsewhere, by a shift of shape (3,)."""

@@ -4,7 +4,6 @@
 - `view_model.py`: what the server asks of a session. `messages.py`: what a page may send. `client.py`: its queue.
 - `control_mailbox.py`: who may fly (a lease), and where the flight reads the sticks.
 - `flight_snapshot.py`, `state.py`: the state that is sent. `live_camera.py`: the camera, in its own process.
-- `target_tracking.py`: the target that the pilot designates in its pictures.
 - `live_coverage.py`: coverage of the photographs. `scene.py`: the view from outside (viser).
 - `page/`: HTML, style and JavaScript.
 """

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.errors import InputError, StageError, WakewiseError
+from wakewise.core.interfaces import TargetEstimate
 from wakewise.operation import Parts, Scenario
 from wakewise.operation.finding.camera_estimator import known_camera
 from wakewise.operation.loop import Step
@@ -33,7 +34,9 @@ from wakewise.operation.teleop.operator_state import (
     tracking_regime,
 )
 from wakewise.operation.teleop.region_methods import RegionMethods, region_methods
+from wakewise.operation.teleop.target_tracking import PERCEPTION, SeenPicture, TargetTracking, pose_std
 from wakewise.perception import TargetTracker
+from wakewise.scene.targets import Region
 from wakewise.ui.cockpit.control_mailbox import ControlMailbox
 from wakewise.ui.cockpit.flight_snapshot import SnapshotRecorder
 from wakewise.ui.cockpit.live_camera import CameraState, LiveCamera
@@ -46,8 +49,8 @@ from wakewise.ui.cockpit.state import (
     rounded,
     scenario_description,
     static_description,
+    target_message,
 )
-from wakewise.ui.cockpit.target_tracking import PERCEPTION, SeenPicture, TargetTracking, pose_std
 from wakewise.ui.cockpit.view_model import CameraPicture, StatusMessage
 
 TENDED_S, SCENE_EVERY_S = 0.05, 0.2
@@ -169,7 +172,7 @@ class CockpitSession:
             "desk": self._desk(),
             "controls": rounded(controls.axes, 3),
             "coverage": self._guide.told(X_WC) if self._guide is not None else None,
-            "target": self._tracking.told(step.time_s, X_WC) if self._tracking is not None else None,
+            "target": None if self._tracking is None else target_message(self._tracking, step.time_s, X_WC),
             "photos": len(live.exposures),
             "loop": {
                 "behind_ms": number(1e3 * live.behind_s, 2),
@@ -292,7 +295,11 @@ class CockpitSession:
             return
         camera, ahead_m = known_camera(parts, PERCEPTION)
         tracker = TargetTracker(camera=camera, settings=PERCEPTION, seed=parts.scenario.seed)
-        self._tracking = TargetTracking(tracker, methods.protect, ahead_m)
+
+        def protect(target: TargetEstimate | None) -> None:
+            methods.protect(None if target is None else Region.of_estimate(target))
+
+        self._tracking = TargetTracking(tracker, protect, ahead_m)
         self._tracking.start()
 
     def _tracking_for(self, kind: str) -> TargetTracking:
@@ -313,7 +320,7 @@ class CockpitSession:
             return
         X_WC = step.estimate.X_WB @ live.parts.vehicle.X_BC_at(step.tilt_rad)
         std = pose_std(step.estimate)
-        tracking.see(SeenPicture(frame=self._pictures, time_s=step.time_s, jpeg=jpeg, X_WC=X_WC, std=std))
+        tracking.see(SeenPicture(frame=self._pictures, time_s=step.time_s, image=jpeg, X_WC=X_WC, std=std))
 
     def _follow(self, live: LiveFlight) -> None:
         """Forward the pilot's notes, and photographs to the coverage guide."""

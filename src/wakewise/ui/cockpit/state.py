@@ -20,9 +20,10 @@ import numpy as np
 from wakewise.allocation import disturbance_of, min_norm_allocation
 from wakewise.control.null_space_allocation import AllocationContext, allocation_context
 from wakewise.core.arrays import Array, freeze
-from wakewise.core.geometry import euler_from_quat
+from wakewise.core.geometry import Pose, euler_from_quat
 from wakewise.core.interfaces import BodyState
 from wakewise.operation import Parts
+from wakewise.operation.teleop.target_tracking import TargetTracking
 from wakewise.simulation.tank.water_truth import STILL_M_S, surface_points
 from wakewise.ui.cockpit.flight_snapshot import SAMPLED_S, WINDOW_S, FlightSnapshot, SnapshotRecorder
 from wakewise.wake import InfluenceModel, free_jet
@@ -198,6 +199,25 @@ class StateEncoder:
         flown, direct = np.mean(self._both, axis=0)
         still = self._gauges.rms_m_s(float(direct)) < STILL_M_S
         return None if still else 100.0 * (1.0 - float(flown / direct))
+
+
+def target_message(tracking: TargetTracking, now_s: float, X_WC: Pose) -> dict[str, Any] | None:
+    """The designated target for the pages; None if none is designated.
+
+    `now_s` is the time of the flight, and `X_WC` the estimated pose of the camera, for which the outline is drawn.
+    """
+    known = tracking.now(now_s)
+    if known is None:
+        return None
+    target, outline = known.target, tracking.outline(X_WC)
+    return {
+        "status": known.status,
+        "trouble": known.trouble,
+        "outline": None if outline is None else {name: number(share, 4) for name, share in outline.items()},
+        "distance_m": None if target is None else number(float(np.linalg.norm(target.centre_W_m - X_WC.p_m)), 3),
+        "std_m": None if target is None else number(target.centre_std_m, 4),
+        "age_ms": number(1e3 * (now_s - known.time_s), 0),
+    }
 
 
 def number(value: float | None, digits: int) -> float | None:

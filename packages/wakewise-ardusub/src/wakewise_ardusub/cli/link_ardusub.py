@@ -89,6 +89,17 @@ def ardusub(
             help="From the camera to a target in a box, where no rangefinder (DISTANCE_SENSOR) tells it.",
         ),
     ] = None,
+    video: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STREAM",
+            help="The camera's stream: an address (rtsp://...), an .sdp file, or a number for a camera at this "
+            "computer. The target of a box is mapped and tracked in it.",
+        ),
+    ] = None,
+    video_delay: Annotated[
+        float, typer.Option(metavar="S", help="How old a picture of the stream is when it arrives, 0 to 3 s.")
+    ] = 0.2,
     relay: Annotated[
         str | None,
         typer.Option(
@@ -145,6 +156,7 @@ def ardusub(
     the sticks back; any loss gives them back by itself. Ctrl-C lets go of the vehicle and ends.
     """
     from wakewise.core.errors import InputError
+    from wakewise.core.optional_dependencies import need as need_extra
     from wakewise_ardusub.optional_dependencies import need
 
     if sum((check or params is not None, motor_test)) > 1:
@@ -156,6 +168,8 @@ def ardusub(
         check_vehicle(connection, vehicle, system, params, motor_results, buttons=meant, untested=untested, json=json)
         return
     need("wakewise link ardusub", "links", only=("pymavlink",))
+    if video is not None:
+        need_extra("wakewise link ardusub --video", "photos", only=("cv2",))
     if check:
         check_vehicle(connection, vehicle, system, None, motor_results, buttons=meant, untested=untested, json=json)
         return
@@ -173,6 +187,7 @@ def ardusub(
     from wakewise_ardusub.session.cameras import parse_camera
     from wakewise_ardusub.session.link_join import SEA
     from wakewise_ardusub.session.session import VehicleSession
+    from wakewise_ardusub.session.video_stream import VideoSource
 
     vehicle_at = parse_connection(connection)
     ground_at = None if relay is None else parse_connection(relay, "--relay")
@@ -186,6 +201,7 @@ def ardusub(
         "listen_only": listen_only,
         "system": system,
     }
+    stream = None if video is None else VideoSource(place=video, delay_s=video_delay)
     made_camera = None if camera is None else parse_camera(camera)
     spare = _spare(vehicle, target, ahead, points)
     boxed = None if box is None else checked_box(_numbers(box, "--box", "LEFT,TOP,RIGHT,BOTTOM", 4))
@@ -207,6 +223,7 @@ def ardusub(
             camera=made_camera,
             box=boxed,
             distance_m=math.nan if distance is None else distance,
+            video=stream,
         )
         finish(session)
         why = "ended"

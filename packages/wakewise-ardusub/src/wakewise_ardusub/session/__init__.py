@@ -7,6 +7,7 @@ requested; thrusts of another engagement are not sent (`wakewise_ardusub.link.ou
 
 - `session.py`: from a connection to a flight; the protected region. Read this first.
 - `link_join.py`: plant, pilot, controller and estimator on the link; wash figures; the warm-up.
-- `boxed_target.py`: the target that is designated by a box in the picture.
+- `boxed_target.py`: the target that is designated by a box in the picture. `video_stream.py`, `video_tracking.py`:
+  the camera's stream, in which it is mapped and tracked.
 - `cameras.py`: cameras of the session.
 """

@@ -1,8 +1,9 @@
 """Target that the operator designates by a box in the vehicle's picture: a frustum about the box's rays.
 
-No picture is read here. The box is a bundle of rays from the camera's estimated pose at the time of the command; the
-distance along its middle is measured or stated, and as unsure as `DISTANCE_STD` says. The frustum over that interval is
-protected and stays fixed in the world. What is refused changes nothing: the last target stays protected.
+The box is a bundle of rays from the camera's estimated pose at the time of the command; the distance along its middle
+is measured or stated, and as unsure as `DISTANCE_STD` says. The frustum over that interval is protected and stays fixed
+in the world, until the target is mapped in the camera's stream (`video_tracking`), if there is one. What is refused
+changes nothing: the last target stays protected.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.core.interfaces import BodyState
+from wakewise.core.interfaces import BodyState, TargetEstimate
 from wakewise.scene.targets import Region
 from wakewise_ardusub.link.message_state import MavlinkMessage
 from wakewise_ardusub.link.output_gate import OutputGate
@@ -38,6 +39,7 @@ from wakewise_ardusub.link.tracking_commands import (
 
 if TYPE_CHECKING:
     from wakewise.vision.imaging.camera import Camera
+    from wakewise_ardusub.session.video_tracking import VideoTracking
 
 DISTANCE_STD = 0.2
 """Standard deviation of the distance, as a share of it: the perception's own of a target that is not mapped yet."""
@@ -53,23 +55,28 @@ LEVELS = (0.1, 0.5, 0.9)
 WEIGHT = 15.0
 """Of all points together, as of a ball's (`session.ball_points`)."""
 STATUS_S = 0.5
+MAPPED = "mapped"
+"""Who says how far a target is that is mapped in the camera's stream."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoxedTarget:
-    """Middle, shape (3,), and radius of the ball round a frustum, its points, and the distance of its middle."""
+    """Middle, shape (3,), and radius of the ball round the target, its points, and the distance of its middle.
+
+    The points are those of the box's frustum, or of the mapped target's region.
+    """
 
     centre_W_m: Array
     radius_m: float
     region: Region
     distance_m: float
+    std_m: float
     distance_from: str
 
     @property
     def words(self) -> str:
         """For people."""
-        std_m = DISTANCE_STD * self.distance_m
-        return f"target by a box, {self.distance_m:.2f} m off (+-{std_m:.2f}, {self.distance_from})"
+        return f"target by a box, {self.distance_m:.2f} m off (+-{self.std_m:.2f}, {self.distance_from})"
 
 
 def target_distance(
@@ -137,13 +144,26 @@ def boxed_target(
             points_W_m=points, weights=np.full(len(points), WEIGHT / len(points)), distance_m=np.zeros(len(points))
         ),
         distance_m=distance_m,
+        std_m=DISTANCE_STD * distance_m,
         distance_from=said,
+    )
+
+
+def mapped_target(found: TargetEstimate, p_WC_m: Array) -> BoxedTarget:
+    """The target as mapped in the camera's stream, from where the camera is, shape (3,)."""
+    return BoxedTarget(
+        centre_W_m=found.centre_W_m,
+        radius_m=found.radius_m,
+        region=Region.of_estimate(found),
+        distance_m=float(np.linalg.norm(found.centre_W_m - p_WC_m)),
+        std_m=found.centre_std_m,
+        distance_from=MAPPED,
     )
 
 
 def box_of(target: BoxedTarget, camera: Camera, X_WC: Pose) -> Box:
     """Where a target lies in the picture of a camera at a pose: edges NaN where it is not in it."""
-    p_C = X_WC.inverse().apply(target.region.points_W_m)
+    p_C = X_WC.inverse().apply(target.region.points_W_m[target.region.distance_m <= 0.0])
     nowhere = (math.nan,) * 4
     if not (p_C[:, 2] > 0.0).all():
         return nowhere
@@ -172,6 +192,8 @@ class BoxDesignation:
         Distance where no rangefinder tells it; NaN for none.
     note : callable
         Told of every answer: result and words.
+    video : VideoTracking, optional
+        Tracks the target in the camera's stream.
     """
 
     def __init__(
@@ -182,9 +204,10 @@ class BoxDesignation:
         follow: Follow,
         stated_m: float,
         note: Callable[[int, str], object],
+        video: VideoTracking | None = None,
     ) -> None:
         self._gate, self._camera, self._here, self._follow = gate, camera, here, follow
-        self._stated_m, self._note = stated_m, note
+        self._stated_m, self._note, self._video = stated_m, note, video
         self._beside, self._busy = ThreadPoolExecutor(1, thread_name_prefix="box"), threading.Lock()
         self._last: TrackingCommand | None = None
         self._due_s = -math.inf
@@ -215,8 +238,27 @@ class BoxDesignation:
             X_WC,
             lambda way: target_distance(way, estimate.X_WB, X_WC.p_m, known.ranges, now_s, self._stated_m),
         )
-        self._follow(found)
-        self.target = found
+
+        def follow() -> None:
+            self._follow(found)
+            self.target = found
+
+        if self._video is None:
+            follow()
+        else:
+            self._video.designate(box, found.distance_m, follow)
+
+    def forget(self) -> None:
+        """Protect the first target again."""
+
+        def follow() -> None:
+            self._follow(None)
+            self.target = None
+
+        if self._video is None:
+            follow()
+        else:
+            self._video.forget(follow)
 
     def told(self, X_WC: Pose) -> None:
         """Tell ground stations twice a second where the target is in the picture of the camera at this pose."""
@@ -233,8 +275,7 @@ class BoxDesignation:
         try:
             box = command.box(self._camera.width / self._camera.height)
             if box is None:
-                self._follow(None)
-                self.target = None
+                self.forget()
             else:
                 self.designate(box, here)
             self._last = command

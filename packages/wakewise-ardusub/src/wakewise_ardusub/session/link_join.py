@@ -335,6 +335,13 @@ class WashFigures:
         """Reckon them of another target from now on; nothing of it was photographed."""
         self._beside.submit(self._retarget, parts)
 
+    def protect(self, parts: Parts) -> None:
+        """Reckon them for another region of the same target from now on."""
+        self._beside.submit(self._protect, parts)
+
+    def _protect(self, parts: Parts) -> None:
+        self._view = InfluenceModel.of(parts.vehicle, parts.region, parts.wake)
+
     def _retarget(self, parts: Parts) -> None:
         self.parts, self._coverage, self._covered_pct = parts, None, None
         self._view = InfluenceModel.of(parts.vehicle, parts.region, parts.wake)
@@ -362,12 +369,16 @@ RATE_HZ = 10.0
 SEA = {
     "control.rate_hz": RATE_HZ,
     "calibration_error.target_position_m": 0.0,
+    "calibration_error.focal_length_pct": 0.0,
+    "calibration_error.principal_point_pct": 0.0,
+    "calibration_error.distortion": 0.0,
     "estimation.position_std_m": 0.02,
     "estimation.attitude_std_rad": 0.02,
     "estimation.gyro_std_rad_s": 0.01,
     "estimation.accelerometer_std_m_s2": 0.3,
 }
-"""What a flight at sea has other than one in the tank: an autopilot's own estimate is no camera pose. Estimates."""
+"""What a flight at sea has other than one in the tank: an autopilot's own estimate is no camera pose, and errors are
+those that there are. Estimates."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -398,6 +409,11 @@ class VehicleFlight:
         pilot.inner.retarget(parts)
         self.methods.adopt(made)
         self.figures.retarget(parts)
+
+    def protect(self, parts: Parts) -> None:
+        """Protect the region of these parts from the next step on; mission, obstacles and coverage stay as they are."""
+        self.methods.adopt(region_methods(parts))
+        self.figures.protect(parts)
 
 
 def surroundings_of_target(target: Target, surface: Array) -> Surroundings:

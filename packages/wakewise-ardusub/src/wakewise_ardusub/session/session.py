@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -22,10 +23,11 @@ from scipy.spatial import ConvexHull
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.geometry import Pose, euler_from_quat, matrix_from_quat, quat_from_euler
-from wakewise.core.interfaces import BodyState, TruthProvider
+from wakewise.core.interfaces import BodyState, TargetEstimate, TruthProvider
 from wakewise.core.jit.precompile import compile_kernels
 from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.loop import Step
+from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.teleop.live import LiveFlight
 from wakewise.robot.importers import any_vehicle
@@ -35,7 +37,7 @@ from wakewise_ardusub.link.motor_interface import VehicleMotors
 from wakewise_ardusub.link.output_gate import OutputGate, Send
 from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
 from wakewise_ardusub.link.tracking_commands import Box
-from wakewise_ardusub.session.boxed_target import BoxDesignation, BoxedTarget, Follow
+from wakewise_ardusub.session.boxed_target import MAPPED, BoxDesignation, BoxedTarget, Follow, mapped_target
 from wakewise_ardusub.session.cameras import MakeCamera, note_view
 from wakewise_ardusub.session.link_join import (
     LinkThread,
@@ -45,6 +47,10 @@ from wakewise_ardusub.session.link_join import (
     run_warm_up,
     surroundings_of_target,
 )
+
+if TYPE_CHECKING:
+    from wakewise_ardusub.session.video_stream import VideoSource
+    from wakewise_ardusub.session.video_tracking import VideoTracking
 
 BALL_M = 0.25
 
@@ -115,6 +121,8 @@ class ProtectedRegion:
 
 
 LOOK_S = 0.05
+MOVED_M = 0.05
+"""A mapped target that moved by more is flown by where it is now: obstacle, look and mission."""
 LEFT_S = 2.0
 """How long preparations are waited for at the end: there is nothing to keep of them."""
 
@@ -141,6 +149,8 @@ class VehicleSession:
         Designates the target in the picture as the flight begins: left, top, right, bottom, see `boxed_target`.
     distance_m : float
         Of a target designated by a box where no rangefinder tells it.
+    video : VideoSource, optional
+        The camera's stream, in which that target is tracked.
     """
 
     scenario: Scenario
@@ -153,6 +163,7 @@ class VehicleSession:
     camera: MakeCamera | None = None
     box: Box | None = None
     distance_m: float = math.nan
+    video: VideoSource | None = None
     fault: BaseException | None = None
     preparing: str = "not begun"
     live: LiveFlight | None = None
@@ -170,6 +181,7 @@ class VehicleSession:
         )
         self._camera = None if self.camera is None else self.camera(self.gate, self.folder, self.journal)
         self.boxes: BoxDesignation | None = None
+        self.tracking: VideoTracking | None = None
         self._link = LinkThread(self.receiving, self.gate, self._heard)
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="session", daemon=True)
@@ -194,6 +206,8 @@ class VehicleSession:
             self._camera.close()
         if self.boxes is not None:
             self.boxes.close()
+        if self.tracking is not None:
+            self.tracking.close()
         self.fault = self.fault or self._link.fault
         known, gate = self.gate.known, self.gate
         self.journal.write(
@@ -219,6 +233,7 @@ class VehicleSession:
             "photographs": self.photographs,
             "photographs_confirmed": self.gate.known.photographs,
             "trips": dict(self.gate.margins.trips),
+            **({} if self.tracking is None else self.tracking.figures()),
         }
 
     def line(self) -> str:
@@ -238,6 +253,8 @@ class VehicleSession:
             parts.append(known.camera)
         if self.boxes is not None and self.boxes.target is not None:
             parts.append(self.boxes.target.words)
+        if self.tracking is not None:
+            parts.append(self.tracking.words())
         live = self.live
         if live is None or live.preparing is not None:
             parts.append(self.preparing if live is None else f"begins: {live.preparing}")
@@ -312,8 +329,13 @@ class VehicleSession:
                 f"method {self.scenario.method}: a step takes {1e3 * took_s:.0f} ms on this computer, the control "
                 f"period is {1e3 * period_s:.0f} ms; end what else runs here, or take a lighter method, such as dp"
             )
+        if self.video is not None:
+            from wakewise_ardusub.session.video_tracking import video_tracking  # OpenCV is an extra
+
+            self.tracking = video_tracking(self.video, sea.bare, gate.clock, self._protector(sea))
+            self.tracking.start()
         boxes = BoxDesignation(
-            gate, sea.bare.camera, self._seen_from, self._follower(sea), self.distance_m, self._noted
+            gate, sea.bare.camera, self._seen_from, self._follower(sea), self.distance_m, self._noted, self.tracking
         )
         if self.box is not None:
             here = self._here()
@@ -331,9 +353,12 @@ class VehicleSession:
 
     def _watch(self, step: Step, truth_provider: TruthProvider | None) -> None:
         """What is reckoned and told at each step."""
+        X_WC = step.estimate.X_WB @ self.vehicle.X_BC_at(step.tilt_rad)
+        if self.tracking is not None:
+            self.tracking.note(self.gate.clock(), X_WC, step.estimate)
         if self.sea is not None and self.boxes is not None:
             self.sea.figures(step, truth_provider)
-            self.boxes.told(step.estimate.X_WB @ self.vehicle.X_BC_at(step.tilt_rad))
+            self.boxes.told(X_WC)
 
     def _seen_from(self) -> tuple[BodyState, Pose] | None:
         """The estimate at the last step and the camera's pose there; None while nobody flies."""
@@ -347,18 +372,38 @@ class VehicleSession:
         """Has the flight go by a target of a box, or by its first one."""
 
         def follow(found: BoxedTarget | None) -> None:
-            here = self._seen_from()
-            estimate = self._here() if here is None else here[0]
             if sea.desk.state.mode == "scan":
                 raise InputError("box: the mission flies, hold first")
-            parts = sea.bare
-            if found is not None:
-                target = ball(found.centre_W_m, found.radius_m)
-                around = surroundings_of_target(target, parts.surroundings.planes)
-                parts = parts.replace(target=target, region=found.region, surroundings=around)
-            sea.retarget(parts, estimate)
+            sea.retarget(sea.bare if found is None else _parts_of(found, sea), self._estimate())
 
         return follow
+
+    def _protector(self, sea: VehicleFlight) -> Callable[[TargetEstimate], None]:
+        """Has the mapped target protected; one that is elsewhere is flown by, too, unless the mission flies."""
+        flown_by = np.full(3, np.inf)
+
+        def protect(mapped: TargetEstimate) -> None:
+            nonlocal flown_by
+            boxes, here = self.boxes, self._seen_from()
+            if boxes is None or here is None:
+                raise InputError("not flying yet")
+            found = mapped_target(mapped, here[1].p_m)
+            begun = boxes.target is not None and boxes.target.distance_from == MAPPED
+            near = begun and float(np.linalg.norm(found.centre_W_m - flown_by)) < MOVED_M
+            parts = _parts_of(found, sea)
+            if near or sea.desk.state.mode == "scan":
+                sea.protect(parts)
+            else:
+                sea.retarget(parts, here[0])
+                flown_by = found.centre_W_m
+            boxes.target = found
+
+        return protect
+
+    def _estimate(self) -> BodyState:
+        """The estimate at the last step; where the vehicle is heard to be before there is one."""
+        here = self._seen_from()
+        return self._here() if here is None else here[0]
 
     def _here(self) -> BodyState:
         """Where the vehicle is now, as heard; a position was heard."""
@@ -393,6 +438,13 @@ class VehicleSession:
                 note_view(self.folder, self.photographs, X_WC, live.time_s)
         if self._camera is not None:
             self._camera.take(self.photographs)
+
+
+def _parts_of(found: BoxedTarget, sea: VehicleFlight) -> Parts:
+    """The parts of a flight with another target."""
+    target = ball(found.centre_W_m, found.radius_m)
+    around = surroundings_of_target(target, sea.bare.surroundings.planes)
+    return sea.bare.replace(target=target, region=found.region, surroundings=around)
 
 
 def _age(seconds: float) -> str:

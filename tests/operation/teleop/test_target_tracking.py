@@ -9,58 +9,29 @@ from collections.abc import Callable, Iterator
 import cv2
 import numpy as np
 import pytest
+from ball_on_sand import CAMERA, CENTRE_W_M, RADIUS_M, BallOnSand, ball_jpeg
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.perception import CalibratedCamera, TargetTracker
+from wakewise.core.interfaces import TargetEstimate
+from wakewise.operation.teleop.target_tracking import PERCEPTION, STALE_S, SeenPicture, TargetTracking, grey_of
+from wakewise.perception import TargetTracker
 from wakewise.scene.missions.orbit import camera_pose
-from wakewise.scene.targets import Region
-from wakewise.ui.cockpit.target_tracking import PERCEPTION, STALE_S, SeenPicture, TargetTracking, grey_of
+from wakewise.ui.cockpit.state import target_message
 
-CAMERA = CalibratedCamera(width=480, height=360, fx=420.0, fy=420.0, cx=239.5, cy=179.5)
-BED_M, CENTRE_W_M, RADIUS_M = 1.5, np.array([0.0, 0.0, 1.42]), 0.1
 BOX = (0.36, 0.3, 0.64, 0.7)
 FRAME_S, STEP_RAD = 0.2, 0.02
 STD = (0.003, 0.003)
 
 
-class Water:
-    """Pictures of a ball with dots on a bed of sand."""
-
-    def __init__(self) -> None:
-        rng = np.random.default_rng(3)
-        sand = cv2.GaussianBlur(rng.uniform(0.0, 255.0, (800, 800)), (0, 0), 1.5)
-        self.sand = cv2.normalize(sand, None, 40, 160, cv2.NORM_MINMAX).astype(np.uint8)
-        way = rng.normal(size=(900, 3))
-        ball = CENTRE_W_M + RADIUS_M * way / np.linalg.norm(way, axis=1, keepdims=True)
-        self.ball_W_m, self.greys = ball[ball[:, 2] < BED_M], rng.integers(20, 255, 900)
-
-    def jpeg(self, X_WC: Pose, width: int = CAMERA.width) -> bytes:
-        # From texels of 4 mm to the bed, to the camera, to pixels.
-        bed = np.array([[0.004, 0.0, -1.6], [0.0, 0.004, -1.6], [0.0, 0.0, 1.0]])
-        plane = np.column_stack([X_WC.R.T[:, 0], X_WC.R.T[:, 1], X_WC.R.T @ (np.array([0.0, 0.0, BED_M]) - X_WC.p_m)])
-        K = np.array([[CAMERA.fx, 0.0, CAMERA.cx], [0.0, CAMERA.fy, CAMERA.cy], [0.0, 0.0, 1.0]])
-        image = cv2.warpPerspective(self.sand, K @ plane @ bed, (CAMERA.width, CAMERA.height), borderValue=90)
-        away = float(np.linalg.norm(CENTRE_W_M - X_WC.p_m))
-        middle = np.rint(CAMERA.pixels(((CENTRE_W_M - X_WC.p_m) @ X_WC.R)[None])[0]).astype(int)
-        cv2.circle(image, middle.tolist(), round(CAMERA.fx * RADIUS_M / away), 120, -1)
-        near = (self.ball_W_m - CENTRE_W_M) @ (X_WC.p_m - CENTRE_W_M) > RADIUS_M**2
-        p_C = (self.ball_W_m[near] - X_WC.p_m) @ X_WC.R
-        for (u, v), z, grey in zip(CAMERA.pixels(p_C), p_C[:, 2], self.greys[: len(near)][near], strict=True):
-            at = (round(16 * float(u)), round(16 * float(v)))
-            cv2.circle(image, at, round(16 * CAMERA.fx * 0.004 / float(z)), int(grey), -1, cv2.LINE_AA, 4)
-        fit = cv2.resize(image, (width, width * CAMERA.height // CAMERA.width), interpolation=cv2.INTER_AREA)
-        return cv2.imencode(".jpg", fit)[1].tobytes()
-
-
 class Rig:
     """A tracking thread, the regions that it protected, and a camera that goes round the target."""
 
-    def __init__(self, protect: Callable[[Region | None], None] | None = None) -> None:
-        self.regions: list[Region | None] = []
+    def __init__(self, protect: Callable[[TargetEstimate | None], None] | None = None) -> None:
+        self.regions: list[TargetEstimate | None] = []
         tracker = TargetTracker(camera=CAMERA, settings=PERCEPTION)
         self.tracking = TargetTracking(tracker, protect or self.regions.append)
-        self.water, self.frame, self.time_s = Water(), 0, 5.0
+        self.water, self.frame, self.time_s = BallOnSand(), 0, 5.0
         self.X_WC = self.pose()
 
     def pose(self) -> Pose:
@@ -69,11 +40,11 @@ class Rig:
     def see(self, jpeg: bytes | None = None, width: int = CAMERA.width) -> None:
         """The next picture, tracked where a target is designated."""
         self.frame, self.time_s, self.X_WC = self.frame + 1, self.time_s + FRAME_S, self.pose()
-        data = self.water.jpeg(self.X_WC, width) if jpeg is None else jpeg
-        self.tracking.see(SeenPicture(frame=self.frame, time_s=self.time_s, jpeg=data, X_WC=self.X_WC, std=STD))
+        data = ball_jpeg(self.water, self.X_WC, width) if jpeg is None else jpeg
+        self.tracking.see(SeenPicture(frame=self.frame, time_s=self.time_s, image=data, X_WC=self.X_WC, std=STD))
 
     def told(self) -> dict:
-        told = self.tracking.told(self.time_s, self.X_WC)
+        told = target_message(self.tracking, self.time_s, self.X_WC)
         json.dumps(told, allow_nan=False)
         return told or {}
 
@@ -109,7 +80,7 @@ def test_a_box_becomes_a_ball_and_then_the_target_itself(rig: Rig) -> None:
     Smaller pictures, as under load, change nothing. Without pictures the last region stays; forgotten, the first one is
     protected again.
     """
-    assert rig.tracking.told(5.0, rig.X_WC) is None
+    assert rig.tracking.now(5.0) is None
     rig.see()
     rig.tracking.designate(BOX, rig.frame)
     first = rig.until(lambda told: told["outline"])
@@ -134,7 +105,7 @@ def narrower_pictures_are_tracked_in_the_same_size(rig: Rig) -> None:
     for width in (400, 320):
         told = rig.track(lambda told: not told["trouble"], width=width)
         assert told["status"] == "tracked"
-    assert grey_of(rig.water.jpeg(rig.X_WC, 256), CAMERA).shape == (360, 480)
+    assert grey_of(ball_jpeg(rig.water, rig.X_WC, 256), CAMERA).shape == (360, 480)
 
 
 def without_pictures_it_is_lost(rig: Rig) -> None:
@@ -149,7 +120,7 @@ def without_pictures_it_is_lost(rig: Rig) -> None:
 
 def forgotten_it_is_the_scenarios(rig: Rig) -> None:
     rig.tracking.forget()
-    assert rig.tracking.told(rig.time_s, rig.X_WC) is None
+    assert rig.tracking.now(rig.time_s) is None
     assert "forgotten" in rig.tracking.notes(rig.time_s)[0][1]
     assert rig.tracking.notes(rig.time_s) == ()
     end_s = time.monotonic() + 10.0
@@ -205,7 +176,7 @@ def test_the_box_is_taken_in_the_picture_in_which_it_was_drawn(rig: Rig) -> None
         rig.see()
     rig.tracking.designate((0.7, 0.3, 0.9, 0.6), frame)
     rig.until(lambda told: told["outline"])
-    outline = (rig.tracking.told(rig.time_s, X_WC) or {})["outline"]
+    outline = rig.tracking.outline(X_WC) or {}
     assert outline["u"] == pytest.approx(0.8, abs=0.01)
     assert outline["v"] == pytest.approx(0.45, abs=0.01)
 
@@ -236,7 +207,7 @@ def test_a_picture_that_shows_nothing_is_a_trouble_and_the_region_stays(rig: Rig
 def test_a_region_that_cannot_be_protected_is_told() -> None:
     """The thread goes on, and another box may be drawn."""
 
-    def refuse(region: Region | None) -> None:
+    def refuse(target: TargetEstimate | None) -> None:
         raise ValueError("no\nroom")
 
     other = Rig(refuse)

@@ -8,12 +8,13 @@ the pilot accepts or refuses.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -23,17 +24,15 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, TargetEstimate
 from wakewise.perception import CalibratedCamera, PerceptionSettings, TargetTracker, TrackerState
 from wakewise.perception.feature_tracks import Grey, fitted
-from wakewise.scene.targets import Region
-from wakewise.ui.cockpit.state import number, rounded
 
 PERCEPTION = PerceptionSettings(width_px=480, rate_hz=5.0, accept_s=600.0)
 """Live pictures change their width under load; they are tracked in one. A proposal waits for the pilot."""
 STALE_S = 2.0
 """A target is lost if no picture was tracked for this time."""
-KEPT = 32
-"""Last pictures in which a box may have been drawn: about 2 s."""
 NEAREST_M = 0.05
 """A target nearer to the camera along its axis, or behind it, has no outline."""
+KEPT = 32
+"""Last pictures in which a box may have been drawn: about 2 s."""
 STD = (0.02, 0.03)
 """Standard deviation of the camera's pose per axis, m and rad, where the estimate states none."""
 _NOTES = {
@@ -51,12 +50,12 @@ Box = tuple[float, float, float, float]
 class SeenPicture:
     """A live picture with its number, and the camera's pose X_WC by the estimate at its time in the flight.
 
-    `std`: standard deviations of that pose per axis, m and rad.
+    `image`: a JPEG, or grey levels, shape (h, w). `std`: standard deviations of that pose per axis, m and rad.
     """
 
     frame: int
     time_s: float
-    jpeg: bytes
+    image: bytes | Grey
     X_WC: Pose
     std: tuple[float, float] = STD
 
@@ -70,12 +69,17 @@ class _Request:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Tracked:
-    """The target after a picture; `time_s` is the time of the last one that was used."""
+class TrackedTarget:
+    """The designated target: `target` after a picture, None before the first one.
 
-    target: TargetEstimate | None
-    time_s: float
-    trouble: str
+    `time_s` is the time of the last picture that was used, -inf before the first. `status` is the estimate's, or `lost`
+    where no picture was used for `STALE_S`. `trouble` says what is wrong with the last picture; empty if nothing is.
+    """
+
+    status: Literal["assumed", "proposed", "tracked", "lost"] = "assumed"
+    target: TargetEstimate | None = None
+    time_s: float = -math.inf
+    trouble: str = "no picture yet"
 
 
 class TargetTracking:
@@ -86,12 +90,14 @@ class TargetTracking:
     tracker : TargetTracker
         Of the camera as the crew has calibrated it.
     protect : callable
-        Called in the thread with the region of the target when it changes; with None when the target is forgotten.
+        Called in the thread with the target's estimate when its region changes; with None when the target is forgotten.
     ahead_m : float
         How far the calibrated camera's projection centre lies before the lens's.
     """
 
-    def __init__(self, tracker: TargetTracker, protect: Callable[[Region | None], None], ahead_m: float = 0.0) -> None:
+    def __init__(
+        self, tracker: TargetTracker, protect: Callable[[TargetEstimate | None], None], ahead_m: float = 0.0
+    ) -> None:
         self._tracker, self._protect = tracker, protect
         self._X_CM = Pose(np.array([0.0, 0.0, ahead_m]))
         self._changed = threading.Condition()
@@ -99,7 +105,7 @@ class TargetTracking:
         self._waiting: SeenPicture | None = None
         self._request: _Request | None = None
         self._accepted: bool | None = None
-        self._last: _Tracked | None = None
+        self._last: TrackedTarget | None = None
         self._taken_s = -np.inf
         self._over = False
         self._said: str | None = None
@@ -160,35 +166,43 @@ class TargetTracking:
             self._request = self._last = self._waiting = self._accepted = None
             self._changed.notify()
 
-    def told(self, now_s: float, X_WC: Pose) -> dict[str, Any] | None:
-        """The target for the pages; None if none is designated.
-
-        `now_s` is the time of the flight, and `X_WC` the estimated pose of the camera, for which the outline is drawn:
-        a circle with centre u, v in shares of the picture's width and height, and radius in shares of its width.
-        """
-        status, tracked = self._now(now_s)
-        if status is None:
+    def now(self, now_s: float) -> TrackedTarget | None:
+        """What is known of the target at a time of the flight; None if none is designated."""
+        with self._changed:
+            request, last = self._request, self._last
+        if request is None:
             return None
-        if tracked is None:
-            nothing = {"outline": None, "distance_m": None, "std_m": None, "age_ms": None}
-            return {"status": status, "trouble": "no picture yet"} | nothing
-        age_s, target, trouble = now_s - tracked.time_s, tracked.target, tracked.trouble
-        if not trouble and age_s > STALE_S:
-            trouble = "no pictures"
-        return {
-            "status": status,
-            "outline": None if target is None else outline(target, self._tracker.camera, X_WC @ self._X_CM),
-            "distance_m": None if target is None else number(float(np.linalg.norm(target.centre_W_m - X_WC.p_m)), 3),
-            "std_m": None if target is None else number(target.centre_std_m, 4),
-            "age_ms": number(1e3 * age_s, 0),
-            "trouble": trouble,
-        }
+        if last is None:
+            return TrackedTarget()
+        if last.target is None or not now_s - last.time_s > STALE_S:
+            return last
+        trouble = last.trouble or "no pictures"
+        status = last.status if last.status == "assumed" else "lost"
+        return replace(last, status=status, trouble=trouble)
+
+    def outline(self, X_WC: Pose) -> dict[str, float] | None:
+        """Circle round the target in a picture taken at the camera's pose; None if it does not lie before the camera.
+
+        Centre u, v in shares of the picture's width and height, and radius in shares of its width.
+        """
+        with self._changed:
+            last, camera = self._last, self._tracker.camera
+        if last is None or last.target is None:
+            return None
+        X_WM = X_WC @ self._X_CM
+        p_C = X_WM.R.T @ (last.target.centre_W_m - X_WM.p_m)
+        if not p_C[2] > NEAREST_M:
+            return None
+        u, v = (camera.pixels(p_C[None])[0] + 0.5) / (camera.width, camera.height)
+        radius = camera.focal_px * last.target.radius_m / float(p_C[2]) / camera.width
+        return {"u": float(u), "v": float(v), "radius": float(radius)}
 
     def notes(self, now_s: float) -> tuple[tuple[str, str], ...]:
         """Level and text of what changed since the last call."""
-        status, tracked = self._now(now_s)
-        if status is not None and tracked is None:
+        known = self.now(now_s)
+        if known is not None and known.time_s == -math.inf:
             return ()
+        status = None if known is None else known.status
         before, self._said = self._said, status
         if status == before:
             return ()
@@ -197,17 +211,6 @@ class TargetTracking:
         request = self._request
         asked = status == "assumed" and request is not None and request.box is None
         return (("warn" if status == "lost" else "info", _NOTES["asked" if asked else status]),)
-
-    def _now(self, now_s: float) -> tuple[str | None, _Tracked | None]:
-        """Status, and what is known of the target; both None if none is designated."""
-        with self._changed:
-            request, last = self._request, self._last
-        if request is None:
-            return None, None
-        if last is None or last.target is None:
-            return "assumed", last
-        stale = now_s - last.time_s > STALE_S and last.target.status != "assumed"
-        return "lost" if stale else last.target.status, last
 
     def _run(self) -> None:
         request: _Request | None = None
@@ -254,7 +257,7 @@ class TargetTracking:
         state = self._tracker.accept(state) if accepted else self._tracker.refuse(state)
         with self._changed:
             if self._request is request and self._last is not None:
-                self._last = replace(self._last, target=state.target)
+                self._last = _tracked(state.target, self._last.time_s, self._last.trouble)
         return state
 
     def _take(
@@ -266,46 +269,38 @@ class TargetTracking:
         """
         pictures = state.pictures
         try:
-            grey = grey_of(picture.jpeg, self._tracker.camera)
+            grey = grey_of(picture.image, self._tracker.camera)
             pose = picture.X_WC @ self._X_CM
             state, _ = self._tracker.step(state, grey, picture.time_s, pose, picture.std)
             trouble = state.trouble
             if state.target is not None and state.target.version != version:
-                self._protect(region_of(state.target))
+                self._protect(state.target)
                 version = state.target.version
         except Exception as fault:  # tracking that fails must not end, nor may it disturb the flight
             trouble = f"not tracked, {type(fault).__name__}: {' '.join(str(fault).split())}"[:160]
         with self._changed:
             if self._request is request:
                 time_s = picture.time_s if self._last is None or state.pictures > pictures else self._last.time_s
-                self._last = _Tracked(target=state.target, time_s=time_s, trouble=trouble)
+                self._last = _tracked(state.target, time_s, trouble)
         return state, version
 
 
-def region_of(target: TargetEstimate) -> Region:
-    """The protected region of an estimate."""
-    return Region(points_W_m=target.points_W_m, weights=target.weights, distance_m=target.distance_m)
+def _tracked(target: TargetEstimate | None, time_s: float, trouble: str) -> TrackedTarget:
+    status = "assumed" if target is None else target.status
+    return TrackedTarget(status=status, target=target, time_s=time_s, trouble=trouble)
 
 
-def grey_of(jpeg: bytes, camera: CalibratedCamera) -> Grey:
-    """A JPEG as grey levels in the camera's size, shape (h, w); one of another shape is left for the tracker to refuse.
+def grey_of(image: bytes | Grey, camera: CalibratedCamera) -> Grey:
+    """A picture as grey levels in the camera's size, shape (h, w); one of another shape is left to the tracker.
 
-    Raises ValueError if it is no picture.
+    Raises ValueError of a JPEG that is none.
     """
-    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE) if jpeg else None
+    if not isinstance(image, bytes):
+        return fitted(image, camera)
+    picture = cv2.imdecode(np.frombuffer(image, np.uint8), cv2.IMREAD_GRAYSCALE) if image else None
     if picture is None:
         raise ValueError("no picture in the JPEG")
     return fitted(np.asarray(picture, dtype=np.uint8), camera)
-
-
-def outline(target: TargetEstimate, camera: CalibratedCamera, X_WC: Pose) -> dict[str, float | None] | None:
-    """Circle round the target in a picture taken at the camera's pose; None if it does not lie before the camera."""
-    p_C = X_WC.R.T @ (target.centre_W_m - X_WC.p_m)
-    if not p_C[2] > NEAREST_M:
-        return None
-    u, v = (camera.pixels(p_C[None])[0] + 0.5) / (camera.width, camera.height)
-    radius = camera.focal_px * target.radius_m / float(p_C[2]) / camera.width
-    return dict(zip(("u", "v", "radius"), rounded([u, v, radius], 4), strict=True))
 
 
 def pose_std(estimate: BodyState) -> tuple[float, float]:

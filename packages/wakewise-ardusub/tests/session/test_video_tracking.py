@@ -1,0 +1,210 @@
+"""The stream of the vehicle's camera, the poses of its pictures, and the target that is tracked in it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import cv2
+import numpy as np
+import pytest
+from ball_on_sand import CAMERA, CENTRE_W_M, RADIUS_M, BallOnSand
+
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_euler
+from wakewise.core.interfaces import BodyState, TargetEstimate
+from wakewise.scene.missions.orbit import camera_pose
+from wakewise_ardusub.session.video_stream import VideoReader, VideoSource
+from wakewise_ardusub.session.video_tracking import GAP_S, PoseHistory, VideoTracking
+
+BOX = (0.36, 0.3, 0.64, 0.7)
+STD = (0.003, 0.003)
+
+
+def until(true: Callable[[], object], what: str, patience_s: float = 30.0) -> None:
+    end_s = time.monotonic() + patience_s
+    while not true():
+        assert time.monotonic() < end_s, f"waited {patience_s:g} s for {what}"
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize(
+    ("place", "delay_s", "words"),
+    [
+        ("film.mp4", 0.2, "must be an address"),
+        ("rtsp://127.0.0.1:8554/video", 4.0, "--video-delay 4: must be 0 to 3 s"),
+        ("rtsp://127.0.0.1:8554/video", float("nan"), "--video-delay nan"),
+        ("ftp://127.0.0.1/video", 0.2, "must be an address"),
+        ("nowhere.sdp", 0.2, "no such file"),
+        ("", 0.2, "must be an address"),
+    ],
+)
+def test_what_is_no_stream_is_refused(place: str, delay_s: float, words: str) -> None:
+    """A film is not of now; so its pictures have no pose."""
+    with pytest.raises(InputError, match=words):
+        VideoSource(place=place, delay_s=delay_s)
+
+
+def test_a_picture_has_the_pose_between_its_neighbours_in_time() -> None:
+    """Halfway is half the way and half the turn; there is none before the first, in a gap, or long after the last."""
+    poses = PoseHistory()
+    assert poses.at(0.0) is None
+    poses.add(1.0, Pose(np.zeros(3), quat_from_euler(0.0, 0.0, 0.0)), STD)
+    poses.add(1.4, Pose(np.array([0.4, 0.0, 0.2]), quat_from_euler(0.0, 0.0, 0.2)), STD)
+    found, std = poses.at(1.2) or pytest.fail("no pose")
+    assert found.p_m == pytest.approx([0.2, 0.0, 0.1])
+    assert found.q == pytest.approx(quat_from_euler(0.0, 0.0, 0.1))
+    assert std == STD
+    assert poses.at(0.9) is None
+    assert poses.at(1.4 + 0.9 * GAP_S) is not None
+    assert poses.at(1.4 + 1.1 * GAP_S) is None
+    poses.add(3.0, Pose(np.zeros(3), quat_from_euler(0.0, 0.0, 0.0)), STD)
+    assert poses.at(2.0) is None
+    poses.add(7.0, Pose(np.zeros(3), quat_from_euler(0.0, 0.0, 0.0)), STD)
+    assert poses.at(1.2) is None
+
+
+class Streamer:
+    """A camera at a port of this computer that sends JPEGs over HTTP, of a grey level that is a number."""
+
+    def __init__(self, port: int = 0) -> None:
+        streamer = self
+
+        class Handler(BaseHTTPRequestHandler):
+            def do_GET(self) -> None:
+                self.send_response(200)
+                self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=next")
+                self.end_headers()
+                while not streamer.over.is_set():
+                    jpeg = cv2.imencode(".jpg", np.full((48, 64, 3), streamer.level, np.uint8))[1].tobytes()
+                    head = f"--next\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
+                    try:
+                        self.wfile.write(head.encode() + jpeg + b"\r\n")
+                    except OSError:
+                        return
+                    time.sleep(0.01)
+
+            def log_message(self, *_: object) -> None:
+                pass
+
+        self.level, self.over = 60, threading.Event()
+        self.server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        self.thread = threading.Thread(target=self.server.serve_forever)
+        self.thread.start()
+
+    @property
+    def port(self) -> int:
+        return self.server.server_address[1]
+
+    def close(self) -> None:
+        self.over.set()
+        self.server.shutdown()
+        self.server.server_close()
+        self.thread.join()
+
+
+def test_a_stream_is_read_as_it_comes_and_opened_anew_when_it_ends() -> None:
+    """Pictures are new ones, not those that wait in a buffer, at the rate asked for, each of the time it was taken."""
+    camera, seen = Streamer(), list[tuple[float, float]]()
+    source = VideoSource(place=f"http://127.0.0.1:{camera.port}/", delay_s=0.5)
+
+    def take(picture: np.ndarray, time_s: float) -> None:
+        assert picture.shape == (48, 64, 3)
+        seen.append((float(picture.mean()), time_s - time.monotonic()))
+
+    reader = VideoReader(source, time.monotonic, take, rate_hz=20.0)
+    try:
+        reader.start()
+        until(lambda: len(seen) >= 10, "pictures")
+        assert all(level == pytest.approx(60, abs=3) for level, _ in seen)
+        assert all(-1.0 < late <= -0.5 for _, late in seen)
+        camera.level = 200
+        until(lambda: seen[-1][0] == pytest.approx(200, abs=3), "the new picture", 2.0)
+        assert reader.trouble == ""
+        camera.close()
+        until(lambda: reader.trouble != "", "the end of the stream")
+        camera, before = Streamer(camera.port), len(seen)
+        until(lambda: len(seen) > before, "the stream again")
+        assert reader.trouble == ""
+    finally:
+        reader.close()
+        camera.close()
+    assert not reader._thread.is_alive()
+
+
+class Flight:
+    """Tracking without a stream: a camera on an arc about the ball; pictures are given as they are asked for."""
+
+    def __init__(self) -> None:
+        self.protected = list[TargetEstimate]()
+        self.time_s, self.water, self.k = 10.0, BallOnSand(), 0
+        source = VideoSource(place="rtsp://127.0.0.1:9/none", delay_s=0.0)
+        self.tracking = VideoTracking(source, CAMERA, lambda: self.time_s, self.protected.append)
+
+    def see(self) -> None:
+        """The next picture, a fifth of a second and a fiftieth of a radian on; waits until it is tracked."""
+        self.k, self.time_s = self.k + 1, self.time_s + 0.2
+        X_WC = camera_pose(CENTRE_W_M, 0.02 * self.k, np.radians(35.0), 0.7)
+        self.tracking.note(self.time_s, X_WC, BodyState(X_WB=X_WC, covariance=STD[0] ** 2 * np.eye(12)))
+        self.tracking.see(np.repeat(self.water.grey(X_WC)[:, :, None], 3, axis=2), self.time_s)
+        now = self.tracking.now()
+        if now is not None:
+            until(lambda: (self.tracking.now() or now).time_s == self.time_s, "the picture to be tracked")
+
+
+@pytest.fixture
+def flight() -> Iterator[Flight]:
+    made = Flight()
+    yield made
+    made.tracking.close()
+
+
+def test_what_lies_in_a_box_is_protected_once_it_is_mapped(flight: Flight) -> None:
+    """Nothing is, while only its direction is known; what follows a box is done before anything is tracked."""
+    assert flight.tracking.now() is None
+    flight.see()
+    done = list[str]()
+    flight.tracking.designate(BOX, 0.7, lambda: done.append("frustum"))
+    assert done == ["frustum"]
+    assert flight.tracking.now().status == "assumed"
+    for _ in range(80):
+        flight.see()
+        if flight.protected:
+            break
+    assert flight.tracking.now().status == "tracked"
+    assert np.linalg.norm(flight.protected[-1].centre_W_m - CENTRE_W_M) < 0.5 * RADIUS_M
+    figures = flight.tracking.figures()
+    assert figures["pictures"] == flight.k
+    assert figures["picture_to_region_ms_p99"] == pytest.approx(0.0, abs=1e-6)  # time stands still here
+    assert flight.tracking.words() == "video: not opened yet"
+
+
+def test_a_box_that_is_refused_leaves_the_tracked_target(flight: Flight) -> None:
+    """Forgotten, or with another box, nothing of it is protected any more."""
+    flight.see()
+    flight.tracking.designate(BOX, 0.7, lambda: None)
+    until_tracked(flight)
+
+    def refuse() -> None:
+        raise InputError("into the hull")
+
+    with pytest.raises(InputError, match="into the hull"):
+        flight.tracking.designate((0.0, 0.0, 0.1, 0.1), 0.7, refuse)
+    assert flight.tracking.now().status == "tracked"
+    flight.tracking.designate((0.0, 0.0, 0.1, 0.1), 0.7, lambda: None)
+    count = len(flight.protected)
+    for _ in range(3):
+        flight.see()
+    assert len(flight.protected) == count
+    flight.tracking.forget(lambda: None)
+    assert flight.tracking.now() is None
+
+
+def until_tracked(flight: Flight) -> None:
+    for _ in range(80):
+        flight.see()
+        if flight.tracking.now().status == "tracked":
+            return
+    raise AssertionError(flight.tracking.now())
