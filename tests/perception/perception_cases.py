@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, look_at, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
+from wakewise.perception.bed_plane import BedPlane
 from wakewise.perception.bundle_adjustment import BundleAdjustment, after_round
 from wakewise.perception.calibrated_camera import CalibratedCamera
 
+LEVEL = BedPlane(up_W=np.array([0.0, 0.0, -1.0]), at_W_m=np.array([0.0, 0.0, 1.5]))
+"""A level bed at 1.5 m."""
 CAMERA = CalibratedCamera(width=640, height=480, fx=500.0, fy=500.0, cx=319.5, cy=239.5)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from perception_cases import LEVEL
 
 from wakewise.core.arrays import Array
 from wakewise.perception.bed_plane import (
@@ -16,7 +17,6 @@ from wakewise.perception.bed_plane import (
     WITHIN_M,
     BedPlane,
     fit_bed,
-    level_plane,
     near_bed,
 )
 
@@ -77,7 +77,7 @@ def test_a_ray_hits_the_plane_before_it_or_not_at_all(
 
 def test_a_level_bed_lies_at_its_depth() -> None:
     """Heights are counted up from it, though z points down."""
-    bed = level_plane(1.5)
+    bed = LEVEL
     np.testing.assert_array_equal(bed.height_m(np.array([[3.0, 1.0, 1.2], [0.0, 0.0, 1.6]])), [1.5 - 1.2, 1.5 - 1.6])
     hit = bed.hit(np.array([0.0, 0.0, 0.5]), np.array([0.6, 0.0, 0.8]))
     assert hit is not None
@@ -117,7 +117,7 @@ def test_exact_points_give_the_exact_plane() -> None:
 def test_a_few_points_below_do_not_matter() -> None:
     """With 5 % of the points in the ground, where mapping failed, the bed is found."""
     rng = np.random.default_rng(8)
-    bed = level_plane(1.5)
+    bed = LEVEL
     wrong = on_plane(bed, 10, rng) + rng.uniform(0.05, 0.5, (10, 1)) * [0.0, 0.0, 1.0]
     found = fit_bed(np.concatenate([on_plane(bed, 190, rng), wrong]), rng)
     assert found is not None
@@ -140,15 +140,15 @@ def test_a_bed_is_found_beside_a_wall_of_more_points() -> None:
     """The wall has more points, and is passed over."""
     rng = np.random.default_rng(10)
     wall = rng.uniform([0.79, -0.8, 0.5], [0.81, 0.8, 1.5], (150, 3))
-    found = fit_bed(np.concatenate([wall, on_plane(level_plane(1.5), 100, rng)]), rng)
+    found = fit_bed(np.concatenate([wall, on_plane(LEVEL, 100, rng)]), rng)
     assert found is not None
-    assert angle_rad(found, level_plane(1.5)) < math.radians(1.0)
+    assert angle_rad(found, LEVEL) < math.radians(1.0)
 
 
 def test_too_few_points_are_no_bed() -> None:
     """Fewer than `LEAST_POINTS`, none, all at one place or all on one line give None."""
     rng = np.random.default_rng(11)
-    points = on_plane(level_plane(1.5), LEAST_POINTS, rng, noise_m=0.0)
+    points = on_plane(LEVEL, LEAST_POINTS, rng, noise_m=0.0)
     assert fit_bed(points, rng) is not None
     assert fit_bed(points[1:], rng) is None
     assert fit_bed(points[:0], rng) is None
@@ -166,7 +166,7 @@ def test_points_all_over_the_water_are_no_bed() -> None:
 def test_the_lowest_of_two_planes_is_the_bed(seed: int) -> None:
     """A ledge 10 cm higher with as many points is not taken for the bed."""
     rng = np.random.default_rng(seed)
-    low, high = level_plane(1.5), level_plane(1.4)
+    low, high = LEVEL, BedPlane(up_W=LEVEL.up_W, at_W_m=np.array([0.0, 0.0, 1.4]))
     found = fit_bed(np.concatenate([on_plane(high, 120, rng), on_plane(low, 120, rng)]), rng)
     assert found is not None
     assert abs(found.at_W_m[2] - 1.5) < 0.5 * WITHIN_M
@@ -174,7 +174,7 @@ def test_the_lowest_of_two_planes_is_the_bed(seed: int) -> None:
 
 def test_the_fit_is_a_function_of_points_and_seed() -> None:
     """Equal seeds give equal planes."""
-    points = on_plane(level_plane(1.5), 80, np.random.default_rng(13))
+    points = on_plane(LEVEL, 80, np.random.default_rng(13))
     one, other = (fit_bed(points, np.random.default_rng(5)) for _ in range(2))
     assert one is not None and other is not None
     np.testing.assert_array_equal(one.up_W, other.up_W)
@@ -183,7 +183,7 @@ def test_the_fit_is_a_function_of_points_and_seed() -> None:
 
 def test_the_bed_under_a_place_is_that_of_the_points_about_it() -> None:
     """A plane is moved to the points within reach, by less than its own thickness; few points leave it as it is."""
-    rng, bed = np.random.default_rng(5), level_plane(1.5)
+    rng, bed = np.random.default_rng(5), LEVEL
     near = np.column_stack([rng.uniform(-0.3, 0.3, (60, 2)), np.full(60, 1.506)])
     far = np.column_stack([rng.uniform(1.0, 2.0, (60, 2)), np.full(60, 1.494)])
     moved = near_bed(bed, np.concatenate([near, far]), np.zeros(3), 0.35)

@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from perception_cases import looking, pixels_of
+from perception_cases import LEVEL, looking, pixels_of
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.perception import surface_map
-from wakewise.perception.bed_plane import level_plane
 from wakewise.perception.bundle_adjustment import Keyframe
 from wakewise.perception.calibrated_camera import CalibratedCamera
 from wakewise.perception.feature_tracks import Grey
@@ -210,7 +209,7 @@ def test_only_what_is_clearly_seen_through_is_denied() -> None:
 def test_points_of_the_bed_are_left_out() -> None:
     """Those less than `ABOVE_BED_M` above it or below it are no surface; without a bed they are."""
     down = looking(np.array([0.0, 0.001, 0.8]), np.array([0.0, 0.0, 1.5]))
-    bed = level_plane(1.5)
+    bed = LEVEL
     above, on, under = (0.7 - up for up in (3.0 * ABOVE_BED_M, 0.5 * ABOVE_BED_M, -ABOVE_BED_M))
     swept = seen([[above, math.nan, math.nan, on, math.nan, math.nan, under]], X_WC=down)
     assert len(with_sweep(empty_surface(), swept, CAMERA)) == 3
@@ -223,7 +222,7 @@ def test_the_bed_denies_what_was_seen_before_it() -> None:
     """Though its own points are left out."""
     down = looking(np.array([0.0, 0.001, 0.8]), np.array([0.0, 0.0, 1.5]))
     surface = surface_of(*[seen(0.5, X_WC=down)] * 2)
-    after = with_sweep(surface, seen(0.7, X_WC=down), CAMERA, level_plane(1.5))
+    after = with_sweep(surface, seen(0.7, X_WC=down), CAMERA, LEVEL)
     assert after.denials.tolist() == [1]
 
 

@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from perception_cases import LEVEL
 from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.perception.bed_plane import BedPlane, level_plane
+from wakewise.perception.bed_plane import BedPlane
 from wakewise.perception.target_shape import (
     LEAST_POINTS,
     VOXEL_M,
@@ -29,7 +30,7 @@ from wakewise.perception.target_shape import (
 from wakewise.scene.targets import Mesh, find_target, region_measure, sample_region
 from wakewise.scene.targets.region import DECAY_M, SHELL_M
 
-BED = level_plane(1.5)
+BED = LEVEL
 RADIUS_M = 0.1
 CENTRE = np.array([0.3, -0.2, 1.5 - RADIUS_M])
 

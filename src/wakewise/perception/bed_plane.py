@@ -58,11 +58,6 @@ def near_bed(bed: BedPlane, points_W_m: Array, about_W_m: Array, reach_m: float)
     return BedPlane(up_W=bed.up_W, at_W_m=bed.at_W_m + float(np.median(height)) * bed.up_W)
 
 
-def level_plane(depth_m: float) -> BedPlane:
-    """A level bed at a depth."""
-    return BedPlane(up_W=np.array([0.0, 0.0, -1.0]), at_W_m=np.array([0.0, 0.0, depth_m]))
-
-
 def fit_bed(points_W_m: Array, rng: np.random.Generator) -> BedPlane | None:
     """The lowest plane, not steeper than `STEEPEST_RAD`, that many points lie on; None if there is none.
 

@@ -121,9 +121,9 @@ def test_a_scan_goes_on_where_it_was_left(parts):
     now[0] = CENTRED
     flown.desk.set(mode="scan")
     fastest, before = 0.0, flown.eye
-    while flown.pilot.scan_phase != "flying":
+    while (flown.pilot._mode, flown.pilot._scan.phase) != ("scan", "flying"):
         flown.until(DT_S * (flown.step + 1))
-        if flown.pilot.scan_phase == "returning":
+        if flown.pilot._scan.phase == "returning":
             fastest = max(fastest, np.linalg.norm(flown.eye - before) / DT_S)
         before = flown.eye
         assert flown.step < 2000 and flown.pilot.mission_s == left_s

@@ -31,7 +31,7 @@ def test_steps_wait_for_their_time_and_a_little_lost_is_caught_up() -> None:
     expected = [0.0, 0.02, 0.04, 0.13, 0.135, 0.14, 0.145, 0.15, 0.16, 0.18]
     assert begun == pytest.approx(expected)
     assert pace.lost_s == 0.0 and pace.behind_s == pytest.approx(0.0)
-    assert pace.late_s(1.0) == pytest.approx(0.07) and pace.answered_s(0.0) == pytest.approx(0.005)
+    assert pace.late_s(1.0) == pytest.approx(0.07) and pace.reaction_s == pytest.approx(0.005)
 
 
 def test_a_long_stop_is_let_go() -> None:

@@ -85,6 +85,7 @@ def test_a_box_in_the_picture_of_a_flight_changes_what_is_protected(session: Coc
     page.press("KeyT")
     until(lambda: methods["wake-aware"] is not own, "another region", 60.0)
     page.until("document.getElementById('designated-line').innerText.startsWith('assumed')")
+    page.until("document.getElementById('notes').innerText.includes('target designated')")
     page.press("Escape")
     until(lambda: methods["wake-aware"] is own, "the scenario's region")
     page.until("document.getElementById('designated').hidden")

@@ -94,8 +94,8 @@ def test_a_distance_is_measured_before_it_is_stated():
 class Sea:
     """The stand-in autopilot in a thread of its own, on a UDP port of this computer, with a pilot ashore."""
 
-    def __init__(self, port: int) -> None:
-        values = own_parameters(len(VEHICLE.thrusters))
+    def __init__(self, port: int, **others: float) -> None:
+        values = own_parameters(len(VEHICLE.thrusters)) | others
         self.autopilot = SimulatedAutopilot(values, loop_hz=50.0, scripts=shipped_script())
         self._link = UdpEndpoint("127.0.0.1", port, out=True)
         behind = InProcessPhysics(body=FreeWater(VEHICLE), table=PulseTable.of(VEHICLE, values))
@@ -242,6 +242,8 @@ def test_a_ground_station_designates_a_target_by_a_box_while_the_link_drives(sea
         assert session.boxes.target is found
         assert session.gate.entry is not None, session.gate.engagement.why
         assert "target by a box" in session.line()
+        until(lambda: -40.0 < sea.autopilot.mount_deg < -10.0, "the camera to look down at it", 20.0)
+        until(lambda: f"camera {sea.autopilot.mount_deg:+.0f} deg  " in session.line(), "its angle", 5.0)
         joined.desk.set(mode="scan")
         assert sea.order(2005, 0.3, 0.6, 0.6, 0.8) == DENIED
         joined.desk.set(mode="hold")
@@ -250,6 +252,8 @@ def test_a_ground_station_designates_a_target_by_a_box_while_the_link_drives(sea
         assert session.boxes.target is None
         assert pilot.target_W_m == pytest.approx(at_first)
         assert session.gate.entry is not None, session.gate.engagement.why
+        assert session.gate.press().startswith("released")
+        until(lambda: sea.autopilot.mount_deg == 0.0, "the mount to be the pilot's", 10.0)
     finally:
         close()
     assert session.fault is None
@@ -362,3 +366,22 @@ def test_a_mapped_target_takes_the_place_of_its_box(sea, port, tmp_path, monkeyp
         close()
     assert session.fault is None
     assert session.figures()["picture_to_region_ms_p99"] is None
+
+
+def test_a_camera_whose_mount_is_not_reported_is_fixed(port, tmp_path):
+    """It points as stated: a box lies on that ray, and the controller has no joint to turn."""
+    sea, tilt_rad = Sea(port, MNT1_TYPE=0.0), math.radians(-30.0)
+    session, close = session_at(port, tmp_path / "sea", box=(0.4, 0.4, 0.6, 0.6), distance_m=1.2, tilt_rad=tilt_rad)
+    try:
+        until(lambda: session._seen_from() is not None, "a flight")
+        assert session.sea.bare.vehicle.tilt is None
+        camera, target = session._here().X_WB @ session.mount.X_BC(), session.boxes.target
+        assert math.asin(camera.R[2, 2]) == pytest.approx(-tilt_rad, abs=0.02)
+        way = target.centre_W_m - camera.p_m
+        assert math.asin(way[2] / np.linalg.norm(way)) == pytest.approx(-tilt_rad, abs=0.1)
+        assert "camera -30 deg (stated)" in session.line()
+        assert not session.mount.reported
+    finally:
+        close()
+        sea.close()
+    assert session.fault is None

@@ -200,15 +200,6 @@ def mean_figures(rows: Iterable[Figures], keys: Iterable[str], worst: Sequence[s
 # Several tests at once ---------------------------------------------------------------------------------------------
 
 
-def bonferroni(p: Sequence[float] | Array) -> Array:
-    """Each p times how many there are, at most 1; shape (n,) in the order given.
-
-    Raises InputError if one is not between 0 and 1.
-    """
-    values = _checked(p)
-    return np.asarray(np.minimum(1.0, len(values) * values))
-
-
 def holm(p: Sequence[float] | Array) -> Array:
     """Holm's step-down correction: never larger than Bonferroni's, as safe (Holm 1979, Scand. J. Statist. 6, 65).
 

@@ -133,11 +133,6 @@ class AssistedPilot:
         """How much of the mission is flown, on its own clock."""
         return self._scan.mission_s
 
-    @property
-    def scan_phase(self) -> str | None:
-        """What the scan does ("stopping", "returning", "flying"); None in other modes."""
-        return self._scan.phase if self._mode == "scan" else None
-
     def taken(self) -> tuple[str, ...]:
         """Requests since the last call, in order: "capture" for a photograph, "stop" for the end."""
         return _emptied(self._actions)

@@ -204,10 +204,6 @@ class RealTimePacer:
         """How late this share of the last steps came at most; 0 before the first."""
         return _quantile(self._behind, self._steps, share)
 
-    def answered_s(self, share: float = 0.99) -> float:
-        """Within what time this share of the last steps turned controls into thrusts, lateness included."""
-        return _quantile(self._behind + self._reaction, self._steps, share)
-
 
 def _quantile(ring: Array, steps: int, share: float) -> float:
     return float(np.quantile(ring[: min(steps, KEPT)], share)) if steps else 0.0

@@ -124,11 +124,6 @@ class LagFit:
         """Dead time and the lag's own mean delay together."""
         return self.delay_s + self.model.mean_delay_s
 
-    def predict_N(self, time_s: Array, command: Array) -> Array:
-        """Thrust that the fit expects at even times, shape (m,), for commands, shape (m,), each held to the next."""
-        dt_s = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
-        return self.offset_N + self.gain * _lagged(self.model, self.delay_s, command, dt_s)
-
 
 @dataclass(frozen=True, kw_only=True)
 class LagFamily:

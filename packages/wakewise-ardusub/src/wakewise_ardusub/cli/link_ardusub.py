@@ -100,6 +100,15 @@ def ardusub(
     video_delay: Annotated[
         float, typer.Option(metavar="S", help="How old a picture of the stream is when it arrives, 0 to 3 s.")
     ] = 0.2,
+    tilt: Annotated[
+        float,
+        typer.Option(
+            metavar="DEG",
+            min=-90.0,
+            max=90.0,
+            help="How far the camera is tilted up, where the autopilot reports no camera mount.",
+        ),
+    ] = 0.0,
     relay: Annotated[
         str | None,
         typer.Option(
@@ -224,6 +233,7 @@ def ardusub(
             box=boxed,
             distance_m=math.nan if distance is None else distance,
             video=stream,
+            tilt_rad=math.radians(tilt),
         )
         finish(session)
         why = "ended"

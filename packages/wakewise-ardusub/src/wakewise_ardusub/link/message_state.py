@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.geometry import quat_from_euler
+from wakewise.core.geometry import euler_from_quat, quat_from_euler
 from wakewise.operation.teleop.input.controls import CONTROL_AXES, apply_dead_zone
 from wakewise_ardusub.link import protocol
 from wakewise_ardusub.logs.channels import MODES
@@ -94,6 +94,8 @@ class LinkState:
         Of the autopilot, as last said.
     ground : mapping
         System ids of ground stations and when each was last heard.
+    mount_pitch : tuple of float
+        Angle of the camera's mount, rad, up positive, and the time at which it came.
     ranges : mapping
         Distances in m of rangefinders by MAV_SENSOR_ORIENTATION, each with the time at which it came.
     sent_us : tuple of int
@@ -127,6 +129,7 @@ class LinkState:
     parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     ground: Mapping[int, float] = field(default_factory=lambda: MappingProxyType({}))
     ranges: Mapping[int, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
+    mount_pitch: tuple[float, float] = (math.nan, -math.inf)
     components: frozenset[int] = frozenset()
     sent_us: tuple[int, ...] = ()
     duplicate: str = ""
@@ -166,7 +169,7 @@ WANTED = frozenset({
     "VFR_HUD", "SYS_STATUS", "SERVO_OUTPUT_RAW", "MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE", "NAMED_VALUE_FLOAT",
     "SET_ACTUATOR_CONTROL_TARGET", "SET_MODE", "COMMAND_LONG", "STATUSTEXT", "RAW_IMU", "PARAM_VALUE",
     "COMMAND_ACK", "CAMERA_IMAGE_CAPTURED", "DISTANCE_SENSOR", "EKF_STATUS_REPORT", "AUTOPILOT_VERSION",
-    "GLOBAL_POSITION_INT",
+    "GLOBAL_POSITION_INT", "MOUNT_STATUS", "GIMBAL_DEVICE_ATTITUDE_STATUS",
 })  # fmt: skip
 """Messages that are looked into, here, in `measuring.py` or by a survey."""
 
@@ -263,6 +266,13 @@ def _from_autopilot(known: LinkState, said: MavlinkMessage, now_s: float) -> Lin
         return replace(known, depth_m=-altitude, depth_s=now_s)
     if name in ("LOCAL_POSITION_NED", "ODOMETRY", "VISION_POSITION_ESTIMATE"):
         return _placed(known, said, now_s)
+    if name == "MOUNT_STATUS":
+        return replace(known, mount_pitch=(math.radians(0.01 * int(get["pointing_a"])), now_s))
+    if name == "GIMBAL_DEVICE_ATTITUDE_STATUS":  # of a mount with servos: the angles that are asked of them
+        pitch = float(euler_from_quat(np.array([float(part) for part in get["q"]]))[1])
+        if not math.isfinite(pitch):
+            raise ValueError
+        return replace(known, mount_pitch=(pitch, now_s))
     if name == "SYS_STATUS":
         millivolts = int(get["voltage_battery"])
         return known if millivolts == _NO_VOLTAGE else replace(known, battery_V=1e-3 * millivolts)

@@ -10,6 +10,7 @@ the mixer, so MOT_n_DIRECTION has no effect on it; the companion applies it (`mo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -130,6 +131,9 @@ TRIED_FIRMWARE: Final = ((4, 6), (4, 7))
 
 
 SET_MESSAGE_INTERVAL = 511
+DO_MOUNT_CONTROL = 205
+MOUNT_BY_MAVLINK, MOUNT_BY_STICKS = 2, 3
+"""MAV_MOUNT_MODE: the angles of this command, and the pilot's."""
 RATES_HZ: dict[int, tuple[str, float]] = {
     30: ("ATTITUDE", 50.0),
     32: ("LOCAL_POSITION_NED", 20.0),
@@ -137,6 +141,8 @@ RATES_HZ: dict[int, tuple[str, float]] = {
     36: ("SERVO_OUTPUT_RAW", 20.0),
     74: ("VFR_HUD", 10.0),
     1: ("SYS_STATUS", 2.0),
+    158: ("MOUNT_STATUS", 5.0),
+    285: ("GIMBAL_DEVICE_ATTITUDE_STATUS", 5.0),
 }
 """Message ids with their names and rates: attitude for the estimator, positions four to an age limit, and the rest for
 limits and the meter."""
@@ -155,6 +161,13 @@ def parameter_request(system: int, name: str) -> Mapping[str, Any]:
         "param_id": name.encode("ascii"),
         "param_index": -1,
     }
+
+
+def mount_command(system: int, pitch_rad: float, mode: int) -> Mapping[str, Any]:
+    """Fields of MAV_CMD_DO_MOUNT_CONTROL: the camera's pitch, up positive, and who steers the mount."""
+    target = {"target_system": system, "target_component": AUTOPILOT_COMPONENT, "confirmation": 0}
+    zero = {f"param{i}": 0.0 for i in range(2, 7)}
+    return {"command": DO_MOUNT_CONTROL, **target, "param1": math.degrees(pitch_rad), **zero, "param7": float(mode)}
 
 
 def interval_requests(system: int) -> list[tuple[str, Mapping[str, Any]]]:

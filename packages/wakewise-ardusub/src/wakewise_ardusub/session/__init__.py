@@ -9,5 +9,6 @@ requested; thrusts of another engagement are not sent (`wakewise_ardusub.link.ou
 - `link_join.py`: plant, pilot, controller and estimator on the link; wash figures; the warm-up.
 - `boxed_target.py`: the target that is designated by a box in the picture. `video_stream.py`, `video_tracking.py`:
   the camera's stream, in which it is mapped and tracked.
+- `camera_mount.py`: the joint that tilts the camera.
 - `cameras.py`: cameras of the session.
 """

@@ -43,6 +43,7 @@ from wakewise.wake import InfluenceModel
 from wakewise_ardusub.link.message_state import MavlinkMessage
 from wakewise_ardusub.link.output_gate import RELEASES, TICK_S, OutputGate
 from wakewise_ardusub.link.protocol import COVERAGE_NAME, DISTURBANCE_NAME, SAVED_NAME
+from wakewise_ardusub.session.camera_mount import MountControl
 
 EARLY = 0.1
 """Share of a step by which measurements are handed over before its end: 10 ms at 10 Hz, where a filter takes 4."""
@@ -68,13 +69,21 @@ class ArduSubPlant:
         Waits so many seconds, or less where there is nothing to wait for any more.
     entry : callable
         In which engagement the controller decided what it hands over; None: in none, and nothing is sent.
+    mount : MountControl, optional
+        The joint of its camera.
     """
 
     gate: OutputGate
     clock: FlightClock
     wait: Callable[[float], object]
     entry: Callable[[], int | None]
+    mount: MountControl | None = None
     _time_s: float = 0.0
+
+    def aim(self, tilt_rad: float) -> None:
+        """Turn the camera's joint while engaged."""
+        if self.mount is not None:
+            self.mount.ask(tilt_rad, engaged=self.entry() is not None)
 
     def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
         """Send thrusts, shape (n,), if they may be, and return what was measured until they are nearly due again."""
@@ -85,8 +94,11 @@ class ArduSubPlant:
         left_s = self.clock.due_s(self._time_s) - EARLY * dt_s - self.gate.clock()
         if left_s > 0.0:
             self.wait(left_s)
-        begun_s = self.clock.due_s(0.0)
-        return tuple(replace(found, time_s=found.time_s - begun_s) for found in self.gate.measurements())
+        begun_s, mount = self.clock.due_s(0.0), self.mount
+        tilt_rad = mount.angle_rad if mount is not None and mount.reported else None
+        return tuple(
+            replace(found, time_s=found.time_s - begun_s, tilt_rad=tilt_rad) for found in self.gate.measurements()
+        )
 
 
 @dataclass(kw_only=True, eq=False)
@@ -436,6 +448,7 @@ def join_vehicle(
     wait: Callable[[float], object],
     flown_N: Callable[[], Array],
     photographed: Callable[[], None],
+    mount: MountControl | None = None,
 ) -> VehicleFlight:
     """Join a scenario's parts to the vehicle of an output gate.
 
@@ -458,6 +471,8 @@ def join_vehicle(
         What the thrusters give by the servos' pulses, shape (n,).
     photographed : callable
         Called when the pilot or the mission takes a photograph.
+    mount : MountControl, optional
+        The joint of its camera; by default the controller's vehicle has one that always obeys.
 
     Raises
     ------
@@ -470,10 +485,16 @@ def join_vehicle(
     around = surroundings_of_target(target, surface)
 
     def plant() -> ArduSubPlant:
-        return ArduSubPlant(gate=gate, clock=clock(), wait=wait, entry=lambda: turn.entry)
+        return ArduSubPlant(gate=gate, clock=clock(), wait=wait, entry=lambda: turn.entry, mount=mount)
 
-    parts = Parts(scenario).replace(
-        target=target, region=region, surroundings=around, start=start, world=ArduSubWorld(plant=plant)
+    parts = Parts(scenario)
+    parts = parts.replace(
+        vehicle=parts.vehicle if mount is None else mount.flown(parts.vehicle),
+        target=target,
+        region=region,
+        surroundings=around,
+        start=start,
+        world=ArduSubWorld(plant=plant),
     )
     check_start(parts.vehicle, region, state_of(start), around, what="here")
     if gate.target_W_m is None:

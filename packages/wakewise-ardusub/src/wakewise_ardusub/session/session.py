@@ -38,6 +38,7 @@ from wakewise_ardusub.link.output_gate import OutputGate, Send
 from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
 from wakewise_ardusub.link.tracking_commands import Box
 from wakewise_ardusub.session.boxed_target import MAPPED, BoxDesignation, BoxedTarget, Follow, mapped_target
+from wakewise_ardusub.session.camera_mount import MountControl
 from wakewise_ardusub.session.cameras import MakeCamera, note_view
 from wakewise_ardusub.session.link_join import (
     LinkThread,
@@ -151,6 +152,8 @@ class VehicleSession:
         Of a target designated by a box where no rangefinder tells it.
     video : VideoSource, optional
         The camera's stream, in which that target is tracked.
+    tilt_rad : float
+        How far the camera is tilted up, where the autopilot reports no mount.
     """
 
     scenario: Scenario
@@ -164,6 +167,7 @@ class VehicleSession:
     box: Box | None = None
     distance_m: float = math.nan
     video: VideoSource | None = None
+    tilt_rad: float = 0.0
     fault: BaseException | None = None
     preparing: str = "not begun"
     live: LiveFlight | None = None
@@ -179,6 +183,7 @@ class VehicleSession:
         self.gate = OutputGate(
             send=self.send, drive=self.drive, journal=self.journal, session=self.session, **self.gate_options
         )
+        self.mount = MountControl(gate=self.gate, vehicle=self.vehicle, stated_rad=self.tilt_rad)
         self._camera = None if self.camera is None else self.camera(self.gate, self.folder, self.journal)
         self.boxes: BoxDesignation | None = None
         self.tracking: VideoTracking | None = None
@@ -195,6 +200,7 @@ class VehicleSession:
 
     def stop(self, why: str) -> None:
         """Let go of the vehicle at once, then end the flight, write its folder and close the journal."""
+        self.mount.give_back()
         self._link.stop(why)
         self._over.set()
         if self.live is not None:
@@ -249,6 +255,8 @@ class VehicleSession:
         margins = gate.margins.words(gate.limits)
         if margins:
             parts.append(margins)
+        if self.boxes is not None and self.vehicle.tilt is not None:
+            parts.append(self.mount.words)
         if self._camera is not None and known.camera:
             parts.append(known.camera)
         if self.boxes is not None and self.boxes.target is not None:
@@ -320,6 +328,7 @@ class VehicleSession:
             wait=lambda seconds: self._flight().wait(seconds),
             flown_N=self._flown_N,
             photographed=self._photographed,
+            mount=self.mount,
         )
         self.preparing = "rehearses"
         took_s, period_s = run_warm_up(sea), 1.0 / sea.parts.control.rate_hz
@@ -339,7 +348,7 @@ class VehicleSession:
         )
         if self.box is not None:
             here = self._here()
-            boxes.designate(self.box, (here, here.X_WB @ self.vehicle.X_BC))
+            boxes.designate(self.box, (here, here.X_WB @ self.mount.X_BC()))
             self._noted(0, boxes.target.words if boxes.target is not None else "")
         self.boxes = boxes
         # The vehicle may have moved while parts were made: an estimator that begins where it was takes the step to
@@ -353,7 +362,7 @@ class VehicleSession:
 
     def _watch(self, step: Step, truth_provider: TruthProvider | None) -> None:
         """What is reckoned and told at each step."""
-        X_WC = step.estimate.X_WB @ self.vehicle.X_BC_at(step.tilt_rad)
+        X_WC = step.estimate.X_WB @ self.mount.X_BC()
         if self.tracking is not None:
             self.tracking.note(self.gate.clock(), X_WC, step.estimate)
         if self.sea is not None and self.boxes is not None:
@@ -363,7 +372,7 @@ class VehicleSession:
     def _seen_from(self) -> tuple[BodyState, Pose] | None:
         """The estimate at the last step and the camera's pose there; None while nobody flies."""
         step = None if self.live is None else self.live.latest
-        return None if step is None else (step.estimate, step.estimate.X_WB @ self.vehicle.X_BC_at(step.tilt_rad))
+        return None if step is None else (step.estimate, step.estimate.X_WB @ self.mount.X_BC())
 
     def _noted(self, result: int, words: str) -> None:
         self.journal.write("box", result=result, words=words)
@@ -429,7 +438,7 @@ class VehicleSession:
         live, sea = self._flight(), self.sea
         step = live.latest
         if step is not None and sea is not None:
-            X_WC = step.estimate.X_WB @ self.vehicle.X_BC_at(step.tilt_rad)
+            X_WC = step.estimate.X_WB @ self.mount.X_BC()
             sea.figures.photographed(X_WC)
             self.journal.write(
                 "photograph", number=self.photographs, flight_s=live.time_s, p_WC_m=X_WC.p_m, q_WC=X_WC.q

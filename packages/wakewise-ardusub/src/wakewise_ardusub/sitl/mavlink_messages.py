@@ -44,9 +44,12 @@ RATES_HZ: dict[int, float] = {
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
     mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 3.0,
     mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: 3.0,
+    mavlink.MAVLINK_MSG_ID_MOUNT_STATUS: 2.0,
 }
 """How often each is told before anybody asks for another rate: about as often as by ArduSub's stream parameters."""
 FASTEST_HZ = 200.0
+MOUNT_STOPS_DEG = 45.0
+"""Of a BlueROV2's camera; the pilot's own angle, without this command, is 0."""
 
 
 def heartbeat(board: SimulatedAutopilot) -> Any:
@@ -116,6 +119,13 @@ def _distance(board: SimulatedAutopilot) -> Any | None:
     return mavlink.MAVLink_distance_sensor_message(
         board.boot_ms, least, most, max(told, 0), 0, 0, mavlink.MAV_SENSOR_ROTATION_PITCH_270, 255
     )
+
+
+def _mount_status(board: SimulatedAutopilot) -> Any | None:
+    """The camera's mount as its servo is asked to be; nothing without one."""
+    if board.parameters.value("MNT1_TYPE", otherwise=0.0) < 1.0:
+        return None
+    return mavlink.MAVLink_mount_status_message(0, 0, round(100.0 * board.mount_deg), 0, 0)
 
 
 def _position_target(board: SimulatedAutopilot) -> Any | None:
@@ -209,6 +219,7 @@ BUILDERS: dict[int, Callable[[SimulatedAutopilot], Any]] = {
     mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf_status,
     mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: _distance,
     mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: _position_target,
+    mavlink.MAVLINK_MSG_ID_MOUNT_STATUS: _mount_status,
 }
 """What can be told, by message id."""
 
@@ -250,7 +261,7 @@ _ANY_COMPONENT = 0
 _MAGIC_2 = 0xFD
 _RECORD_PAYLOAD_B, _RECORD_TAIL_B = 264, 15
 _NO_INDEX = -1
-_LAST = (("param5", "x"), ("param6", "y"))
+_LAST = (("param5", "x"), ("param6", "y"), ("param7", "z"))
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = (
     mavlink.MAV_RESULT_ACCEPTED,
@@ -366,7 +377,7 @@ def _files(board: SimulatedAutopilot, message: Any) -> None:
 
 def _command(board: SimulatedAutopilot, message: Any) -> None:
     numbers = [float(getattr(message, f"param{i}")) for i in range(1, 5)]
-    # COMMAND_INT has whole numbers for the fifth and sixth.
+    # COMMAND_INT has whole numbers for the fifth and sixth, and names of its own for the last three.
     numbers += [float(getattr(message, name, getattr(message, other, 0.0))) for name, other in _LAST]
     does = _COMMANDS.get(message.command)
     result = UNSUPPORTED if does is None else does(board, numbers)
@@ -386,6 +397,16 @@ def _arm(board: SimulatedAutopilot, numbers: list[float]) -> int:
 
 def _photograph(board: SimulatedAutopilot, _numbers: list[float]) -> int:
     board.photographs += 1
+    return int(ACCEPTED)
+
+
+def _mount(board: SimulatedAutopilot, numbers: list[float]) -> int:
+    if board.parameters.value("MNT1_TYPE", otherwise=0.0) < 1.0:
+        return int(UNSUPPORTED)
+    if not math.isfinite(numbers[0] + numbers[6]):
+        return int(DENIED)
+    by_mavlink = round(numbers[6]) == mavlink.MAV_MOUNT_MODE_MAVLINK_TARGETING
+    board.mount_deg = min(max(numbers[0], -MOUNT_STOPS_DEG), MOUNT_STOPS_DEG) if by_mavlink else 0.0
     return int(ACCEPTED)
 
 
@@ -439,6 +460,7 @@ _COMMANDS: dict[int, Callable[[SimulatedAutopilot, list[float]], int]] = {
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
     mavlink.MAV_CMD_DO_SET_MODE: _mode,
     mavlink.MAV_CMD_DO_DIGICAM_CONTROL: _photograph,
+    mavlink.MAV_CMD_DO_MOUNT_CONTROL: _mount,
     mavlink.MAV_CMD_IMAGE_START_CAPTURE: _photograph,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _interval,
     mavlink.MAV_CMD_REQUEST_MESSAGE: _request,

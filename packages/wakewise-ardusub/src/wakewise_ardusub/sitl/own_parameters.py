@@ -72,6 +72,7 @@ def own_parameters(motors: int = 8) -> dict[str, float]:
         "PSC_ACCZ_I": 0.1,
         "PSC_ACCZ_IMAX": 100,
         "BATT_CAPACITY": 18000,
+        "MNT1_TYPE": 1,
         "SCHED_LOOP_RATE": 400,
         "SCR_ENABLE": 1,
         "SCR_HEAP_SIZE": 204800,

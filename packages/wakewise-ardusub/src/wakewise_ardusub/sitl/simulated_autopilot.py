@@ -153,6 +153,8 @@ class SimulatedAutopilot:
         self._out: list[bytes] = []
         self.bad_data = self.photographs = 0
         """Stretches of bytes that were no packet; photographs that were asked for."""
+        self.mount_deg = 0.0
+        """Angle of the camera's mount, up positive."""
         self.pulses_us: tuple[int, ...] = (0,) * OUTPUTS
         """What the outputs carry now."""
         self.motion = _AT_REST
