@@ -77,6 +77,7 @@ def open_video(place: str) -> VideoCapture | None:
         "OPENCV_FFMPEG_CAPTURE_OPTIONS",
         "protocol_whitelist;file,rtp,udp,tcp,tls,http,https,rtsp,rtsps|fflags;nobuffer|flags;low_delay",
     )
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # a broken picture is no line at the terminal
     if place.isdigit():
         capture = cv2.VideoCapture(int(place))
     else:
