@@ -124,11 +124,15 @@ def test_the_flight_is_the_one_that_was_flown_before() -> None:
 
 
 def test_the_small_scan_is_as_good_as_it_was(trial: tuple[Path, dict]) -> None:
-    """The same photographs are placed, and the model is as near to the truth, to a twentieth of a millimetre."""
+    """The same photographs are placed, and the model is as near to the truth.
+
+    Rounding, which is the processor's own, shifts pulses of thrusters and so the flight. Mean and standard deviation
+    are of nine flights whose sensor noise differed by 1e-9 to 5e-3 of itself.
+    """
     _, figures = trial
     before = GOLDEN["scan"]
     assert figures["registered_images"] == before["registered_images"] == before["images"]
-    assert figures["rmse_mm"] == pytest.approx(before["rmse_mm"], abs=0.05)
+    assert figures["rmse_mm"] == pytest.approx(before["rmse_mm"], abs=4.0 * before["rmse_std_mm"])
     assert figures["completeness_pct"] == pytest.approx(before["completeness_pct"], abs=0.3)
     assert figures["duration_s"] == pytest.approx(before["duration_s"])
 
