@@ -243,7 +243,7 @@ def test_the_simulators_parameters_are_written_beside_the_script(capsys: Capture
         (["ardusub", "--box", "0.2,0.2,1.5,0.4"], "box 0.2,0.2,1.5,0.4: outside the picture, 0 to 1"),
         (["ardusub", "--box", "0.2,0.2,0.2,0.4"], "box 0.2,0.2,0.2,0.4: too small"),
         (["ardusub", "--video", "dive.mp4"], "--video 'dive.mp4': must be an address (rtsp, rtsps"),
-        (["ardusub", "--video", "0", "--video-delay", "9"], "--video-delay 9: must be 0 to 3 s"),
+        (["ardusub", "--video", "0", "--video-delay", "9"], "--video-delay 9: must be 0 to 1.5 s"),
         (["ardusub", "--box", "0.2,0.2,nan,0.4"], "--box '0.2,0.2,nan,0.4': must be LEFT,TOP,RIGHT,BOTTOM"),
         (["ardusub", "--out", "here.txt"], "a file is there, a folder is needed"),
         (["ardusub", "--connection", "serial:/dev/ttyNONE:115200"], "/dev/ttyNONE: no such device"),

@@ -7,6 +7,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -317,7 +318,7 @@ def mapped(centre_W_m) -> TargetEstimate:
 
 
 def test_a_mapped_target_takes_the_place_of_its_box(sea, port, tmp_path, monkeypatch):
-    """Its region is protected; one that moved is flown by where it is now, but not while the mission flies.
+    """Its region is protected; one that moved or grew is flown by as it is now, but not once a mission has begun.
 
     One that would reach into the hull is refused, and the last one stays.
     """
@@ -353,9 +354,18 @@ def test_a_mapped_target_takes_the_place_of_its_box(sea, port, tmp_path, monkeyp
         assert protected(away)
         assert pilot.target_W_m == pytest.approx(middle)
         joined.desk.set(mode="hold")
+        begun, pilot._scan = pilot._scan, replace(pilot._scan, mission_s=3.0)
+        protect(mapped(away))
+        assert protected(away)
+        assert pilot.target_W_m == pytest.approx(middle)
+        pilot._scan = begun
         protect(mapped(away))
         assert protected(away)
         assert pilot.target_W_m == pytest.approx(away)
+        grown = replace(mapped(away), radius_m=0.08 + 2.0 * MOVED_M)
+        protect(grown)
+        assert protected(away)
+        assert pilot.keep_off.around.spheres[0, 3] == pytest.approx(0.18)
         with pytest.raises(InputError, match="here: "):
             protect(mapped(session._here().X_WB.p_m))
         assert not protected(away)

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -17,7 +18,7 @@ from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState, TargetEstimate
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise_ardusub.session.video_stream import VideoReader, VideoSource
-from wakewise_ardusub.session.video_tracking import GAP_S, PoseHistory, VideoTracking
+from wakewise_ardusub.session.video_tracking import FRESH_S, LASTS_S, PoseHistory, VideoTracking
 
 BOX = (0.36, 0.3, 0.64, 0.7)
 STD = (0.003, 0.003)
@@ -34,7 +35,7 @@ def until(true: Callable[[], object], what: str, patience_s: float = 30.0) -> No
     ("place", "delay_s", "words"),
     [
         ("film.mp4", 0.2, "must be an address"),
-        ("rtsp://127.0.0.1:8554/video", 4.0, "--video-delay 4: must be 0 to 3 s"),
+        ("rtsp://127.0.0.1:8554/video", 4.0, "--video-delay 4: must be 0 to 1.5 s"),
         ("rtsp://127.0.0.1:8554/video", float("nan"), "--video-delay nan"),
         ("ftp://127.0.0.1/video", 0.2, "must be an address"),
         ("nowhere.sdp", 0.2, "no such file"),
@@ -58,8 +59,8 @@ def test_a_picture_has_the_pose_between_its_neighbours_in_time() -> None:
     assert found.q == pytest.approx(quat_from_euler(0.0, 0.0, 0.1))
     assert std == STD
     assert poses.at(0.9) is None
-    assert poses.at(1.4 + 0.9 * GAP_S) is not None
-    assert poses.at(1.4 + 1.1 * GAP_S) is None
+    assert poses.at(1.4 + 0.9 * LASTS_S) is not None
+    assert poses.at(1.4 + 1.1 * LASTS_S) is None
     poses.add(3.0, Pose(np.zeros(3), quat_from_euler(0.0, 0.0, 0.0)), STD)
     assert poses.at(2.0) is None
     poses.add(7.0, Pose(np.zeros(3), quat_from_euler(0.0, 0.0, 0.0)), STD)
@@ -137,11 +138,11 @@ def test_a_stream_is_read_as_it_comes_and_opened_anew_when_it_ends() -> None:
 class Flight:
     """Tracking without a stream: a camera on an arc about the ball; pictures are given as they are asked for."""
 
-    def __init__(self) -> None:
+    def __init__(self, folder: Path | None = None) -> None:
         self.protected = list[TargetEstimate]()
         self.time_s, self.water, self.k = 10.0, BallOnSand(), 0
         source = VideoSource(place="rtsp://127.0.0.1:9/none", delay_s=0.0)
-        self.tracking = VideoTracking(source, CAMERA, lambda: self.time_s, self.protected.append)
+        self.tracking = VideoTracking(source, CAMERA, lambda: self.time_s, self.protected.append, folder=folder)
 
     def see(self) -> None:
         """The next picture, a fifth of a second and a fiftieth of a radian on; waits until it is tracked."""
@@ -155,14 +156,17 @@ class Flight:
 
 
 @pytest.fixture
-def flight() -> Iterator[Flight]:
-    made = Flight()
+def flight(tmp_path: Path) -> Iterator[Flight]:
+    made = Flight(tmp_path)
     yield made
     made.tracking.close()
 
 
-def test_what_lies_in_a_box_is_protected_once_it_is_mapped(flight: Flight) -> None:
-    """Nothing is, while only its direction is known; what follows a box is done before anything is tracked."""
+def test_what_lies_in_a_box_is_protected_once_it_is_mapped(flight: Flight, tmp_path: Path) -> None:
+    """Nothing is, while only its direction is known; what follows a box is done before anything is tracked.
+
+    The picture of the box is kept.
+    """
     assert flight.tracking.now() is None
     flight.see()
     done = list[str]()
@@ -179,6 +183,10 @@ def test_what_lies_in_a_box_is_protected_once_it_is_mapped(flight: Flight) -> No
     assert figures["pictures"] == flight.k
     assert figures["picture_to_region_ms_p99"] == pytest.approx(0.0, abs=1e-6)  # time stands still here
     assert flight.tracking.words() == "video: not opened yet"
+    (kept,) = tmp_path.glob("box-1-*.png")
+    drawn = cv2.imread(str(kept), cv2.IMREAD_GRAYSCALE)
+    assert drawn.shape == (360, 480)
+    assert (drawn[108, 173:307] == 255).all()
 
 
 def test_a_box_that_is_refused_leaves_the_tracked_target(flight: Flight) -> None:
@@ -208,3 +216,27 @@ def until_tracked(flight: Flight) -> None:
         if flight.tracking.now().status == "tracked":
             return
     raise AssertionError(flight.tracking.now())
+
+
+def test_a_box_waits_for_its_picture_a_second_only(flight: Flight) -> None:
+    """It was drawn in what the operator saw then: an old picture, or one that comes much later, is of elsewhere."""
+    flight.see()
+    flight.time_s += 2.0 * FRESH_S
+    flight.tracking.designate(BOX, 0.7, lambda: None)
+    flight.time_s += 2.0 * FRESH_S
+    flight.see()
+    assert flight.tracking.now() is None
+    assert flight.tracking._expired == "no picture to find the box in, draw it again"
+    flight.tracking.designate(BOX, 0.7, lambda: None)
+    until_tracked(flight)
+
+
+def test_pictures_of_another_shape_are_told_at_once(flight: Flight) -> None:
+    """With what is to be set."""
+    flight.tracking.see(np.zeros((1080, 1920, 3), np.uint8), flight.time_s)
+    assert flight.tracking._unlike == (
+        "pictures of 1920 x 1080: give --set imaging.width=1920 --set imaging.height=1080"
+    )
+    assert flight.tracking.pictures == 0
+    flight.see()
+    assert flight.tracking._unlike == ""

@@ -93,14 +93,19 @@ class TargetTracking:
         Called in the thread with the target's estimate when its region changes; with None when the target is forgotten.
     ahead_m : float
         How far the calibrated camera's projection centre lies before the lens's.
+    begun_s : float
+        When the flight began: the estimator's first poses are not used.
     """
 
     def __init__(
-        self, tracker: TargetTracker, protect: Callable[[TargetEstimate | None], None], ahead_m: float = 0.0
+        self,
+        tracker: TargetTracker,
+        protect: Callable[[TargetEstimate | None], None],
+        ahead_m: float = 0.0,
+        begun_s: float = 0.0,
     ) -> None:
-        self._tracker, self._protect = tracker, protect
-        self._X_CM = Pose(np.array([0.0, 0.0, ahead_m]))
-        self._changed = threading.Condition()
+        self._tracker, self._protect, self._begun_s = tracker, protect, begun_s
+        self._X_CM, self._changed = Pose(np.array([0.0, 0.0, ahead_m])), threading.Condition()
         self._recent: deque[SeenPicture] = deque(maxlen=KEPT)
         self._waiting: SeenPicture | None = None
         self._request: _Request | None = None
@@ -176,17 +181,15 @@ class TargetTracking:
             return TrackedTarget()
         if last.target is None or not now_s - last.time_s > STALE_S:
             return last
-        trouble = last.trouble or "no pictures"
         status = last.status if last.status == "assumed" else "lost"
-        return replace(last, status=status, trouble=trouble)
+        return replace(last, status=status, trouble=last.trouble or "no pictures")
 
     def outline(self, X_WC: Pose) -> dict[str, float] | None:
         """Circle round the target in a picture taken at the camera's pose; None if it does not lie before the camera.
 
         Centre u, v in shares of the picture's width and height, and radius in shares of its width.
         """
-        with self._changed:
-            last, camera = self._last, self._tracker.camera
+        last, camera = self._last, self._tracker.camera
         if last is None or last.target is None:
             return None
         X_WM = X_WC @ self._X_CM
@@ -241,8 +244,8 @@ class TargetTracking:
         return self._over or self._request is not request or (request is not None and new)
 
     def _begun(self, request: _Request) -> TrackerState:
-        """State before the first picture. The estimator has been at work since the flight began, at time 0."""
-        state = replace(self._tracker.init(), first_s=0.0)
+        """State before the first picture. The estimator has been at work since the flight began."""
+        state = replace(self._tracker.init(), first_s=self._begun_s)
         if request.box is None:
             return state
         width, height = self._tracker.camera.width, self._tracker.camera.height
@@ -291,10 +294,7 @@ def _tracked(target: TargetEstimate | None, time_s: float, trouble: str) -> Trac
 
 
 def grey_of(image: bytes | Grey, camera: CalibratedCamera) -> Grey:
-    """A picture as grey levels in the camera's size, shape (h, w); one of another shape is left to the tracker.
-
-    Raises ValueError of a JPEG that is none.
-    """
+    """Grey levels in the camera's size, shape (h, w), or in another shape than its; ValueError of a JPEG that is none."""
     if not isinstance(image, bytes):
         return fitted(image, camera)
     picture = cv2.imdecode(np.frombuffer(image, np.uint8), cv2.IMREAD_GRAYSCALE) if image else None

@@ -98,7 +98,7 @@ def ardusub(
         ),
     ] = None,
     video_delay: Annotated[
-        float, typer.Option(metavar="S", help="How old a picture of the stream is when it arrives, 0 to 3 s.")
+        float, typer.Option(metavar="S", help="How old a picture of the stream is when it arrives, 0 to 1.5 s.")
     ] = 0.2,
     tilt: Annotated[
         float,

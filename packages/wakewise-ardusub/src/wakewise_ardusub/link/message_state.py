@@ -31,6 +31,8 @@ _GROUND_STATION = 6
 _NO_AXIS = 32767
 _NO_VOLTAGE = 65535
 _PITCH_GIVEN = 1
+_UNIT = 0.01
+"""How far the length of a quaternion may be from 1."""
 _TAKING_OVER = {176: "set the mode", 400: "armed or disarmed", 185: "terminated the flight", 300: "started a mission"}
 """Commands of a ground station (MAV_CMD) by which its operator takes the vehicle into their own hands."""
 
@@ -181,7 +183,7 @@ def update_link_state(known: LinkState, said: MavlinkMessage, now_s: float) -> L
         return known
     try:
         return _taken(known, said, now_s)
-    except (KeyError, TypeError, ValueError, OverflowError):
+    except (KeyError, TypeError, ValueError, ArithmeticError):
         odd = known.odd if said.name in known.odd else (*known.odd, said.name)
         return replace(known, garbage=known.garbage + 1, odd=odd)
 
@@ -269,10 +271,10 @@ def _from_autopilot(known: LinkState, said: MavlinkMessage, now_s: float) -> Lin
     if name == "MOUNT_STATUS":
         return replace(known, mount_pitch=(math.radians(0.01 * int(get["pointing_a"])), now_s))
     if name == "GIMBAL_DEVICE_ATTITUDE_STATUS":  # of a mount with servos: the angles that are asked of them
-        pitch = float(euler_from_quat(np.array([float(part) for part in get["q"]]))[1])
-        if not math.isfinite(pitch):
+        q = np.array([float(part) for part in get["q"]])
+        if q.shape != (4,) or not abs(float(np.linalg.norm(q)) - 1.0) < _UNIT:
             raise ValueError
-        return replace(known, mount_pitch=(pitch, now_s))
+        return replace(known, mount_pitch=(float(euler_from_quat(q)[1]), now_s))
     if name == "SYS_STATUS":
         millivolts = int(get["voltage_battery"])
         return known if millivolts == _NO_VOLTAGE else replace(known, battery_V=1e-3 * millivolts)

@@ -83,7 +83,8 @@ class ArduSubPlant:
     def aim(self, tilt_rad: float) -> None:
         """Turn the camera's joint while engaged."""
         if self.mount is not None:
-            self.mount.ask(tilt_rad, engaged=self.entry() is not None)
+            entry = self.entry()
+            self.mount.ask(tilt_rad, engaged=entry is not None and entry == self.gate.entry)
 
     def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
         """Send thrusts, shape (n,), if they may be, and return what was measured until they are nearly due again."""
@@ -403,6 +404,13 @@ class VehicleFlight:
     desk: OperatorState
     methods: RegionMethods
     turn: FlightOwnership = field(default_factory=FlightOwnership)
+
+    @property
+    def on_mission(self) -> bool:
+        """Whether the mission flies, or was left and can be gone on with."""
+        pilot = self.parts.pilot
+        assert isinstance(pilot, EngagedPilot)  # see `join_vehicle`
+        return self.desk.state.mode == "scan" or pilot.inner.mission_s > 0.0
 
     def retarget(self, parts: Parts, estimate: BodyState) -> None:
         """Fly by the target, region and surroundings of these parts from the next step on.

@@ -38,7 +38,7 @@ from wakewise_ardusub.link.output_gate import OutputGate, Send
 from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
 from wakewise_ardusub.link.tracking_commands import Box
 from wakewise_ardusub.session.boxed_target import MAPPED, BoxDesignation, BoxedTarget, Follow, mapped_target
-from wakewise_ardusub.session.camera_mount import MountControl
+from wakewise_ardusub.session.camera_mount import GIVES, WAITS_S, MountControl
 from wakewise_ardusub.session.cameras import MakeCamera, note_view
 from wakewise_ardusub.session.link_join import (
     LinkThread,
@@ -123,7 +123,7 @@ class ProtectedRegion:
 
 LOOK_S = 0.05
 MOVED_M = 0.05
-"""A mapped target that moved by more is flown by where it is now: obstacle, look and mission."""
+"""A mapped target that moved or grew by more is flown by where it is now: obstacle, look and mission."""
 LEFT_S = 2.0
 """How long preparations are waited for at the end: there is nothing to keep of them."""
 
@@ -200,8 +200,12 @@ class VehicleSession:
 
     def stop(self, why: str) -> None:
         """Let go of the vehicle at once, then end the flight, write its folder and close the journal."""
-        self.mount.give_back()
-        self._link.stop(why)
+        try:
+            self.gate.release(why)
+            for _ in range(GIVES):
+                self.mount.give_back()
+        finally:
+            self._link.stop(why)
         self._over.set()
         if self.live is not None:
             self.live.stop()
@@ -314,6 +318,12 @@ class VehicleSession:
             )
         else:
             return None
+        if self.vehicle.tilt is not None:
+            self.preparing = "waits for the camera's mount"
+            self.mount.ask_kind()
+            end_s = gate.clock() + WAITS_S
+            while not self.mount.reported and gate.clock() < end_s and not self._over.wait(LOOK_S):
+                pass
         self.preparing = "makes the parts"
         start = self._here()
         middle, radius, region = self.spare.found(start, self.vehicle.size_m[0], float(self.vehicle.X_BC.p_m[2]))
@@ -330,6 +340,11 @@ class VehicleSession:
             photographed=self._photographed,
             mount=self.mount,
         )
+        if self.video is not None:
+            from wakewise_ardusub.session.video_tracking import video_tracking  # OpenCV is an extra
+
+            self.preparing = "makes the tracker"
+            self.tracking = video_tracking(self.video, sea.bare, gate.clock, self._protector(sea), self.folder)
         self.preparing = "rehearses"
         took_s, period_s = run_warm_up(sea), 1.0 / sea.parts.control.rate_hz
         self.journal.write("rehearsed", step_ms=1e3 * took_s, period_ms=1e3 * period_s, target_W_m=middle)
@@ -338,10 +353,7 @@ class VehicleSession:
                 f"method {self.scenario.method}: a step takes {1e3 * took_s:.0f} ms on this computer, the control "
                 f"period is {1e3 * period_s:.0f} ms; end what else runs here, or take a lighter method, such as dp"
             )
-        if self.video is not None:
-            from wakewise_ardusub.session.video_tracking import video_tracking  # OpenCV is an extra
-
-            self.tracking = video_tracking(self.video, sea.bare, gate.clock, self._protector(sea))
+        if self.tracking is not None:
             self.tracking.start()
         boxes = BoxDesignation(
             gate, sea.bare.camera, self._seen_from, self._follower(sea), self.distance_m, self._noted, self.tracking
@@ -363,8 +375,8 @@ class VehicleSession:
     def _watch(self, step: Step, truth_provider: TruthProvider | None) -> None:
         """What is reckoned and told at each step."""
         X_WC = step.estimate.X_WB @ self.mount.X_BC()
-        if self.tracking is not None:
-            self.tracking.note(self.gate.clock(), X_WC, step.estimate)
+        if self.tracking is not None and not self.mount.silent:
+            self.tracking.note(self._flight().pace.due_s(step.time_s), X_WC, step.estimate)
         if self.sea is not None and self.boxes is not None:
             self.sea.figures(step, truth_provider)
             self.boxes.told(X_WC)
@@ -388,8 +400,8 @@ class VehicleSession:
         return follow
 
     def _protector(self, sea: VehicleFlight) -> Callable[[TargetEstimate], None]:
-        """Has the mapped target protected; one that is elsewhere is flown by, too, unless the mission flies."""
-        flown_by = np.full(3, np.inf)
+        """Has the mapped target protected; one that moved or grew is flown by, too, unless a mission has begun."""
+        flown_by: BoxedTarget | None = None
 
         def protect(mapped: TargetEstimate) -> None:
             nonlocal flown_by
@@ -397,14 +409,14 @@ class VehicleSession:
             if boxes is None or here is None:
                 raise InputError("not flying yet")
             found = mapped_target(mapped, here[1].p_m)
-            begun = boxes.target is not None and boxes.target.distance_from == MAPPED
-            near = begun and float(np.linalg.norm(found.centre_W_m - flown_by)) < MOVED_M
+            if boxes.target is None or boxes.target.distance_from != MAPPED:
+                flown_by = None  # another box
             parts = _parts_of(found, sea)
-            if near or sea.desk.state.mode == "scan":
+            if (flown_by is not None and _near(found, flown_by)) or sea.on_mission:
                 sea.protect(parts)
             else:
                 sea.retarget(parts, here[0])
-                flown_by = found.centre_W_m
+                flown_by = found
             boxes.target = found
 
         return protect
@@ -447,6 +459,12 @@ class VehicleSession:
                 note_view(self.folder, self.photographs, X_WC, live.time_s)
         if self._camera is not None:
             self._camera.take(self.photographs)
+
+
+def _near(found: BoxedTarget, other: BoxedTarget) -> bool:
+    """Whether two targets are one, hardly moved or grown."""
+    moved_m = float(np.linalg.norm(found.centre_W_m - other.centre_W_m))
+    return moved_m + abs(found.radius_m - other.radius_m) < MOVED_M
 
 
 def _parts_of(found: BoxedTarget, sea: VehicleFlight) -> Parts:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from wakewise.core.errors import InputError
 
 Picture = NDArray[np.uint8]
-MOST_DELAY_S = 3.0
+MOST_DELAY_S = 1.5
 RETRY_S = 2.0
 OPENS_MS, READS_MS = 5000, 3000
 """A stream that does not answer, or stops, is given up after this, and opened anew."""
@@ -75,9 +75,11 @@ def open_video(place: str) -> VideoCapture | None:
     # OpenCV takes options of the stream from the environment only; what the user has set stays.
     os.environ.setdefault(
         "OPENCV_FFMPEG_CAPTURE_OPTIONS",
-        "protocol_whitelist;file,rtp,udp,tcp,tls,http,https,rtsp,rtsps|fflags;nobuffer|flags;low_delay",
+        "protocol_whitelist;file,rtp,udp,tcp,tls,http,https,rtsp,rtsps|rtsp_flags;prefer_tcp|fflags;nobuffer|flags;low_delay",
     )
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # a broken picture is no line at the terminal
+    # A broken picture, or a stream that is not there, is no line at the terminal.
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
     if place.isdigit():
         capture = cv2.VideoCapture(int(place))
     else:

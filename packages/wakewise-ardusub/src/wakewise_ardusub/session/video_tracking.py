@@ -10,14 +10,19 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import cv2
 import numpy as np
 
+from wakewise.core.errors import WakewiseError
+from wakewise.core.files import write_bytes
 from wakewise.core.geometry import Pose, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from wakewise.core.interfaces import BodyState, TargetEstimate
 from wakewise.operation.finding.camera_estimator import known_camera
@@ -36,8 +41,10 @@ from wakewise_ardusub.session.video_stream import Picture, VideoReader, VideoSou
 
 KEPT_S = 5.0
 """Poses are kept so long: a picture may be `MOST_DELAY_S` old when it arrives."""
-GAP_S = 0.5
-"""A picture has no pose if the nearest estimates are farther apart than this."""
+GAP_S, LASTS_S = 0.5, 0.15
+"""A picture has no pose if the estimates before and after it are farther apart than this, or the last one is older."""
+FRESH_S = 1.0
+"""A box was drawn in a picture that is not older when it arrived; without one, in one that comes within this time."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,8 +73,8 @@ class PoseHistory:
         if k == 0 or not poses:
             return None
         before = poses[k - 1]
-        if k == len(poses):  # a pose to come: the vehicle hardly moves within a control period
-            return (before.X_WC, before.std) if time_s - before.time_s < GAP_S else None
+        if k == len(poses):  # a pose to come: the vehicle hardly moves until then
+            return (before.X_WC, before.std) if time_s - before.time_s < LASTS_S else None
         after = poses[k]
         span_s = after.time_s - before.time_s
         if span_s > GAP_S:
@@ -86,6 +93,10 @@ class VideoTracking:
     source : VideoSource
     camera : CalibratedCamera
         Of the stream, in any size of the same shape.
+    ahead_m : float
+        How far its projection centre lies before the lens's, behind a flat port.
+    folder : Path
+        Keeps the picture of each box.
     clock : callable
         The time now, s.
     protect : callable
@@ -98,12 +109,24 @@ class VideoTracking:
         camera: CalibratedCamera,
         clock: Callable[[], float],
         protect: Callable[[TargetEstimate], None],
+        ahead_m: float = 0.0,
+        folder: Path | None = None,
     ) -> None:
         self._camera = camera.scaled(PERCEPTION.width_px)
+        self._size = camera.width, camera.height
         self._clock, self._protect, self._poses = clock, protect, PoseHistory()
+        self._ahead_m, self._folder, self._boxes = ahead_m, folder, 0
+        TargetTracker(camera=self._camera, settings=PERCEPTION).init()  # its kernel is loaded before anything flies
         self._reader = VideoReader(source, clock, self.see, PERCEPTION.rate_hz)
         self._changes = threading.Lock()
         self._newest: SeenPicture | None = None
+        self._arrived: tuple[float, float] = (-math.inf, math.nan)
+        """When the newest picture with a pose arrived, by this clock and in UTC."""
+        self._begun_s = math.inf
+        self._until_s = math.inf
+        """Until when the picture of a box is waited for; inf where it is there."""
+        self._unlike = self._expired = ""
+        """What is wrong with the pictures' shape, and with the last box, for people."""
         self._tracking: TargetTracking | None = None
         self.pictures = 0
         self.ages_s: deque[float] = deque(maxlen=10_000)
@@ -115,20 +138,28 @@ class VideoTracking:
 
     def note(self, time_s: float, X_WC: Pose, estimate: BodyState) -> None:
         """Note the camera's pose by the estimate now."""
+        if self._begun_s == math.inf:
+            self._begun_s, self._until_s = time_s, time_s + FRESH_S
         self._poses.add(time_s, X_WC, pose_std(estimate))
 
     def see(self, picture: Picture, time_s: float) -> None:
         """Take a picture, BGR, shape (h, w, 3), of the time at which it was taken."""
+        self._unlike = self._compared(picture)
         found = self._poses.at(time_s)
-        if found is None:
+        if found is None or self._unlike:
             return
         X_WC, std = found
         self.pictures += 1
         small = grey_of(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), self._camera)
         self._newest = newest = SeenPicture(frame=self.pictures, time_s=time_s, image=small, X_WC=X_WC, std=std)
-        tracking = self._tracking
-        if tracking is not None:
-            tracking.see(newest)
+        now_s = self._clock()
+        self._arrived = now_s, time.time()
+        if self._tracking is not None and now_s > self._until_s:
+            self.forget(lambda: None)
+            self._expired = "no picture to find the box in, draw it again"
+        elif self._tracking is not None:
+            self._until_s = math.inf
+            self._tracking.see(newest)
 
     def designate(self, box: Box, distance_m: float, follow: Callable[[], None]) -> None:
         """Run `follow`, which has something protected meanwhile, then track what is in the box, in shares.
@@ -154,8 +185,9 @@ class VideoTracking:
     def words(self) -> str:
         """How it stands, for people."""
         known = self.now()
-        if self._reader.trouble:
-            return f"video: {self._reader.trouble}"
+        trouble = self._reader.trouble or self._unlike or self._expired
+        if trouble:
+            return f"video: {trouble}"
         if known is None:
             return f"video: {self.pictures} pictures, no box"
         age_s = self._clock() - known.time_s
@@ -171,6 +203,7 @@ class VideoTracking:
     def _begin(self, begun: Callable[[], TargetTracking | None], follow: Callable[[], None]) -> None:
         with self._changes:
             follow()
+            self._expired, self._until_s = "", math.inf
             before, self._tracking = self._tracking, begun()
         if before is not None:  # not while the changes are locked: it may wait for that
             before.close()
@@ -184,18 +217,48 @@ class VideoTracking:
                     self._protect(target)
                     self.ages_s.append(self._clock() - target.time_s)
 
+        newest = self._newest if self._clock() - self._arrived[0] <= FRESH_S else None
+        self._until_s = max(self._clock(), self._begun_s) + FRESH_S if newest is None else math.inf
         settings = PERCEPTION.model_copy(update={"assumed_distance_m": distance_m})
-        tracking = TargetTracking(TargetTracker(camera=self._camera, settings=settings), protect)
+        tracker = TargetTracker(camera=self._camera, settings=settings)
+        tracking = TargetTracking(tracker, protect, self._ahead_m, begun_s=min(self._begun_s, self._clock()))
         tracking.start()
-        newest = self._newest
         if newest is not None:
             tracking.see(newest)
+            self._keep(newest, box)
         tracking.designate(box, -1 if newest is None else newest.frame)
         return tracking
 
+    def _compared(self, picture: Picture) -> str:
+        """What is wrong with a picture's shape; empty if nothing is."""
+        (height, width), (own_width, own_height) = picture.shape[:2], self._size
+        if abs(height * own_width - width * own_height) <= max(width, own_width):
+            return ""
+        return f"pictures of {width} x {height}: give --set imaging.width={width} --set imaging.height={height}"
+
+    def _keep(self, picture: SeenPicture, box: Box) -> None:
+        """Keep the picture of a box with the box drawn in it; its name has the time in UTC at which it arrived."""
+        assert not isinstance(picture.image, bytes)
+        if self._folder is None:
+            return
+        self._boxes += 1
+        left, top, right, bottom = (
+            round(share * side) for share, side in zip(box, 2 * picture.image.shape[::-1], strict=True)
+        )
+        drawn = cv2.rectangle(picture.image.copy(), (left, top), (right, bottom), 255, 1)
+        utc_s = self._arrived[1]
+        stamp = time.strftime("%H%M%S", time.gmtime(utc_s)) + f".{int(1e3 * (utc_s % 1.0)):03d}"
+        with suppress(OSError, WakewiseError):  # a full disk ends no flight
+            write_bytes(self._folder / f"box-{self._boxes}-{stamp}.png", cv2.imencode(".png", drawn)[1].tobytes())
+
 
 def video_tracking(
-    source: VideoSource, parts: Parts, clock: Callable[[], float], protect: Callable[[TargetEstimate], None]
+    source: VideoSource,
+    parts: Parts,
+    clock: Callable[[], float],
+    protect: Callable[[TargetEstimate], None],
+    folder: Path,
 ) -> VideoTracking:
     """Tracking in the stream of the camera of a flight's parts."""
-    return VideoTracking(source, known_camera(parts, PERCEPTION)[0], clock, protect)
+    camera, ahead_m = known_camera(parts, PERCEPTION)
+    return VideoTracking(source, camera, clock, protect, ahead_m, folder)

@@ -48,8 +48,6 @@ RATES_HZ: dict[int, float] = {
 }
 """How often each is told before anybody asks for another rate: about as often as by ArduSub's stream parameters."""
 FASTEST_HZ = 200.0
-MOUNT_STOPS_DEG = 45.0
-"""Of a BlueROV2's camera; the pilot's own angle, without this command, is 0."""
 
 
 def heartbeat(board: SimulatedAutopilot) -> Any:
@@ -406,7 +404,7 @@ def _mount(board: SimulatedAutopilot, numbers: list[float]) -> int:
     if not math.isfinite(numbers[0] + numbers[6]):
         return int(DENIED)
     by_mavlink = round(numbers[6]) == mavlink.MAV_MOUNT_MODE_MAVLINK_TARGETING
-    board.mount_deg = min(max(numbers[0], -MOUNT_STOPS_DEG), MOUNT_STOPS_DEG) if by_mavlink else 0.0
+    board.mount_target_deg = numbers[0] if by_mavlink else None
     return int(ACCEPTED)
 
 

@@ -7,6 +7,7 @@ falls silent while the vehicle is armed.
 from __future__ import annotations
 
 import logging
+import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
@@ -17,6 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
+from wakewise.core.geometry import euler_from_quat
 from wakewise_ardusub.link.protocol import ALT_HOLD, AUTOPILOT_COMPONENT, DEFAULT_SYSTEM, MANUAL, MIDDLE_US
 from wakewise_ardusub.physics.datagrams import PhysicsState
 from wakewise_ardusub.sitl.files import MavftpServer
@@ -64,6 +66,8 @@ FIRMWARE = (4, 5, 3)
 """Release that it says it is: the one that BlueOS 1.4 brings."""
 HOME_DEG = (33.810313, -118.393867)
 """Latitude and longitude of the origin: where ArduPilot's simulated submarine starts."""
+MOUNT_STOPS_DEG = 45.0
+"""Of a BlueROV2's camera."""
 PLACE_LASTS_S = 7.0
 """How long the filter's position outlasts the Doppler log."""
 LOOPS_HZ = (50.0, 1000.0)
@@ -153,8 +157,8 @@ class SimulatedAutopilot:
         self._out: list[bytes] = []
         self.bad_data = self.photographs = 0
         """Stretches of bytes that were no packet; photographs that were asked for."""
-        self.mount_deg = 0.0
-        """Angle of the camera's mount, up positive."""
+        self.mount_target_deg: float | None = None
+        """What was asked of the camera's mount, up positive; None: it is the pilot's."""
         self.pulses_us: tuple[int, ...] = (0,) * OUTPUTS
         """What the outputs carry now."""
         self.motion = _AT_REST
@@ -194,6 +198,16 @@ class SimulatedAutopilot:
     def boot_ms(self) -> int:
         """The same in whole milliseconds."""
         return round(1e3 * self.now_s) & 0xFFFFFFFF
+
+    @property
+    def mount_deg(self) -> float:
+        """Angle of the camera's servo: the hull's pitch is taken off, as by ArduSub's servo mount; the pilot's is 0."""
+        if self.mount_target_deg is None:
+            return 0.0
+        pitch_deg = math.degrees(float(euler_from_quat(self.motion.q_WB)[1]))
+        steady = self.parameters.value("MNT1_TYPE", otherwise=0.0) == 1.0
+        angle = self.mount_target_deg - (pitch_deg if steady else 0.0)
+        return min(max(angle, -MOUNT_STOPS_DEG), MOUNT_STOPS_DEG)
 
     @property
     def depth_m(self) -> float:
