@@ -294,7 +294,7 @@ def _tracked(target: TargetEstimate | None, time_s: float, trouble: str) -> Trac
 
 
 def grey_of(image: bytes | Grey, camera: CalibratedCamera) -> Grey:
-    """Grey levels in the camera's size, shape (h, w), or in another shape than its; ValueError of a JPEG that is none."""
+    """Grey levels in the camera's size, shape (h, w), or in another shape; ValueError of a JPEG that is none."""
     if not isinstance(image, bytes):
         return fitted(image, camera)
     picture = cv2.imdecode(np.frombuffer(image, np.uint8), cv2.IMREAD_GRAYSCALE) if image else None
