@@ -84,6 +84,7 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Never(
         r"pip install pre-commit|pre-commit install", "changes a clone's hooks; its checks are those of `make check`"
     ),
+    Never(r"podman (build|run) .*", "no container program among Debian's and Python's packages that tests may ask for"),
     Never(r"\. \.venv/bin/activate", "this test runs in the environment already"),
     Never(r"pip install .*", "installs packages; tests/test_core.py and the lock file's test judge what is installed"),
     # Flights, photographs, models.
