@@ -279,3 +279,19 @@ def test_a_camera_whose_mount_is_not_reported_is_fixed(port, tmp_path):
         close()
         sea.close()
     assert session.fault is None
+
+
+def test_an_engagement_begins_with_the_camera_where_the_pilot_turned_it(sea, port, tmp_path):
+    """The first angle that is asked of the mount is the one that it has, not that of the mission."""
+    sea.autopilot.mount_target_deg = -38.0
+    session, close = session_at(port, tmp_path / "sea")
+    try:
+        until(lambda: session._seen_from() is not None, "a flight")
+        until(lambda: session.gate.engagement.state == "ready", "all to be well")
+        assert session.gate.press() == "engaged"
+        until(lambda: any(one.command == 205 for one in sea.of("COMMAND_LONG")), "an angle", 10.0)
+        first = next(one for one in sea.of("COMMAND_LONG") if one.command == 205)
+        assert first.param1 == pytest.approx(-38.0, abs=3.0)
+    finally:
+        close()
+    assert session.fault is None

@@ -205,12 +205,16 @@ class GroundStationInput:
 
 @dataclass(kw_only=True, eq=False)
 class EngagedPilot:
-    """A `Pilot`: the assisted one while engaged, on its own clock; else the vehicle is wished to be where it is."""
+    """A `Pilot`: the assisted one while engaged, on its own clock; else the vehicle is wished to be where it is.
+
+    `mount`: of its camera, which is where the pilot had turned it as an engagement begins.
+    """
 
     inner: AssistedPilot
     gate: OutputGate
     turn: FlightOwnership
     photographed: Callable[[], None]
+    mount: MountControl | None = None
     _notes_told: int = 0
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
@@ -220,9 +224,14 @@ class EngagedPilot:
         if entry is None:
             turn.entry = None
             return Goal(X_WB=estimate.X_WB, nu_B=estimate.nu_B)
-        if entry != turn.entry:
+        begins = entry != turn.entry
+        if begins:
             turn.entry, turn.began_s = entry, time_s
         goal = self.inner.goal(time_s - turn.began_s, estimate)
+        if begins and self.mount is not None and self.mount.reported:
+            tilt_rad = self.mount.angle_rad
+            self.inner.motion = replace(self.inner.motion, tilt_rad=tilt_rad)
+            goal = replace(goal, tilt_rad=tilt_rad)
         for note in self.inner.notes():
             if self.gate.journal is not None:
                 self.gate.journal.write("note", level=note.level, words=note.text)
@@ -514,7 +523,7 @@ def join_vehicle(
     flown = parts.replace(pilot=inner)
     methods = region_methods(flown)
     flown = flown.replace(controller=switched_controller(flown, lambda: inner.state.method, methods))
-    beside = EngagedPilot(inner=inner, gate=gate, turn=turn, photographed=photographed)
+    beside = EngagedPilot(inner=inner, gate=gate, turn=turn, photographed=photographed, mount=mount)
     rests = EngagedController(inner=flown.controller, turn=turn, thrusters=len(parts.vehicle.thrusters))
     told = ServoEstimator(inner=flown.estimator, turn=turn, flown_N=flown_N)
     whole = flown.replace(pilot=beside, controller=rests, estimator=told)
