@@ -4,8 +4,9 @@ The photographs are rendered: a textured bed with plateaus at several heights, s
 Ours and pycolmap's own calls (features, all pairs, incremental mapping) have the same number of features, one thread
 and the same lens model; pycolmap has no dense points without CUDA. Each part runs in a process of its own, so that its
 memory is its own. Figures of 500 photographs are extrapolated, not measured: features, pairs and stereo take a time for
-each, mapping follows a power of the number, and the memory of each stage a line. Each further thread of feature
-extraction has 2.2 GB of its own.
+each, mapping follows a power of the number, and the memory of each stage a line. That of fusion and mesh is a line over
+the points, of which there are `dense_points.MOST_POINTS` at most; reading and stereo have stores of bounded size beside
+a small picture of each photograph. Each further thread of feature extraction has 2.2 GB of its own.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from wakewise.core.errors import StageError
 from wakewise.core.geometry import matrix_from_quat, quat_from_rotvec
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.vision.reconstruction import ReconstructionRequest, ReconstructionSettings, reconstruct
+from wakewise.vision.reconstruction.dense.dense_points import HELD_BYTES, MOST_POINTS
 from wakewise.vision.reconstruction.sfm.colmap import pycolmap
 from wakewise.vision.reconstruction.sfm.pairs import RETRIEVED_NEIGHBOURS, SEQUENCE_OVERLAP, sequence_pairs
 from wakewise_benchmarks.peak_memory import forget_peak, peak_memory_MB
@@ -38,6 +40,8 @@ WIDTH, HEIGHT, FOCAL_PX = 4000, 3000, 3600.0
 ABOVE_M, STEP_M, TEXEL_M, TILT_RAD = 2.0, 0.3, 0.001, 0.08
 """Height of the cameras above the bed, their distance, size of the texture's pixels, and largest tilt."""
 PLATEAUS, HIGHEST_M, RADIUS_M, SEED = 40, 0.4, 0.15, 1
+SMALL_MB = 3e-6 * (WIDTH // (WIDTH // 640)) * (HEIGHT // (WIDTH // 640))
+"""Of a photograph as stereo keeps it, at the usual `dense_px` of 640."""
 COUNTS, MANY = (12, 24), 500
 """At 12 the room for decoded photographs is full (`photo_folder.KEPT_BYTES`), from where memory follows a line."""
 
@@ -231,9 +235,22 @@ def extrapolated(found: dict[str, dict[str, Any]], many: int = MANY) -> dict[str
                 for one in (low, high))  # fmt: skip
         return float(each + power(*rest))
 
+    def dense_MB() -> float:
+        a, b = low["dense"], high["dense"]
+        more = b["dense_points"] - a["dense_points"]
+        points = min(b["dense_points"] + more / (most - few) * (many - most), MOST_POINTS)
+        ends = []
+        for stage, memory_MB in b["memory_MB"].items():
+            if stage in ("fusion", "mesh"):
+                each = max(0.0, memory_MB - a["memory_MB"].get(stage, memory_MB)) / max(more, 1)
+                ends.append(memory_MB + each * max(0.0, points - b["dense_points"]))
+            else:
+                ends.append(memory_MB + 1e-6 * HELD_BYTES + SMALL_MB * (many - most))
+        return float(max(ends))
+
     dense = sum(high["dense"]["cpu_s"].values()) / most * many
     return {
-        keys[0]: max(line("sparse"), line("dense")),
+        keys[0]: max(line("sparse"), dense_MB()),
         keys[1]: cpu("sparse", pairs_of_many(many)) + dense,
         keys[2]: line("pycolmap"),
         keys[3]: cpu("pycolmap", many * (many - 1) // 2),

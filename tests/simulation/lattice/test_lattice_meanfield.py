@@ -155,13 +155,6 @@ def test_flow_continues_beyond_the_table_like_itself():
     assert np.all(table.at(np.array([-5.0, 3.0]), np.array([0.0, 6.0])) == 0)
 
 
-def test_fluctuations_follow_the_tables():
-    """Root of the mean of the three variances, times U0."""
-    flow = _flow(_table())
-    expected = math.sqrt(1.0 / (DENSITY * AREA_M2)) * math.sqrt((0.04 + 0.01 + 0.01) / 3)
-    assert flow.fluctuation_m_s(np.zeros((1, 3))) == pytest.approx([expected], rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

@@ -30,6 +30,24 @@ def test_means_equal_their_twin(seed, parts, spread):
     assert np.allclose(means, wanted, rtol=1e-12, atol=1e-12 * spread) and counts.tolist() == numbers
 
 
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), spread=st.sampled_from([0.5, 5.0]))
+def test_coarser_cells_hold_what_they_would_have_held_from_the_first(seed, spread):
+    """Rows that came before and rows that come after are in the means and numbers of cells twice as large."""
+    rng = np.random.default_rng(seed)
+    rows, weights = spread * rng.normal(size=(200, 5)), rng.integers(1, 4, 200)
+    cells = CellMeans(5, 0.3)
+    cells.add(rows[:120], weights[:120])
+    fine = len(cells)
+    cells = cells.coarser()
+    assert len(cells) <= fine
+    cells.add(rows[120:], weights[120:])
+    means, counts = cells.means()
+    wanted, numbers = slow_means(rows, weights, 0.6)
+    assert np.allclose(means, wanted, rtol=1e-12, atol=1e-12 * spread)
+    assert counts.tolist() == numbers
+
+
 def test_nothing_gives_nothing():
     """No rows, no cells."""
     means, counts = CellMeans(9, 1.0).means()

@@ -2,11 +2,23 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from wakewise.vision.reconstruction import ReconstructionSettings, reconstruct
 from wakewise.vision.reconstruction.dense import dense_points
 from wakewise.vision.reconstruction.dense.dense_points import DepthStore
 from wakewise.vision.reconstruction.dense.stereo import DepthMap
+from wakewise.vision.reconstruction.outputs.clouds import read_cloud
+from wakewise.vision.reconstruction.stages import read_stamp
+
+FEW = ReconstructionSettings(
+    detector="opencv",
+    max_features=1000,
+    first_octave=0,
+    agreeing_views=1,
+    mesh=False,
+    check_shared_intrinsics=False,
+)
 
 
 def depth_map(rng, height, width):
@@ -48,16 +60,25 @@ def test_what_comes_out_is_what_went_in(tmp_path):
 def test_a_cloud_from_maps_on_disk_is_the_same_to_the_byte(relief_photos, tmp_path, monkeypatch):
     """With no room in memory at all; nothing of them is left in the folder."""
     folder, _ = relief_photos
-    settings = ReconstructionSettings(
-        detector="opencv",
-        max_features=1000,
-        first_octave=0,
-        agreeing_views=1,
-        mesh=False,
-        check_shared_intrinsics=False,
-    )
     for name, held in (("memory", 10**9), ("disk", 0)):
         monkeypatch.setattr(dense_points.DepthStore.__init__, "__defaults__", (held,))
-        reconstruct(folder, tmp_path / name, settings)
+        reconstruct(folder, tmp_path / name, FEW)
     assert (tmp_path / "memory" / "dense.ply").read_bytes() == (tmp_path / "disk" / "dense.ply").read_bytes()
     assert [p.name for p in (tmp_path / "disk").iterdir() if p.name.startswith(".")] == []
+
+
+@pytest.mark.slow
+def test_points_are_thinned_to_a_bound(relief_photos, tmp_path, monkeypatch):
+    """A quarter of them is left when cells become twice as large, and what is said of their spacing is true."""
+    folder, _ = relief_photos
+    whole = reconstruct(folder, tmp_path / "whole", FEW)
+    monkeypatch.setattr(dense_points, "MOST_POINTS", round(0.6 * whole.dense_points))
+    few = reconstruct(folder, tmp_path / "few", FEW)
+    assert 0.15 * whole.dense_points < few.dense_points < 0.4 * whole.dense_points
+    spacing_mm, before_mm = (
+        read_stamp(tmp_path / name, "dense")["figures"]["point_spacing_mm"] for name in ("few", "whole")
+    )
+    assert spacing_mm == 2.0 * before_mm
+    at = read_cloud(tmp_path / "few" / "dense.ply").points_m
+    apart_mm = 1e3 * np.median(KDTree(at).query(at, k=2)[0][:, 1])
+    assert 0.4 < apart_mm / spacing_mm < 1.5

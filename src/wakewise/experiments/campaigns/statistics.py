@@ -197,9 +197,6 @@ def mean_figures(rows: Iterable[Figures], keys: Iterable[str], worst: Sequence[s
     return answer
 
 
-# Several tests at once ---------------------------------------------------------------------------------------------
-
-
 def holm(p: Sequence[float] | Array) -> Array:
     """Holm's step-down correction: never larger than Bonferroni's, as safe (Holm 1979, Scand. J. Statist. 6, 65).
 

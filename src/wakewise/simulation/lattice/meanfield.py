@@ -190,15 +190,3 @@ class LatticeFlow:
             return u[0]
         momentum = np.sum(np.linalg.norm(u, axis=2, keepdims=True) * u, axis=0)
         return momentum / np.sqrt(np.maximum(np.linalg.norm(momentum, axis=1, keepdims=True), 1e-30))
-
-    def fluctuation_m_s(self, points_W_m: Array) -> Array:
-        """Rms of the turbulent velocity in m/s, each component's share taken equal, shape (n,) at points (n, 3).
-
-        Variances of several jets add. For particle images: add a random velocity of this size to `velocity`.
-        """
-        variance = np.zeros(len(points_W_m))
-        for j, speed in enumerate(self.exit_speeds_m_s):
-            x, r, _, _ = self._cylinder(points_W_m, j)
-            rms = self.table.at(x, r, ("axial_rms", "radial_rms", "swirl_rms"))
-            variance += speed**2 * np.mean(rms**2, axis=0)
-        return np.sqrt(variance)

@@ -108,10 +108,12 @@ class DepthStore:
         )
 
 
-# Depth maps of at most this many other photos vote on a point.
 AGREEMENT_PX = 1.0
 """Largest disparity difference of depths that agree."""
 VOTING_PHOTOS = 8
+"""Depth maps of at most so many other photos vote on a point."""
+MOST_POINTS = 8_000_000
+"""With more, cells become twice as large, so that four points of a surface are one: fusion and mesh stay below 8 GB."""
 
 
 def densify(
@@ -137,7 +139,7 @@ def densify(
         with one_opencv_thread():  # the threads are over photos and pairs
             given = store or PhotoStore(folder)
             spacing = _all_depths(maps, given, views, partners, region, settings, scale, progress)
-        cloud = _fuse_all(maps, partners, settings, spacing, progress) if len(maps) else np.zeros((0, 9))
+        cloud, spacing = _fuse_all(maps, partners, settings, spacing, progress)
     if len(cloud) < 100:
         raise StageError(f"dense: {len(cloud)} points survive from {len(maps)} depth maps, at least 100 must")
     normals = facing_normals(cloud[:, :3], cloud[:, 6:9], settings.threads)
@@ -223,8 +225,8 @@ def _fuse_all(
     settings: ReconstructionSettings,
     spacing: float,
     progress: Progress,
-) -> Array:
-    """Points, colours and directions to the camera side by side, shape (n, 9)."""
+) -> tuple[Array, float]:
+    """Points, colours and directions to the camera side by side, shape (n, 9); their spacing, m."""
     photos = [maps.photos(k) for k in range(len(maps))]
     alone = len({photo for both in photos for photo in both}) == 2
 
@@ -246,9 +248,11 @@ def _fuse_all(
     for index, rows in enumerate(in_order(of_one, range(len(maps)), settings.threads)):
         progress(len(maps) + index, 2 * len(maps), "fusion")
         gathered.add(rows)
+        while len(gathered) > MOST_POINTS:
+            gathered, spacing = gathered.coarser(), 2.0 * spacing
     cloud, _ = gathered.means()
     del gathered  # as large as the cloud and half as large again
-    return cloud[~outlier_mask(cloud[:, :3], threads=settings.threads)]
+    return cloud[~outlier_mask(cloud[:, :3], threads=settings.threads)], spacing
 
 
 def require_cuda() -> None:

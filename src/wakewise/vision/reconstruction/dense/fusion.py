@@ -280,6 +280,15 @@ class CellMeans:
             self._slots, self._cells, self._sums, self._counts, self._used, rows, heavy, float(self._cell_m)
         )
 
+    def __len__(self) -> int:
+        return self._used
+
+    def coarser(self) -> CellMeans:
+        """The same rows in cells twice as large; one cell's mean counts as often as it had rows."""
+        larger, (mean, count) = CellMeans(self._sums.shape[1], 2.0 * self._cell_m), self.means()
+        larger.add(mean, count)
+        return larger
+
     def means(self) -> tuple[Array, IntArray]:
         """Mean row of each cell, shape (m, columns), in order of the cells' places, and how many rows it had."""
         used = self._used
