@@ -438,7 +438,7 @@ def test_a_program_of_a_page_starts_and_ends_when_it_is_stopped(line: Line, benc
             assert program.wait(PATIENCE_S) == rule.code, heard.read_text(errors="replace")[-2000:]
         finally:
             program.kill()
-            program.wait()
+            program.communicate()  # which closes its input, too
 
 
 def test_every_line_of_a_page_is_run_or_says_why_not() -> None:
