@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from ball_on_sand import CAMERA, CENTRE_W_M, RADIUS_M, BallOnSand
 
+from loopback_sea import until
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState, TargetEstimate
@@ -22,13 +23,6 @@ from wakewise_ardusub.session.video_tracking import FRESH_S, LASTS_S, PoseHistor
 
 BOX = (0.36, 0.3, 0.64, 0.7)
 STD = (0.003, 0.003)
-
-
-def until(true: Callable[[], object], what: str, patience_s: float = 30.0) -> None:
-    end_s = time.monotonic() + patience_s
-    while not true():
-        assert time.monotonic() < end_s, f"waited {patience_s:g} s for {what}"
-        time.sleep(0.01)
 
 
 @pytest.mark.parametrize(

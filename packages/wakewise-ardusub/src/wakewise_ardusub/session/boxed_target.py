@@ -238,27 +238,21 @@ class BoxDesignation:
             X_WC,
             lambda way: target_distance(way, estimate.X_WB, X_WC.p_m, known.ranges, now_s, self._stated_m),
         )
-
-        def follow() -> None:
-            self._follow(found)
-            self.target = found
-
         if self._video is None:
-            follow()
+            self._go_by(found)
         else:
-            self._video.designate(box, found.distance_m, follow)
+            self._video.designate(box, found.distance_m, lambda: self._go_by(found))
 
     def forget(self) -> None:
         """Protect the first target again."""
-
-        def follow() -> None:
-            self._follow(None)
-            self.target = None
-
         if self._video is None:
-            follow()
+            self._go_by(None)
         else:
-            self._video.forget(follow)
+            self._video.forget(lambda: self._go_by(None))
+
+    def _go_by(self, found: BoxedTarget | None) -> None:
+        self._follow(found)
+        self.target = found
 
     def told(self, X_WC: Pose) -> None:
         """Tell ground stations twice a second where the target is in the picture of the camera at this pose."""

@@ -92,7 +92,7 @@ class VideoTracking:
     ----------
     source : VideoSource
     camera : CalibratedCamera
-        Of the stream, in any size of the same shape.
+        Of the stream's pictures, in the size in which they are tracked.
     ahead_m : float
         How far its projection centre lies before the lens's, behind a flat port.
     folder : Path
@@ -112,8 +112,7 @@ class VideoTracking:
         ahead_m: float = 0.0,
         folder: Path | None = None,
     ) -> None:
-        self._camera = camera.scaled(PERCEPTION.width_px)
-        self._size = camera.width, camera.height
+        self._camera = camera
         self._clock, self._protect, self._poses = clock, protect, PoseHistory()
         self._ahead_m, self._folder, self._boxes = ahead_m, folder, 0
         TargetTracker(camera=self._camera, settings=PERCEPTION).init()  # its kernel is loaded before anything flies
@@ -231,7 +230,7 @@ class VideoTracking:
 
     def _compared(self, picture: Picture) -> str:
         """What is wrong with a picture's shape; empty if nothing is."""
-        (height, width), (own_width, own_height) = picture.shape[:2], self._size
+        (height, width), (own_width, own_height) = picture.shape[:2], (self._camera.width, self._camera.height)
         if abs(height * own_width - width * own_height) <= max(width, own_width):
             return ""
         return f"pictures of {width} x {height}: give --set imaging.width={width} --set imaging.height={height}"
