@@ -73,19 +73,21 @@ def render(folder: Path, count: int) -> None:
     size = math.ceil(side_m / TEXEL_M)
     texture = _texture(size, rng)
     corners = rng.uniform(0.0, side_m, (PLATEAUS, 2))
-    layers = [(0.0, np.full_like(texture, 255))]
+    layers = [(0.0, None, np.full_like(texture, 255))]
     for height, (x, y) in zip(np.linspace(0.05, HIGHEST_M, PLATEAUS), corners, strict=True):
         mask = np.zeros_like(texture)
         cv2.circle(mask, (int(x / TEXEL_M), int(y / TEXEL_M)), int(RADIUS_M / TEXEL_M), 255, -1)
-        layers.append((float(height), mask))
+        layers.append((float(height), np.array([x, y]) / TEXEL_M, mask))
     folder.mkdir()
     for k in range(count):
         row, column = divmod(k, columns)
         eye = np.array([reach_m + column * STEP_M, reach_m + row * STEP_M, ABOVE_M])
         tilt = matrix_from_quat(quat_from_rotvec(rng.uniform(-TILT_RAD, TILT_RAD, 3)))
         grey = np.zeros((HEIGHT, WIDTH), np.uint8)
-        for height, mask in layers:  # the higher ones hide the others
+        for height, middle, mask in layers:  # the higher ones hide the others
             H = _homography(eye, tilt, height)
+            if middle is not None and _is_outside(H, middle):
+                continue
             seen = cv2.warpPerspective(mask, H, (WIDTH, HEIGHT), flags=cv2.INTER_NEAREST) > 0
             if seen.any():
                 np.copyto(grey, cv2.warpPerspective(texture, H, (WIDTH, HEIGHT)), where=seen)
@@ -99,6 +101,13 @@ def _texture(size: int, rng: np.random.Generator) -> NDArray[np.uint8]:
         few = rng.standard_normal((size // cell + 2, size // cell + 2)).astype(np.float32)
         total += cv2.resize(few, (size, size), interpolation=cv2.INTER_CUBIC)
     return np.clip(128.0 + 30.0 * total, 0, 255).astype(np.uint8)
+
+
+def _is_outside(H: Array, middle: Array) -> bool:
+    """Whether no part of a plateau about this pixel of the texture can lie in the photograph."""
+    x, y, w = H @ np.append(middle, 1.0)
+    margin = 2.0 * RADIUS_M * FOCAL_PX / (ABOVE_M - HIGHEST_M)
+    return not (-margin < x / w < WIDTH + margin and -margin < y / w < HEIGHT + margin)
 
 
 def _homography(eye: Array, tilt: Array, height_m: float) -> Array:
