@@ -40,6 +40,7 @@ _SHOWN = {
     "operator": "wakewise_paper.cli.bench_operator:show_operator",
     "reef": "wakewise_benchmarks.reef:show_reef",
     "survey": "wakewise_benchmarks.survey:show_survey",
+    "tank": "wakewise_benchmarks.tank_scaling:show_tank",
     "target": "wakewise_benchmarks.target_finding:show_target",
     "truth": "wakewise_benchmarks.truth:show_truth",
     "worlds": "wakewise_paper.cli.bench_worlds:show_worlds",
@@ -50,6 +51,7 @@ _DRAWN = {
     "gentle": "wakewise_paper.reports.wash_bench_plot:draw_gentle",
     "models": "wakewise_paper.reports.models_bench_plot:draw_models",
     "operator": "wakewise_paper.reports.operator_bench_plot:draw_operator",
+    "tank": "wakewise_benchmarks.tank_scaling_plot:draw_scaling",
     "truth": "wakewise_benchmarks.cube_channel_plot:draw_cube",
 }
 """What draws the answer of a bench: pictures need an extra."""
@@ -162,8 +164,8 @@ def bench(
     plot: Annotated[
         Path | None,
         typer.Option(
-            help="front, gentle, models, operator, truth: draw the figures into this file (.png, .svg, .pdf); of truth "
-            "the cube, of models the doses."
+            help="front, gentle, models, operator, tank, truth: draw the figures into this file (.png, .svg, .pdf); of "
+            "truth the cube, of models the doses, of tank how costs grow."
         ),
     ] = None,
     photographs: Annotated[

@@ -73,7 +73,7 @@ def render(folder: Path, count: int) -> None:
     size = math.ceil(side_m / TEXEL_M)
     texture = _texture(size, rng)
     corners = rng.uniform(0.0, side_m, (PLATEAUS, 2))
-    layers = [(0.0, None, np.full_like(texture, 255))]
+    layers: list[tuple[float, Array | None, NDArray[np.uint8]]] = [(0.0, None, np.full_like(texture, 255))]
     for height, (x, y) in zip(np.linspace(0.05, HIGHEST_M, PLATEAUS), corners, strict=True):
         mask = np.zeros_like(texture)
         cv2.circle(mask, (int(x / TEXEL_M), int(y / TEXEL_M)), int(RADIUS_M / TEXEL_M), 255, -1)

@@ -4,6 +4,7 @@ A flight of the preset is flown once with `dp`; then the thrusts it commanded ar
 the same again (same seed), and that is what is timed: vehicle, water, silt and sensors, the measures that a trial takes
 at 10 Hz, and the water's speed at 5,000 points round the target at 10 Hz. `realtime_factor` is by the wall clock and so
 of the whole machine, whatever else runs on it; `realtime_factor_one_core` by the processor's time of this process.
+`scaling` tells how costs grow (`tank_scaling`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import Scenario, fly, load_scenario
 from wakewise.operation.worlds.makers import tank_world
 from wakewise.simulation.tank import Tank
+from wakewise_benchmarks.tank_scaling import measure_scaling
 
 FLIGHT_S = 120.0
 WARM_UP_S = 10.0
@@ -79,6 +81,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
         "rings": tank.water.counts.rings,
         "silt_particles": len(tank.silt.mass_kg),
         "cores": os.cpu_count(),
+        "scaling": measure_scaling(options.progress),
     }
 
 
