@@ -18,11 +18,11 @@ from wakewise.core.geometry import (
     quat_multiply,
 )
 from wakewise_ardusub.link.message_state import MavlinkMessage
+from wakewise_ardusub.link.pose_messages import odometry_pose
 from wakewise_ardusub.link.telemetry_adapter import (
     SETTLED,
     SenderClock,
     TelemetryAdapter,
-    odometry_pose,
     to_measurements,
 )
 
@@ -89,11 +89,14 @@ def test_a_position_without_a_fresh_attitude_is_no_pose():
 
 
 def test_other_vehicles_measure_nothing():
-    """Attitude of system 2, or of another component of ours, is not this vehicle's."""
+    """Attitude of system 2, or of another component of ours, and system 2's odometry are not this vehicle's."""
     message = attitude(10.0)
     for system, component in ((2, 1), (1, 154)):
         said = MavlinkMessage(system, component, message.name, message.fields)
         assert to_measurements(TelemetryAdapter(), said, 100.0, 1)[1] == ()
+    for system, measured in ((1, 1), (2, 0)):
+        said = MavlinkMessage(system, 197, "ODOMETRY", odometry())
+        assert len(to_measurements(TelemetryAdapter(), said, 100.0, 1)[1]) == measured
 
 
 def test_specific_force_at_rest_points_up():
@@ -129,9 +132,13 @@ def test_odometry_is_the_same_pose_in_every_frame(p, q):
         assert abs(turned[0]) == pytest.approx(1.0, abs=1e-9)
 
 
+def odometry() -> dict[str, object]:
+    """Fields of an ODOMETRY at the origin."""
+    return {"time_usec": 1, "frame_id": 1, "child_frame_id": 12, "x": 0.0, "y": 0.0, "z": 0.0, "q": [1.0, 0, 0, 0]}
+
+
 @pytest.mark.parametrize("fields", [{"frame_id": 0}, {"child_frame_id": 99}, {"q": [0.0] * 4}, {"x": math.nan}])
 def test_odometry_that_is_none_measures_nothing(fields):
     """A global frame, an unknown one, no quaternion, no number: nothing is measured and nothing raised."""
-    whole = {"time_usec": 1, "frame_id": 1, "child_frame_id": 12, "x": 0.0, "y": 0.0, "z": 0.0, "q": [1.0, 0, 0, 0]}
-    said = MavlinkMessage(1, 197, "ODOMETRY", {**whole, **fields})
+    said = MavlinkMessage(1, 197, "ODOMETRY", {**odometry(), **fields})
     assert to_measurements(TelemetryAdapter(), said, 100.0, 1)[1] == ()

@@ -8,6 +8,7 @@ import threading
 from contextlib import ExitStack
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.ui.cli.main import run
@@ -59,7 +60,9 @@ def test_what_one_says_goes_to_all_others_as_it_is() -> None:
 
 
 def test_a_firmware_that_comes_back_at_another_port_is_answered_there() -> None:
-    """And who is not there yet loses nothing for the others."""
+    """From its first heartbeat on; who is not there yet loses nothing for the others."""
+    mav = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
+    beat = bytes(mav.heartbeat_encode(12, 3, 129, 19, 4).pack(mav))
     port = free_port()
     with ExitStack() as stack:
         station = opened(stack)
@@ -68,10 +71,10 @@ def test_a_firmware_that_comes_back_at_another_port_is_answered_there() -> None:
         stack.callback(shared.close)
         for _ in range(2):
             autopilot = opened(stack)
-            autopilot.sendto(b"beat", ("127.0.0.1", port))
+            autopilot.sendto(beat, ("127.0.0.1", port))
             shared.turn()
             data, sender = heard(station)
-            assert data == b"beat"
+            assert data == beat
             station.sendto(b"arm", sender)
             for _ in range(5):  # a refused datagram to nobody may wake it
                 shared.turn()

@@ -134,11 +134,31 @@ def test_ground_stations_are_known_by_their_heartbeats():
 
 def test_a_sensors_own_pose_is_preferred():
     """While a camera's pose comes, the autopilot's estimate, which is made of it, does not stand for it."""
-    camera = MavlinkMessage(1, 197, "VISION_POSITION_ESTIMATE", {"x": 1.0, "y": 2.0, "z": 3.0})
-    own = MavlinkMessage(1, 1, "LOCAL_POSITION_NED", {"x": 9.0, "y": 9.0, "z": 9.0, "vx": 0.0, "vy": 0.0, "vz": 0.0})
+    level = {"roll": 0.0, "pitch": 0.0, "yaw": 0.0}
+    camera = MavlinkMessage(1, 197, "VISION_POSITION_ESTIMATE", {"x": 1.0, "y": 2.0, "z": 3.0, **level})
+    own = MavlinkMessage(1, 1, "LOCAL_POSITION_NED", {"x": 9.0, "y": 9.0, "z": 9.0, "vx": 0.2, "vy": 0.0, "vz": 0.0})
     known = update_link_state(update_link_state(LinkState(), camera, 0.0), own, 0.5)
     assert known.place_W_m == pytest.approx([1.0, 2.0, 3.0])
+    assert known.velocity_W_m_s == (0.2, 0.0, 0.0)  # which the sensor does not give
     assert update_link_state(known, own, 1.5).place_W_m == pytest.approx([9.0, 9.0, 9.0])
+
+
+@pytest.mark.parametrize(("frame", "child", "place"), [(1, 12, (1, 2, 3)), (4, 13, (2, 1, -3)), (21, 13, (1, -2, -3))])
+def test_a_place_is_in_ned_whatever_frame_odometry_has(frame, child, place):
+    """East, north, up and forward, left, up become north, east, down: fence and start use the estimator's place."""
+    fields = {"frame_id": frame, "child_frame_id": child, "x": 1.0, "y": 2.0, "z": 3.0, "q": [1.0, 0.0, 0.0, 0.0]}
+    assert after(MavlinkMessage(1, 197, "ODOMETRY", fields)).place_W_m == pytest.approx(place)
+
+
+@pytest.mark.parametrize(
+    ("system", "fields"),
+    [(1, {"child_frame_id": 99}), (1, {"q": [0.0] * 4}), (1, {"x": math.nan}), (2, {})],
+    ids=["frame", "quaternion", "number", "vehicle"],
+)
+def test_a_pose_that_the_estimator_refuses_is_not_a_fresh_one(system, fields):
+    """Nor is one of another vehicle: the loss of the position must be noticed."""
+    whole = {"frame_id": 1, "child_frame_id": 12, "x": 1.0, "y": 2.0, "z": 3.0, "q": [1.0, 0.0, 0.0, 0.0]}
+    assert math.isinf(after(MavlinkMessage(system, 197, "ODOMETRY", {**whole, **fields})).pose_s)
 
 
 def test_depth_is_positive_down():

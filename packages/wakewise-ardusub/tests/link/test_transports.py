@@ -50,6 +50,28 @@ def test_who_waits_answers_whoever_spoke():
         speaking.close()
 
 
+def test_who_only_sends_poses_is_not_answered():
+    """Of two that speak to one port the one with heartbeats is answered, before and after the other's poses."""
+    heart = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
+    beat = heart.heartbeat_encode(12, 3, 129, 19, 4).pack(heart)
+    pose = heart.vision_position_estimate_encode(1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0).pack(heart)
+    waiting = UdpTransport(Endpoint(way="udpin", host="127.0.0.1"))
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2)]
+    try:
+        for one in sockets:
+            one.bind(("127.0.0.1", 0))
+            one.settimeout(2.0)
+        router, sender = sockets
+        for who, data in ((sender, pose), (router, beat), (sender, pose)):
+            who.sendto(data, waiting.socket.getsockname())
+            assert waiting.receive(2.0) == bytes(data)
+        waiting.send(b"thrusts")
+        assert router.recv(100) == b"thrusts"
+    finally:
+        for one in (*sockets, waiting):
+            one.close()
+
+
 def test_a_record_cannot_be_flown(tmp_path):
     """A file is refused, and what reads it is named."""
     (tmp_path / "flight.tlog").write_bytes(b"")

@@ -33,6 +33,9 @@ def sensors(
         str | None,
         typer.Option(metavar="HOST:PORT", help="Hand poses on as MAVLink's VISION_POSITION_ESTIMATE, over UDP."),
     ] = None,
+    system: Annotated[
+        int, typer.Option(help="Id of the vehicle of which --forward sends poses (SYSID_THISMAV).", min=1, max=255)
+    ] = 1,
     density: Annotated[float, typer.Option(help="Of the water, kg/m3: 1000 fresh, 1025 salt.")] = 1000.0,
     zero: Annotated[
         bool, typer.Option("--zero", help="The vehicle is at the surface now: take its pressure for depth 0.")
@@ -55,7 +58,7 @@ def sensors(
     with ExitStack() as stack:
         if forward is not None and poses is None:
             raise InputError("--forward: goes with --poses")
-        forwarder = None if forward is None else stack.enter_context(closing(PoseForwarder(forward)))
+        forwarder = None if forward is None else stack.enter_context(closing(PoseForwarder(forward, system)))
         sources = _sources(stack, depth, depth_model, imu, baud, imu_axes, poses, density, zero)
         try:
             for told in watch(sources, math.inf if seconds is None else seconds, every_s=1.0, passed=forwarder):

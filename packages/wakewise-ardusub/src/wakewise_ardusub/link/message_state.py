@@ -18,6 +18,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.geometry import euler_from_quat, quat_from_euler
 from wakewise.operation.teleop.input.controls import CONTROL_AXES, apply_dead_zone
 from wakewise_ardusub.link import protocol
+from wakewise_ardusub.link.pose_messages import SENSED_POSES, finite, sensed_pose
 from wakewise_ardusub.logs.channels import MODES
 
 REMEMBERED_S = 1.0
@@ -173,7 +174,7 @@ WANTED = frozenset({
     "COMMAND_ACK", "CAMERA_IMAGE_CAPTURED", "DISTANCE_SENSOR", "EKF_STATUS_REPORT", "AUTOPILOT_VERSION",
     "GLOBAL_POSITION_INT", "MOUNT_STATUS", "GIMBAL_DEVICE_ATTITUDE_STATUS",
 })  # fmt: skip
-"""Messages that are looked into, here, in `measuring.py` or by a survey."""
+"""Messages that are looked into, here, in `telemetry_adapter` or by a survey."""
 
 
 def update_link_state(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
@@ -204,8 +205,8 @@ def _taken(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
         if said.fields["type"] == _GROUND_STATION:
             return replace(known, ground=MappingProxyType({**known.ground, said.system: now_s}))
         return known
-    if said.name in ("VISION_POSITION_ESTIMATE", "ODOMETRY"):
-        return _placed(known, said, now_s)
+    if said.name in SENSED_POSES:  # one of another vehicle says nothing of this one
+        return _placed(known, said, now_s) if ours else known
     return _from_ground(known, said, now_s)
 
 
@@ -245,7 +246,7 @@ def _from_companion(known: LinkState, said: MavlinkMessage, now_s: float) -> Lin
     elif said.name == "HEARTBEAT":
         rival = int(said.fields["custom_mode"]) != known.session
         words = f"another program speaks as component {protocol.COMPANION_COMPONENT} of this vehicle"
-    elif said.name in ("VISION_POSITION_ESTIMATE", "ODOMETRY"):
+    elif said.name in SENSED_POSES:
         return _placed(known, said, now_s)
     else:
         return known
@@ -266,7 +267,7 @@ def _from_autopilot(known: LinkState, said: MavlinkMessage, now_s: float) -> Lin
     if name == "VFR_HUD":
         (altitude,) = _floats(get, "alt")
         return replace(known, depth_m=-altitude, depth_s=now_s)
-    if name in ("LOCAL_POSITION_NED", "ODOMETRY", "VISION_POSITION_ESTIMATE"):
+    if name == "LOCAL_POSITION_NED" or name in SENSED_POSES:
         return _placed(known, said, now_s)
     if name == "MOUNT_STATUS":
         return replace(known, mount_pitch=(math.radians(0.01 * int(get["pointing_a"])), now_s))
@@ -331,16 +332,15 @@ def _overtaken(known: LinkState, words: str, now_s: float) -> LinkState:
 
 def _placed(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkState:
     """A position: of the autopilot's own estimate, or of a sensor that others feed it with."""
-    place = np.array(_floats(said.fields, "x", "y", "z"))
-    if np.abs(place).max() > 1e5:
-        raise ValueError
-    sensed = said.name != "LOCAL_POSITION_NED"
-    if not sensed and known.pose_from not in ("", said.name) and now_s - known.pose_s < REMEMBERED_S:
-        return known  # a sensor's own word is better than what the autopilot made of it
-    known = replace(known, place_W_m=place, pose_s=now_s, pose_from=said.name)
-    if sensed:
-        return known
-    return replace(known, velocity_W_m_s=_floats(said.fields, "vx", "vy", "vz"))
+    if said.name in SENSED_POSES:
+        # What the estimator refuses is no position here either, so that it cannot pass for a fresh one.
+        place = sensed_pose(said.name, said.fields).p_m
+        return replace(known, place_W_m=place, pose_s=now_s, pose_from=said.name)
+    place = finite(said.fields, "x", "y", "z")
+    known = replace(known, velocity_W_m_s=_floats(said.fields, "vx", "vy", "vz"))
+    if known.pose_from not in ("", said.name) and now_s - known.pose_s < REMEMBERED_S:
+        return known  # a sensor's own place is better than what the autopilot made of it
+    return replace(known, place_W_m=place, pose_s=now_s, pose_from=said.name)
 
 
 def stick_axes(fields: Mapping[str, Any]) -> Array:

@@ -4,8 +4,8 @@
 with the least delay of the last ones, up to the least travel time. After a jump of the sender's clock its messages are
 refused until `SETTLED` of them are consistent.
 
-**Frames.** The autopilot's local frame is NED and its body FRD, as ours are. ODOMETRY may come in FLU and ENU and is
-converted. A position without an attitude gets the autopilot's attitude, extrapolated by its rates to the same instant.
+**Frames.** The autopilot's local frame is NED and its body FRD, as ours are; `pose_messages` converts what sensors
+send. A position without an attitude gets the autopilot's attitude, extrapolated by its rates to the same instant.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.constants import GRAVITY_M_S2
-from wakewise.core.geometry import Pose, quat_from_euler, quat_integrate, quat_multiply
+from wakewise.core.geometry import Pose, quat_from_euler, quat_integrate
 from wakewise.core.interfaces import Measurement
 from wakewise_ardusub.link.message_state import MavlinkMessage
+from wakewise_ardusub.link.pose_messages import SENSED_POSES, finite, sensed_pose
 from wakewise_ardusub.link.protocol import AUTOPILOT_COMPONENT
 
 AHEAD_S, BEHIND_S = 1.0, 1.0
@@ -33,10 +34,6 @@ COMPARED = 250
 """Messages over which clocks are compared; what is older is forgotten, since clocks drift."""
 ATTITUDE_S = 0.1
 """How far an attitude is carried on to the instant of a position."""
-_LOCAL_NED, _LOCAL_ENU, _LOCAL_FRD, _LOCAL_FLU = 1, 4, 20, 21
-_BODY_NED, _BODY_FRD, _BODY_FLU = 8, 12, 13
-_NED_FROM_ENU = np.array([0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0])
-_FRD_FROM_FLU = np.array([0.0, 1.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,8 +113,10 @@ def _measured(
     known: TelemetryAdapter, said: MavlinkMessage, came_s: float, system: int
 ) -> tuple[TelemetryAdapter, tuple[Measurement, ...]]:
     name, get = said.name, said.fields
-    autopilot = said.system == system and said.component == AUTOPILOT_COMPONENT
-    if name in ("VISION_POSITION_ESTIMATE", "ODOMETRY"):
+    if said.system != system:
+        return known, ()
+    autopilot = said.component == AUTOPILOT_COMPONENT
+    if name in SENSED_POSES:
         made_s = 1e-6 * float(get["usec" if name == "VISION_POSITION_ESTIMATE" else "time_usec"])
     elif autopilot and name in ("ATTITUDE", "LOCAL_POSITION_NED"):
         made_s = 1e-3 * float(get["time_boot_ms"])
@@ -126,7 +125,7 @@ def _measured(
     else:
         return known, ()
     # Milliseconds since boot and microseconds of another epoch are two clocks, though one program may send both.
-    key = (said.system, said.component, name in ("VISION_POSITION_ESTIMATE", "ODOMETRY"))
+    key = (said.system, said.component, name in SENSED_POSES)
     clock, time_s, jump_s = known.clocks.get(key, SenderClock()).at(made_s, came_s)
     known = replace(known, clocks=MappingProxyType({**known.clocks, key: clock}))
     if jump_s:
@@ -135,60 +134,24 @@ def _measured(
     if time_s is None:
         return replace(known, jump_s=came_s), ()
     if name == "ATTITUDE":
-        q, omega = quat_from_euler(*_finite(get, "roll", "pitch", "yaw")), _rates(get)
+        q, omega = quat_from_euler(*finite(get, "roll", "pitch", "yaw")), _rates(get)
         return (
             replace(known, attitude=AttitudeSample(time_s=time_s, q_WB=q, omega_B_rad_s=omega)),
             (Measurement(time_s=time_s, omega_B_rad_s=omega),),
         )
     if name == "RAW_IMU":
-        force = 1e-3 * GRAVITY_M_S2 * _finite(get, "xacc", "yacc", "zacc")
+        force = 1e-3 * GRAVITY_M_S2 * finite(get, "xacc", "yacc", "zacc")
         return known, ((Measurement(time_s=time_s, force_B_m_s2=force),) if np.any(force) else ())
     if name == "LOCAL_POSITION_NED":
         turned = known.attitude
         if came_s - known.sensed_s < BEHIND_S or turned is None or abs(time_s - turned.time_s) > ATTITUDE_S:
             return known, ()
-        X_WB = Pose(_finite(get, "x", "y", "z"), turned.at(time_s))
-    elif name == "VISION_POSITION_ESTIMATE":
-        X_WB = Pose(_finite(get, "x", "y", "z"), quat_from_euler(*_finite(get, "roll", "pitch", "yaw")))
+        X_WB = Pose(finite(get, "x", "y", "z"), turned.at(time_s))
     else:
-        X_WB = odometry_pose(get)
+        X_WB = sensed_pose(name, get)
     sensed_s = known.sensed_s if name == "LOCAL_POSITION_NED" else came_s
     return replace(known, sensed_s=sensed_s), (Measurement(time_s=time_s, X_WB=X_WB),)
 
 
-def odometry_pose(fields: Mapping[str, Any]) -> Pose:
-    """Body (FRD) in the world (NED) of an ODOMETRY message, whatever of the usual frames it is said in.
-
-    Raises
-    ------
-    ValueError
-        If the frame is none that says where the body is, or the quaternion is none.
-    """
-    frame, child = int(fields["frame_id"]), int(fields["child_frame_id"])
-    place, q = _finite(fields, "x", "y", "z"), np.array([float(v) for v in fields["q"]])
-    if not abs(float(np.linalg.norm(q)) - 1.0) < 0.01:
-        raise ValueError
-    q = q / np.linalg.norm(q)
-    # A world in FLU is turned to FRD by pi about its x axis, one in ENU by swapping its first two axes.
-    into = {_LOCAL_NED: None, _LOCAL_FRD: None, _LOCAL_ENU: _NED_FROM_ENU, _LOCAL_FLU: _FRD_FROM_FLU}[frame]
-    body = {_BODY_FRD: None, _BODY_NED: None, _BODY_FLU: _FRD_FROM_FLU}[child]
-    if frame == _LOCAL_ENU:
-        place = place[[1, 0, 2]] * np.array([1.0, 1.0, -1.0])
-    elif frame == _LOCAL_FLU:
-        place = place * np.array([1.0, -1.0, -1.0])
-    if into is not None:
-        q = quat_multiply(into, q)
-    if body is not None:
-        q = quat_multiply(q, body)
-    return Pose(place, q)
-
-
 def _rates(fields: Mapping[str, Any]) -> Array:
-    return _finite(fields, "rollspeed", "pitchspeed", "yawspeed")
-
-
-def _finite(fields: Mapping[str, Any], *names: str) -> Array:
-    values = np.array([float(fields[name]) for name in names])
-    if not np.isfinite(values).all() or np.abs(values).max() > 1e5:
-        raise ValueError
-    return values
+    return finite(fields, "rollspeed", "pitchspeed", "yawspeed")

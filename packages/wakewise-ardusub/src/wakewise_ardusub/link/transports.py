@@ -117,10 +117,11 @@ LARGEST = 65535
 _AT_ONCE = 4096
 _PATIENCE_S = 5.0
 _TAKEN = 98
+_HEARTBEAT = 0
 
 
 def open_transport(endpoint: Endpoint) -> UdpTransport | StreamTransport:
-    """The carrier to an endpoint.
+    """The transport to an endpoint.
 
     Raises
     ------
@@ -144,7 +145,7 @@ def open_udp(endpoint: Endpoint) -> socket.socket:
     Raises
     ------
     InputError, EnvironmentFailure
-        As `carrier_of`.
+        As `open_transport`.
     """
     at = _address(endpoint)
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -157,7 +158,11 @@ def open_udp(endpoint: Endpoint) -> socket.socket:
 
 
 class UdpTransport:
-    """A `Carrier` over a UDP socket. It answers whoever spoke last, or the place that it was told to speak to."""
+    """A `Transport` over a UDP socket: it speaks to the place that it was told, or to who sent heartbeats last.
+
+    Who only sends poses to the same port, as `wakewise link sensors --forward` does, is heard and not answered. Before
+    the first heartbeat it answers whoever spoke first.
+    """
 
     def __init__(self, endpoint: Endpoint) -> None:
         self.socket = open_udp(endpoint)
@@ -168,7 +173,9 @@ class UdpTransport:
         """The next datagram."""
         try:
             if select.select([self.socket], [], [], max(timeout_s, 0.0))[0]:
-                data, self._peer = self.socket.recvfrom(LARGEST)
+                data, sender = self.socket.recvfrom(LARGEST)
+                if self._peer is None or (sender != self._peer and _beats(data)):
+                    self._peer = sender
                 return data
         except OSError:  # such as what a refused datagram leaves behind
             return b""
@@ -184,8 +191,13 @@ class UdpTransport:
         self.socket.close()
 
 
+def _beats(data: bytes) -> bool:
+    """Whether a HEARTBEAT is among the packets of a datagram."""
+    return any(isinstance(part, MavlinkPacket) and part.number == _HEARTBEAT for part in packets(data))
+
+
 class StreamTransport:
-    """A `Carrier` over bytes without borders: what may be the begin of a packet is kept until the rest has come."""
+    """A `Transport` over bytes without borders: what may be the begin of a packet is kept until the rest has come."""
 
     def __init__(
         self, handle: Any, read: Callable[[int], bytes], write: Callable[[bytes], Any], close: Callable[[], Any]
