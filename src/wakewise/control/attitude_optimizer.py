@@ -54,8 +54,7 @@ RESERVE = 0.8
 RATE_RAD_S, ACCELERATION_RAD_S2 = 0.08, 0.04
 """How fast an offset changes, and how fast that. The body's middle goes round a hinge at most a quarter of a metre
 away: at 2 cm/s, a third of a mission's speed on its orbits, with 1 cm/s2, a fifth of the acceleration of a mission's
-legs, so
-that a change of attitude asks for less than the mission itself does."""
+legs, so that a change of attitude asks for less than the mission itself does."""
 
 EVALUATE_S, ROUND_S = 0.1, 2.0
 """Time between two evaluations: the planner's own; and what a round of them takes over a joint of 90 deg."""
@@ -113,7 +112,7 @@ def offset_step(offset_rad: float, rate_rad_s: float, target_rad: float, dt_s: f
 
 @lru_cache(maxsize=512)
 def return_profile(offset_rad: float, held_s: float = 0.0) -> tuple[float, ...]:
-    """Leans every `AHEAD_S` from now on, if one is held for a while and then given back."""
+    """Offsets every `AHEAD_S` from now on, if one is held for a while and then given back."""
     offset, rate, offsets = offset_rad, 0.0, [offset_rad] * (1 + round(held_s / AHEAD_S))
     while offset != 0.0:
         for _ in range(round(AHEAD_S / EVALUATE_S)):
@@ -159,8 +158,7 @@ class AttitudeCost:
 INFEASIBLE = AttitudeCost(cost=np.inf, power_W=np.inf)
 NEAR = 4.0
 """Attitudes that cost at most this many times the least are as good as the least: no wake model of ours knows the
-speeds
-of the water within a factor of two (docs/research-log/0014), and cost goes with their square."""
+speeds of the water within a factor of two (docs/research-log/0014), and cost goes with their square."""
 MOST_POWER = 2.0
 """An attitude may take this many times the power of the mission's own. Where wash is carried off by a current or has
 nothing to disturb, wake models still find it, and a vehicle that hovers for nearly nothing would pitch for it."""
@@ -225,7 +223,7 @@ class AttitudeEvaluator:
         )
 
     def offsets(self, goal: Goal) -> tuple[float, ...]:
-        """Leans to compare: whole steps between the stops, and the stops."""
+        """Offsets to compare: whole steps between the stops, and the stops."""
         low, high = self.hinge.span(goal.tilt_rad)
         steps = STEP_RAD * np.arange(np.ceil(low / STEP_RAD), np.floor(high / STEP_RAD) + 1.0)
         return tuple(float(offset) for offset in np.unique(np.concatenate([[low], steps, [0.0], [high]]).round(9)))

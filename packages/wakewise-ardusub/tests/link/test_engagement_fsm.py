@@ -33,7 +33,6 @@ WELL = EngagementInputs(
     loop_s=0.05,
     script_version=SCRIPT_VERSION,
     acts=False,
-    acts_s=0.3,
     depth_m=2.0,
     distance_m=1.0,
     tilt_rad=0.1,
@@ -129,7 +128,7 @@ def test_a_script_of_another_version_is_refused():
 
 def test_a_script_that_does_not_act_ends_the_engagement():
     """Engaged for two of its reports, and it says that it does not act."""
-    idle = replace(WELL, engaged_s=2.0, acts=False, acts_s=0.1)
+    idle = replace(WELL, engaged_s=2.0, acts=False, script_s=0.1)
     assert engaged().judged(idle, LIMITS).why == "the script does not act on the thrusts"
     assert engaged().judged(replace(idle, acts=True), LIMITS).state == "engaged"
     assert engaged().judged(replace(idle, engaged_s=0.5), LIMITS).state == "engaged"
@@ -157,7 +156,6 @@ ANY = st.builds(
     script_s=st.floats(0.0, 2.0),
     script_version=st.sampled_from([SCRIPT_VERSION] * 3 + [1, None]),
     acts=st.sampled_from([True, False, None]),
-    acts_s=st.floats(0.0, 2.0),
     loop_s=st.floats(0.0, 0.6),
     thrusts_s=st.floats(0.0, 0.3),
     engaged_s=st.floats(0.0, 5.0),

@@ -142,9 +142,9 @@ def patches_of(
             f"coverage: nothing of the target is {CLEARANCE_M:g} m or more above the bed, nothing to photograph"
         )
     n = count * per_patch
-    face = np.searchsorted(total, (np.arange(n) + rng.random(n)) / n * total[-1], side="right")
+    face = np.searchsorted(total, (np.arange(n) + rng.random(n)) / n * total[-1], side="right").clip(max=len(total) - 1)
     root, v = np.sqrt(rng.random(n)), rng.random(n)
-    a, b, c = corners[np.minimum(face, len(corners) - 1)].transpose(1, 0, 2)
+    a, b, c = corners[face].transpose(1, 0, 2)
     points = a + (b - a) * (root * (1.0 - v))[:, None] + (c - a) * (root * v)[:, None]
     normals = cross[face] / twice_area[face, None]
     shield, off_m = _shield(np.asarray(surface.vertices_m), np.asarray(surface.faces))

@@ -181,7 +181,7 @@ def _print(figures: dict[str, Any]) -> None:
 def _fly(session: TransectSession, codec: MavlinkCodec, *, consent: bool, wait_s: float) -> None:
     """Receive, judge and send until it is over; Ctrl-C ends it in the firmware's hold."""
     from wakewise.core.errors import InputError
-    from wakewise_ardusub.survey.survey_safety import GUIDED
+    from wakewise_ardusub.link.protocol import GUIDED
 
     keys = sys.stdin if sys.stdin is not None and sys.stdin.isatty() else None
     if keys is None and not consent and session.options.limits.mode != GUIDED:

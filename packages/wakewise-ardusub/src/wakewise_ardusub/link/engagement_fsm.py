@@ -74,7 +74,7 @@ class EngagementInputs:
         Ages of what was last heard from autopilot, its attitude, a position, the pilot's sticks and the script.
     script_version : int or None
     acts : bool or None
-        What the script last said of itself, `acts_s` ago.
+        What the script last said of itself, `script_s` ago.
     thrusts_s : float
         Age of the thrusts that the controller decided last, since it was engaged.
     loop_s : float
@@ -103,7 +103,6 @@ class EngagementInputs:
     script_s: float = math.inf
     script_version: int | None = None
     acts: bool | None = None
-    acts_s: float = math.inf
     thrusts_s: float = 0.0
     loop_s: float = math.inf
     engaged_s: float = 0.0
@@ -173,7 +172,7 @@ def faults(facts: EngagementInputs, limits: EngagementLimits, *, engaged: bool) 
             found["late"] = f"no thrusts from the controller for {f.thrusts_s:.2f} s"
         if not f.standstill_s <= m.standstill_s:
             found["stopped"] = f"this program stood still for {f.standstill_s:.2f} s"
-        if f.acts is False and f.engaged_s > ACTUATION_TIMEOUT_S and f.acts_s < f.engaged_s - ACTUATION_TIMEOUT_S:
+        if f.acts is False and f.engaged_s > ACTUATION_TIMEOUT_S and f.script_s < f.engaged_s - ACTUATION_TIMEOUT_S:
             found["script"] = "the script does not act on the thrusts"
     low, high = m.depth_m
     figures: tuple[tuple[Kind, bool, str], ...] = (

@@ -138,7 +138,6 @@ TICK_S = 0.02
 RELEASES = 3
 """How often letting go is said, a tick apart."""
 _KEPT = 4096
-_ONBOARD_CONTROLLER, _NO_AUTOPILOT, _ACTIVE = 18, 8, 4
 
 
 class OutputGate:
@@ -256,7 +255,6 @@ class OutputGate:
                 script_s=acts_s,
                 script_version=round(version) if math.isfinite(version) else None,
                 acts=acts > 0.5 if math.isfinite(acts) else None,
-                acts_s=acts_s,
                 thrusts_s=now_s - max(self._decided_s, since_s),
                 loop_s=now_s - self._estimated_s,
                 engaged_s=now_s - since_s,
@@ -408,11 +406,11 @@ class OutputGate:
     def heartbeat(self) -> dict[str, int]:
         """Fields of this program's heartbeat: an onboard controller, never a ground station."""
         return {
-            "type": _ONBOARD_CONTROLLER,
-            "autopilot": _NO_AUTOPILOT,
+            "type": protocol.ONBOARD_CONTROLLER,
+            "autopilot": protocol.NO_AUTOPILOT,
             "base_mode": 0,
             "custom_mode": self.known.session,
-            "system_status": _ACTIVE,
+            "system_status": protocol.ACTIVE,
         }
 
     def _judge(self) -> None:

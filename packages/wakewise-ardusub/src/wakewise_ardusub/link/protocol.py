@@ -103,12 +103,22 @@ PARAMETER_TABLE: Final = 87
 # Flight modes of ArduSub (ArduPilot, ArduSub/mode.h).
 STABILIZE: Final = 0
 ALT_HOLD: Final = 2
+GUIDED: Final = 4
 POSHOLD: Final = 16
 MANUAL: Final = 19
 ALLOWED_MODES: Final = frozenset({STABILIZE, ALT_HOLD, MANUAL})
 """Those in which nothing jumps when the override ends. ALT_HOLD's controllers go on beneath it, so the script has the
 autopilot enter that mode anew at hand-back; POSHOLD would need its place taken anew as well."""
 DEFAULT_MODES: Final = sum(1 << mode for mode in sorted(ALLOWED_MODES))
+
+# The companion's heartbeat, and what it asks the autopilot for by COMMAND_LONG (common.xml).
+ONBOARD_CONTROLLER: Final = 18
+"""MAV_TYPE_ONBOARD_CONTROLLER; beside it MAV_AUTOPILOT_INVALID and MAV_STATE_ACTIVE."""
+NO_AUTOPILOT: Final = 8
+ACTIVE: Final = 4
+SET_MODE: Final = 176
+REQUEST_MESSAGE: Final = 512
+AUTOPILOT_VERSION: Final = 148
 
 # The pilot.
 STICKS_MESSAGE: Final = 69

@@ -12,7 +12,17 @@ from wakewise.robot.vehicles import Vehicle
 from wakewise_ardusub.link.checks import CheckInputs, MotorResults, ReceivedTelemetry
 from wakewise_ardusub.link.connection import MavlinkSession, send_command
 from wakewise_ardusub.link.parameters import read_parameters
-from wakewise_ardusub.link.protocol import AUTOPILOT_COMPONENT, HEARTBEAT_PERIOD_S, VERSION_NAME, interval_requests
+from wakewise_ardusub.link.protocol import (
+    ACTIVE,
+    AUTOPILOT_COMPONENT,
+    AUTOPILOT_VERSION,
+    HEARTBEAT_PERIOD_S,
+    NO_AUTOPILOT,
+    ONBOARD_CONTROLLER,
+    REQUEST_MESSAGE,
+    VERSION_NAME,
+    interval_requests,
+)
 
 LISTEN_S = 3.0
 """Long enough for the script, which speaks twice a second, and for sticks and poses."""
@@ -20,7 +30,6 @@ PATIENCE_S = 5.0
 SETTLE_S = 1.0
 """How long an autopilot may take to speak at the rates that were asked for."""
 _ARDUPILOT, _SUBMARINE = 3, 12
-_REQUEST_MESSAGE, _AUTOPILOT_VERSION = 512, 148
 _POSES = frozenset(
     {"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "VISION_POSITION_ESTIMATE", "ODOMETRY", "VISION_POSITION_DELTA"}
 )
@@ -88,7 +97,9 @@ def await_autopilot(link: MavlinkSession, patience_s: float | None = None) -> An
 
 def send_heartbeat(link: MavlinkSession) -> None:
     """The companion's heartbeat: an onboard controller, never a ground station."""
-    link.send("heartbeat", type=18, autopilot=8, base_mode=0, custom_mode=0, system_status=4)
+    link.send(
+        "heartbeat", type=ONBOARD_CONTROLLER, autopilot=NO_AUTOPILOT, base_mode=0, custom_mode=0, system_status=ACTIVE
+    )
 
 
 def _listened(link: MavlinkSession, seconds: float, kind: str, *, mavlink_2: bool) -> ReceivedTelemetry:
@@ -119,7 +130,7 @@ def _listened(link: MavlinkSession, seconds: float, kind: str, *, mavlink_2: boo
         if time.monotonic() >= hello_s:
             send_heartbeat(link)
             if firmware is None:
-                send_command(link, _REQUEST_MESSAGE, _AUTOPILOT_VERSION)
+                send_command(link, REQUEST_MESSAGE, AUTOPILOT_VERSION)
             hello_s = time.monotonic() + HEARTBEAT_PERIOD_S
         message = link.receive_any(min(left_s, HEARTBEAT_PERIOD_S))
         if message is None:

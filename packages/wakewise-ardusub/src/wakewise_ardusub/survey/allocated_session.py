@@ -20,12 +20,12 @@ from wakewise.robot.vehicles import Vehicle
 from wakewise_ardusub.link.engagement_fsm import EngagementLimits, faults
 from wakewise_ardusub.link.message_state import LinkState, MavlinkMessage
 from wakewise_ardusub.link.output_gate import OutputGate
-from wakewise_ardusub.link.protocol import ENGAGED_NAME, MANUAL, REASON_NAME, STABILIZE
+from wakewise_ardusub.link.protocol import ALT_HOLD, ENGAGED_NAME, MANUAL, REASON_NAME, STABILIZE
 from wakewise_ardusub.link.session_log import SessionLog
 from wakewise_ardusub.survey.guided_messages import SurveyTarget
 from wakewise_ardusub.survey.survey_control import SurveyController, state_of_filter
 from wakewise_ardusub.survey.survey_plan import MakeLines
-from wakewise_ardusub.survey.survey_safety import ALT_HOLD, SurveyFacts, SurveyLimits
+from wakewise_ardusub.survey.survey_safety import SurveyFacts, SurveyLimits
 from wakewise_ardusub.survey.transect_session import (
     ASK_S,
     ASKS_FOR_S,

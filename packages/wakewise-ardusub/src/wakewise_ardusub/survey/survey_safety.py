@@ -9,10 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from wakewise_ardusub.link.protocol import ALT_HOLD, GUIDED, POSHOLD
 from wakewise_ardusub.logs.channels import MODES
 
-GUIDED, POSHOLD, ALT_HOLD = 4, 16, 2
-"""Modes of ArduSub (ArduSub/mode.h)."""
 BEHIND_S = 0.5
 """Two turns of the program further apart than this: it stood still."""
 

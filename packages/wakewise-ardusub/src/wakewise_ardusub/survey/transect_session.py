@@ -35,12 +35,20 @@ from wakewise_ardusub.link.message_state import (
 )
 from wakewise_ardusub.link.motor_interface import VehicleMotors
 from wakewise_ardusub.link.protocol import (
+    ACTIVE,
     AGAIN_S,
+    ALT_HOLD,
     AUTOPILOT_COMPONENT,
+    AUTOPILOT_VERSION,
+    GUIDED,
     HEARTBEAT_PERIOD_S,
     MOST_PARAMETERS,
+    NO_AUTOPILOT,
+    ONBOARD_CONTROLLER,
     PARAMETERS_S,
+    REQUEST_MESSAGE,
     SET_MESSAGE_INTERVAL,
+    SET_MODE,
     parameter_request,
 )
 from wakewise_ardusub.link.session_log import SessionLog
@@ -65,8 +73,6 @@ from wakewise_ardusub.survey.survey_plan import (
     wrapped,
 )
 from wakewise_ardusub.survey.survey_safety import (
-    ALT_HOLD,
-    GUIDED,
     SurveyFacts,
     SurveyLimits,
     fault_of,
@@ -88,12 +94,10 @@ LOW, BRAKE_M_S2 = 0.8, 0.05
 """Share of the altitude below which the way ahead stops, by this deceleration, until the altitude is there again."""
 STILL_M, STILL_M_S, REST_S = 0.05, 0.012, 3.0
 """A vehicle nearer than this to its place, and slower, for so long, is at rest."""
-SET_MODE, REQUEST_MESSAGE, AUTOPILOT_VERSION = 176, 512, 148
 ACCELERATION_FROM = 4 << 24 | 8 << 16
 """Release of ArduSub from which GUIDED takes an acceleration (ardupilot 33609), as `flight_sw_version`."""
 _RATES_HZ = {0: 5.0, 30: 20.0, 32: 20.0, 33: 2.0, 36: 5.0, 74: 5.0, 132: 10.0, 193: 5.0}
 _HORIZONTAL, _CONSTANT = 0x08 | 0x10, 0x80
-_ONBOARD, _NO_AUTOPILOT, _ACTIVE = 18, 8, 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -535,7 +539,7 @@ class TransectSession:
     def _beat(self, now_s: float) -> None:
         if now_s - self._came["beat"] >= HEARTBEAT_PERIOD_S:
             self._came["beat"] = now_s
-            fields = {"type": _ONBOARD, "autopilot": _NO_AUTOPILOT, "base_mode": 0, "system_status": _ACTIVE}
+            fields = {"type": ONBOARD_CONTROLLER, "autopilot": NO_AUTOPILOT, "base_mode": 0, "system_status": ACTIVE}
             self._post("heartbeat", {**fields, "custom_mode": self.known.session})
         if math.isinf(self.known.heartbeat_s) or self.state in ("flying", "paused"):
             return  # nobody is there, or no address is known

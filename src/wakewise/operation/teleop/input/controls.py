@@ -1,8 +1,8 @@
 """Inputs of an operator at one instant, from any device: gamepad, keyboard, a page in the browser, a script.
 
 Axes are shares of full stick in the vehicle's level frame: forward along its heading, right, down, turn clockwise as
-seen from above, tilt of the camera upwards. The operator's settings (gain, precise mode) scale full stick; what
-comes of it that of `wakewise.operation`.
+seen from above, tilt of the camera upwards. The operator's settings (gain, precise mode) scale full stick
+(`wakewise.operation`).
 """
 
 from __future__ import annotations
