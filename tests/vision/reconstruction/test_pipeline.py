@@ -9,7 +9,13 @@ import pytest
 from relief import CENTRE, FOCAL, height
 
 from wakewise.core.errors import InputError, StageError
-from wakewise.vision.reconstruction import Model, ReconstructionSettings, read_cloud, reconstruct
+from wakewise.vision.reconstruction import (
+    Model,
+    ReconstructionRequest,
+    ReconstructionSettings,
+    read_cloud,
+    reconstruct,
+)
 
 SETTINGS = ReconstructionSettings(max_features=1500, first_octave=0, stereo_partners=2, agreeing_views=1, mesh_depth=6)
 REGION = (CENTRE, 0.06)
@@ -62,6 +68,22 @@ def test_summary_says_what_was_found(model):
     assert all(0 <= a <= b for a, b, _ in done)
     assert {"features", "matches", "stereo"} <= {note for _, _, note in done}
     assert [p for p in out.iterdir() if p.name.startswith(".")] == []
+
+
+def test_a_new_sparse_model_leaves_nothing_of_the_old_ones_surface(model, tmp_path):
+    """Without references the frame is another: cloud, surface and outputs of the earlier run would be of no model."""
+    folder, done, centres, *_ = model
+    out = shutil.copytree(done, tmp_path / "again")
+    (out / "mesh.glb").write_bytes(b"of the earlier surface")
+    until = ReconstructionRequest(until="sparse")
+    kept = reconstruct(folder, out, SETTINGS, focal_px=FOCAL, reference_positions=centres, region=REGION, request=until)
+    assert set(kept.skipped) == {"match", "map"}
+    assert (out / "mesh.ply").exists()
+    assert (out / "mesh.glb").exists()
+    changed = reconstruct(folder, out, SETTINGS, focal_px=FOCAL, request=until)
+    assert changed.scale is None
+    assert not any((out / name).exists() for name in ("dense.ply", "mesh.ply", "mesh.glb"))
+    assert {path.stem for path in (out / "stages").iterdir()} == {"match", "map"}
 
 
 def test_second_run_skips_and_a_changed_setting_does_not(model):

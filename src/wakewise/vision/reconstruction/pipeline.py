@@ -427,10 +427,11 @@ def _run_stages(job: _Inputs, out: Path, progress: Progress) -> dict[str, StageR
         fit = 2 * matched["posed_pairs"] >= matched["pairs"]
         key = stage_key(settings, "map", key, placed, job.fixed)
         model = (sparse / "images.bin",)
-        results["map"] = run_stage(out, "map", key, model, lambda: _map(job, database, sparse, fit, progress))
-        if request.bars is None and request.fixes is None:
+        scaled = request.bars is not None or request.fixes is not None
+        if not scaled:
             invalidate_stage(out, "scale", "map")
-        else:
+        results["map"] = run_stage(out, "map", key, model, lambda: _map(job, database, sparse, fit, progress))
+        if scaled:
             bars, fixes = request.bars and request.bars.key(), request.fixes and request.fixes.key()
             key = stage_key(settings, "scale", key, bars, fixes)
             results["scale"] = run_stage(out, "scale", key, model, lambda: _scale(job, sparse, progress))

@@ -40,7 +40,8 @@ def run_stage(
 ) -> StageResult:
     """Run `work` unless its products are there and its stamp, `folder/stages/<name>.json`, has the same key.
 
-    The stamp is removed before and written after the work, so that a stage that was stopped is done again.
+    The stamp is removed before and written after the work, so that a stage that was stopped is done again. What later
+    stages made of the earlier product is removed once the new one is there: it is of another model.
 
     Raises EnvironmentFailure if a file cannot be read or written, or the disk is full; whatever `work` raises else.
     """
@@ -53,6 +54,7 @@ def run_stage(
         stamp.unlink(missing_ok=True)
         figures = work()
         wall_s = time.perf_counter() - start
+        remove_later(folder, name)
         write_json(stamp, {"key": key, "wall_s": wall_s, "figures": figures})
     except OSError as fault:
         raise EnvironmentFailure(f"{name}: {no_room(fault, folder)}; the stages before it are kept") from fault
@@ -66,6 +68,29 @@ def run_stage(
         reason = " ".join(str(fault).split())[:200]
         raise EnvironmentFailure(f"{reason}; the disk of {folder} is full, {free_MB:.0f} MB are left") from fault
     return StageResult(figures=figures, wall_s=wall_s, key=key, skipped=False)
+
+
+_MADE = {
+    "match": (),
+    "map": (),
+    "scale": ("reconstruction.json",),
+    "dense": ("dense.ply", "dense.las"),
+    "mesh": ("mesh.ply",),
+    "outputs": ("mesh.glb", "textured.obj", "textured.mtl", "textured.png", "textured.glb", "orthophoto.png",
+                "orthophoto.pgw", "orthophoto.json", "heights.png", "heights.pgw", "extent.json", "report.html"),
+}  # fmt: skip
+"""Stages of a model in their order, and the files that stand for each in its folder besides database and sparse model.
+
+The figures of a model are those of all stages up to the scale; its surface may be made after they are written."""
+
+
+def remove_later(folder: Path, name: str) -> None:
+    """Remove stamps and files of the stages after one; of a stage that is not in `_MADE`, none."""
+    order = list(_MADE)
+    for later in order[order.index(name) + 1 :] if name in order else ():
+        (folder / "stages" / f"{later}.json").unlink(missing_ok=True)
+        for file in _MADE[later]:
+            (folder / file).unlink(missing_ok=True)
 
 
 def invalidate_stage(folder: Path, name: str, changed: str) -> None:
