@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from analytic_colonies import UP, Array, bed, box, cone, hemisphere, joined, noisy, turned
+from analytic_colonies import UP, Array, above, bed, box, cone, hemisphere, joined, noisy, turned
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -171,6 +171,34 @@ def test_a_spike_that_sets_the_height_is_told() -> None:
             size, plane, _ = measure(mesh, MeasuringRule(), rng)
             lines = measuring_warnings(mesh, MeasuringRule(), size, plane)
             assert any("the height rests on" in line for line in lines) is told
+
+
+def test_a_coarse_bed_does_not_raise_the_cut_of_a_fine_colony() -> None:
+    """A bed of edges of 30 mm below a hemisphere of 50 mm: its size is that on a fine bed, and nothing is warned of."""
+    coarse = joined(bed(cells=11), hemisphere())
+    found, plane, _ = measure(coarse, MeasuringRule(), np.random.default_rng(0))
+    assert found.volume_cm3 == pytest.approx(size(joined(bed(), hemisphere())).volume_cm3, rel=1e-3)
+    assert measuring_warnings(coarse, MeasuringRule(), found, plane) == []
+
+
+def test_a_mesh_that_is_coarse_for_its_colony_is_told() -> None:
+    """Edges of a quarter of its radius: what is cut off is a sixth of its height, and the line says how much."""
+    rough = joined(bed(), above(trimesh.creation.icosphere(2, 0.05)))
+    found, plane, _ = measure(rough, MeasuringRule(), np.random.default_rng(0))
+    lines = measuring_warnings(rough, MeasuringRule(), found, plane)
+    assert [line for line in lines if "lowest 8.3 mm are extrapolated" in line]
+
+
+def test_a_given_normal_that_points_down_is_told() -> None:
+    """A foot of 0.1 mm below the bed would pass for a colony, with all of the real one below."""
+    mesh = joined(noisy(bed(), np.random.default_rng(0)), hemisphere())
+    rule = MeasuringRule(bed=given_bed(-UP, 0.0))
+    try:
+        found, plane, _ = measure(mesh, rule, np.random.default_rng(0))
+    except InputError as refused:
+        assert "may point down" in str(refused) or "noise" in str(refused)
+    else:
+        assert any("may point down" in line for line in measuring_warnings(mesh, rule, found, plane))
 
 
 def test_a_wild_vertex_does_not_turn_the_bed() -> None:

@@ -53,45 +53,15 @@ def times(packed: Array, row: int, n: Six) -> Six:
     """Product of the symmetric matrix at `row` (M or its inverse) with a vector."""
     a, b, c, d, e, f = n
     # Column by column: the columns are the rows, so that neighbours in memory are worked on together.
-    m = packed
+    m, i = packed, row
     return (
-        m[row, 0] * a
-        + m[row + 1, 0] * b
-        + m[row + 2, 0] * c
-        + m[row + 3, 0] * d
-        + m[row + 4, 0] * e
-        + m[row + 5, 0] * f,
-        m[row, 1] * a
-        + m[row + 1, 1] * b
-        + m[row + 2, 1] * c
-        + m[row + 3, 1] * d
-        + m[row + 4, 1] * e
-        + m[row + 5, 1] * f,
-        m[row, 2] * a
-        + m[row + 1, 2] * b
-        + m[row + 2, 2] * c
-        + m[row + 3, 2] * d
-        + m[row + 4, 2] * e
-        + m[row + 5, 2] * f,
-        m[row, 3] * a
-        + m[row + 1, 3] * b
-        + m[row + 2, 3] * c
-        + m[row + 3, 3] * d
-        + m[row + 4, 3] * e
-        + m[row + 5, 3] * f,
-        m[row, 4] * a
-        + m[row + 1, 4] * b
-        + m[row + 2, 4] * c
-        + m[row + 3, 4] * d
-        + m[row + 4, 4] * e
-        + m[row + 5, 4] * f,
-        m[row, 5] * a
-        + m[row + 1, 5] * b
-        + m[row + 2, 5] * c
-        + m[row + 3, 5] * d
-        + m[row + 4, 5] * e
-        + m[row + 5, 5] * f,
-    )
+        m[i, 0] * a + m[i + 1, 0] * b + m[i + 2, 0] * c + m[i + 3, 0] * d + m[i + 4, 0] * e + m[i + 5, 0] * f,
+        m[i, 1] * a + m[i + 1, 1] * b + m[i + 2, 1] * c + m[i + 3, 1] * d + m[i + 4, 1] * e + m[i + 5, 1] * f,
+        m[i, 2] * a + m[i + 1, 2] * b + m[i + 2, 2] * c + m[i + 3, 2] * d + m[i + 4, 2] * e + m[i + 5, 2] * f,
+        m[i, 3] * a + m[i + 1, 3] * b + m[i + 2, 3] * c + m[i + 3, 3] * d + m[i + 4, 3] * e + m[i + 5, 3] * f,
+        m[i, 4] * a + m[i + 1, 4] * b + m[i + 2, 4] * c + m[i + 3, 4] * d + m[i + 4, 4] * e + m[i + 5, 4] * f,
+        m[i, 5] * a + m[i + 1, 5] * b + m[i + 2, 5] * c + m[i + 3, 5] * d + m[i + 4, 5] * e + m[i + 5, 5] * f,
+    )  # fmt: skip
 
 
 @njit

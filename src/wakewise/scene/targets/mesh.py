@@ -173,6 +173,8 @@ def _read(path: Path) -> tuple[Array, IntArray]:
     except Exception as error:
         # The parsers check little, and raise whatever malformed bytes happen to lead to.
         reason = str(error).strip().splitlines()[0][:120] if str(error).strip() else "the file is damaged"
+        if "unexpected length" in reason:  # nothing is cut short (`broken_ply`): a binary list of changing length
+            reason = "its faces have different numbers of corners: save it with triangles, as ASCII PLY or as OBJ"
         raise InputError(f"{path}: not a readable {path.suffix[1:].upper()} mesh ({reason})") from error
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)

@@ -247,10 +247,24 @@ def open_edges_m(mesh: Mesh, bed: BedFit, above_m: float, faces: BoolArray) -> f
 def bed_clearance_m(mesh: Mesh, bed: BedFit) -> float:
     """Height above the bed, m, from which on the shape of the colony's flank is that of the colony.
 
-    Four edges of the mesh, a sixth of the colony's height if that is less, but three standard deviations of the bed.
+    Four of its edges, a sixth of its height if that is less (`is_coarse`), but three standard deviations of the bed.
     """
-    height = float(bed.to_plane(mesh.vertices_m)[:, 2].max())
-    return max(min(CUT_EDGES * median_edge_m(mesh), height / 6.0), CUT_SIGMAS * bed.sigma_m)
+    rounded_m, most_m = _rounded_and_most_m(mesh, bed)
+    return max(min(rounded_m, most_m), CUT_SIGMAS * bed.sigma_m)
+
+
+def is_coarse(mesh: Mesh, bed: BedFit) -> bool:
+    """Whether four edges of the colony are more than a sixth of its height."""
+    rounded_m, most_m = _rounded_and_most_m(mesh, bed)
+    return rounded_m > most_m
+
+
+def _rounded_and_most_m(mesh: Mesh, bed: BedFit) -> tuple[float, float]:
+    """Four edges of what stands above a sixth of the greatest height, and that sixth: the bed may be coarser."""
+    height = bed.to_plane(mesh.vertices_m)[:, 2]
+    most_m = float(height.max()) / 6.0
+    high = height[mesh.faces].max(axis=1) > most_m
+    return CUT_EDGES * median_edge_m(Mesh(mesh.vertices_m, mesh.faces[high]) if high.any() else mesh), most_m
 
 
 def median_edge_m(mesh: Mesh) -> float:

@@ -24,6 +24,7 @@ from wakewise.vision.evaluation.bed_and_colony import (
     cut_above,
     fit_bed,
     in_box,
+    is_coarse,
     median_edge_m,
     open_edges_m,
     pieces,
@@ -44,6 +45,8 @@ DEFINITIONS: dict[str, tuple[str, int, str]] = {
 LEAST_BED_SHARE_PCT, MOST_OPEN, LEAST_LEFT, MOST_UNSEEN_PCT = 25.0, 0.1, 0.75, 10.0
 """Bounds of `measuring_warnings`: share of the bed; open edges, and the length one clearance further up, in lengths of
 the colony; share of the surface without dense points."""
+MOST_BELOW = 5.0
+"""So many times as far below a given plane as above it: which way is up may be mistaken."""
 LEAST_BEHIND = 0.01
 """Share of a surface's area that must face down in all, for the colony to lie behind the faces."""
 TOP, LEAST_TOP_FACES = 0.1, 10
@@ -129,7 +132,14 @@ def measuring_warnings(mesh: Mesh, rule: MeasuringRule, size: ColonySize, bed: B
     part = mesh if rule.box is None else in_box(mesh, *rule.box)
     if not rule.colony:
         return out + _behind(part, bed)
-    cut_m = bed_clearance_m(part, bed)
+    cut_m, height = bed_clearance_m(part, bed), bed.to_plane(part.vertices_m)[:, 2]
+    if is_coarse(part, bed):
+        out.append(f"the mesh is coarse for this colony: its lowest {1e3 * cut_m:.1f} mm are extrapolated")
+    if rule.bed is not None and -height.min() > MOST_BELOW * height.max():
+        out.append(
+            f"the model reaches {1e3 * height.max():.1f} mm above the plane and {-1e3 * height.min():.0f} mm below it: "
+            "its normal (--bed) may point down"
+        )
     middle = None if rule.box is None else 0.5 * (np.asarray(rule.box[0]) + np.asarray(rule.box[1]))
     faces = colony_faces(part, bed, cut_m, middle)
     colony = Mesh(part.vertices_m, part.faces[faces])
