@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from loopback_sea import until
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState, TargetEstimate
+from wakewise.operation.teleop.target_tracking import PERCEPTION
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise_ardusub.session.video_stream import VideoReader, VideoSource
 from wakewise_ardusub.session.video_tracking import FRESH_S, LASTS_S, PoseHistory, VideoTracking
@@ -181,6 +183,40 @@ def test_what_lies_in_a_box_is_protected_once_it_is_mapped(flight: Flight, tmp_p
     drawn = cv2.imread(str(kept), cv2.IMREAD_GRAYSCALE)
     assert drawn.shape == (360, 480)
     assert (drawn[108, 173:307] == 255).all()
+
+
+class JitteryVideo:
+    """An open stream of black pictures, 20 s long, whose times differ from those of an even rate by 5 ms at most."""
+
+    def __init__(self, flight: Flight, rate_hz: float) -> None:
+        times_s = np.arange(1, round(20.0 * rate_hz)) / rate_hz
+        self.times_s = iter(flight.time_s + times_s + np.random.default_rng(0).uniform(-0.005, 0.005, len(times_s)))
+        self.flight, self.taken_s = flight, set[float]()
+
+    def grab(self) -> bool:
+        self.flight.time_s = float(next(self.times_s, math.inf))
+        there = math.isfinite(self.flight.time_s)
+        if there:
+            X_WC = camera_pose(CENTRE_W_M, 0.0, np.radians(35.0), 0.7)
+            self.flight.tracking.note(self.flight.time_s, X_WC, BodyState(X_WB=X_WC))
+        self.taken_s.add(self.flight.tracking._tracking._taken_s)
+        return there
+
+    def retrieve(self) -> tuple[bool, np.ndarray]:
+        return True, np.zeros((CAMERA.height, CAMERA.width, 3), np.uint8)
+
+    def release(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("rate_hz", [24.0, 30.0, 60.0])
+def test_pictures_are_tracked_at_the_rate_of_the_tracker(flight: Flight, rate_hz: float) -> None:
+    """A stream whose rate is no multiple of it, and jitter of its pictures, lower it by less than a tenth."""
+    flight.see()
+    flight.tracking.designate(BOX, 0.7, lambda: None)
+    video = JitteryVideo(flight, rate_hz)
+    flight.tracking._reader._read(video)
+    assert len(video.taken_s) / 20.0 > 0.9 * PERCEPTION.rate_hz
 
 
 def test_a_box_that_is_refused_leaves_the_tracked_target(flight: Flight) -> None:

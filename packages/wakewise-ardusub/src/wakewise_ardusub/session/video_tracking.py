@@ -218,7 +218,8 @@ class VideoTracking:
 
         newest = self._newest if self._clock() - self._arrived[0] <= FRESH_S else None
         self._until_s = max(self._clock(), self._begun_s) + FRESH_S if newest is None else math.inf
-        settings = PERCEPTION.model_copy(update={"assumed_distance_m": distance_m})
+        # The reader hands on `PERCEPTION.rate_hz` pictures a second; a second limit would drop some of them.
+        settings = PERCEPTION.model_copy(update={"assumed_distance_m": distance_m, "rate_hz": math.inf})
         tracker = TargetTracker(camera=self._camera, settings=settings)
         tracking = TargetTracking(tracker, protect, self._ahead_m, begun_s=min(self._begun_s, self._clock()))
         tracking.start()
