@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from loopback_sea import until
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState, TargetEstimate
-from wakewise.operation.teleop.target_tracking import PERCEPTION
+from wakewise.operation.teleop.target_tracking import PERCEPTION, TargetTracking
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise_ardusub.session.video_stream import VideoReader, VideoSource
 from wakewise_ardusub.session.video_tracking import FRESH_S, LASTS_S, PoseHistory, VideoTracking
@@ -259,6 +259,61 @@ def test_a_box_waits_for_its_picture_a_second_only(flight: Flight) -> None:
     assert flight.tracking._expired == "no picture to find the box in, draw it again"
     flight.tracking.designate(BOX, 0.7, lambda: None)
     until_tracked(flight)
+
+
+class ForgottenMeanwhile(VideoTracking):
+    """Another thread forgets the target between any two lines: a second look finds none."""
+
+    looks: list[TargetTracking]
+
+    @property
+    def _tracking(self) -> TargetTracking | None:
+        return self.looks.pop() if self.looks else None
+
+    @_tracking.setter
+    def _tracking(self, value: TargetTracking | None) -> None:
+        self.looks = [] if value is None else [value]
+
+
+def test_a_target_may_be_forgotten_while_a_picture_comes(flight: Flight) -> None:
+    """The picture goes to what was tracked as it came."""
+    flight.see()
+    flight.tracking.designate(BOX, 0.7, lambda: None)
+    tracked = flight.tracking._tracking
+    before_s = tracked._taken_s
+    flight.tracking.__class__ = ForgottenMeanwhile
+    flight.tracking._tracking = tracked
+    flight.see()
+    assert tracked._taken_s > before_s
+    tracked.close()
+
+
+class DesignatedMeanwhile:
+    """A lock that another thread takes first, once, to designate a box."""
+
+    def __init__(self, designate: Callable[[], None]) -> None:
+        self.designate, self.lock = designate, threading.Lock()
+
+    def __enter__(self) -> None:
+        designate, self.designate = self.designate, lambda: None
+        designate()
+        self.lock.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self.lock.release()
+
+
+def test_a_new_box_is_not_forgotten_with_one_that_waited_too_long(flight: Flight) -> None:
+    """Where it comes while the late picture is looked at, it is tracked from that picture on."""
+    flight.see()
+    flight.time_s += 2.0 * FRESH_S
+    flight.tracking.designate(BOX, 0.7, lambda: None)
+    first = flight.tracking._tracking
+    flight.time_s += 2.0 * FRESH_S
+    flight.tracking._changes = DesignatedMeanwhile(lambda: flight.tracking.designate(BOX, 0.7, lambda: None))
+    flight.see()
+    assert flight.tracking._tracking not in (None, first)
+    assert flight.tracking._expired == ""
 
 
 def test_pictures_of_another_shape_are_told_at_once(flight: Flight) -> None:

@@ -153,12 +153,11 @@ class VideoTracking:
         self._newest = newest = SeenPicture(frame=self.pictures, time_s=time_s, image=small, X_WC=X_WC, std=std)
         now_s = self._clock()
         self._arrived = now_s, time.time()
-        if self._tracking is not None and now_s > self._until_s:
-            self.forget(lambda: None)
-            self._expired = "no picture to find the box in, draw it again"
-        elif self._tracking is not None:
-            self._until_s = math.inf
-            self._tracking.see(newest)
+        tracking = self._tracking  # before `_until_s`, which a new box sets first
+        if self._until_s < math.inf:
+            tracking = self._awaiting(now_s)
+        if tracking is not None:
+            tracking.see(newest)
 
     def designate(self, box: Box, distance_m: float, follow: Callable[[], None]) -> None:
         """Run `follow`, which has something protected meanwhile, then track what is in the box, in shares.
@@ -206,6 +205,17 @@ class VideoTracking:
             before, self._tracking = self._tracking, begun()
         if before is not None:  # not while the changes are locked: it may wait for that
             before.close()
+
+    def _awaiting(self, now_s: float) -> TargetTracking | None:
+        """What waits for a picture that arrived now; forgotten if that is too late."""
+        with self._changes:
+            tracking, late = self._tracking, now_s > self._until_s
+            self._until_s = math.inf
+            if tracking is None or not late:
+                return tracking
+            self._tracking, self._expired = None, "no picture to find the box in, draw it again"
+        tracking.close()  # see `_begin`
+        return None
 
     def _tracked(self, box: Box, distance_m: float) -> TargetTracking:
         def protect(target: TargetEstimate | None) -> None:
