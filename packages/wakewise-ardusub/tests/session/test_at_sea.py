@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from loopback_sea import until
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
@@ -18,7 +19,7 @@ from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.message_state import attitude_of
 from wakewise_ardusub.link.protocol import ALT_HOLD, STABILIZE
 from wakewise_ardusub.link.session_log import SessionLog, read_journal
-from wakewise_ardusub.session.link_join import SEA, join_vehicle, run_warm_up
+from wakewise_ardusub.session.link_join import SEA, LinkThread, join_vehicle, run_warm_up
 from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession, ball, ball_points
 from wakewise_ardusub.sitl.companion_harness import CompanionHarness
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession
@@ -221,6 +222,26 @@ def test_a_session_with_a_button_of_the_autopilots_ends_in_one_line(tmp_path, mo
     assert isinstance(session.fault, InputError)
     assert str(session.fault) == "--buttons engage=4: BTN4_FUNCTION is 4 (disarm) on this autopilot; free is 15"
     assert not (tmp_path / "sea" / "steps.parquet").exists()
+
+
+class Broken:
+    """A connection that ends at the first look."""
+
+    def receive(self, timeout_s):
+        raise OSError("the adapter is gone")
+
+
+def test_a_session_whose_link_breaks_is_over(tmp_path, monkeypatch):
+    """Its owner sees that it runs no more, while the flight is still being prepared, and gets the link's fault."""
+    session = session_of(tmp_path / "sea", monkeypatch)
+    session._link = LinkThread(Broken(), session.gate)
+    session.start()
+    until(lambda: not session.running, "the end of the session", 10.0)
+    assert session._thread.is_alive()
+    session.stop("ended")
+    assert str(session.fault) == "the adapter is gone"
+    told = [line.get("reason") for line in read_journal(tmp_path / "sea" / "journal.jsonl")[0]]
+    assert "the link broke (OSError: the adapter is gone)" in told
 
 
 def test_a_flight_begins_where_the_vehicle_is_when_its_parts_are_made(tmp_path, monkeypatch):

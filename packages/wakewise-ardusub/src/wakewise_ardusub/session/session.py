@@ -229,8 +229,8 @@ class VehicleSession:
 
     @property
     def running(self) -> bool:
-        """Whether anything is still at work."""
-        return self._thread.is_alive()
+        """Whether flight and link are at work; `stop` a session of which one has ended, then see `fault`."""
+        return self._thread.is_alive() and self._link.fault is None
 
     def figures(self) -> dict[str, Any]:
         """How the flight's loop kept its time, in ms; None before it began."""
