@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import replace
 
@@ -242,6 +243,29 @@ def test_a_session_whose_link_breaks_is_over(tmp_path, monkeypatch):
     assert str(session.fault) == "the adapter is gone"
     told = [line.get("reason") for line in read_journal(tmp_path / "sea" / "journal.jsonl")[0]]
     assert "the link broke (OSError: the adapter is gone)" in told
+
+
+def test_what_fails_beside_the_flight_is_journalled_and_its_thread_ends(tmp_path, monkeypatch):
+    """Coverage that cannot be reckoned: a line names the fault; a session that stops leaves no thread."""
+    session = session_of(tmp_path / "sea", monkeypatch)
+    companion = aboard(session.journal)
+    companion.flight.run(1.0)
+    session.sea, _ = afloat(companion)
+
+    def no_patches(mesh, bed_z_m):
+        raise ValueError("no surface")
+
+    def told() -> list[str]:
+        lines = read_journal(tmp_path / "sea" / "journal.jsonl")[0]
+        return [line["amiss"] for line in lines if line["event"] == "figures"]
+
+    monkeypatch.setattr("wakewise_ardusub.session.link_join.patches_of", no_patches)
+    session.sea.figures.photographed(session.sea.parts.start.X_WB)
+    until(told, "a line in the journal", 10.0)
+    assert told() == ["ValueError: no surface"]
+    session._link.start()
+    session.stop("over")
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("coverage")]
 
 
 def test_a_flight_begins_where_the_vehicle_is_when_its_parts_are_made(tmp_path, monkeypatch):

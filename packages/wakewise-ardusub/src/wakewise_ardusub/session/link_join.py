@@ -104,8 +104,7 @@ class ArduSubPlant:
 
 @dataclass(kw_only=True, eq=False)
 class ArduSubWorld:
-    """Where a real vehicle flies; implements `wakewise.core.interfaces.World`. It does not wait, and nobody knows its
-    truth.
+    """Where a real vehicle flies; implements `wakewise.core.interfaces.World`. It does not wait and has no truth.
 
     `plant` is what makes the plant when a flight begins.
     """
@@ -215,7 +214,6 @@ class EngagedPilot:
     turn: FlightOwnership
     photographed: Callable[[], None]
     mount: MountControl | None = None
-    _notes_told: int = 0
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
         """What is wanted now; settles in which engagement this step is flown."""
@@ -351,15 +349,27 @@ class WashFigures:
 
     def photographed(self, X_WC: Pose) -> None:
         """A photograph was taken from here; what it has seen is reckoned beside the flight."""
-        self._beside.submit(self._see, X_WC)
+        self._beside.submit(self._do, self._see, X_WC)
 
     def retarget(self, parts: Parts) -> None:
         """Reckon them of another target from now on; nothing of it was photographed."""
-        self._beside.submit(self._retarget, parts)
+        self._beside.submit(self._do, self._retarget, parts)
 
     def protect(self, parts: Parts) -> None:
         """Reckon them for another region of the same target from now on."""
-        self._beside.submit(self._protect, parts)
+        self._beside.submit(self._do, self._protect, parts)
+
+    def close(self) -> None:
+        """Finish what is reckoned beside the flight, and drop what waits."""
+        self._beside.shutdown(cancel_futures=True)
+
+    def _do(self, work: Callable[[Any], None], about: Pose | Parts) -> None:
+        """Reckon beside the flight, which goes on with the last figures where that fails."""
+        try:
+            work(about)
+        except Exception as fault:
+            if self.gate.journal is not None:
+                self.gate.journal.write("figures", amiss=f"{type(fault).__name__}: {fault}")
 
     def _protect(self, parts: Parts) -> None:
         self._view = InfluenceModel.of(parts.vehicle, parts.region, parts.wake)
@@ -567,7 +577,7 @@ def run_warm_up(sea: VehicleFlight, steps: int = 12) -> float:
         sea.bare.replace(world=_WaitingWorld()), _MovingInput(), OperatorState(), OperatorSettings(mode="operator")
     )
     resting = sea.parts.controller
-    assert isinstance(resting, EngagedController)  # see `join.at_sea`
+    assert isinstance(resting, EngagedController)  # see `join_vehicle`
     flying, filtering, method = chain.pipeline, chain.estimator, resting.inner
     state, own, known, estimate, took_s = flying.init(), method.init(), filtering.init(start), start, 0.0
     for k in range(steps):

@@ -218,6 +218,8 @@ class VehicleSession:
             self.boxes.close()
         if self.tracking is not None:
             self.tracking.close()
+        if self.sea is not None:
+            self.sea.figures.close()  # after all that hands it work
         self.fault = self.fault or self._link.fault
         known, gate = self.gate.known, self.gate
         self.journal.write(
