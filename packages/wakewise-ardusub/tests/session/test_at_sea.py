@@ -14,12 +14,14 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.operation.flying import loop_of, recorder_of
+from wakewise.operation.loop import Step
 from wakewise.operation.scenario import Scenario
-from wakewise.operation.teleop.live import PhotoTrigger
+from wakewise.operation.teleop.live import LiveFlight, PhotoTrigger
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.message_state import attitude_of
 from wakewise_ardusub.link.protocol import ALT_HOLD, STABILIZE
 from wakewise_ardusub.link.session_log import SessionLog, read_journal
+from wakewise_ardusub.session.cameras import CAMERAS_FILE
 from wakewise_ardusub.session.link_join import SEA, LinkThread, join_vehicle, run_warm_up
 from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession, ball, ball_points
 from wakewise_ardusub.sitl.companion_harness import CompanionHarness
@@ -54,8 +56,8 @@ class Clock:
         return self.began_s + time_s
 
 
-def afloat(companion: CompanionHarness, method: str = "dp"):
-    """The parts of a flight of the vehicle of a companion, and how often it took a photograph."""
+def afloat(companion: CompanionHarness, method: str = "dp", photographed=None):
+    """The parts of a flight of the vehicle of a companion, and when it took a photograph."""
     known = companion.gate.known
     start = BodyState(X_WB=Pose(known.place_W_m, attitude_of(known)))
     middle = start.X_WB.apply(np.array([0.9, 0.0, 0.0]))
@@ -70,7 +72,7 @@ def afloat(companion: CompanionHarness, method: str = "dp"):
         clock=lambda: Clock(companion.clock()),
         wait=companion.flight.run,
         flown_N=companion.flown_N,
-        photographed=lambda: photographs.append(companion.clock()),
+        photographed=photographed or (lambda time_s, estimate: photographs.append(companion.clock())),
     )
     return sea, photographs
 
@@ -266,6 +268,32 @@ def test_what_fails_beside_the_flight_is_journalled_and_its_thread_ends(tmp_path
     session._link.start()
     session.stop("over")
     assert not [thread for thread in threading.enumerate() if thread.name.startswith("coverage")]
+
+
+def test_a_photograph_has_the_estimate_and_the_time_of_its_step(tmp_path, monkeypatch):
+    """In cameras.csv, also in the first step of a flight."""
+    companion = aboard()
+    companion.flight.run(1.0)
+    session = session_of(tmp_path / "sea", monkeypatch)
+    session.sea, _ = afloat(companion, photographed=session._photographed)
+    steps: list[Step] = []
+
+    def watch(step, truth_provider):
+        steps.append(step)
+        if len(steps) in (3, 5):
+            companion.gate._pressed.append("capture")
+        if len(steps) == 8:
+            session.live.stop()
+
+    session.live = LiveFlight(session.sea.parts, folder=tmp_path / "sea", paced=False, watch=watch, checked=False)
+    companion.gate._pressed.append("capture")
+    session.live.run()
+    table = np.genfromtxt(tmp_path / "sea" / CAMERAS_FILE, delimiter=",", names=True, dtype=None, encoding="utf-8")
+    taken = [steps[k] for k in (0, 3, 5)]
+    assert table["flight_s"] == pytest.approx([step.time_s for step in taken])
+    for row, step in zip(table, taken, strict=True):
+        X_WC = step.estimate.X_WB @ session.mount.X_BC()
+        assert [row[name] for name in ("x_m", "y_m", "z_m")] == pytest.approx(X_WC.p_m, abs=2e-6)
 
 
 def test_a_flight_begins_where_the_vehicle_is_when_its_parts_are_made(tmp_path, monkeypatch):

@@ -206,17 +206,20 @@ class GroundStationInput:
 class EngagedPilot:
     """A `Pilot`: the assisted one while engaged, on its own clock; else the vehicle is wished to be where it is.
 
-    `mount`: of its camera, which is where the pilot had turned it as an engagement begins.
+    `photographed`: called with the step's time and estimate for each photograph. `mount`: of its camera, which is where
+    the pilot had turned it as an engagement begins.
     """
 
     inner: AssistedPilot
     gate: OutputGate
     turn: FlightOwnership
-    photographed: Callable[[], None]
+    photographed: Callable[[float, BodyState], None]
     mount: MountControl | None = None
+    _step: tuple[float, BodyState] = field(init=False)
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
         """What is wanted now; settles in which engagement this step is flown."""
+        self._step = time_s, estimate
         self.gate.estimated(estimate)
         entry, turn = self.gate.entry, self.turn
         if entry is None:
@@ -227,9 +230,8 @@ class EngagedPilot:
             turn.entry, turn.began_s = entry, time_s
         goal = self.inner.goal(time_s - turn.began_s, estimate)
         if begins and self.mount is not None and self.mount.reported:
-            tilt_rad = self.mount.angle_rad
-            self.inner.motion = replace(self.inner.motion, tilt_rad=tilt_rad)
-            goal = replace(goal, tilt_rad=tilt_rad)
+            self.inner.motion = replace(self.inner.motion, tilt_rad=self.mount.angle_rad)
+            goal = replace(goal, tilt_rad=self.inner.motion.tilt_rad)
         for note in self.inner.notes():
             if self.gate.journal is not None:
                 self.gate.journal.write("note", level=note.level, words=note.text)
@@ -240,7 +242,7 @@ class EngagedPilot:
         actions = self.inner.taken() if self.turn.entry is not None else self.gate.pressed()
         found = tuple(what for what in actions if what in ("capture", "stop"))
         for _ in range(found.count("capture")):
-            self.photographed()
+            self.photographed(*self._step)
         return found
 
     @property
@@ -474,7 +476,7 @@ def join_vehicle(
     clock: Callable[[], FlightClock],
     wait: Callable[[float], object],
     flown_N: Callable[[], Array],
-    photographed: Callable[[], None],
+    photographed: Callable[[float, BodyState], None],
     mount: MountControl | None = None,
 ) -> VehicleFlight:
     """Join a scenario's parts to the vehicle of an output gate.
@@ -497,7 +499,7 @@ def join_vehicle(
     flown_N : callable
         What the thrusters give by the servos' pulses, shape (n,).
     photographed : callable
-        Called when the pilot or the mission takes a photograph.
+        Called when the pilot or the mission takes a photograph, with the time and the estimate of its step.
     mount : MountControl, optional
         The joint of its camera; by default the controller's vehicle has one that always obeys.
 
@@ -566,10 +568,7 @@ class _MovingInput:
 def run_warm_up(sea: VehicleFlight, steps: int = 12) -> float:
     """Let the whole chain decide a few times for nobody, so that its kernels are there when thrusts count.
 
-    Returns
-    -------
-    float
-        The longest of the last steps, in s: what takes longer than a control period is not flown.
+    Gives the longest of the last steps, in s: what takes longer than a control period is not flown.
     """
     parts, start = sea.parts, sea.parts.start
     dt_s, layout = 1.0 / parts.control.rate_hz, vehicle_layout(parts.vehicle)

@@ -447,18 +447,14 @@ class VehicleSession:
         known = self.gate.known
         return self.drive.flown_N(known.parameters, known.servo_us, known.battery_V)
 
-    def _photographed(self) -> None:
+    def _photographed(self, time_s: float, estimate: BodyState) -> None:
         self.photographs += 1
-        live, sea = self._flight(), self.sea
-        step = live.latest
-        if step is not None and sea is not None:
-            X_WC = step.estimate.X_WB @ self.mount.X_BC()
-            sea.figures.photographed(X_WC)
-            self.journal.write(
-                "photograph", number=self.photographs, flight_s=live.time_s, p_WC_m=X_WC.p_m, q_WC=X_WC.q
-            )
-            with suppress(OSError):  # a full disk ends no flight; the journal counts what it lost
-                note_view(self.folder, self.photographs, X_WC, live.time_s)
+        X_WC = estimate.X_WB @ self.mount.X_BC()
+        if self.sea is not None:
+            self.sea.figures.photographed(X_WC)
+        self.journal.write("photograph", number=self.photographs, flight_s=time_s, p_WC_m=X_WC.p_m, q_WC=X_WC.q)
+        with suppress(OSError):  # a full disk ends no flight; the journal counts what it lost
+            note_view(self.folder, self.photographs, X_WC, time_s)
         if self._camera is not None:
             self._camera.take(self.photographs)
 
