@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bottle import Bottle
+from loopback_sea import until
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.vision.reconstruction import read_reference_cameras
@@ -71,11 +72,27 @@ def test_a_program_takes_the_photographs_beside_the_flight(tmp_path):
     for number in (1, 2):
         camera.take(number)
     assert time.monotonic() - began_s < 0.05
+    until(lambda: len(journal.path.read_bytes().splitlines()) == 2, "two photographs", 30.0)
     camera.close()
     journal.close()
     assert [(tmp_path / PHOTOGRAPHS / photo_name(k)).read_text() for k in (1, 2)] == ["1", "2"]
     told = [line for line in read_journal(tmp_path / "j")[0] if line["event"] == "camera"]
     assert [(line["number"], line["there"], line["amiss"]) for line in told] == [(1, True, ""), (2, True, "")]
+
+
+def test_photographs_that_wait_are_not_taken_as_the_camera_closes(tmp_path):
+    """The one under way is finished; the journal names each that is dropped."""
+    journal = SessionLog(tmp_path / "j")
+    sleeps = f'run:{sys.executable} -c "import sys, time; open(sys.argv[1], chr(119)); time.sleep(1.0)" {{file}}'
+    camera = parse_camera(sleeps)(Bottle().gate, tmp_path, journal)
+    for number in range(1, 5):
+        camera.take(number)
+    until((tmp_path / PHOTOGRAPHS / photo_name(1)).exists, "the first photograph", 30.0)
+    camera.close()
+    journal.close()
+    told = [line for line in read_journal(tmp_path / "j")[0] if line["event"] == "camera"]
+    assert [(line["number"], line["there"]) for line in told] == [(1, True), (2, False), (3, False), (4, False)]
+    assert [line["amiss"] for line in told] == ["", *["not taken: the session ended"] * 3]
 
 
 def test_a_program_that_fails_is_told_of_and_ends_nothing(tmp_path):

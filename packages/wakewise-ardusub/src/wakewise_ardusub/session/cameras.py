@@ -17,7 +17,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -118,14 +118,17 @@ class ProgramCamera:
     def __init__(self, program: list[str], folder: Path, journal: SessionLog) -> None:
         self._program, self._folder, self._journal = program, folder, journal
         self._beside = ThreadPoolExecutor(1, thread_name_prefix="camera")
+        self._asked: dict[int, Future[None]] = {}
 
     def take(self, number: int) -> None:
         """Start it, or have it wait for the one before."""
-        self._beside.submit(self._run, number)
+        self._asked[number] = self._beside.submit(self._run, number)
 
     def close(self) -> None:
-        """Wait for the last photograph."""
-        self._beside.shutdown(wait=True)
+        """Wait for the photograph under way; those that wait for it are not taken."""
+        self._beside.shutdown(cancel_futures=True)
+        for number in (number for number, asked in self._asked.items() if asked.cancelled()):
+            self._told(number, 0.0, "not taken: the session ended")
 
     def _run(self, number: int) -> None:
         file = self._folder / photo_name(number)
@@ -140,7 +143,10 @@ class ProgramCamera:
             amiss = f"took longer than {PATIENCE_S:g} s"
         except OSError as fault:
             amiss = fault.strerror or str(fault)
-        took_s = round(time.monotonic() - began_s, 3)
+        self._told(number, round(time.monotonic() - began_s, 3), amiss)
+
+    def _told(self, number: int, took_s: float, amiss: str) -> None:
+        file = self._folder / photo_name(number)
         self._journal.write("camera", number=number, file=str(file), there=file.exists(), took_s=took_s, amiss=amiss)
 
 
