@@ -11,6 +11,7 @@ import pytest
 from wakewise.core.errors import InputError, StageError
 from wakewise.perception.detector import detect_checked, find_detector
 from wakewise.perception.onnx_detector import MOST, load_onnx_detector
+from wakewise.perception.onnx_model import OnnxModel
 
 pytest.importorskip("onnxruntime", reason="needs ONNX Runtime, of the extra `detector`")
 
@@ -91,11 +92,13 @@ def test_two_red_squares_are_two_detections(tmp_path):
     assert best.name == other.name == ""
 
 
-def test_the_latency_is_measured_and_the_file_names_the_detector(tmp_path):
-    """Both are there after construction."""
+def test_a_model_runs_once_as_it_is_loaded_and_its_file_names_the_detector(tmp_path, monkeypatch):
+    """One call shows whether it can be run."""
+    calls, run = [], OnnxModel.run
+    monkeypatch.setattr(OnnxModel, "run", lambda model, image: calls.append(image.shape) or run(model, image))
     detector = load_onnx_detector(write(tmp_path / "red.onnx"), threads=2, **SMALL)
     assert detector.name == "red"
-    assert 0.0 < detector.latency_s < 5.0
+    assert calls == [(SMALL["height"], SMALL["width"], 3)]
 
 
 def test_a_uniform_picture_has_no_detection(tmp_path):

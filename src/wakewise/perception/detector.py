@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.arrays import BoolArray
-from wakewise.core.checks import callable_of, finite_number, has_methods, instance_of, one_of, quoted
+from wakewise.core.checks import callable_of, has_methods, instance_of, one_of, quoted
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.optional_dependencies import need
 from wakewise.core.plugins import find, offered
@@ -54,10 +54,6 @@ class Detector(Protocol):
     @property
     def name(self) -> str:
         """Name in messages and records."""
-
-    @property
-    def latency_s(self) -> float:
-        """Stated time from picture to answer, in s."""
 
     def detect(self, image: Image) -> tuple[Detection, ...]:
         """Detections in an RGB picture, shape (h, w, 3), best first; masks have the shape (h, w)."""
@@ -106,7 +102,6 @@ def find_detector(name: str) -> Detector:
         raise InputError(f"{where}: cannot be made, {reason_of(fault)}") from fault
     has_methods(made, ("detect",), where, KIND)
     instance_of(getattr(made, "name", None), str, f"{where}: name")
-    finite_number(getattr(made, "latency_s", None), f"{where}: latency_s", least=0.0)
     return made
 
 

@@ -27,7 +27,6 @@ Metadata of the model, all optional, text; lists are separated by commas:
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,7 +45,6 @@ from wakewise.perception.onnx_model import PREFIX, OnnxModel, OnnxSettings, open
 
 MOST = 50
 """At most so many detections of a picture, the best, because each has a mask of the whole picture."""
-TIMED_CALLS = 5
 BOXES = {"boxes", "scores"}
 Floats = NDArray[np.floating[Any]]
 
@@ -64,10 +62,9 @@ class _Part:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OnnxDetector:
-    """Detector that runs an ONNX model; `load_onnx_detector` makes it, and measures `latency_s`."""
+    """Detector that runs an ONNX model; `load_onnx_detector` makes it."""
 
     name: str
-    latency_s: float
     model: OnnxModel
 
     def detect(self, image: Image) -> tuple[Detection, ...]:
@@ -80,7 +77,7 @@ class OnnxDetector:
 
 
 def load_onnx_detector(path: str | Path, *, width: int = 640, height: int = 480, threads: int = 1) -> OnnxDetector:
-    """Detector from an ONNX file, with its latency: the median of a few calls on a picture of noise.
+    """Detector from an ONNX file, which has run once on a picture of noise.
 
     `width`, `height`: size in px of that picture. `threads`: 1 or 2. Raises InputError if there is no file, it is no
     ONNX model, has other inputs or outputs than this module describes, or cannot be run; MissingExtra if ONNX Runtime
@@ -92,19 +89,8 @@ def load_onnx_detector(path: str | Path, *, width: int = 640, height: int = 480,
     model = open_onnx_model(path_of(path, "ONNX detector"), threads)
     if len(model.outputs) != 1 and set(model.outputs) != BOXES:
         raise InputError(f"{model.path}: outputs {', '.join(model.outputs)}, must be one mask, or boxes and scores")
-    noise = np.random.default_rng(0).integers(0, 256, shape, dtype=np.uint8)
-    _detect(model, noise)  # the first call allocates, and is not timed
-    return OnnxDetector(name=model.path.stem, latency_s=_latency_s(model, noise), model=model)
-
-
-def _latency_s(model: OnnxModel, image: Image) -> float:
-    """Median time of a few calls, in s."""
-    times: list[float] = []
-    for _ in range(TIMED_CALLS):
-        begin = time.perf_counter()
-        _detect(model, image)
-        times.append(time.perf_counter() - begin)
-    return float(np.median(times))
+    _detect(model, np.random.default_rng(0).integers(0, 256, shape, dtype=np.uint8))  # refused if it cannot be run
+    return OnnxDetector(name=model.path.stem, model=model)
 
 
 def _detect(model: OnnxModel, image: Image) -> tuple[Detection, ...]:

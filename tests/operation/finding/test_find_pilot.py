@@ -428,7 +428,6 @@ def red_box() -> object:
 
     class Fixed:
         name = "fixed"
-        latency_s = 0.01
 
         def detect(self, image: np.ndarray) -> tuple[Detection, ...]:
             mask = np.zeros(image.shape[:2], np.bool_)
