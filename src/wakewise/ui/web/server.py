@@ -20,6 +20,7 @@ import secrets
 import socket
 import threading
 from collections.abc import Callable, Coroutine, Mapping
+from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -190,12 +191,12 @@ class WebServer:
         self._gate = replace(self._gate, port=self.port, open_to_net=not is_loopback(str(address)))
 
     def start(self) -> None:
-        """Answer requests from now on; raises as `bind`."""
+        """Answer requests from now on; raises as `bind`, or what kept it from starting."""
         self.bind()
-        ready = threading.Event()
-        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve(ready)), name="web", daemon=True)
+        started: Future[None] = Future()
+        self._thread = threading.Thread(target=self._run, args=(started,), name="web", daemon=True)
         self._thread.start()
-        ready.wait()
+        started.result()
 
     def stop(self) -> None:
         """Close all connections and end the thread."""
@@ -214,7 +215,17 @@ class WebServer:
         """Coroutines that run while the server runs."""
         return ()
 
-    async def _serve(self, ready: threading.Event) -> None:
+    def _run(self, started: Future[None]) -> None:
+        try:
+            asyncio.run(self._serve(started))
+        except BaseException as fault:
+            if started.done():
+                raise
+            if self._listener is not None:
+                self._listener.close()
+            started.set_exception(fault)
+
+    async def _serve(self, started: Future[None]) -> None:
         assert self._listener is not None
         self._loop, self._over = asyncio.get_running_loop(), asyncio.Event()
         sockets = None
@@ -227,7 +238,7 @@ class WebServer:
         if sockets is not None:
             sockets.attach(listening)
         tasks = [asyncio.create_task(one) for one in self.tasks()]
-        ready.set()
+        started.set_result(None)
         await self._over.wait()
         for task in tasks:
             task.cancel()
