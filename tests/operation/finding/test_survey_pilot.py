@@ -11,12 +11,13 @@ import pytest
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, TargetEstimate
 from wakewise.operation import Parts, Scenario
 from wakewise.operation.finding.camera_estimator import CameraEstimator
 from wakewise.operation.finding.find_parts import found_region, read_found, write_found
 from wakewise.operation.finding.region_controller import NEAR_M, RegionController, near_spheres
-from wakewise.operation.finding.survey_mission import SurveyPilot
+from wakewise.operation.finding.survey_mission import OrbitPlanner, SurveyPilot
 from wakewise.perception.target_shape import protected_region
 from wakewise.scene.missions import check_clearance
 from wakewise.scene.targets.reef import CELL_M, reef_patch
@@ -107,6 +108,29 @@ def test_a_survey_without_a_map_flies_its_orbits_all_the_same() -> None:
     pilot, _, _ = flown(SCENARIO.parts(), None)
     assert len(pilot.parts) == SCENARIO.survey.most_orbits
     assert pilot.photographed is None
+
+
+@pytest.mark.parametrize("all_blocked", [False, True])
+def test_a_part_without_a_clear_orbit_is_left_out(
+    all_blocked: bool, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A line of the log names each; the mission ends well, also where none is left."""
+    clear = OrbitPlanner._clear
+
+    def blocked(planner: OrbitPlanner, X_WC: Pose, solid_W_m: Array) -> bool:
+        """As if something stood in all orbits, or in those of the north."""
+        return clear(planner, X_WC, solid_W_m) and not all_blocked and X_WC.p_m[0] < 0.5
+
+    monkeypatch.setattr(OrbitPlanner, "_clear", blocked)
+    with caplog.at_level("WARNING"):
+        pilot, legs, _ = flown(SCENARIO.parts(), mapped())
+    northmost = [orbit.centre_W_m[0] + orbit.range_m * math.cos(orbit.elevation_rad) for orbit in pilot.parts]
+    told = [line for line in caplog.messages if line.startswith("no orbit round the part at")]
+    assert told
+    assert all(north_m < 0.5 + 1e-9 for north_m in northmost)
+    assert (not pilot.parts) == all_blocked
+    assert legs[-1] == "done"
+    assert pilot.photographed is not None
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ high that is and in which order they are flown is decided after the last transec
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Sequence
@@ -41,6 +42,9 @@ SETTLE_S = 3.0
 """Hover before the first transect."""
 
 
+log = logging.getLogger(__name__)
+
+
 @dataclass(frozen=True, kw_only=True)
 class OrbitPlanner:
     """Plans orbits by what is mapped; `bed_z_m`: depth of the bed, `views`: what is known of vehicle and water."""
@@ -52,7 +56,7 @@ class OrbitPlanner:
     def plan(
         self, target: TargetEstimate | None, taken_from: Sequence[Pose], over_z_m: float, last: Leg
     ) -> tuple[list[PartOrbit], Route]:
-        """Orbits in the order in which they are flown, and the route through them.
+        """Orbits in the order in which they are flown, and the route through them; parts without a clear one have none.
 
         - `target`: its mapped surface; None if there is none. `taken_from`: X_WC of the photographs so far.
         - `over_z_m`: depth at which the camera is clear of everything; `last`: the leg that it comes from.
@@ -66,14 +70,11 @@ class OrbitPlanner:
         else:
             need = need_of(points, covered, MIDDLE_M, np.array(survey.size_m))
             middles = choose_parts(need, PART_RADIUS_M, survey.least_orbits, survey.most_orbits)
-        solid = points if len(points) else np.full((1, 3), 1e6)
         assert last.centre_W_m is not None
         end_W_m = last.centre_W_m + last.shift_W_m
-        orbits = ordered([self._lowest(middle, points) for middle in middles], end_W_m)
-
-        mission, first = self.views.mission, len(taken_from)
-        clear = partial(self._clear, solid_W_m=solid)
-        return orbits, orbits_route(orbits, end_W_m, last.end, over_z_m, mission, first, clear)
+        orbits = ordered([orbit for middle in middles if (orbit := self._lowest(middle, points))], end_W_m)
+        clear = partial(self._clear, solid_W_m=_some(points))
+        return orbits, orbits_route(orbits, end_W_m, last.end, over_z_m, self.views.mission, len(taken_from), clear)
 
     def load_kernels(self, X_WC: Pose) -> None:
         """Have what counts coverage compiled or loaded, which takes a second, before the flight."""
@@ -96,18 +97,21 @@ class OrbitPlanner:
             coverage = coverage.seen(X_WC, self.views.lens)
         return coverage
 
-    def _lowest(self, plan_m: Array, points_W_m: Array) -> PartOrbit:
-        """The lowest orbit round a part at which the hull keeps clear of what is mapped."""
-        views, range_m = self.views, self.views.mission.standoff_m
+    def _lowest(self, plan_m: Array, points_W_m: Array) -> PartOrbit | None:
+        """The lowest orbit round a part at which the hull keeps clear of what is mapped; None if there is none."""
+        views, count, range_m = self.views, self.survey.orbit_views, self.views.mission.standoff_m
         centre = middle_of(points_W_m, plan_m, PART_RADIUS_M, self.bed_z_m - RELIEF * self.survey.height_m)
         away = np.linalg.norm(points_W_m[:, :2] - plan_m, axis=1)
-        near = points_W_m[away < range_m + 2.0 * float(np.max(views.size_m))]
-        solid = near if len(near) else np.full((1, 3), 1e6)
+        solid = _some(points_W_m[away < range_m + 2.0 * float(np.max(views.size_m))])
         azimuths = 2.0 * math.pi / CHECKED * np.arange(CHECKED)
         for elevation in np.radians(ELEVATIONS_DEG).tolist():
             if all(self._clear(camera_pose(centre, float(a), elevation, range_m), solid) for a in azimuths):
-                break
-        return PartOrbit(centre_W_m=centre, elevation_rad=elevation, range_m=range_m, views=self.survey.orbit_views)
+                return PartOrbit(centre_W_m=centre, elevation_rad=elevation, range_m=range_m, views=count)
+        words = (
+            "no orbit round the part at %.1f, %.1f m: the hull would come too near to what is mapped, at any elevation"
+        )
+        log.warning(words, *plan_m.tolist())
+        return None
 
     def _clear(self, X_WC: Pose, solid_W_m: Array) -> bool:
         """Whether the hull keeps clear of what is mapped and of the water's bounds, with its camera at a pose."""
@@ -194,18 +198,18 @@ class SurveyPilot:
     def _next(self, time_s: float) -> None:
         """After the transects the orbits, after these the end; what was seen well is kept."""
         last = self._route.legs[-1]
-        centre_W_m = self._route.centre_W_m
         if self._phase == "transects" and self._survey.orbits != "none":
             began = time.thread_time()
             over = float(self.transects.X_WC_planned[0].p_m[2])
-            self.parts, self._route = self._planner.plan(self._mapped, self._taken_from, over, last)
+            self.parts, route = self._planner.plan(self._mapped, self._taken_from, over, last)
             self.replanned_ms = 1e3 * (time.thread_time() - began)
-            self._first = len(self.transects.exposures_s)
-            self._phase, self._since_s = "orbits", time_s
-            return
+            if self.parts:
+                self._route, self._first = route, len(self.transects.exposures_s)
+                self._phase, self._since_s = "orbits", time_s
+                return
         self.photographed = self._seen()
         self._phase, self._since_s = "done", time_s
-        self._route = open_route(centre_W_m, 1.0, "done", last.end)
+        self._route = open_route(self._route.centre_W_m, 1.0, "done", last.end)
 
     def _seen(self) -> PhotographedSurface | None:
         """What the photographs saw well of the mapped surface; None if too little of it is mapped."""
