@@ -16,7 +16,7 @@ from wakewise.core.geometry import Pose
 from wakewise.perception.bed_plane import BedPlane
 from wakewise.perception.calibrated_camera import CalibratedCamera
 from wakewise.perception.point_map import ray_directions
-from wakewise.perception.settings import PerceptionSettings
+from wakewise.perception.settings import DISTANCE_STD, PerceptionSettings
 from wakewise.perception.target_shape import TargetShape, ball
 
 BOX_MARGIN = 0.15
@@ -27,8 +27,6 @@ SIZE_WEIGHT = 0.2
 """Slope off the axis that is forgiven to the largest body over the smallest: a stone may lie nearer to the middle."""
 NEAREST_M = 0.05
 LEAST_RADIUS_M = 0.02
-DISTANCE_STD = 0.2
-"""Standard deviation of an assumed ball's place, as a share of its distance."""
 FARTHEST = 2.0
 """The bed is taken for the target's place up to so many times the stated distance."""
 SAME_BALL = 0.05

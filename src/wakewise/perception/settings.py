@@ -8,6 +8,9 @@ from pydantic import Field
 
 from wakewise.core.settings import Settings
 
+DISTANCE_STD = 0.2
+"""Standard deviation of the distance of a target that is not mapped yet, as a share of it."""
+
 
 class PerceptionSettings(Settings):
     """How the target is found, mapped and tracked in the camera's pictures."""

@@ -14,9 +14,10 @@ from loopback_sea import VEHICLE, Sea, session_at, until
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import TargetEstimate
+from wakewise.perception.settings import DISTANCE_STD
 from wakewise.vision.imaging import PinholeCamera
 from wakewise_ardusub.link.session_log import read_journal
-from wakewise_ardusub.session.boxed_target import DISTANCE_STD, box_of, boxed_target, target_distance
+from wakewise_ardusub.session.boxed_target import box_of, boxed_target, target_distance
 from wakewise_ardusub.session.session import MOVED_M
 from wakewise_ardusub.session.video_stream import VideoSource
 

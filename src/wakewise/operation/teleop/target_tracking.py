@@ -22,6 +22,7 @@ import numpy as np
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, TargetEstimate
+from wakewise.operation.teleop.input.controls import Box
 from wakewise.perception import CalibratedCamera, PerceptionSettings, TargetTracker, TrackerState
 from wakewise.perception.feature_tracks import Grey, fitted
 
@@ -42,8 +43,6 @@ _NOTES = {
     "tracked": "target tracked; its region is protected",
     "lost": "target lost; its last region stays protected",
 }
-
-Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

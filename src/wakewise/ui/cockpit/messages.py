@@ -13,15 +13,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from wakewise.core.arrays import Array
-from wakewise.operation.teleop.input.controls import ACTIONS, CONTROL_AXES, apply_dead_zone
+from wakewise.operation.teleop.input.controls import ACTIONS, CONTROL_AXES, LEAST_SIDE, apply_dead_zone
 
 _WORD = 64  # characters of a name, a token, an id
 _LARGEST = 2**53  # the largest whole number that JavaScript counts to
 _FIELDS = 16
 CLEAR = "clear"
 """In place of a box: the designated target is forgotten."""
-LEAST_SIDE = 0.01
-"""Least side of a box, in shares of the picture."""
 PROPOSAL = ("ask", "accept", "refuse")
 """What the holder may do about a proposed target."""
 

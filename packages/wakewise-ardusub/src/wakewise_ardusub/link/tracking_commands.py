@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from wakewise.core.errors import InputError
+from wakewise.operation.teleop.input.controls import LEAST_SIDE, Box
 from wakewise_ardusub.link.message_state import MavlinkMessage
 from wakewise_ardusub.link.protocol import COMPANION_COMPONENT
 
@@ -22,13 +23,10 @@ ACCEPTED, TEMPORARILY_REJECTED, DENIED, FAILED = 0, 1, 2, 4
 """MAV_RESULT."""
 POINT_RADIUS = 0.06
 """Half the width of the box about a point whose radius is not given, in shares of the picture's width."""
-LEAST_SIDE = 0.01
 _ALL_COMPONENTS = 0
 _STATUS_BYTES, _WARNING = 50, 4
 _ACTIVE, _RECTANGLE, _IN_STATUS = 1, 2, 4
 """CAMERA_TRACKING_STATUS_FLAGS, CAMERA_TRACKING_MODE and CAMERA_TRACKING_TARGET_DATA."""
-
-Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)

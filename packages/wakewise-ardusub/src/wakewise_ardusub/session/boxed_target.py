@@ -21,6 +21,8 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, TargetEstimate
+from wakewise.operation.teleop.input.controls import Box
+from wakewise.perception.settings import DISTANCE_STD
 from wakewise.scene.targets import Region
 from wakewise_ardusub.link.message_state import MavlinkMessage
 from wakewise_ardusub.link.output_gate import OutputGate
@@ -29,7 +31,6 @@ from wakewise_ardusub.link.tracking_commands import (
     DENIED,
     FAILED,
     TEMPORARILY_REJECTED,
-    Box,
     TrackingCommand,
     command_ack,
     status_text,
@@ -41,8 +42,6 @@ if TYPE_CHECKING:
     from wakewise.vision.imaging.camera import Camera
     from wakewise_ardusub.session.video_tracking import VideoTracking
 
-DISTANCE_STD = 0.2
-"""Standard deviation of the distance, as a share of it: the perception's own of a target that is not mapped yet."""
 RANGE_S = 2.0
 """A rangefinder's word is as fresh as this."""
 FORWARD, DOWN = 0, 25

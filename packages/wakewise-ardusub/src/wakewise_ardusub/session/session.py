@@ -29,6 +29,7 @@ from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.loop import Step
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario
+from wakewise.operation.teleop.input.controls import Box
 from wakewise.operation.teleop.live import LiveFlight
 from wakewise.robot.importers import any_vehicle
 from wakewise.scene.targets import Mesh, Region, Target
@@ -36,7 +37,6 @@ from wakewise_ardusub.link.message_state import MavlinkMessage, attitude_of
 from wakewise_ardusub.link.motor_interface import VehicleMotors
 from wakewise_ardusub.link.output_gate import OutputGate, Send
 from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
-from wakewise_ardusub.link.tracking_commands import Box
 from wakewise_ardusub.session.boxed_target import MAPPED, BoxDesignation, BoxedTarget, Follow, mapped_target
 from wakewise_ardusub.session.camera_mount import GIVES, WAITS_S, MountControl
 from wakewise_ardusub.session.cameras import MakeCamera, note_view

@@ -27,6 +27,7 @@ from wakewise.core.geometry import Pose, quat_conjugate, quat_from_rotvec, quat_
 from wakewise.core.interfaces import BodyState, TargetEstimate
 from wakewise.operation.finding.camera_estimator import known_camera
 from wakewise.operation.parts import Parts
+from wakewise.operation.teleop.input.controls import Box
 from wakewise.operation.teleop.target_tracking import (
     PERCEPTION,
     SeenPicture,
@@ -36,7 +37,6 @@ from wakewise.operation.teleop.target_tracking import (
     pose_std,
 )
 from wakewise.perception import CalibratedCamera, TargetTracker
-from wakewise_ardusub.link.tracking_commands import Box
 from wakewise_ardusub.session.video_stream import Picture, VideoReader, VideoSource
 
 KEPT_S = 5.0

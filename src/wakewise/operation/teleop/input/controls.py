@@ -21,6 +21,9 @@ CONTROL_AXES = ("forward", "right", "down", "turn", "tilt")
 ACTIONS = ("capture", "hold", "scan", "operator", "stop", "precise", "gain_up", "gain_down")
 """Actions of buttons: take a photograph; hold the position; fly the mission; fly by sticks; end the flight; precise
 mode on or off; the gain a step up or down."""
+Box = tuple[float, float, float, float]
+LEAST_SIDE = 0.01
+"""Least side of a box drawn in a picture, (left, top, right, bottom) in shares of it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
