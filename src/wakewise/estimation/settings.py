@@ -42,7 +42,7 @@ class Priors:
     tank's current does. The model's noise is for what changes within seconds: gains within 5 % (one sigma 3 %) of 0.2 N
     on 10 kg are 6e-4 m/s2, lasting the 0.1 s of the thruster's lag, as white noise 6e-4 sqrt(2 x 0.1) = 3e-4
     m/s2/sqrt(Hz); with arms of 0.15 m on 0.1 kg m2 about 0.004 rad/s2/sqrt(Hz). When more happens than that, the filter
-    notices and lets the noise grow (`error_state`).
+    notices and lets the noise grow (`eskf`).
     """
 
     # gyro_bias_std_rad_s, accelerometer_bias_std_m_s2: bias at the start.

@@ -67,9 +67,9 @@ class AssistedPilot:
         What the camera is kept on, and the middle of orbits.
     dt_s : float
         Time between two goals.
-    begin : DeskState, optional
+    begin : OperatorSettings, optional
         Settings at time zero, for reproducible flights; None: they stay as they are.
-    keep_off : KeepOff, optional
+    keep_off : CollisionLimiter, optional
         Obstacles that the motion commanded by the sticks must not reach.
 
     Attributes

@@ -53,7 +53,7 @@ class WaterConstants(NamedTuple):
     rest_speed: float  # in m/s
     gusty: bool
     bed_z: float
-    curve: np.ndarray  # `space_order.curve()`
+    curve: np.ndarray  # `induction.curve()`
     constants: np.ndarray  # `induction.SINGLE`
 
 
@@ -100,7 +100,7 @@ def flow_at(
     """Write the velocity of free and wall jets at some of the points, shape (n, 3), into those rows of `out`.
 
     `order` says at which, best as `ordered` has them; `rows` and `starts` are those of an `ImpulseField`; `planes`,
-    `ring_starts` and `rings` those of `WallRows`.
+    `ring_starts` and `rings` those of `bedjets.wall_rows`.
     """
     some, sums = points[order], np.zeros((order.shape[0], 3))
     sum_field(some, rows, starts, constants, sums)

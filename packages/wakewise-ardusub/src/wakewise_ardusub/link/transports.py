@@ -282,7 +282,7 @@ class MavlinkCodec:
 
     Parameters
     ----------
-    carrier : Transport
+    transport : Transport
     system : int
         The vehicle's id, which its companion shares.
     """

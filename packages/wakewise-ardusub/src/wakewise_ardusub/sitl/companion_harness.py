@@ -46,7 +46,7 @@ class CompanionHarness:
     Parameters
     ----------
     flight : InProcessSession
-    limits : Limits, optional
+    limits : EngagementLimits, optional
     journal : SessionLog, optional
     buttons : mapping, optional
         As of `OutputGate`.

@@ -43,7 +43,7 @@ class MeterReading:
     time_s : float
     why_not : str or None
         Why there is no judgement at this instant, None where there is one.
-    spared : Spared or None
+    savings : WashSavings or None
     peak_m_s, rms_m_s : dict of float
         Highest speed at the points and root mean square over them, as flown, with least thrusts and with gentle ones.
     shares : ndarray, shape (m,)
@@ -92,7 +92,7 @@ class WashMeter:
     Parameters
     ----------
     craft : VehicleSummary
-    hearing : VehicleListener
+    listener : VehicleListener
     points_B_m, weights : ndarray, shape (n, 3) and (n,)
         What is to be spared, in the vehicle's frame.
 

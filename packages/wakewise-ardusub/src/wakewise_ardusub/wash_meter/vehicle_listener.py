@@ -65,7 +65,7 @@ class VehicleListener:
         MAVLink system id of the vehicle; the first whose servo outputs are heard if not given.
     parameters : mapping, optional
         The autopilot's, as known beforehand.
-    clock : Stamped, optional
+    clock : ClockModel, optional
         Makes times of stamps; they are taken as they are if not given.
     """
 
