@@ -85,29 +85,35 @@ def _geojson_lines(path: Path, text: str) -> tuple[list[Any], set[str]]:
     if crs is not None and not any(name in json.dumps(crs) for name in _WGS_84):
         raise InputError(f"{path}: crs {json.dumps(crs)[:80]}, must be WGS 84 (longitude, latitude; no crs member)")
     lines, others = [], set[str]()
-    for kind, places in _geometries(found):
+    for kind, places in _geometries(path, found):
         if kind == "LineString":
             lines.append(places)
         elif kind == "MultiLineString":
-            lines += places or []
+            lines += _listed(path, "coordinates", places)
         else:
             others.add(kind)
     return lines, others
 
 
-def _geometries(node: Any) -> Iterator[tuple[str, Any]]:
+def _listed(path: Path, member: str, value: Any) -> list[Any]:
+    if not isinstance(value, list | None):
+        raise InputError(f"{path}: {member} is a {type(value).__name__}, must be an array")
+    return value or []
+
+
+def _geometries(path: Path, node: Any) -> Iterator[tuple[str, Any]]:
     """Kind and coordinates of each geometry."""
     if not isinstance(node, dict):
         return
     kind = node.get("type")
     if kind == "FeatureCollection":
-        for feature in node.get("features") or []:
-            yield from _geometries(feature)
+        for feature in _listed(path, "features", node.get("features")):
+            yield from _geometries(path, feature)
     elif kind == "Feature":
-        yield from _geometries(node.get("geometry"))
+        yield from _geometries(path, node.get("geometry"))
     elif kind == "GeometryCollection":
-        for geometry in node.get("geometries") or []:
-            yield from _geometries(geometry)
+        for geometry in _listed(path, "geometries", node.get("geometries")):
+            yield from _geometries(path, geometry)
     elif isinstance(kind, str):
         yield kind, node.get("coordinates")
 
