@@ -80,13 +80,16 @@ def grey_picture(image: NDArray[Any]) -> Grey:
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
 
 
+def has_shape(shape: tuple[int, ...], camera: CalibratedCamera) -> bool:
+    """Whether a picture of this shape, (height, width), is as wide for its height as the camera's; see `ROUNDED_PX`."""
+    return abs(shape[0] * camera.width / shape[1] - camera.height) <= ROUNDED_PX
+
+
 def fitted(picture: Grey, camera: CalibratedCamera) -> Grey:
     """A grey picture in the camera's size; one of another shape is left for the tracker to refuse."""
-    height, width = picture.shape
-    same = (width, height) == (camera.width, camera.height)
-    if same or abs(height * camera.width / width - camera.height) > ROUNDED_PX:
+    if picture.shape == (camera.height, camera.width) or not has_shape(picture.shape, camera):
         return picture
-    way = cv2.INTER_AREA if width > camera.width else cv2.INTER_LINEAR
+    way = cv2.INTER_AREA if picture.shape[1] > camera.width else cv2.INTER_LINEAR
     return np.asarray(cv2.resize(picture, (camera.width, camera.height), interpolation=way), dtype=np.uint8)
 
 

@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState, TargetEstimate
 from wakewise.operation.teleop.target_tracking import PERCEPTION, TargetTracking
+from wakewise.perception.feature_tracks import fitted
 from wakewise.scene.missions.orbit import camera_pose
 from wakewise_ardusub.session.video_stream import VideoReader, VideoSource
 from wakewise_ardusub.session.video_tracking import FRESH_S, LASTS_S, PoseHistory, VideoTracking
@@ -314,6 +316,19 @@ def test_a_new_box_is_not_forgotten_with_one_that_waited_too_long(flight: Flight
     flight.see()
     assert flight.tracking._tracking not in (None, first)
     assert flight.tracking._expired == ""
+
+
+@pytest.mark.parametrize(
+    "size", [(256, 145), (160, 91), (256, 144), (1920, 1080), (1920, 1088), (640, 361), (854, 480)]
+)
+def test_pictures_are_taken_exactly_where_they_fit_the_camera(size: tuple[int, int]) -> None:
+    """A picture that the tracker would refuse is told of as one of another shape."""
+    camera = replace(CAMERA, width=480, height=270)
+    source = VideoSource(place="rtsp://127.0.0.1:9/none", delay_s=0.0)
+    tracking = VideoTracking(source, camera, lambda: 1.0, lambda target: None)
+    tracking.see(np.zeros((size[1], size[0], 3), np.uint8), 1.0)
+    fits = fitted(np.zeros((size[1], size[0]), np.uint8), camera).shape == (270, 480)
+    assert (tracking._unlike == "") == fits
 
 
 def test_pictures_of_another_shape_are_told_at_once(flight: Flight) -> None:

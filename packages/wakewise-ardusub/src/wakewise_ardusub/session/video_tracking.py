@@ -37,6 +37,7 @@ from wakewise.operation.teleop.target_tracking import (
     pose_std,
 )
 from wakewise.perception import CalibratedCamera, TargetTracker
+from wakewise.perception.feature_tracks import has_shape
 from wakewise_ardusub.session.video_stream import Picture, VideoReader, VideoSource
 
 KEPT_S = 5.0
@@ -241,9 +242,9 @@ class VideoTracking:
 
     def _compared(self, picture: Picture) -> str:
         """What is wrong with a picture's shape; empty if nothing is."""
-        (height, width), (own_width, own_height) = picture.shape[:2], (self._camera.width, self._camera.height)
-        if abs(height * own_width - width * own_height) <= max(width, own_width):
+        if has_shape(picture.shape, self._camera):
             return ""
+        height, width = picture.shape[:2]
         return f"pictures of {width} x {height}: give --set imaging.width={width} --set imaging.height={height}"
 
     def _keep(self, picture: SeenPicture, box: Box) -> None:
