@@ -22,6 +22,8 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import euler_from_quat, matrix_from_quat
 from wakewise.ui.cli.main import run
 from wakewise.vision.photo_selection.dive_track import poses_at, read_track
+from wakewise_ardusub.logs import dive_track
+from wakewise_ardusub.logs.channels import ChannelSeries
 from wakewise_ardusub.logs.dive_track import read_dive_log
 
 
@@ -75,6 +77,23 @@ def _tlog(made: Dive, source: str) -> bytes:
             )
             said(autopilot, time_s, message)
     return out.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("time_s", "kept"),
+    [
+        ([0.0, 1.0, 2.0, 3.0, 4.0, 100.0, 5.0, 6.0, 101.0], [0, 1, 2, 3, 4, 5, 8]),
+        ([0.0, 1.0, 2.0, 2.0, 1.5, 1.7, 3.0, 4.0], [0, 1, 2, 6, 7]),
+        ([0.0, 1.0, np.nan, 2.0, 3.0, 4.0], [0, 1, 3, 4, 5]),
+    ],
+)
+def test_samples_of_a_channel_have_rising_times(time_s: list[float], kept: list[int]) -> None:
+    """After a jump of the clock no sample is kept that is earlier than one before it."""
+    times = np.array(time_s)
+    found = dive_track._finite(ChannelSeries(time_s=times, values=np.arange(len(times))[:, None].astype(float)))
+    assert found is not None
+    assert found.values[:, 0].tolist() == kept
+    assert (np.diff(found.time_s) > 0.0).all()
 
 
 @pytest.mark.parametrize(

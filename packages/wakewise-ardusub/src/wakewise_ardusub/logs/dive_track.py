@@ -65,11 +65,12 @@ def dive_track(log: VehicleLog) -> DiveTrack:
 
 
 def _finite(series: ChannelSeries | None) -> ChannelSeries | None:
-    """Undamaged samples at rising times; None where they are too few."""
+    """Undamaged samples, each later than all before it; None where they are too few."""
     if series is None:
         return None
-    good: BoolArray = np.asarray(np.isfinite(series.values).all(axis=1))
-    good[1:] &= np.diff(series.time_s) > 0.0
+    good: BoolArray = np.asarray(np.isfinite(series.values).all(axis=1) & np.isfinite(series.time_s))
+    latest_s = np.maximum.accumulate(np.where(good, series.time_s, -np.inf))
+    good[1:] &= series.time_s[1:] > latest_s[:-1]
     if good.sum() < _LEAST_SAMPLES:
         return None
     return ChannelSeries(time_s=series.time_s[good].copy(), values=series.values[good].copy())
