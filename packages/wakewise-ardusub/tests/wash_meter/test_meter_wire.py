@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from pathlib import Path
@@ -19,7 +20,7 @@ from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
 from wakewise_ardusub.vehicle_summary import VehicleSummary
 from wakewise_ardusub.wash_meter.meter import KEPT_S, DiveRecord, MeterReading, WashHistory
-from wakewise_ardusub.wash_meter.run import MeterSettings
+from wakewise_ardusub.wash_meter.run import MeterLoop, MeterSettings
 from wakewise_ardusub.wash_meter.vehicle_listener import MavlinkSocket, TimedMessage, VehicleListener
 from wakewise_ardusub.wash_savings import Shares, WashSavings
 
@@ -113,6 +114,21 @@ def test_the_past_is_a_mean_of_each_second_with_gaps() -> None:
     assert (told["until_s"], history.last[0]) == (8, 7)
     history.add(reading(1e6, 1e-6, 0.0))
     assert len(history.told()["flown_mm_s"]) == KEPT_S
+
+
+def test_a_record_is_closed_however_the_meter_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fault of a reading ends the meter; its summary is written all the same."""
+    craft = VehicleSummary.of(load_vehicle("bluerov2-heavy"), wake_model("jet"))
+    settings = MeterSettings(connection=free_ends(), port=0, out=tmp_path / "dive")
+    meter = MeterLoop(settings, craft, np.array([[1.0, 0.0, 0.0]]), np.ones(1), "of a point", {}, lambda line: None)
+
+    def fails(now_s: float) -> MeterReading:
+        raise ValueError("no reading")
+
+    monkeypatch.setattr(meter.meter, "read", fails)
+    with pytest.raises(ValueError, match="no reading"):
+        meter.run()
+    assert json.loads((tmp_path / "dive" / "meter.json").read_text())["messages"] == 0
 
 
 def test_a_record_goes_on_and_keeps_another_crafts_rows(tmp_path: Path) -> None:

@@ -154,7 +154,10 @@ class MeterLoop:
             stack.callback(self.wire.close)
             self.server.start()
             stack.callback(self.server.stop)
-            record = None if self.settings.out is None else DiveRecord(self.settings.out, self.meter.craft)
+            record = None
+            if self.settings.out is not None:
+                record = kept = DiveRecord(self.settings.out, self.meter.craft)
+                stack.callback(lambda: kept.close(self.state()))
             self._introduce()
             due_s = time.monotonic()
             while not self.over.is_set():
@@ -168,10 +171,7 @@ class MeterLoop:
                 if record is not None:
                     record.add(time.time(), reading)
                 due_s = max(due_s + TICK_S, now_s)
-            state = self.state()
-            if record is not None:
-                record.close(state)
-        return state
+        return self.state()
 
     def state(self) -> dict[str, Any]:
         """How it stands, as JSON has it."""
