@@ -98,7 +98,10 @@ def ardusub(
         ),
     ] = None,
     video_delay: Annotated[
-        float, typer.Option(metavar="S", help="How old a picture of the stream is when it arrives, 0 to 1.5 s.")
+        float,
+        typer.Option(
+            metavar="S", min=0.0, max=1.5, help="How old a picture of the stream is when it arrives, 0 to 1.5 s."
+        ),
     ] = 0.2,
     tilt: Annotated[
         float,
@@ -126,7 +129,7 @@ def ardusub(
         typer.Option(
             metavar="WHAT=N,...",
             help="Buttons of the pilot's sticks, by number from 0: engage (which also releases), capture, scan, hold, "
-            "operator, precise, gain_up, gain_down. Those at which the autopilot itself acts (BTNn_FUNCTION) are "
+            "stop, operator, precise, gain_up, gain_down. Those at which the autopilot itself acts (BTNn_FUNCTION) are "
             "refused; on a fresh ArduSub 0 and 15 are free.",
         ),
     ] = "",
@@ -280,6 +283,8 @@ def _carried(
     for option, end in (("--connection", vehicle_at), ("--relay", ground_at)):
         if end.way not in ("udpin", "udpout"):
             raise InputError(f"{option} {end.words}: the relay forwards udpin:HOST:PORT and udpout:HOST:PORT only")
+    if vehicle_at == ground_at:
+        raise InputError(f"--relay {ground_at.words}: is the place of --connection, two are needed")
     tap = RelayTransport()
     sockets = [stack.enter_context(open_udp(end)) for end in (vehicle_at, ground_at)]
     known = [None if end.way == "udpin" else (end.host, end.port) for end in (vehicle_at, ground_at)]
@@ -327,6 +332,9 @@ def _watch(session: VehicleSession, where: str) -> None:
             _say(line)
 
 
+_FARTHEST_M = 10_000.0
+
+
 def _spare(vehicle: str, target: str | None, ahead: float, points: Path | None) -> ProtectedRegion:
     import numpy as np
 
@@ -340,7 +348,10 @@ def _spare(vehicle: str, target: str | None, ahead: float, points: Path | None) 
     if target is not None and points is not None:
         raise InputError("--target, --points: both say what to spare, give one")
     if target is not None:
-        return ProtectedRegion(place_W_m=np.array(_numbers(target, "--target", "N,E,D", 3)))
+        place = np.array(_numbers(target, "--target", "N,E,D", 3))
+        if np.abs(place).max() > _FARTHEST_M:
+            raise InputError(f"--target {target!r}: is farther than {_FARTHEST_M:g} m from the autopilot's origin")
+        return ProtectedRegion(place_W_m=place)
     chosen = any_vehicle(vehicle)
     if points is None:
         bow_points(chosen, ahead)  # refuses what is too near or too far

@@ -99,12 +99,12 @@ def test_vehicle_motors(
     """Turn motors one by one with the operator's consent, and keep what was seen."""
     from wakewise.robot.importers import any_vehicle
     from wakewise_ardusub.link.checks import read_results, write_results
-    from wakewise_ardusub.link.motor_test import planned_turns, run_motor_test
+    from wakewise_ardusub.link.motor_test import chosen_motors, planned_turns, run_motor_test
     from wakewise_ardusub.link.parameters import read_parameters
     from wakewise_ardusub.link.vehicle_survey import await_autopilot
 
     chosen = any_vehicle(vehicle)
-    numbers = _motor_numbers(motors)
+    numbers = chosen_motors(chosen, _motor_numbers(motors))
     before = read_results(motor_results) if motor_results.exists() else None
     with _connected(connection, system, "--motor-test") as link:
         await_autopilot(link)

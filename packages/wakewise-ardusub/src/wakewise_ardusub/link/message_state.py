@@ -36,10 +36,6 @@ _UNIT = 0.01
 """How far the length of a quaternion may be from 1."""
 _TAKING_OVER = {176: "set the mode", 400: "armed or disarmed", 185: "terminated the flight", 300: "started a mission"}
 """Commands of a ground station (MAV_CMD) by which its operator takes the vehicle into their own hands."""
-
-
-IMAGE_START_CAPTURE, DIGICAM_CONTROL = 2000, 203
-"""Commands (MAV_CMD) by which the companion asks for a photograph."""
 _DONE, _IN_PROGRESS = 0, 5
 _ANSWERS = {1: "temporarily rejected", 2: "denied", 3: "unsupported", 4: "failed"}
 
@@ -220,7 +216,7 @@ def _photographed(known: LinkState, said: MavlinkMessage, now_s: float) -> LinkS
             words = f"{who} could not take image {int(get['image_index'])}"
         return replace(known, photographs=known.photographs + took, camera=words, camera_s=now_s)
     meant = int(get.get("target_component", 0)) in (0, protocol.COMPANION_COMPONENT)
-    if int(get["command"]) not in (IMAGE_START_CAPTURE, DIGICAM_CONTROL) or not meant:
+    if int(get["command"]) not in (protocol.IMAGE_START_CAPTURE, protocol.DIGICAM_CONTROL) or not meant:
         return known
     result = int(get["result"])
     agreed = result in (_DONE, _IN_PROGRESS)

@@ -65,6 +65,21 @@ class Operator(Protocol):
         ...
 
 
+def chosen_motors(vehicle: Vehicle, motors: Sequence[int] | None) -> list[int]:
+    """Numbers of the motors to turn, from 1; all if none are given.
+
+    Raises
+    ------
+    InputError
+        If a motor is asked for that there is not.
+    """
+    count = len(vehicle.thrusters)
+    for motor in motors or ():
+        if not 1 <= motor <= count:
+            raise InputError(f"--motors: there is no motor {motor}, vehicle {vehicle.name} has motors 1 to {count}")
+    return list(range(1, count + 1)) if motors is None else list(motors)
+
+
 def planned_turns(
     vehicle: Vehicle, parameters: Mapping[str, float], motors: Sequence[int] | None = None
 ) -> list[MotorTestStep]:
@@ -76,11 +91,7 @@ def planned_turns(
         If the autopilot's motors are not the vehicle's, or a motor is asked for that there is not.
     """
     output = motor_output(vehicle, parameters)
-    count = len(vehicle.thrusters)
-    chosen = list(range(1, count + 1)) if motors is None else list(motors)
-    for motor in chosen:
-        if not 1 <= motor <= count:
-            raise InputError(f"--motors: there is no motor {motor}, vehicle {vehicle.name} has motors 1 to {count}")
+    count, chosen = len(vehicle.thrusters), chosen_motors(vehicle, motors)
     supply_V = supply_in_table(vehicle, float("nan"))
     # A pulse above the middle for every motor, so the wish is along the axis as the motor itself turns.
     own = pulses_of_thrusts(vehicle, SHARE * vehicle.thrust_upper_N, np.ones(count), supply_V)

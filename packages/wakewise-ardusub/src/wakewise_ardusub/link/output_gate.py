@@ -404,14 +404,8 @@ class OutputGate:
             return found
 
     def heartbeat(self) -> dict[str, int]:
-        """Fields of this program's heartbeat: an onboard controller, never a ground station."""
-        return {
-            "type": protocol.ONBOARD_CONTROLLER,
-            "autopilot": protocol.NO_AUTOPILOT,
-            "base_mode": 0,
-            "custom_mode": self.known.session,
-            "system_status": protocol.ACTIVE,
-        }
+        """Fields of this program's heartbeat."""
+        return protocol.heartbeat(self.known.session)
 
     def _judge(self) -> None:
         if self.engagement.state != "off":

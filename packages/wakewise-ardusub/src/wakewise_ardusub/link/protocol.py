@@ -111,14 +111,12 @@ ALLOWED_MODES: Final = frozenset({STABILIZE, ALT_HOLD, MANUAL})
 autopilot enter that mode anew at hand-back; POSHOLD would need its place taken anew as well."""
 DEFAULT_MODES: Final = sum(1 << mode for mode in sorted(ALLOWED_MODES))
 
-# The companion's heartbeat, and what it asks the autopilot for by COMMAND_LONG (common.xml).
-ONBOARD_CONTROLLER: Final = 18
-"""MAV_TYPE_ONBOARD_CONTROLLER; beside it MAV_AUTOPILOT_INVALID and MAV_STATE_ACTIVE."""
-NO_AUTOPILOT: Final = 8
-ACTIVE: Final = 4
+# What is asked of the autopilot by COMMAND_LONG (common.xml).
 SET_MODE: Final = 176
 REQUEST_MESSAGE: Final = 512
 AUTOPILOT_VERSION: Final = 148
+IMAGE_START_CAPTURE: Final = 2000
+DIGICAM_CONTROL: Final = 203
 
 # The pilot.
 STICKS_MESSAGE: Final = 69
@@ -171,6 +169,18 @@ def parameter_request(system: int, name: str) -> Mapping[str, Any]:
         "param_id": name.encode("ascii"),
         "param_index": -1,
     }
+
+
+def heartbeat(session: int = 0) -> dict[str, int]:
+    """Fields of the companion's HEARTBEAT: an onboard controller without an autopilot of its own, active."""
+    return {"type": 18, "autopilot": 8, "base_mode": 0, "custom_mode": session, "system_status": 4}
+
+
+def photograph_command(number: int, digicam: bool) -> tuple[int, tuple[float, ...]]:
+    """Command and parameters of one photograph by all cameras: MAV_CMD_IMAGE_START_CAPTURE, or DO_DIGICAM_CONTROL."""
+    if digicam:
+        return DIGICAM_CONTROL, (0.0, 0.0, 0.0, 0.0, 1.0, float(number), 0.0)  # the fifth is: shoot
+    return IMAGE_START_CAPTURE, (0.0, 0.0, 1.0, float(number), 0.0, 0.0, 0.0)  # no interval, one image, its number
 
 
 def mount_command(system: int, pitch_rad: float, mode: int) -> Mapping[str, Any]:

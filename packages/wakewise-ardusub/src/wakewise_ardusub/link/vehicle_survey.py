@@ -13,14 +13,12 @@ from wakewise_ardusub.link.checks import CheckInputs, MotorResults, ReceivedTele
 from wakewise_ardusub.link.connection import MavlinkSession, send_command
 from wakewise_ardusub.link.parameters import read_parameters
 from wakewise_ardusub.link.protocol import (
-    ACTIVE,
     AUTOPILOT_COMPONENT,
     AUTOPILOT_VERSION,
     HEARTBEAT_PERIOD_S,
-    NO_AUTOPILOT,
-    ONBOARD_CONTROLLER,
     REQUEST_MESSAGE,
     VERSION_NAME,
+    heartbeat,
     interval_requests,
 )
 
@@ -97,9 +95,7 @@ def await_autopilot(link: MavlinkSession, patience_s: float | None = None) -> An
 
 def send_heartbeat(link: MavlinkSession) -> None:
     """The companion's heartbeat: an onboard controller, never a ground station."""
-    link.send(
-        "heartbeat", type=ONBOARD_CONTROLLER, autopilot=NO_AUTOPILOT, base_mode=0, custom_mode=0, system_status=ACTIVE
-    )
+    link.send("heartbeat", **heartbeat())
 
 
 def _listened(link: MavlinkSession, seconds: float, kind: str, *, mavlink_2: bool) -> ReceivedTelemetry:

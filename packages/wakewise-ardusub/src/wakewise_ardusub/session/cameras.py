@@ -24,8 +24,8 @@ from typing import Protocol
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise_ardusub.link.message_state import DIGICAM_CONTROL, IMAGE_START_CAPTURE
 from wakewise_ardusub.link.output_gate import OutputGate
+from wakewise_ardusub.link.protocol import photograph_command
 from wakewise_ardusub.link.session_log import SessionLog
 
 PHOTOGRAPHS = "photographs"
@@ -91,10 +91,8 @@ class MavlinkCamera:
 
     def take(self, number: int) -> None:
         """Ask for one image now."""
-        # IMAGE_START_CAPTURE: all cameras, no interval, one image, its number. DO_DIGICAM_CONTROL: shoot is the fifth.
-        numbers = (0, 0, 0, 0, 1, number, 0) if self.digicam else (0, 0, 1, number, 0, 0, 0)
-        command = DIGICAM_CONTROL if self.digicam else IMAGE_START_CAPTURE
-        fields = {f"param{i}": float(value) for i, value in enumerate(numbers, start=1)}
+        command, numbers = photograph_command(number, self.digicam)
+        fields = {f"param{i}": value for i, value in enumerate(numbers, start=1)}
         target = {"target_system": self.gate.known.system, "target_component": _ALL_COMPONENTS}
         self.gate.send("command_long", {**target, "command": command, "confirmation": 0, **fields})
 

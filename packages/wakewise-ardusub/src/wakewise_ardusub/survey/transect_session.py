@@ -24,9 +24,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import Vehicle
 from wakewise_ardusub.link.message_state import (
-    DIGICAM_CONTROL,
     GROUND_STATION_S,
-    IMAGE_START_CAPTURE,
     REMEMBERED_S,
     LinkState,
     MavlinkMessage,
@@ -35,7 +33,6 @@ from wakewise_ardusub.link.message_state import (
 )
 from wakewise_ardusub.link.motor_interface import VehicleMotors
 from wakewise_ardusub.link.protocol import (
-    ACTIVE,
     AGAIN_S,
     ALT_HOLD,
     AUTOPILOT_COMPONENT,
@@ -43,13 +40,13 @@ from wakewise_ardusub.link.protocol import (
     GUIDED,
     HEARTBEAT_PERIOD_S,
     MOST_PARAMETERS,
-    NO_AUTOPILOT,
-    ONBOARD_CONTROLLER,
     PARAMETERS_S,
     REQUEST_MESSAGE,
     SET_MESSAGE_INTERVAL,
     SET_MODE,
+    heartbeat,
     parameter_request,
+    photograph_command,
 )
 from wakewise_ardusub.link.session_log import SessionLog
 from wakewise_ardusub.logs.channels import MODES
@@ -495,9 +492,8 @@ class TransectSession:
         if at.leg >= len(plan.legs) or not plan.legs[at.leg].line or at.flown_m < self.photographs * every:
             return
         self.photographs += 1
-        digicam = self.options.camera == "digicam"
-        numbers = (0, 0, 0, 0, 1, self.photographs, 0) if digicam else (0, 0, 1, self.photographs, 0, 0, 0)
-        self._command(DIGICAM_CONTROL if digicam else IMAGE_START_CAPTURE, *map(float, numbers), component=0)
+        command, numbers = photograph_command(self.photographs, self.options.camera == "digicam")
+        self._command(command, *numbers, component=0)
         self._write("photograph", number=self.photographs, flown_m=at.flown_m, place=self._place and self._place[0])
 
     # How it ends.
@@ -539,8 +535,7 @@ class TransectSession:
     def _beat(self, now_s: float) -> None:
         if now_s - self._came["beat"] >= HEARTBEAT_PERIOD_S:
             self._came["beat"] = now_s
-            fields = {"type": ONBOARD_CONTROLLER, "autopilot": NO_AUTOPILOT, "base_mode": 0, "system_status": ACTIVE}
-            self._post("heartbeat", {**fields, "custom_mode": self.known.session})
+            self._post("heartbeat", heartbeat(self.known.session))
         if math.isinf(self.known.heartbeat_s) or self.state in ("flying", "paused"):
             return  # nobody is there, or no address is known
         unknown = [name for name in self._motors.needs if name not in self.known.parameters]
