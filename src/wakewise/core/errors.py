@@ -69,7 +69,7 @@ _SAID = {
     "failed to map segment from shared object": errno.ENOMEM,
 }
 _PLACELESS = {
-    "no locator available": "compiled code can be kept nowhere; set NUMBA_CACHE_DIR to a folder that can be written",
+    "no locator available": "compiled code can be kept nowhere; set NUMBA_CACHE_DIR to a folder that can be written"
 }
 # A reader, a peer or a child that went away: no file, and told by those who met it.
 _OTHERS_ENDED = (ConnectionError, BlockingIOError, ChildProcessError, InterruptedError, TimeoutError)

@@ -209,10 +209,7 @@ def _after_lists(rest: Bytes, at: int, count: int, kind: np.dtype[Any], item: in
 def _array(file: IO[bytes]) -> tuple[tuple[int, ...], int]:
     """Shape and bytes of an array by its header."""
     version = np.lib.format.read_magic(file)
-    read = {
-        (1, 0): np.lib.format.read_array_header_1_0,
-        (2, 0): np.lib.format.read_array_header_2_0,
-    }.get(version)
+    read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}.get(version)
     if read is None:
         raise ValueError(f"version {version} of the format")
     shape, _, dtype = read(file)

@@ -55,10 +55,7 @@ def flight_trim(vehicle: Vehicle, steps: pl.DataFrame) -> HoverTrim:
         )
     kept = steps.filter(still)
     return hover_trim(
-        vehicle,
-        _table(kept, [f"est_q{a}" for a in "wxyz"]),
-        _table(kept, [*LOAD]),
-        _table(kept, needed[len(LOAD) :]),
+        vehicle, _table(kept, [f"est_q{a}" for a in "wxyz"]), _table(kept, [*LOAD]), _table(kept, needed[len(LOAD) :])
     )
 
 

@@ -264,13 +264,7 @@ def _cells(campaign: Campaign) -> Iterator[_Cell]:
     vehicles = campaign.vehicles or (own.vehicle,)
     variations = campaign.variations or {AS_IS: {}}
     for variation, target, world, vehicle, method in product(variations, targets, worlds, vehicles, campaign.methods):
-        names = {
-            "method": method,
-            "target": target,
-            "world": world,
-            "vehicle": vehicle,
-            "variation": variation,
-        }
+        names = {"method": method, "target": target, "world": world, "vehicle": vehicle, "variation": variation}
         told = {f"target.{key}": value for key, value in targets[target].items()}
         fields = {**campaign.scenario, **told, "world": world, "vehicle": vehicle, "method": method}
         yield _Cell(names, fields | variations[variation])

@@ -84,10 +84,7 @@ class ProcessExecutor:
         executor = ThreadPoolExecutor(workers, thread_name_prefix="campaign")
         try:
             yield WorkerPool(
-                executor=executor,
-                threads=threads_each(cores(), workers),
-                size=lambda: workers,
-                check=lambda: None,
+                executor=executor, threads=threads_each(cores(), workers), size=lambda: workers, check=lambda: None
             )
         finally:
             executor.shutdown(wait=False, cancel_futures=True)

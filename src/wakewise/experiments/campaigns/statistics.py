@@ -77,9 +77,7 @@ def mean_interval(
 
 
 def geometric_ratio(
-    ours: Sequence[float] | Array,
-    theirs: Sequence[float] | Array,
-    strata: Sequence[Hashable] | None = None,
+    ours: Sequence[float] | Array, theirs: Sequence[float] | Array, strata: Sequence[Hashable] | None = None
 ) -> tuple[float, Interval | None]:
     """Ratio of the geometric means of pairs, shape (n,) each, and its 95 % interval: that of the mean log ratio.
 

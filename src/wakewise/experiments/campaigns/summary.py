@@ -13,11 +13,7 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns.definition import FACTORS
-from wakewise.experiments.campaigns.statistics import (
-    WORST,
-    compare_pairs,
-    probability_of_improvement,
-)
+from wakewise.experiments.campaigns.statistics import WORST, compare_pairs, probability_of_improvement
 from wakewise.experiments.campaigns.table import MEASURES, ComparisonMetric, Results, varying_factors
 
 Place = Mapping[str, Any]

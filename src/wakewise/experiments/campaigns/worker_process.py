@@ -52,12 +52,7 @@ _ASK_S, _BEAT_S = 0.5, 10.0
 """How often a slot looks at its process, checks whether its driver still runs, and shows that it is alive."""
 _START_S = 300.0
 """How long a process may take to start and to claim its trial, which is no time of the trial."""
-_THREADS = (
-    "OMP_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "POLARS_MAX_THREADS",
-)
+_THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS")
 
 
 @dataclass(frozen=True, kw_only=True)

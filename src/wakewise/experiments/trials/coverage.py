@@ -193,7 +193,4 @@ def measure_coverage(folder: Path) -> dict[str, Any]:
 
 def _costs(spent_ms: list[float]) -> dict[str, float]:
     later_ms = spent_ms[1:] or spent_ms
-    return {
-        "coverage_ms_per_photo": float(np.median(later_ms)),
-        "coverage_ms_per_photo_max": float(np.max(later_ms)),
-    }
+    return {"coverage_ms_per_photo": float(np.median(later_ms)), "coverage_ms_per_photo_max": float(np.max(later_ms))}

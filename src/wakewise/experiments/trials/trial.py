@@ -225,13 +225,7 @@ def compare_methods(
         _ = parts_of(flight).preflight
     result = comparison(
         {
-            name: run_trial(
-                flight,
-                folders[name],
-                watch,
-                None,
-                None if meanwhile is None else partial(meanwhile, name),
-            )
+            name: run_trial(flight, folders[name], watch, None, None if meanwhile is None else partial(meanwhile, name))
             for name, flight in flights.items()
         }
     )
@@ -349,11 +343,7 @@ def _rmse_mean_shape_mm(parts: Parts, folder: Path, cloud: Array) -> float | Non
     exposures = read_exposures(folder / "exposures.npz")
     moved = np.mean([moved_m(parts, exposure) for exposure in exposures], axis=0)
     mesh = parts.target.mesh
-    score = evaluate_surface(
-        cloud,
-        Mesh(mesh.vertices_m + moved, mesh.faces),
-        crop=Crop(bed_z_m=parts.target.bed_z_m),
-    )
+    score = evaluate_surface(cloud, Mesh(mesh.vertices_m + moved, mesh.faces), crop=Crop(bed_z_m=parts.target.bed_z_m))
     return score.rmse_mm
 
 

@@ -212,13 +212,7 @@ class FindPilot:
         quarter of a circle each view's depth is measured across another view.
         """
         here = self._phase.route.legs[-1].end
-        end = np.array(
-            [
-                here[0] + ROUND_RAD,
-                math.radians(self._mission.elevations_deg[0]),
-                self._mission.standoff_m,
-            ]
-        )
+        end = np.array([here[0] + ROUND_RAD, math.radians(self._mission.elevations_deg[0]), self._mission.standoff_m])
         leg = rest_to_rest("approach", here, end, self._mission.speed_m_s, self._mission.acceleration_m_s2)
         return _route(self.centre_W_m, [leg], [0.0], leg.duration_s)
 

@@ -262,12 +262,7 @@ def parameters(draft: VehicleDraft) -> list[ParameterRow]:
         row("thruster_limits", "thrust in reverse", _alike([t.max_reverse_N for t in draft.thrusters]), "N"),
         row("thruster_disk", "propeller diameter", _alike([_diameter(t.disk_area_m2) for t in draft.thrusters]), "m"),
         row("thruster_lag", "time constant of thrust", _alike([t.time_constant_s for t in draft.thrusters]), "s"),
-        row(
-            "thruster_curve",
-            "thrust table",
-            None if curve is None else f"{curve.table} at {curve.supply_V:g} V",
-            "",
-        ),
+        row("thruster_curve", "thrust table", None if curve is None else f"{curve.table} at {curve.supply_V:g} V", ""),
         *_least(draft, row),
         row(
             "thruster_layout",

@@ -115,13 +115,7 @@ def pick(
     need("wakewise photos pick", "photos")
     from wakewise.core.files import whole_folder
     from wakewise.vision.photo_selection.dive_track import read_track
-    from wakewise.vision.photo_selection.pick import (
-        PICTURE,
-        PickRequest,
-        check_folder,
-        pick_photos,
-        write_picked,
-    )
+    from wakewise.vision.photo_selection.pick import PICTURE, PickRequest, check_folder, pick_photos, write_picked
 
     folder = out or Path("runs") / f"picked-{photos.stem or 'photos'}"
     check_folder(folder, photos)

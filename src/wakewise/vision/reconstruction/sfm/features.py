@@ -207,9 +207,7 @@ def _extract(
 ) -> None:
     """Features of all photos; those of one group share a camera. Masks are laid out in `room` for COLMAP."""
     if focal_px is not None and len({frozenset((g.width, g.height)) for g in groups}) > 1:
-        raise InputError(
-            "photos: have different sizes, one focal length cannot hold for all: give --camera and --lens"
-        )
+        raise InputError("photos: have different sizes, one focal length cannot hold for all: give --camera and --lens")
     done, total = 0, sum(len(group.photos) for group in groups)
 
     def report(more: int) -> None:
