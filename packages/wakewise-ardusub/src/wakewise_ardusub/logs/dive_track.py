@@ -65,12 +65,19 @@ def dive_track(log: VehicleLog) -> DiveTrack:
 
 
 def _finite(series: ChannelSeries | None) -> ChannelSeries | None:
-    """Undamaged samples, each later than all before it; None where they are too few."""
+    """Undamaged samples at rising times; None where they are too few.
+
+    Each is later than all before it, or sooner than all behind it, whichever leaves more: one may be far too late.
+    """
     if series is None:
         return None
     good: BoolArray = np.asarray(np.isfinite(series.values).all(axis=1) & np.isfinite(series.time_s))
     latest_s = np.maximum.accumulate(np.where(good, series.time_s, -np.inf))
-    good[1:] &= series.time_s[1:] > latest_s[:-1]
+    soonest_s = np.minimum.accumulate(np.where(good, series.time_s, np.inf)[::-1])[::-1]
+    forwards, backwards = good.copy(), good.copy()
+    forwards[1:] &= series.time_s[1:] > latest_s[:-1]
+    backwards[:-1] &= series.time_s[:-1] < soonest_s[1:]
+    good = forwards if forwards.sum() >= backwards.sum() else backwards
     if good.sum() < _LEAST_SAMPLES:
         return None
     return ChannelSeries(time_s=series.time_s[good].copy(), values=series.values[good].copy())
