@@ -4,6 +4,7 @@ import errno
 
 import numpy as np
 import pytest
+import trimesh
 
 from wakewise.core.errors import EnvironmentFailure, InputError, StageError
 from wakewise.vision.reconstruction import OrientedPointCloud, read_cloud, write_cloud, write_mesh
@@ -98,6 +99,15 @@ def test_a_stage_that_could_not_bear_a_full_disk_is_not_begun(tmp_path):
     need_room(tmp_path, 1.0, "match")
     with pytest.raises(EnvironmentFailure, match=r"match: the disk of .* is full, .* MB are left"):
         need_room(tmp_path, 1e18, "match")
+
+
+def test_points_that_are_no_numbers_are_counted(tmp_path):
+    """Two of five are NaN or infinite: the line says so, and what to do."""
+    points = np.zeros((5, 3))
+    points[1, 0], points[3, 2] = np.nan, np.inf
+    trimesh.PointCloud(points).export(tmp_path / "some.ply")
+    with pytest.raises(InputError, match=r"some\.ply: 2 of 5 points are NaN or infinite; remove them"):
+        read_cloud(tmp_path / "some.ply")
 
 
 def test_fingerprint_tells_inputs_apart():

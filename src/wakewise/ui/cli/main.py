@@ -108,7 +108,9 @@ _NEXT_STEP = (
     "`wakewise COMMAND -h` explains a command."
 )
 _STOPPED = "stopped; what was finished is kept, run the same command again to go on"
-_BEGIN_ANEW = {"photos", "measure", "compare-models", "evaluate", "calibrate", "film", "target", "vehicle", "allocate"}
+_BEGIN_ANEW = {
+    "photos", "measure", "compare-models", "evaluate", "calibrate", "film", "target", "vehicle", "allocate", "link",
+}  # fmt: skip
 """Commands that write at their end and keep nothing of a run that was stopped."""
 
 

@@ -70,8 +70,10 @@ def read_cloud(path: Path) -> OrientedPointCloud:
     if broken is not None:
         raise InputError(f"{path}: was cut short, {broken}")
     points = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64).reshape(-1, 3)
-    if len(points) == 0 or not np.all(np.isfinite(points)):
-        raise InputError(f"{path}: holds {len(points)} points, needs at least one and all finite")
+    if len(points) == 0:
+        raise InputError(f"{path}: holds no points, at least one is needed")
+    if wrong := int((~np.isfinite(points)).any(axis=1).sum()):
+        raise InputError(f"{path}: {wrong} of {len(points)} points are NaN or infinite; remove them")
     normals, colours = (_raw(loaded, names, len(points)) for names in (("nx", "ny", "nz"), ("red", "green", "blue")))
     return OrientedPointCloud(
         points_m=points,
