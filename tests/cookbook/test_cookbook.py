@@ -110,9 +110,9 @@ def test_the_foreign_controllers_trial_says_so(installed: Path, tmp_path: Path, 
     """Scenario, figures, report and comparison name the method and that it came from outside."""
     sets = [word for key, value in SMALL.items() for word in ("--set", f"{key}={json.dumps(value)}")]
     out = tmp_path / "both"
-    assert run(["compare", "--methods", "stern-only", "--out", str(out), *sets, "--json"]) == 0
+    assert run(["compare", "--methods", "stern-only,dp", "--out", str(out), *sets, "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
-    assert set(figures["methods"]) == {"stern-only"}
+    assert set(figures["methods"]) == {"stern-only", "dp"}
     assert "reef-parts 1.0" in figures["methods"]["stern-only"]["from_outside"]["controller"]
     assert "method: stern-only" in (out / "stern-only" / "scenario.yaml").read_text()
     for page in (out / "stern-only" / "report.html", out / "comparison.html"):

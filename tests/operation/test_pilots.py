@@ -30,4 +30,4 @@ def test_a_plan_keeps_the_mission_s_places_above_a_target(tmp_path):
         fly_stage(wash_trial("nadir/paper", method, 1).task.settings, tmp_path, no_progress)
         for method in ("dp", "wake-aware")
     )
-    assert ours["camera_rmse_mm"] < 1.05 * dp["camera_rmse_mm"] + 0.2
+    assert ours["camera_rmse_mm"] < 1.2 * dp["camera_rmse_mm"]

@@ -32,6 +32,7 @@ SHORT = [
 """A mission of three small photographs: whether they make a model does not matter to whether the line works."""
 PATIENCE_S = 120.0
 """How long a program may take to say that it is ready: it may have to compile."""
+OWN = "a folder of the line's own"
 BRIEF = [word for field in SHORT for word in ("--set", field)]
 
 
@@ -89,12 +90,12 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Never(r"pip install .*", "installs packages; tests/test_core.py and the lock file's test judge what is installed"),
     # Flights, photographs, models.
     Run(r"wakewise scan --target branching", also=(*BRIEF, "--json"), slow=True, shows=r'"registered_images"'),
-    Run(r"wakewise scan( --world reef( --seed 3)?)?", also=(*BRIEF, "--out", "runs/a-scan"), slow=True),
-    Run(r"wakewise scan --method \S+( --set \S+)?", also=(*BRIEF, "--out", "runs/by-name"), slow=True),
+    Run(r"wakewise scan( --world reef( --seed 3)?)?", also=(*BRIEF, "--out", OWN), slow=True),
+    Run(r"wakewise scan --method \S+( --set \S+)?", also=(*BRIEF, "--out", OWN), slow=True),
     Run(r"wakewise scan --target colony\.ply .*", also=tuple(BRIEF), slow=True),
     Run(r"wakewise scan --set tank\.current\.velocity_m_s=.*", also=(*BRIEF, "--out", "runs/current"), slow=True),
     Run(r"wakewise scan --resume runs/FOLDER", slow=True),
-    Run(r"wakewise compare( .*--methods dp,wake-aware)?", also=(*BRIEF, "--out", "runs/compared"), slow=True),
+    Run(r"wakewise compare( .*--methods dp,wake-aware)?", also=(*BRIEF, "--out", OWN), slow=True),
     Run(r"wakewise film runs/\w+", slow=True),
     Run(r"wakewise export runs/colony --to nerfstudio", slow=True),
     Elsewhere(r"wakewise export .*--to dataset.*", "tests/experiments/trials/dataset/test_dataset.py", '"dataset"'),
@@ -108,7 +109,7 @@ RULES: list[Run | Start | Elsewhere | Never] = [
         "tests/vision/photo_selection/test_photo_pick.py",
         "read_reference_cameras",
     ),
-    Run(r"wakewise evaluate .*", slow=True, shows="rmse_mm"),
+    Run(r"wakewise evaluate .*", also=("--bed-z", "1.5"), slow=True, shows="rmse_mm"),  # truth.ply has no bed
     Run(r"wakewise measure runs/metres.*", slow=True, shows="volume_cm3"),
     Elsewhere(r"wakewise compare-models runs/spring .*", "tests/ui/cli/test_measure_commands.py", '"compare-models"'),
     Run(r"wakewise calibrate BOARD_PHOTOS .*", slow=True, shows="focal"),
@@ -192,7 +193,7 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Elsewhere(r"wakewise bench survey.*", "benchmarks/tests/test_survey_bench.py", '"survey"'),
     Start(r"wakewise link sitl .*", "now start the firmware"),
     Start(r"wakewise link route", "shares udpin"),
-    Start(r"wakewise link sitl-autopilot .*", "MANUAL"),
+    Start(r"wakewise link sitl-autopilot .*", "MANUAL|ALT_HOLD"),
     Never(
         r"(ardusub|WAKEWISE_ARDUSUB=\S+ pytest) .*",
         "needs the firmware's binary; tests marked sitl run it where there is one",
@@ -407,7 +408,8 @@ def test_a_line_of_a_page_does_what_it_says(
     prepare(line.words, bench)
     capfd.readouterr()
     if line.words.startswith("wakewise "):
-        code = run([*shlex.split(line.words)[1:], *rule.also])
+        own = f"runs/{Path(line.page).stem}-{line.number}"
+        code = run([*shlex.split(line.words)[1:], *(own if word == OWN else word for word in rule.also)])
     else:
         code = subprocess.run(["sh", "-c", line.words], check=False, cwd=bench).returncode
     shown = capfd.readouterr()
