@@ -124,6 +124,7 @@ def test_a_file_is_heard_to_its_end(tmp_path: Path) -> None:
 
 def test_without_pymavlink_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     """The extra by name."""
+    dialect.cache_clear()
     monkeypatch.setitem(sys.modules, "pymavlink", None)
     with pytest.raises(MissingExtra, match=r"\[links\]"):
         dialect()

@@ -12,6 +12,7 @@ import socket
 import time
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -20,7 +21,7 @@ from wakewise_ardusub.link.protocol import AUTOPILOT_COMPONENT, COMPANION_COMPON
 from wakewise_ardusub.optional_dependencies import need
 from wakewise_ardusub.sensors.devices import SerialPort
 
-RIGHT = (
+CONNECTION_FORMS = (
     "udpin:0.0.0.0:14550 (listen), udpout:192.168.2.2:14550, tcp:192.168.2.2:5777, serial:/dev/ttyACM0:115200 "
     "or file:flight.tlog"
 )
@@ -61,7 +62,7 @@ def parse_connection(words: str, option: str = "--connection") -> Endpoint:
     way, colon, rest = words.strip().partition(":")
 
     def wrong(what: str) -> InputError:
-        return InputError(f"{option} {words!r}: {what}; right is {RIGHT}")
+        return InputError(f"{option} {words!r}: {what}; right is {CONNECTION_FORMS}")
 
     if way not in WAYS:
         known = (
@@ -191,6 +192,7 @@ def send_command(link: MavlinkSession, number: int, *params: float) -> None:
     )
 
 
+@cache
 def dialect() -> Any:
     """ArduPilot's messages of pymavlink, as MAVLink 2.
 

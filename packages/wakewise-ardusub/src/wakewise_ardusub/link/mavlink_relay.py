@@ -21,9 +21,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from wakewise.core.errors import InputError
-from wakewise_ardusub.link.connection import Endpoint
+from wakewise_ardusub.link.connection import Endpoint, dialect
 from wakewise_ardusub.link.protocol import STICKS_MESSAGE, STICKS_MIDDLE
-from wakewise_ardusub.link.transports import MavlinkPacket, UdpTransport, checksum, dialect, is_signed, packets
+from wakewise_ardusub.link.transports import MavlinkPacket, UdpTransport, checksum, is_signed, packets
 
 Address = tuple[str, int]
 FORGOTTEN_S = 10.0

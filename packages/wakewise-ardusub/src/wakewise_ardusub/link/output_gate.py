@@ -31,10 +31,10 @@ from wakewise_ardusub.link.protocol import AGAIN_S, MOST_PARAMETERS, PARAMETERS_
 from wakewise_ardusub.link.session_log import SessionLog
 from wakewise_ardusub.link.telemetry_adapter import TelemetryAdapter, to_measurements
 
-SPAN_S = 60.0
-SHARE = 0.99
-_MOST = round(SPAN_S / 0.02)
-WHAT = ("pose", "sticks", "attitude")
+WINDOW_S = 60.0
+QUANTILE = 0.99
+_MOST = round(WINDOW_S / 0.02)
+AGE_NAMES = ("pose", "sticks", "attitude")
 
 
 class FreshnessMargins:
@@ -64,14 +64,14 @@ class FreshnessMargins:
             self.trips[change.kind] += 1
 
     def p99_s(self) -> dict[str, float]:
-        """The age that 99 of 100 looks of the last minute did not exceed, of each of `WHAT`; NaN before any."""
+        """The age that 99 of 100 looks of the last minute did not exceed, of each of `AGE_NAMES`; NaN before any."""
         if not self._ages:
-            return dict.fromkeys(WHAT, math.nan)
-        return dict(zip(WHAT, np.quantile(np.array(self._ages), SHARE, axis=0).tolist(), strict=True))
+            return dict.fromkeys(AGE_NAMES, math.nan)
+        return dict(zip(AGE_NAMES, np.quantile(np.array(self._ages), QUANTILE, axis=0).tolist(), strict=True))
 
     def words(self, limits: EngagementLimits) -> str:
         """For the status line: ages in ms against their limits, and trips."""
-        most = dict(zip(WHAT, (limits.pose_s, limits.operator_s, limits.telemetry_s), strict=True))
+        most = dict(zip(AGE_NAMES, (limits.pose_s, limits.operator_s, limits.telemetry_s), strict=True))
         ages = [
             f"{what} {1e3 * age_s:.0f}{'!' if age_s > most[what] else ''}"
             for what, age_s in self.p99_s().items()

@@ -12,12 +12,11 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from threading import Condition
 from typing import Any, Protocol
 
 from wakewise.core.errors import EnvironmentFailure, InputError
-from wakewise_ardusub.link.connection import Endpoint
+from wakewise_ardusub.link.connection import Endpoint, dialect
 from wakewise_ardusub.link.message_state import MavlinkMessage
 from wakewise_ardusub.link.protocol import COMPANION_COMPONENT
 from wakewise_ardusub.sensors.devices import SerialPort
@@ -34,14 +33,6 @@ class MavlinkPacket:
     end: int
     payload: int
     number: int
-
-
-@cache
-def dialect() -> Any:
-    """The messages that are known: ArduPilot's."""
-    from pymavlink.dialects.v20 import ardupilotmega
-
-    return ardupilotmega
 
 
 def packets(data: bytes) -> Iterator[MavlinkPacket | tuple[int, int]]:

@@ -34,7 +34,7 @@ PATIENCE_S = 30.0
 """A program that takes longer over a photograph is ended."""
 _COLUMNS = "name,x_m,y_m,z_m,qw,qx,qy,qz,flight_s,utc_s"
 _ALL_COMPONENTS = 0
-RIGHT = "mavlink, digicam, or run:PROGRAM with {file} where the photograph goes"
+CAMERA_FORMS = "mavlink, digicam, or run:PROGRAM with {file} where the photograph goes"
 
 
 class CameraDriver(Protocol):
@@ -70,13 +70,13 @@ def parse_camera(words: str) -> MakeCamera:
         return lambda gate, _folder, _journal: MavlinkCamera(gate, digicam=words == "digicam")
     way, _, line = words.partition(":")
     if way != "run":
-        raise InputError(f"--camera {words!r}: right is {RIGHT}")
+        raise InputError(f"--camera {words!r}: right is {CAMERA_FORMS}")
     try:
         program = shlex.split(line)
     except ValueError as fault:
-        raise InputError(f"--camera {words!r}: {fault}; right is {RIGHT}") from None
+        raise InputError(f"--camera {words!r}: {fault}; right is {CAMERA_FORMS}") from None
     if not program:
-        raise InputError(f"--camera {words!r}: nothing to run; right is {RIGHT}")
+        raise InputError(f"--camera {words!r}: nothing to run; right is {CAMERA_FORMS}")
     if shutil.which(program[0]) is None:
         raise InputError(f"--camera {words!r}: there is no program {program[0]}")
     return lambda _gate, folder, journal: ProgramCamera(program, folder / PHOTOGRAPHS, journal)

@@ -25,7 +25,7 @@ RETRY_S = 2.0
 OPENS_MS, READS_MS = 5000, 3000
 """A stream that does not answer, or stops, is given up after this, and opened anew."""
 SCHEMES = ("rtsp", "rtsps", "http", "https", "udp", "tcp")
-RIGHT = f"an address ({', '.join(SCHEMES)}), an .sdp file, or a number for a camera at this computer"
+STREAM_FORMS = f"an address ({', '.join(SCHEMES)}), an .sdp file, or a number for a camera at this computer"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,7 @@ class VideoSource:
         if self.place.isdigit() or urlsplit(self.place).scheme.lower() in SCHEMES:
             return
         if Path(self.place).suffix.lower() != ".sdp":
-            raise InputError(f"--video {self.place!r}: must be {RIGHT}")
+            raise InputError(f"--video {self.place!r}: must be {STREAM_FORMS}")
         if not Path(self.place).is_file():
             raise InputError(f"--video {self.place}: no such file")
 
