@@ -4,6 +4,7 @@ import dataclasses
 import json
 import shutil
 
+import cv2
 import numpy as np
 import pytest
 from relief import CENTRE, FOCAL, height
@@ -96,6 +97,18 @@ def test_second_run_skips_and_a_changed_setting_does_not(model):
     changed = reconstruct(folder, out, other, focal_px=FOCAL, reference_positions=centres, region=REGION)
     assert changed.skipped == ("match", "map")
     assert changed.mesh_faces is None
+
+
+def test_one_focal_length_holds_for_photos_on_their_sides(relief_photos, tmp_path):
+    """Half of the photos turned by a right angle: their sizes are swapped, their focal length is the same."""
+    turned = shutil.copytree(relief_photos[0], tmp_path / "turned")
+    for path in sorted(turned.iterdir())[::2]:
+        cv2.imwrite(str(path), cv2.rotate(cv2.imread(str(path)), cv2.ROTATE_90_CLOCKWISE))
+    until = ReconstructionRequest(until="sparse")
+    found = reconstruct(turned, tmp_path / "model", SETTINGS, focal_px=FOCAL, request=until)
+    assert found.registered_images == 6
+    assert len(found.lenses) == 2
+    assert all(abs(lens["focal_px"] / FOCAL - 1.0) < 0.05 for lens in found.lenses)
 
 
 def test_interrupt_leaves_whole_files(relief_photos, tmp_path):
