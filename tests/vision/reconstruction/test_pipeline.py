@@ -17,6 +17,8 @@ from wakewise.vision.reconstruction import (
     read_cloud,
     reconstruct,
 )
+from wakewise.vision.reconstruction.scale.position_fixes import PositionFix, PositionFixes
+from wakewise.vision.reconstruction.sfm.registered_photos import camera_centres
 
 SETTINGS = ReconstructionSettings(max_features=1500, first_octave=0, stereo_partners=2, agreeing_views=1, mesh_depth=6)
 REGION = (CENTRE, 0.06)
@@ -97,6 +99,24 @@ def test_second_run_skips_and_a_changed_setting_does_not(model):
     changed = reconstruct(folder, out, other, focal_px=FOCAL, reference_positions=centres, region=REGION)
     assert changed.skipped == ("match", "map")
     assert changed.mesh_faces is None
+
+
+def test_fixes_that_are_given_up_leave_no_scale_behind(relief_photos, tmp_path):
+    """With the fixes of all photos the cameras lie in metres; without them in the same folder they do no more."""
+    folder, truth = relief_photos
+    fixes = PositionFixes(
+        fixes={name: PositionFix(place_W_m=X.p_m, sigma_m=np.full(3, 1e-3)) for name, X in truth.items()}
+    )
+
+    def spread_m(request: ReconstructionRequest) -> float:
+        reconstruct(folder, tmp_path, SETTINGS, focal_px=FOCAL, request=request)
+        return float(np.linalg.norm(np.ptp(list(camera_centres(tmp_path / "sparse").values()), axis=0)))
+
+    true_m = float(np.linalg.norm(np.ptp([X.p_m for X in truth.values()], axis=0)))
+    bare = spread_m(ReconstructionRequest(until="sparse"))
+    assert abs(bare / true_m - 1.0) > 0.5
+    assert spread_m(ReconstructionRequest(until="sparse", fixes=fixes)) == pytest.approx(true_m, rel=0.05)
+    assert spread_m(ReconstructionRequest(until="sparse")) == pytest.approx(bare, rel=1e-3)
 
 
 def test_one_focal_length_holds_for_photos_on_their_sides(relief_photos, tmp_path):
