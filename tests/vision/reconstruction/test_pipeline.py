@@ -77,15 +77,17 @@ def test_a_new_sparse_model_leaves_nothing_of_the_old_ones_surface(model, tmp_pa
     """Without references the frame is another: cloud, surface and outputs of the earlier run would be of no model."""
     folder, done, centres, *_ = model
     out = shutil.copytree(done, tmp_path / "again")
-    (out / "mesh.glb").write_bytes(b"of the earlier surface")
+    for name in ("mesh.glb", "report.html"):
+        (out / name).write_bytes(b"of the earlier surface")
     until = ReconstructionRequest(until="sparse")
     kept = reconstruct(folder, out, SETTINGS, focal_px=FOCAL, reference_positions=centres, region=REGION, request=until)
     assert set(kept.skipped) == {"match", "map"}
     assert (out / "mesh.ply").exists()
     assert (out / "mesh.glb").exists()
+    assert (out / "report.html").exists()
     changed = reconstruct(folder, out, SETTINGS, focal_px=FOCAL, request=until)
     assert changed.scale is None
-    assert not any((out / name).exists() for name in ("dense.ply", "mesh.ply", "mesh.glb"))
+    assert not any((out / name).exists() for name in ("dense.ply", "mesh.ply", "mesh.glb", "report.html"))
     assert {path.stem for path in (out / "stages").iterdir()} == {"match", "map"}
 
 

@@ -73,15 +73,15 @@ def run_stage(
 _MADE = {
     "match": (),
     "map": (),
-    "scale": ("reconstruction.json",),
+    "scale": (),
     "dense": ("dense.ply", "dense.las"),
-    "mesh": ("mesh.ply",),
+    "mesh": ("mesh.ply", "reconstruction.json", "report.html"),
     "outputs": ("mesh.glb", "textured.obj", "textured.mtl", "textured.png", "textured.glb", "orthophoto.png",
-                "orthophoto.pgw", "orthophoto.json", "heights.png", "heights.pgw", "extent.json", "report.html"),
+                "orthophoto.pgw", "orthophoto.json", "heights.png", "heights.pgw", "extent.json"),
 }  # fmt: skip
 """Stages of a model in their order, and the files that stand for each in its folder besides database and sparse model.
 
-The figures of a model are those of all stages up to the scale; its surface may be made after they are written."""
+Figures and report go with the dense points: the surface may be made after they are written."""
 
 
 def remove_later(folder: Path, name: str) -> None:

@@ -369,7 +369,7 @@ class WashFigures:
         """Reckon beside the flight, which goes on with the last figures where that fails."""
         try:
             work(about)
-        except Exception as fault:
+        except Exception as fault:  # a fault of a figure must neither end the flight nor vanish
             if self.gate.journal is not None:
                 self.gate.journal.write("figures", amiss=f"{type(fault).__name__}: {fault}")
 
