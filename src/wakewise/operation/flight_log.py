@@ -286,13 +286,13 @@ def parts_table(folder: Path) -> pl.LazyFrame:
     return pl.scan_parquet(sorted((folder / PARTS).glob("steps-*.parquet")))
 
 
-def hands_part(folder: Path, part: int) -> Path:
-    """Where a part's record of hands lies."""
+def controls_part(folder: Path, part: int) -> Path:
+    """Where a part's record of the controls lies."""
     return folder / PARTS / f"controls-{part:06d}.parquet"
 
 
-def parts_hands(folder: Path) -> pl.DataFrame | None:
-    """What the hands did in all parts in a trial's folder; None where nobody's were kept."""
+def parts_controls(folder: Path) -> pl.DataFrame | None:
+    """The controls of all parts in a trial's folder; None if none were recorded."""
     found = sorted((folder / PARTS).glob("controls-*.parquet"))
     return pl.concat([pl.read_parquet(path) for path in found]) if found else None
 

@@ -19,11 +19,11 @@ def hands(k):
 
 @pytest.mark.parametrize("ending", ["parquet", "csv"])
 def test_what_was_written_is_played_back(tmp_path, ending):
-    """Step by step the same axes, buttons, absences and desk, and nobody after the end; begun again the same again."""
+    """The same axes, buttons, absences and settings at each step, and nobody after the end; twice the same."""
     writer = ControlLogWriter()
-    desks = [{"mode": "hold", "gain": 0.5}, {"mode": "scan", "gain": 0.5}]
+    all_settings = [{"mode": "hold", "gain": 0.5}, {"mode": "scan", "gain": 0.5}]
     for k in range(60):
-        writer.take(0.02 * k, hands(k), desks[k >= 33])
+        writer.take(0.02 * k, hands(k), all_settings[k >= 33])
     writer.write(tmp_path / f"controls.{ending}")
     trace = read_trace(tmp_path / f"controls.{ending}")
     for _ in range(2):
@@ -33,7 +33,7 @@ def test_what_was_written_is_played_back(tmp_path, ending):
             if there is not None and wished is not None:
                 np.testing.assert_array_equal(there.axes, wished.axes)
                 assert there.pressed == wished.pressed
-            assert trace.desk_at(0.02 * k) == desks[k >= 33]
+            assert trace.settings_at(0.02 * k) == all_settings[k >= 33]
         assert trace.read(1.3) is None
 
 
@@ -49,7 +49,7 @@ def test_a_record_by_hand_needs_no_desk():
     """Time and axes suffice."""
     frame = pl.DataFrame({"time_s": [0.0, 1.0], **{name: [0.0, 0.5] for name in CONTROL_AXES}})
     trace = ControlLog(frame)
-    assert trace.read(0.5).centred and trace.desk_at(0.5) is None and trace.end_s == 1.0
+    assert trace.read(0.5).centred and trace.settings_at(0.5) is None and trace.end_s == 1.0
 
 
 @pytest.mark.parametrize(
@@ -60,8 +60,8 @@ def test_a_record_by_hand_needs_no_desk():
         ({"right": [0.0, 1.5]}, "row 2: axes:"),
         ({"right": ["a", "b"]}, "must be numbers"),
         ({"pressed": ["", "jump"]}, "row 2: pressed: 'jump'"),
-        ({"desk": ["{", ""]}, "row 1: "),
-        ({"desk": ["[1]", ""]}, "row 1: desk must be an object"),
+        ({"settings": ["{", ""]}, "row 1: "),
+        ({"settings": ["[1]", ""]}, "row 1: settings must be an object"),
     ],
 )
 def test_a_bad_row_is_named(change, words):

@@ -45,10 +45,10 @@ def tilting():
 class Flown:
     """A pilot whose vehicle is always at its goal; steps on demand."""
 
-    def __init__(self, parts, hands=None, **desk):
-        self.desk = OperatorState(OperatorSettings(**desk))
+    def __init__(self, parts, hands=None, **operator):
+        self.operator = OperatorState(OperatorSettings(**operator))
         self.hands = hands or Hands()
-        self.pilot = assisted_pilot(parts, self.hands, self.desk)
+        self.pilot = assisted_pilot(parts, self.hands, self.operator)
         self.body, self.step, self.goals = parts.start, 0, []
 
     def until(self, time_s):
@@ -97,7 +97,7 @@ def test_goals_never_jump_whoever_takes_over_when(parts, tilting, seed):
     flown = Flown(tilting if seed % 2 else parts, Hands(lambda _: now[0]), mode="scan", gain=0.6)
     for instant in np.cumsum(rng.uniform(0.1, 4.0, 12)):
         flown.until(instant)
-        flown.desk.set(
+        flown.operator.set(
             mode=str(rng.choice(["operator", "operator", "hold", "scan"])),
             watch_target=bool(rng.integers(2)),
             orbit=bool(rng.integers(2)),
@@ -114,12 +114,12 @@ def test_a_scan_goes_on_where_it_was_left(parts):
     now = [CENTRED]
     flown = Flown(parts, Hands(lambda _: now[0]), mode="scan").until(8.0)
     left_s, eye = flown.pilot.mission_s, flown.eye
-    flown.desk.set(mode="operator")
+    flown.operator.set(mode="operator")
     now[0] = sticks(right=1.0)
     flown.until(11.0)
     assert flown.pilot.mission_s == left_s and np.linalg.norm(flown.eye - eye) > 0.2
     now[0] = CENTRED
-    flown.desk.set(mode="scan")
+    flown.operator.set(mode="scan")
     fastest, before = 0.0, flown.eye
     while (flown.pilot._mode, flown.pilot._scan.phase) != ("scan", "flying"):
         flown.until(DT_S * (flown.step + 1))
@@ -138,8 +138,8 @@ def test_a_scan_asks_for_its_photographs_on_its_own_clock(parts):
     flown = Flown(parts, mode="scan")
     asked = 0
     for k in range(5):
-        flown.until(10.0 * k + 6.0).desk.set(mode="hold")
-        flown.until(10.0 * k + 7.0).desk.set(mode="scan")
+        flown.until(10.0 * k + 6.0).operator.set(mode="hold")
+        flown.until(10.0 * k + 7.0).operator.set(mode="scan")
         asked += len(flown.pilot.taken())
     due = int(np.count_nonzero(parts.route.exposures_s <= flown.pilot.mission_s))
     assert asked == due > 0
@@ -170,7 +170,7 @@ def test_velocity_is_in_the_bodys_level_frame(parts):
     heading = flown.body.X_WB.R[:, 0] * [1.0, 1.0, 0.0]
     v = flown.pilot.velocity_W_m_s
     np.testing.assert_allclose(v, -0.2 * heading / np.linalg.norm(heading), atol=1e-3)
-    flown.desk.set(precise=True)
+    flown.operator.set(precise=True)
     assert np.linalg.norm(flown.until(6.0).pilot.velocity_W_m_s) == pytest.approx(0.06, abs=1e-6)
 
 
@@ -234,7 +234,7 @@ def test_buttons_change_the_desk_or_wait_to_be_taken(parts):
     """Modes and gains act at once; photographs and the end are handed on, once, in order."""
     pressed = {1: ("operator", "capture"), 2: ("precise", "gain_up"), 3: ("capture", "stop")}
     flown = Flown(parts, Hands(lambda t: sticks(pressed=pressed.get(round(t / DT_S), ())))).until(0.2)
-    assert flown.desk.state == OperatorSettings(mode="operator", precise=True, gain=0.6)
+    assert flown.operator.state == OperatorSettings(mode="operator", precise=True, gain=0.6)
     assert flown.pilot.taken() == ("capture", "capture", "stop") and flown.pilot.taken() == ()
 
 
@@ -242,7 +242,7 @@ def test_the_dial_reaches_the_planner_little_by_little(parts):
     """w_track from 5 to 50 is ten times the obedience, by no more than 4 % a step."""
     flown = Flown(parts).until(0.1)
     assert flown.goals[-1].tracking_weight_scale == pytest.approx(1.0)
-    flown.desk.set(w_track=50.0)
+    flown.operator.set(w_track=50.0)
     flown.until(3.0)
     shares = np.array([goal.tracking_weight_scale for goal in flown.goals])
     assert shares[-1] == pytest.approx(10.0) and np.all(np.abs(np.diff(np.log(shares))) < 0.0401)
@@ -262,7 +262,7 @@ def test_a_flight_without_a_mission_holds_instead(parts):
 
     some = parts.replace(route=open_route(parts.surveyed_target.centre_W_m, 10.0), start=parts.start)
     flown = Flown(some, mode="scan").until(0.1)
-    assert flown.desk.state.mode == "hold" and "no mission" in flown.pilot.notes()[0].text
+    assert flown.operator.state.mode == "hold" and "no mission" in flown.pilot.notes()[0].text
 
 
 @pytest.mark.parametrize("orbit", [False, True])

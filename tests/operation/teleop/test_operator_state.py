@@ -1,4 +1,4 @@
-"""The desk: what is set is checked when it is set, and read whole."""
+"""Settings of an operator: what is set is checked when it is set, and read whole."""
 
 import threading
 
@@ -27,35 +27,39 @@ from wakewise.operation.teleop.operator_state import (
         ({"mode": ["scan"]}, "mode: "),
         ({"method": None}, "method: None, allowed are wake-aware, direct"),
         ({"precise": 1}, "precise: 1, must be true or false"),
-        ({"speed": 1}, "speed: not on the desk, allowed are mode,"),
+        ({"speed": 1}, "speed: not a setting, allowed are mode,"),
     ],
 )
 def test_nonsense_is_refused_by_name_and_changes_nothing(change, words):
     """The message names field, value and what is allowed."""
-    desk = OperatorState()
+    operator = OperatorState()
     with pytest.raises(InputError, match=words):
-        desk.set(orbit=True, **change)
-    assert desk.state == OperatorSettings()
+        operator.set(orbit=True, **change)
+    assert operator.state == OperatorSettings()
 
 
 def test_what_is_set_stays_set():
     """`set` gives what is set then; the rest stays."""
-    desk = OperatorState(OperatorSettings(gain=0.3))
-    assert desk.set(w_track=20, orbit=True) == desk.state == OperatorSettings(gain=0.3, w_track=20, orbit=True)
-    assert set(FIELDS) == set(vars(desk.state))
+    operator = OperatorState(OperatorSettings(gain=0.3))
+    assert operator.set(w_track=20, orbit=True) == operator.state == OperatorSettings(gain=0.3, w_track=20, orbit=True)
+    assert set(FIELDS) == set(vars(operator.state))
 
 
 def test_buttons_step_the_gain_within_its_range():
-    """Up to 1 and down to 0.1, never beyond; precise mode toggles; capture and stop are not the desk's."""
-    desk = OperatorState()
+    """Up to 1 and down to 0.1, never beyond; precise mode toggles; capture and stop are no settings."""
+    operator = OperatorState()
     for _ in range(8):
-        desk.press("gain_up")
-    assert desk.state.gain == 1.0
+        operator.press("gain_up")
+    assert operator.state.gain == 1.0
     for _ in range(12):
-        desk.press("gain_down")
-    assert desk.state.gain == 0.1 and desk.press("precise").precise and desk.press("operator").mode == "operator"
-    assert desk.press("capture") == desk.press("stop") == desk.state
-    assert desk.state.share == pytest.approx(0.03)
+        operator.press("gain_down")
+    assert (
+        operator.state.gain == 0.1
+        and operator.press("precise").precise
+        and operator.press("operator").mode == "operator"
+    )
+    assert operator.press("capture") == operator.press("stop") == operator.state
+    assert operator.state.share == pytest.approx(0.03)
 
 
 def test_regimes_are_the_papers():
@@ -81,11 +85,11 @@ def test_the_dials_meaning_is_what_was_measured():
 
 def test_threads_lose_no_change():
     """Two writers of different fields: both changes stand."""
-    desk = OperatorState()
+    operator = OperatorState()
 
     def turn(field, values):
         for value in values:
-            desk.set(**{field: value})
+            operator.set(**{field: value})
 
     threads = [
         threading.Thread(target=turn, args=("gain", [0.1 + 0.001 * k for k in range(300)])),
@@ -95,4 +99,4 @@ def test_threads_lose_no_change():
         thread.start()
     for thread in threads:
         thread.join()
-    assert desk.state.gain == pytest.approx(0.399) and desk.state.w_track == pytest.approx(30.9)
+    assert operator.state.gain == pytest.approx(0.399) and operator.state.w_track == pytest.approx(30.9)

@@ -26,7 +26,7 @@ def flown(flight: LiveFlight) -> None:
 
 @pytest.mark.slow
 def test_the_same_hands_give_the_same_flight_to_the_byte(tmp_path: Path) -> None:
-    """Sticks, buttons, the desk, photographs that others asked for: all is where it was, in each row and exposure."""
+    """Sticks, buttons, settings, photographs that others asked for: all is where it was, in each row and exposure."""
     hands = script_of(
         [
             {"at_s": 0.1, "pressed": ["operator", "precise"], "right": 0.5},
@@ -35,14 +35,14 @@ def test_the_same_hands_give_the_same_flight_to_the_byte(tmp_path: Path) -> None
             {"at_s": 1.4, "pressed": ["stop"]},
         ]
     )
-    desk = OperatorState(OperatorSettings(w_track=3.0))
+    operator = OperatorState(OperatorSettings(w_track=3.0))
 
     def watch(step: Step, truth_provider: TruthProvider | None) -> None:
         if step.time_s == pytest.approx(0.8):
             first.capture()
-            desk.set(w_track=20.0, method="direct")
+            operator.set(w_track=20.0, method="direct")
 
-    first = LiveFlight(assisted(SCENARIO.parts(), hands, desk), folder=tmp_path / "a", paced=False, watch=watch)
+    first = LiveFlight(assisted(SCENARIO.parts(), hands, operator), folder=tmp_path / "a", paced=False, watch=watch)
     flown(first)
     assert [e.time_s for e in first.exposures] == pytest.approx([0.6, 0.82]) and first.time_s == pytest.approx(1.4)
     assert read_scenario(tmp_path / "a/scenario.yaml").pilot == "operator"

@@ -1,4 +1,4 @@
-"""The person of the worlds at the desk's sticks."""
+"""A simulated operator at the sticks."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_a_person_flies_the_route_through_the_same_sticks(parts):
 
 
 def test_a_flight_begun_again_is_the_same_and_another_persons_is_not(parts):
-    """At time zero person and desk begin afresh."""
+    """At time zero the person and the settings begin afresh."""
     first, again = flown(parts, 200)[0], flown(parts, 200)[0]
     other = flown(parts.replace(**{"control.operator_seed": 5}), 200)[0]
     assert all(np.array_equal(a.X_WB.p_m, b.X_WB.p_m) for a, b in zip(first, again, strict=True))

@@ -33,7 +33,7 @@ class Rehearsal:
 
     mailbox: ControlMailbox = field(default_factory=ControlMailbox)
     edition: int = 0
-    desk: dict[str, Any] = field(
+    settings: dict[str, Any] = field(
         default_factory=lambda: {
             "mode": "hold",
             "method": "wake-aware",
@@ -78,7 +78,7 @@ class Rehearsal:
             for what in () if controls is None else controls.pressed:
                 self.photos += what == "capture"
                 if what in ("hold", "scan", "operator"):
-                    self.desk["mode"] = what
+                    self.settings["mode"] = what
                 self._notes.append(StatusMessage(text=what, time_s=self.time_s))
             self.mailbox.flown()
             self.heading += 0.5 * self.axes[3] * 0.02
@@ -104,7 +104,7 @@ class Rehearsal:
                 ],
             },
             "target": {"points_W_m": self.points.tolist(), "centre_W_m": [0.0, 0.0, 0.0], "radius_m": 0.15},
-            "desk": {**self.desk, "ranges": _RANGES},
+            "settings": {**self.settings, "ranges": _RANGES},
             "scene_url": None,
             "preparing": None,
         }
@@ -112,14 +112,14 @@ class Rehearsal:
     def state(self) -> dict[str, Any]:
         away = np.linalg.norm(self.points - self.p, axis=1)
         wash = 0.02 * float(np.abs(self.axes[:3]).sum()) / np.maximum(away, 0.1)
-        aware = self.desk["method"] == "wake-aware"
+        aware = self.settings["method"] == "wake-aware"
         thrusts = 5.0 * np.sin(np.arange(_THRUSTERS) + self.time_s) * (0.2 + np.abs(self.axes[:4]).sum())
         asked = (0.3 * self.axes[:3]).tolist()
         direct = float(np.mean(wash**2))
         return {
             "time_s": round(self.time_s, 2),
-            "mode": self.desk["mode"],
-            "desk": self.desk,
+            "mode": self.settings["mode"],
+            "settings": self.settings,
             "controls": self.axes.tolist(),
             "thrusts_N": thrusts.tolist(),
             "commanded_m_s": asked,
@@ -162,9 +162,9 @@ class Rehearsal:
     def change_settings(self, changes: dict[str, Any]) -> None:
         for name, value in changes.items():
             allowed = _RANGES.get(name)
-            if name not in self.desk or (name in ("w_track", "gain") and not allowed[0] <= value <= allowed[1]):
-                raise InputError(f"desk: {name} {value}, allowed {allowed}")
-        self.desk.update(changes)
+            if name not in self.settings or (name in ("w_track", "gain") and not allowed[0] <= value <= allowed[1]):
+                raise InputError(f"settings: {name} {value}, allowed {allowed}")
+        self.settings.update(changes)
 
     def designate(self, box: tuple[float, ...] | None, frame: int) -> None:
         """Keep the box; the first picture is of no use."""

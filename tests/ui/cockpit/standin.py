@@ -71,7 +71,7 @@ class StandIn:
     quiet: bool = False
     received: list[tuple[float, str, dict[str, Any]]] = field(default_factory=list)
     clients: dict[str, Client] = field(default_factory=dict)
-    desk: dict[str, Any] = field(default_factory=dict)
+    settings: dict[str, Any] = field(default_factory=dict)
     holder: str | None = None
     lease: str | None = None
     asked_by: str | None = None
@@ -80,7 +80,7 @@ class StandIn:
     started_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self.desk = {"mode": "hold", "method": "wake-aware", "w_track": 5.0, "gain": 0.5, "precise": False,
+        self.settings = {"mode": "hold", "method": "wake-aware", "w_track": 5.0, "gain": 0.5, "precise": False,
                      "watch_target": False, "orbit": False}  # fmt: skip
         self._loop = asyncio.new_event_loop()
         self._ready = threading.Event()
@@ -216,20 +216,20 @@ class StandIn:
         elif kind == "sticks":
             self._sticks_s = time.monotonic()
             self.axes = message["axes"]
-        elif kind == "desk":
-            self.desk |= message["set"]
+        elif kind == "settings":
+            self.settings |= message["set"]
         elif kind == "press":
             await self._press(message["what"])
 
     async def _press(self, what: str) -> None:
         if what in ("operator", "hold", "scan"):
-            self.desk["mode"] = what
+            self.settings["mode"] = what
         elif what == "capture":
             self.photos += 1
         elif what == "precise":
-            self.desk["precise"] = not self.desk["precise"]
+            self.settings["precise"] = not self.settings["precise"]
         elif what.startswith("gain"):
-            self.desk["gain"] = min(1.0, max(0.1, self.desk["gain"] + (0.1 if what == "gain_up" else -0.1)))
+            self.settings["gain"] = min(1.0, max(0.1, self.settings["gain"] + (0.1 if what == "gain_up" else -0.1)))
         await self._all(json.dumps({"type": "note", "level": "info", "text": what, "time_s": self.time_s}))
 
     async def _lend(self, to: str | None, why: str) -> None:
@@ -289,12 +289,12 @@ class StandIn:
             "scenario": {"name": "coral, by hand", "world": "tank", "method": "wake-aware", "target": "coral"},
             "vehicle": {"name": "bluerov2-heavy", "thrusters": THRUSTERS},
             "target": {"points_W_m": POINTS_W_M.round(4).tolist(), "centre_W_m": [0, 0, 0], "radius_m": 0.17},
-            "desk": self.desk | {"ranges": {"w_track": [0.5, 50], "gain": [0.1, 1]}},
+            "settings": self.settings | {"ranges": {"w_track": [0.5, 50], "gain": [0.1, 1]}},
         }  # fmt: skip
 
     def state(self) -> dict[str, Any]:
         t = self.time_s
-        aware = self.desk["method"] == "wake-aware"
+        aware = self.settings["method"] == "wake-aware"
         direct = 2.4e-4 * (1.3 + math.sin(0.31 * t) + 0.3 * math.sin(1.7 * t))
         flown = direct * ((0.05 + 0.03 * math.sin(0.9 * t)) if aware else 1.0)
         bearing = 0.15 * t
@@ -306,7 +306,8 @@ class StandIn:
         )
         wash = 1e-3 * (0.6 + hit * (9 if aware else 40) * (1 + 0.3 * math.sin(0.8 * t)))
         return {
-            "type": "state", "time_s": round(t, 2), "mode": self.desk["mode"], "desk": self.desk, "controls": self.axes,
+            "type": "state", "time_s": round(t, 2), "mode": self.settings["mode"], "settings": self.settings,
+            "controls": self.axes,
             "thrusts_N": [round(16 * math.sin(0.4 * t + k) * math.cos(0.11 * t * k), 2) for k in range(8)],
             "commanded_m_s": [0.12 * self.axes[0], 0.12 * self.axes[1], 0.12 * self.axes[2]],
             "velocity_m_s": [0.11 * math.sin(0.3 * t), 0.02, 0.0], "deviation_pct": 6.5 + 2.5 * math.sin(0.5 * t),

@@ -188,15 +188,15 @@ class AnyHelm(RuleBasedStateMachine):
         before = self.helm
         sent_s = self.now_s - late_s
         axes = np.array([1.0, seq / 1000.0, 0.0, 0.0, 0.0])
-        number = seq if old else before.hands.seq + 1
+        number = seq if old else before.sticks.seq + 1
         self.helm, took = self.helm.moved(client, lease, number, 1e3 * (sent_s + 7.0), axes, self.now_s)
         if took:
             assert client == before.holder
             assert lease not in self.voided
-            assert number > before.hands.seq
+            assert number > before.sticks.seq
             self.quickest = min(self.quickest, late_s)
             self.sent = {0: (client, sent_s)}
-            if before.hands.seq >= 0 and self.now_s - before.renewed_s > INPUT_TIMEOUT_S:
+            if before.sticks.seq >= 0 and self.now_s - before.renewed_s > INPUT_TIMEOUT_S:
                 assert not self.helm.axes(self.now_s).any()
         else:
             np.testing.assert_array_equal(self.helm.axes(self.now_s), before.axes(self.now_s))

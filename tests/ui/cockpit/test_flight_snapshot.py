@@ -51,7 +51,7 @@ def step(k: int, thrust_N: float = 1.0, speed_m_s: float = 0.1) -> Step:
     )
 
 
-def lookout(asked_m_s: float = 0.1) -> tuple[SnapshotRecorder, list[int]]:
+def snapshots(asked_m_s: float = 0.1) -> tuple[SnapshotRecorder, list[int]]:
     given: list[int] = []
     asked = np.array([asked_m_s, 0.0, 0.0])
     made = SnapshotRecorder(load_vehicle("paper"), np.zeros((4, 3)), DT_S, lambda: given.append(1), lambda: asked)
@@ -60,7 +60,7 @@ def lookout(asked_m_s: float = 0.1) -> tuple[SnapshotRecorder, list[int]]:
 
 def test_pulses_are_averaged_and_energy_adds_up() -> None:
     """Thrusts over the last ten steps, power over all; each step tells that its thrusts are given."""
-    look, given = lookout()
+    look, given = snapshots()
     for k in range(100):
         look(step(k, thrust_N=float(k % 2)), None)
     assert look.now is not None
@@ -73,11 +73,11 @@ def test_pulses_are_averaged_and_energy_adds_up() -> None:
 def test_deviation_is_of_what_was_asked() -> None:
     """At the velocity asked for it is nothing, at twice that all of it; hands off there is nothing to deviate from."""
     for asked_m_s, pct in ((0.1, 0.0), (0.05, 100.0)):
-        look, _ = lookout(asked_m_s)
+        look, _ = snapshots(asked_m_s)
         for k in range(50):
             look(step(k), None)
         assert look.deviation_pct == pytest.approx(pct)
-    look, _ = lookout(0.0)
+    look, _ = snapshots(0.0)
     assert look.deviation_pct is None
     look(step(0), None)
     assert look.deviation_pct is None
@@ -85,7 +85,7 @@ def test_deviation_is_of_what_was_asked() -> None:
 
 def test_the_truth_is_asked_only_while_somebody_looks() -> None:
     """Water twice, silt once a second of flight; nothing for nobody, and nothing twice in one step."""
-    look, _ = lookout()
+    look, _ = snapshots()
     unseen, seen = Water(), Water()
     for k in range(100):
         look(step(k), unseen)

@@ -28,7 +28,7 @@ GOOD: list[dict[str, Any]] = [
     {"type": "consent", "to": "c2", "yes": True},
     {"type": "sticks", "seq": 3, "t": 12.5, "axes": [0, 0.5, -1, 0, 0], "lease": "L"},
     {"type": "press", "what": "capture", "lease": "L"},
-    {"type": "desk", "set": {"w_track": 2}, "lease": "L"},
+    {"type": "settings", "set": {"w_track": 2}, "lease": "L"},
     {"type": "seen", "frame": 7},
     {"type": "designate", "box": [0.1, 0, 1, 0.5], "frame": 7, "lease": "L"},
     {"type": "designate", "box": "clear", "lease": "L"},
@@ -62,7 +62,7 @@ def test_what_the_protocol_allows_is_read(told: dict[str, Any]) -> None:
         ('{"type": "sticks", "seq": 1.5, "t": 0, "axes": [0, 0, 0, 0, 0], "lease": "L"}', "seq must be a whole"),
         ('{"type": "sticks", "seq": 1, "t": NaN, "axes": [0, 0, 0, 0, 0], "lease": "L"}', "t must be a time"),
         ('{"type": "press", "what": "surface", "lease": "L"}', "what 'surface', allowed capture"),
-        ('{"type": "desk", "set": {"gain": [1]}, "lease": "L"}', "set.'gain' must be a number"),
+        ('{"type": "settings", "set": {"gain": [1]}, "lease": "L"}', "set.'gain' must be a number"),
         (
             '{"type": "designate", "frame": 7, "lease": "L"}',
             "top, right and bottom, or 'clear', not None",

@@ -10,8 +10,8 @@ from browser import until
 from standin import StandIn
 
 NOTHING = dict.fromkeys(
-    ("time_s", "mode", "desk", "controls", "thrusts_N", "commanded_m_s", "velocity_m_s", "deviation_pct", "disturbance",
-     "direct_disturbance", "rms_m_s", "direct_rms_m_s", "saved_pct", "predicted_m_s", "true_m_s",
+    ("time_s", "mode", "settings", "controls", "thrusts_N", "commanded_m_s", "velocity_m_s", "deviation_pct",
+     "disturbance", "direct_disturbance", "rms_m_s", "direct_rms_m_s", "saved_pct", "predicted_m_s", "true_m_s",
      "depth_m", "roll_deg", "pitch_deg", "heading_deg",
      "tilt_deg", "power_W", "energy_J", "position_W_m", "goal_W_m", "coverage", "photos", "loop", "fallback", "helm",
      "spectators", "target")
@@ -28,11 +28,11 @@ ODD = (
     {"type": "state", "target": {"status": ["lost"], "outline": 3}},
     {"type": "state", "target": {"status": "lost", "outline": {"u": "x", "v": 1e308, "radius": -1}, "distance_m": "x"}},
     {"type": "state", "target": {"status": "lost", "outline": {"u": 1e308, "v": 0, "radius": 1e308}, "trouble": {}}},
-    {"type": "welcome"}, {"type": "welcome", "vehicle": None, "target": None, "desk": None, "scenario": None},
+    {"type": "welcome"}, {"type": "welcome", "vehicle": None, "target": None, "settings": None, "scenario": None},
     {"type": "welcome", "vehicle": {"thrusters": [None, {}, {"limit_N": "x", "name": 3}]},
      "scene_url": "javascript:alert(1)",
      "target": {"points_W_m": [None, [1], [1, 2, "x"], [1, 2, 3]], "centre_W_m": "x", "radius_m": -1},
-     "desk": {"ranges": {"w_track": [9, 1], "gain": "x"}, "w_track": "x"}},
+     "settings": {"ranges": {"w_track": [9, 1], "gain": "x"}, "w_track": "x"}},
     {"type": "helm", "yours": "yes", "lease": 5, "holder": {}, "asked_by": "x", "why": []},
     {"type": "note"}, {"type": "note", "level": "loud", "text": "<img src=x onerror='window.broken=1'>", "time_s": "x"},
     b"", b"\x01", struct.pack("<II", 999, 0), struct.pack("<II", 998, 0) + b"\xff\xd8\xffno picture at all",

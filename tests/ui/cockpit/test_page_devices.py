@@ -62,7 +62,7 @@ def test_buttons_press_once_and_stop_takes_all_out_of_the_hand(standin: StandIn,
     page.js("pad.buttons[12].pressed = true; 1")
     settled(standin, [0, 0, 0, 0, 1])
     page.js("pad.buttons[1].pressed = true; 1")
-    until(lambda: standin.desk["mode"] == "hold", "hold")
+    until(lambda: standin.settings["mode"] == "hold", "hold")
     settled(standin, [0, 0, 0, 0, 0])
     assert [m["what"] for m in standin.of("press")] == ["operator", "capture", "hold"]
     page.js("pad.buttons[12].pressed = false; 1")
@@ -112,6 +112,6 @@ def test_stop_is_one_touch_that_also_drops_the_sticks(standin: StandIn, fly: Any
     page.touch("touchStart", [thumb])
     settled(standin, [1, 0, 0, 0, 0])
     page.touch("touchStart", [thumb, page.place("#stop")])
-    until(lambda: standin.desk["mode"] == "hold", "hold")
+    until(lambda: standin.settings["mode"] == "hold", "hold")
     settled(standin, [0, 0, 0, 0, 0])
     page.touch("touchEnd", [])

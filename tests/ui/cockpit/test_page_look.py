@@ -9,7 +9,7 @@ import pytest
 from standin import PAGE, SHARED, StandIn
 
 SIZES = {
-    "desk": (1280, 800, False),
+    "desktop": (1280, 800, False),
     "upright": (390, 844, True),
     "sideways": (844, 390, True),
     "tablet": (900, 1100, True),
@@ -52,13 +52,13 @@ def test_words_can_be_read_and_thumbs_find_every_button(standin: StandIn, specta
     for box in ("help", "end"):
         page.click(f"#{box}")
         assert page.js(SMALL) == []
-        assert size in ("desk", "tablet") or page.js(LOW) == []
+        assert size in ("desktop", "tablet") or page.js(LOW) == []
         page.js(f"document.getElementById('{box}-box').close()")
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_stop_is_in_reach_and_nothing_runs_over(standin: StandIn, spectate: Any, size: str) -> None:
-    """At a desk, on a phone held either way, on a tablet: with and without the helm, and as a widget."""
+    """On a desktop, on a phone held either way, on a tablet: with and without the helm, and as a widget."""
     width, height, phone = SIZES[size]
     page = spectate("", width, height, phone=phone)
     for helm in ("free", "mine"):

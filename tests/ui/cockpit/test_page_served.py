@@ -82,7 +82,7 @@ def test_pictures_flow_and_captures_count(rehearsal: Rehearsal, page: Page) -> N
     page.press("KeyC")
     page.until("document.querySelector('[data-field=photos]').innerText === '1'")
     page.press("Space")
-    until(lambda: rehearsal.desk["mode"] == "hold", "hold")
+    until(lambda: rehearsal.settings["mode"] == "hold", "hold")
     assert "capture" in page.text("#notes")
 
 

@@ -31,7 +31,7 @@ def test_a_page_comes_as_a_spectator_whose_keys_move_nothing(standin: StandIn, s
     page.down("KeyW")
     page.press("KeyC")
     time.sleep(SILENCE_S)
-    assert standin.of("sticks") == standin.of("press") == standin.of("desk") == []
+    assert standin.of("sticks") == standin.of("press") == standin.of("settings") == []
     assert "Nobody has the helm" in page.text("#banner")
 
 
@@ -71,10 +71,10 @@ def test_space_stops_whatever_has_the_focus(standin: StandIn, fly: Any) -> None:
 
 def test_stop_by_who_only_watches_takes_the_helm_that_nobody_holds(standin: StandIn, spectate: Any) -> None:
     """An emergency is no time for two buttons."""
-    standin.desk["mode"] = "scan"
+    standin.settings["mode"] = "scan"
     page = spectate()
     page.click("#stop")
-    until(lambda: standin.desk["mode"] == "hold", "hold")
+    until(lambda: standin.settings["mode"] == "hold", "hold")
     assert standin.lease is not None
 
 
@@ -212,7 +212,7 @@ def test_ending_the_flight_asks(standin: StandIn, fly: Any) -> None:
     page = fly()
     page.click("#end")
     page.press("Space")
-    until(lambda: standin.desk["mode"] == "hold", "hold")
+    until(lambda: standin.settings["mode"] == "hold", "hold")
     assert page.js("document.getElementById('end-box').open")
     page.press("Enter")
     page.until("!document.getElementById('end-box').open")
@@ -230,15 +230,15 @@ def test_capture_and_the_desk_go_with_the_lease(standin: StandIn, fly: Any) -> N
     page.press("KeyX")
     page.click("[data-assist=orbit]")
     page.press("BracketRight")
-    until(lambda: standin.desk["orbit"] and standin.desk["w_track"] > 5, "the desk")
+    until(lambda: standin.settings["orbit"] and standin.settings["w_track"] > 5, "the settings")
     page.js(
         "(() => { const d = document.getElementById('w-track'); d.value = 0; d.dispatchEvent(new Event('input')); })()"
     )
-    until(lambda: standin.desk["w_track"] == 0.5, "the gentlest")
+    until(lambda: standin.settings["w_track"] == 0.5, "the gentlest")
     page.until("document.getElementById('regime').innerText === 'delicate'")
     assert [m["what"] for m in standin.of("press")] == ["operator", "capture", "capture"]
-    assert standin.desk["method"] == "direct"
-    assert {m["lease"] for m in standin.of("desk") + standin.of("press")} == {standin.lease}
+    assert standin.settings["method"] == "direct"
+    assert {m["lease"] for m in standin.of("settings") + standin.of("press")} == {standin.lease}
 
 
 def test_inside_a_frame_a_click_outside_centres_the_sticks(standin: StandIn, browser: Browser) -> None:

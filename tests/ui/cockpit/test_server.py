@@ -176,7 +176,7 @@ def test_one_flies_and_another_asks(server: CockpitServer, show: Rehearsal) -> N
             assert two.lease is None
             await one.sticks(0.5)
             await two.sticks(1.0, lease="guess")
-            await two.say(type="desk", set={"w_track": 1.0}, lease="guess")
+            await two.say(type="settings", set={"w_track": 1.0}, lease="guess")
             await two.say(type="press", what="capture", lease="guess")
             await two.say(type="helm", want=True, force=True)
             assert "refused" in (await two.helm())["why"]
@@ -192,7 +192,7 @@ def test_one_flies_and_another_asks(server: CockpitServer, show: Rehearsal) -> N
             await one.sticks(0.5)
             await asyncio.sleep(0.05)
             assert show.axes[0] == 1.0
-            assert (show.photos, show.desk["w_track"]) == (0, 5.0)
+            assert (show.photos, show.settings["w_track"]) == (0, 5.0)
 
     asyncio.run(tries())
 
@@ -277,11 +277,11 @@ def test_a_dial_out_of_range_is_told_to_who_set_it(server: CockpitServer, show: 
 
     async def tries() -> None:
         async with page(server, "helm") as one:
-            await one.say(type="desk", set={"w_track": 500}, lease=one.lease)
+            await one.say(type="settings", set={"w_track": 500}, lease=one.lease)
             note = await one.until(lambda told: told["type"] == "note")
             assert "w_track" in note["text"]
-            await one.say(type="desk", set={"w_track": 2.0}, lease=one.lease)
-            await one.until(lambda told: told["type"] == "state" and told["desk"]["w_track"] == 2.0)
+            await one.say(type="settings", set={"w_track": 2.0}, lease=one.lease)
+            await one.until(lambda told: told["type"] == "state" and told["settings"]["w_track"] == 2.0)
 
     asyncio.run(tries())
 

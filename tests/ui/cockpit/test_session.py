@@ -17,8 +17,8 @@ from wakewise.operation import Scenario
 from wakewise.ui.cockpit.session import CockpitSession
 
 STATE = (
-    "time_s", "mode", "desk", "controls", "thrusts_N", "commanded_m_s", "velocity_m_s", "deviation_pct", "disturbance",
-    "direct_disturbance", "rms_m_s", "direct_rms_m_s", "saved_pct", "predicted_m_s", "true_m_s",
+    "time_s", "mode", "settings", "controls", "thrusts_N", "commanded_m_s", "velocity_m_s", "deviation_pct",
+    "disturbance", "direct_disturbance", "rms_m_s", "direct_rms_m_s", "saved_pct", "predicted_m_s", "true_m_s",
     "depth_m", "roll_deg", "pitch_deg", "heading_deg",
     "tilt_deg", "power_W", "energy_J", "position_W_m", "goal_W_m", "coverage", "photos", "loop", "fallback", "target",
 )  # fmt: skip
@@ -82,7 +82,7 @@ def test_a_state_has_all_that_the_wire_promises(flown: tuple[CockpitSession, Han
     assert len(state["predicted_m_s"]) == len(state["true_m_s"]) == points
     assert len(state["thrusts_N"]) == len(welcome["vehicle"]["thrusters"]) == 8
     assert welcome["preparing"] is None
-    assert welcome["desk"]["ranges"]["w_track"] == [0.5, 50.0]
+    assert welcome["settings"]["ranges"]["w_track"] == [0.5, 50.0]
     json.dumps(welcome, allow_nan=False)
 
 

@@ -107,8 +107,8 @@ def test_arm_engage_fly_an_orbit_capture_release_disarm(tmp_path):
             assert companion.gate.press() == "engaged"
             at["engaged"] = companion.clock()
         elif at["engaged"] and companion.clock() > at["engaged"] + 1.0 and not photographs:
-            sea.desk.set(mode="scan")
-        if at["engaged"] and not at["released"] and len(photographs) == 4 and sea.desk.state.mode == "hold":
+            sea.operator.set(mode="scan")
+        if at["engaged"] and not at["released"] and len(photographs) == 4 and sea.operator.state.mode == "hold":
             companion.gate.press()
             at["released"] = companion.clock()
 

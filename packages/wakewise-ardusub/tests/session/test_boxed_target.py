@@ -130,9 +130,9 @@ def test_a_ground_station_designates_a_target_by_a_box_while_the_link_drives(sea
         assert "target by a box" in session.line()
         until(lambda: -40.0 < sea.autopilot.mount_deg < -10.0, "the camera to look down at it", 20.0)
         until(lambda: f"camera {sea.autopilot.mount_deg:+.0f} deg  " in session.line(), "its angle", 5.0)
-        joined.desk.set(mode="scan")
+        joined.operator.set(mode="scan")
         assert sea.order(2005, 0.3, 0.6, 0.6, 0.8) == DENIED
-        joined.desk.set(mode="hold")
+        joined.operator.set(mode="hold")
         assert session.boxes.target is found
         assert sea.order(2010) == ACCEPTED
         assert session.boxes.target is None
@@ -233,12 +233,12 @@ def test_a_mapped_target_takes_the_place_of_its_box(sea, port, tmp_path, monkeyp
         protect(mapped(swayed))
         assert protected(swayed)
         assert pilot.target_W_m == pytest.approx(middle)
-        joined.desk.set(mode="scan")
+        joined.operator.set(mode="scan")
         away = middle + np.array([0.0, 2.0 * MOVED_M, 0.0])
         protect(mapped(away))
         assert protected(away)
         assert pilot.target_W_m == pytest.approx(middle)
-        joined.desk.set(mode="hold")
+        joined.operator.set(mode="hold")
         begun, pilot._scan = pilot._scan, replace(pilot._scan, mission_s=3.0)
         protect(mapped(away))
         assert protected(away)

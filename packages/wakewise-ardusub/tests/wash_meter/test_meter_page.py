@@ -24,7 +24,7 @@ LIVE: dict[str, Any] = {
     "thrusts_N": {"flown": FLOWN, "least": FLOWN, "gentle": [-1.0, 0.5, -9.0, -4.0, 1.2, 1.2, 1.2, 1.2]},
     "shares_pct": [44.0, 56.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
 }  # fmt: skip
-SIZES = {"desk": (1280, 800, False, ""), "phone": (390, 844, True, ""), "widget": (300, 300, False, "?widget=1")}
+SIZES = {"desktop": (1280, 800, False, ""), "phone": (390, 844, True, ""), "widget": (300, 300, False, "?widget=1")}
 
 
 class Stage:
@@ -63,7 +63,7 @@ def stage() -> Iterator[Stage]:
 def opened(browser: Browser, stage: Stage) -> Iterator[Any]:
     pages: list[Page] = []
 
-    def open_page(size: str = "desk", *, dark: bool = False) -> Page:
+    def open_page(size: str = "desktop", *, dark: bool = False) -> Page:
         width, height, phone, query = SIZES[size]
         page = browser.open(stage.server.address + query, width, height, phone=phone, dark=dark)
         pages.append(page)

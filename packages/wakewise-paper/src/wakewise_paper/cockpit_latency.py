@@ -86,15 +86,15 @@ def measure(
             raise StageError(f"latency: the page that flies ended with exit status {page.returncode}")
         counted: dict[str, Any] = json.loads(told)
         waits_ms = 1e3 * np.array(session.mailbox.waits_s)
-        live, lookout = session.live, session.lookout
-        if live is None or lookout is None or not len(waits_ms):
+        live, snapshots = session.live, session.snapshots
+        if live is None or snapshots is None or not len(waits_ms):
             raise StageError("latency: no stick was flown")
         return LoopTiming(
             latency_ms_p50=float(np.percentile(waits_ms, 50)),
             latency_ms_p99=float(np.percentile(waits_ms, 99)),
             late_ms_p99=1e3 * live.pace.late_s(),
             lost_s=live.pace.lost_s,
-            solve_ms_p99=lookout.solve_ms_p99,
+            solve_ms_p99=snapshots.solve_ms_p99,
             sticks=len(waits_ms),
             pictures_per_s=counted["pictures"] / counted["seconds"],
             states_per_s=counted["states"] / counted["seconds"],

@@ -88,7 +88,7 @@ class AssistedPilot:
     """
 
     source: ControlSource
-    desk: OperatorState
+    operator: OperatorState
     mission: ResumableMission
     target_W_m: Array
     dt_s: float
@@ -110,7 +110,7 @@ class AssistedPilot:
     _notes: deque[OperatorMessage] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     def __post_init__(self) -> None:
-        self.state = self.desk.state
+        self.state = self.operator.state
         self.motion, self._scan = MotionReference.at(self.mission.route.body(0.0, self.aim)), ScanState()
 
     @property
@@ -151,7 +151,7 @@ class AssistedPilot:
             if action in ("capture", "stop"):
                 self._actions.append(action)
             else:
-                self.desk.press(action)
+                self.operator.press(action)
         state = self.state = self._set(time_s)
         self.trace.take(time_s, controls, vars(state))
         self._enter(state.mode, time_s, first)
@@ -168,7 +168,7 @@ class AssistedPilot:
 
     def retarget(self, parts: Parts) -> None:
         """Go by another target and its mission, which is not begun; the motion goes on from its present state."""
-        other = assisted_pilot(parts, self.source, self.desk)
+        other = assisted_pilot(parts, self.source, self.operator)
         self.target_W_m, self.keep_off = other.target_W_m, other.keep_off
         self.mission, self._scan = other.mission, ScanState()
 
@@ -182,18 +182,18 @@ class AssistedPilot:
 
     def _set(self, time_s: float) -> OperatorSettings:
         """The settings; in a replay those of the record."""
-        recorded = getattr(self.source, "desk_at", None)
+        recorded = getattr(self.source, "settings_at", None)
         played = None if recorded is None else recorded(time_s)
-        return self.desk.state if played is None else self.desk.set(**played)
+        return self.operator.state if played is None else self.operator.set(**played)
 
     def _begin(self, estimate: BodyState) -> None:
         if self.begin is not None:
-            self.desk.set(**vars(self.begin))
+            self.operator.set(**vars(self.begin))
         self.motion = MotionReference.at(estimate, self.mission.route.tilt(0.0, self.aim)[0])
         self._scan, self._mode = ScanState(), "hold"
         self._sphere, self._asked, self._missed, self._there = StickFrame(), 0.0, 0.0, True
         self._blocked_s = -math.inf
-        self._dial = math.log(self.desk.state.w_track / PAPER_W_TRACK)
+        self._dial = math.log(self.operator.state.w_track / PAPER_W_TRACK)
         self.trace = ControlLogWriter()
         self._actions.clear()
         self._notes.clear()
@@ -203,7 +203,7 @@ class AssistedPilot:
         try:
             look = getattr(self.source, "look", None)
             if look is not None:
-                look(time_s, estimate, self.desk.state.share)
+                look(time_s, estimate, self.operator.state.share)
             self.controls, why = self.source.read(time_s), "no input from the sticks"
         except Exception as fault:  # a device that goes away must not end the flight
             self.controls, why = None, f"sticks cannot be read ({type(fault).__name__}: {fault})"
@@ -220,7 +220,7 @@ class AssistedPilot:
         """Change of the mode of control; the motion goes on from its present state."""
         if mode == "scan" and not self.mission.flies:
             self._say("warn", "no mission to fly: holding the position", time_s)
-            mode = self.desk.press("hold").mode
+            mode = self.operator.press("hold").mode
         if mode == self._mode:
             return
         if mode == "scan":
@@ -253,7 +253,7 @@ class AssistedPilot:
         self._actions.extend(["capture"] * due)
         if self._scan.mission_s >= self.mission.route.duration_s:
             self._say("info", "the mission is flown", time_s)
-            self._enter(self.desk.press("hold").mode, time_s, False)
+            self._enter(self.operator.press("hold").mode, time_s, False)
 
     def _weigh(self, estimate: BodyState) -> None:
         share = self.dt_s / MEAN_S
@@ -267,7 +267,9 @@ class AssistedPilot:
         self._notes.append(OperatorMessage(level=level, text=text, time_s=time_s))
 
 
-def assisted(parts: Parts, source: ControlSource, desk: OperatorState, begin: OperatorSettings | None = None) -> Parts:
+def assisted(
+    parts: Parts, source: ControlSource, operator: OperatorState, begin: OperatorSettings | None = None
+) -> Parts:
     """Parts of an assisted flight: the pilot is the assisted one, the controller follows the settings at each step.
 
     The route of `parts` is the mission of the mode `scan`. `begin` are the settings at time zero of each flight; None:
@@ -284,19 +286,19 @@ def assisted(parts: Parts, source: ControlSource, desk: OperatorState, begin: Op
         raise InputError(
             f"pilot: {parts.scenario.pilot} flies by itself, take wakewise scan, or pilot route to fly by hand"
         )
-    pilot = assisted_pilot(parts, source, desk, begin)
+    pilot = assisted_pilot(parts, source, operator, begin)
     flown = parts.replace(pilot=pilot)
     return flown.replace(controller=switched_controller(flown, lambda: pilot.state.method))
 
 
 def assisted_pilot(
-    parts: Parts, source: ControlSource, desk: OperatorState, begin: OperatorSettings | None = None
+    parts: Parts, source: ControlSource, operator: OperatorState, begin: OperatorSettings | None = None
 ) -> AssistedPilot:
     """The pilot of `assisted`."""
     mission = parts.scenario.mission
     return AssistedPilot(
         source=source,
-        desk=desk,
+        operator=operator,
         mission=ResumableMission(
             route=parts.route,
             aim=parts.aim,

@@ -32,11 +32,11 @@ from wakewise.operation.flight_log import (
     PARTS,
     ExposureRecord,
     FlightLog,
+    controls_part,
     drop_parts,
-    hands_part,
     has_parts,
+    parts_controls,
     parts_exposures,
-    parts_hands,
     parts_table,
     steps_of,
 )
@@ -63,10 +63,10 @@ def collect_flight(parts: Parts, folder: Path) -> bool:
     seen = table.filter("exposing").select(_SEEN).collect()
     exposures = list(parts_exposures(folder, seen.height))
     write_views(parts, folder, [(parts.route.photo(k), *_view(parts, seen, k)) for k in range(seen.height)])
-    hands = parts_hands(folder)
-    if hands is not None:
+    controls = parts_controls(folder)
+    if controls is not None:
         with whole_file(folder / TRACE_FILE) as path:
-            hands.write_parquet(path)
+            controls.write_parquet(path)
     if has("logs"):
         from wakewise.operation.telemetry import write_mcap
 
@@ -329,7 +329,7 @@ class LiveFlight:
         self._prepare(0, 1, "fills the water")
         plant, truth_provider = parts.world.begin()
         log = FlightLog(
-            folder=None if folder is None else folder / PARTS, keep=folder is not None, beside=self._keep_hands
+            folder=None if folder is None else folder / PARTS, keep=folder is not None, beside=self._keep_controls
         )
         recorder = recorder_of(
             parts, truth_provider, self._shutter, water_every_s=self._water_every_s, exposed=self._exposed, log=log
@@ -356,13 +356,13 @@ class LiveFlight:
             if folder is not None:
                 collect_flight(parts, folder)
 
-    def _keep_hands(self, part: int) -> None:
+    def _keep_controls(self, part: int) -> None:
         """Write the inputs until now, if the pilot has a record of them."""
         pilot: Any = self.parts.pilot
         if not isinstance(getattr(pilot, "trace", None), ControlLogWriter):
             return
         if self.folder is not None and pilot.trace.frame().height:
-            pilot.trace.write(hands_part(self.folder, part))
+            pilot.trace.write(controls_part(self.folder, part))
         pilot.trace = ControlLogWriter()
 
     def _is_over(self) -> bool:

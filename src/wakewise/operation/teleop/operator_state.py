@@ -105,7 +105,7 @@ class OperatorState:
         """
         for name in changes:
             if name not in FIELDS:
-                raise InputError(f"{name}: not on the desk, allowed are {', '.join(FIELDS)}")
+                raise InputError(f"{name}: not a setting, allowed are {', '.join(FIELDS)}")
         with self._lock:
             self._state = replace(self._state, **changes)
             return self._state

@@ -63,11 +63,11 @@ def replay_input(parts: Parts, folder: Path) -> None:
     if parts.scenario.control_log is None:
         _ = parts.pilot  # which says so
         return
-    hands = read_input(Path(parts.scenario.control_log))
-    end_s = hands.end_s if isinstance(hands, ControlLog) else 0.0
-    if isinstance(hands, ScriptedInput):
-        end_s = hands.moments[-1].at_s + AFTER_S
-    flown = assisted(parts, hands, OperatorState())
+    source = read_input(Path(parts.scenario.control_log))
+    end_s = source.end_s if isinstance(source, ControlLog) else 0.0
+    if isinstance(source, ScriptedInput):
+        end_s = source.moments[-1].at_s + AFTER_S
+    flown = assisted(parts, source, OperatorState())
     LiveFlight(flown, folder=folder, paced=False, shutter=TimedPhotoTrigger(flown, end_s)).run()
 
 

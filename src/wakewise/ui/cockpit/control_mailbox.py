@@ -82,7 +82,7 @@ class ControlLease:
     lease: str | None = None
     renewed_s: float = -math.inf
     asked_by: str | None = None
-    hands: HolderInput = field(default_factory=HolderInput)
+    sticks: HolderInput = field(default_factory=HolderInput)
     armed: bool = True
     pressed: tuple[str, ...] = ()
 
@@ -92,8 +92,8 @@ class ControlLease:
 
     def axes(self, now_s: float) -> Array:
         """Sticks with effect now, shape (5,): zero if they are old or without a holder."""
-        fresh = self.armed and self.held(now_s) and now_s - self.hands.sent_s <= INPUT_TIMEOUT_S
-        return self.hands.axes if fresh else np.zeros_like(CENTRED.axes)
+        fresh = self.armed and self.held(now_s) and now_s - self.sticks.sent_s <= INPUT_TIMEOUT_S
+        return self.sticks.axes if fresh else np.zeros_like(CENTRED.axes)
 
     def ask(self, client: str, now_s: float, lease: str, force: bool = False) -> tuple[ControlLease, str]:
         """A client requests the controls, to be given under a new `lease`; the answer in words.
@@ -124,7 +124,7 @@ class ControlLease:
         """A client gives the controls back, or has disconnected: its sticks are zero at once."""
         if client == self.holder:
             return replace(
-                self, holder=None, lease=None, renewed_s=-math.inf, hands=HolderInput(), armed=True, pressed=()
+                self, holder=None, lease=None, renewed_s=-math.inf, sticks=HolderInput(), armed=True, pressed=()
             )
         return replace(self, asked_by=None) if client == self.asked_by else self
 
@@ -132,12 +132,12 @@ class ControlLease:
         self, client: str, lease: str, seq: int, t_ms: float, axes: Array, now_s: float
     ) -> tuple[ControlLease, bool]:
         """The lease after sticks of a client, and whether they were accepted."""
-        if not self.may(client, lease, now_s) or seq <= self.hands.seq or not math.isfinite(t_ms):
+        if not self.may(client, lease, now_s) or seq <= self.sticks.seq or not math.isfinite(t_ms):
             return self, False
-        hands = self.hands.then(seq, 1e-3 * t_ms, axes, now_s)
-        paused = self.hands.seq >= 0 and now_s - self.renewed_s > INPUT_TIMEOUT_S
+        sticks = self.sticks.then(seq, 1e-3 * t_ms, axes, now_s)
+        paused = self.sticks.seq >= 0 and now_s - self.renewed_s > INPUT_TIMEOUT_S
         armed = (self.armed and not paused) or not axes.any()
-        return replace(self, hands=hands, armed=armed, renewed_s=now_s), True
+        return replace(self, sticks=sticks, armed=armed, renewed_s=now_s), True
 
     def press(self, client: str, lease: str, what: str, now_s: float) -> tuple[ControlLease, bool]:
         """The lease after a button of a client, and whether it was accepted."""
@@ -147,8 +147,8 @@ class ControlLease:
 
     def may(self, client: str, lease: str, now_s: float) -> bool:
         """Whether this client, with this lease, may change what is flown."""
-        helm = self.tick(now_s)
-        return client == helm.holder and lease == helm.lease
+        now = self.tick(now_s)
+        return client == now.holder and lease == now.lease
 
     def tick(self, now_s: float) -> ControlLease:
         """The lease now; void if it lapsed longer than `FORGET_S` ago."""
@@ -186,7 +186,7 @@ class ControlMailbox:
     def __init__(self, clock: Callable[[], float] = time.monotonic, device: ControlSource | None = None) -> None:
         self.clock = clock
         self._device = device
-        self._helm = ControlLease()
+        self._lease = ControlLease()
         self._lock = threading.Lock()
         self._unflown_s: float | None = None
         self._flown = ("", -1)
@@ -197,45 +197,45 @@ class ControlMailbox:
     def holding(self) -> ControlOwnership:
         """Holder and lease now."""
         with self._lock:
-            self._helm = helm = self._helm.tick(self.clock())
-            flying = helm.held(self.clock())
+            self._lease = lease = self._lease.tick(self.clock())
+            flying = lease.held(self.clock())
             return ControlOwnership(
-                holder=helm.holder, lease=helm.lease, asked_by=helm.asked_by, flying=flying, armed=helm.armed
+                holder=lease.holder, lease=lease.lease, asked_by=lease.asked_by, flying=flying, armed=lease.armed
             )
 
     def ask(self, client: str, force: bool = False) -> str:
         """Request the controls for a client; the answer in words."""
         with self._lock:
-            self._helm, words = self._helm.ask(client, self.clock(), secrets.token_urlsafe(12), force)
+            self._lease, words = self._lease.ask(client, self.clock(), secrets.token_urlsafe(12), force)
             return words
 
     def consent(self, client: str, to: str, yes: bool) -> str:
         """The holder's answer to a request; the result in words."""
         with self._lock:
-            self._helm, words = self._helm.consent(client, to, yes, self.clock(), secrets.token_urlsafe(12))
+            self._lease, words = self._lease.consent(client, to, yes, self.clock(), secrets.token_urlsafe(12))
             return words
 
     def left(self, client: str) -> None:
         """Give the controls of a client back."""
         with self._lock:
-            self._helm = self._helm.left(client)
+            self._lease = self._lease.left(client)
 
     def moved(self, client: str, lease: str, seq: int, t_ms: float, axes: Array) -> bool:
         """Take in sticks of a client; whether they were accepted."""
         with self._lock:
-            self._helm, taken = self._helm.moved(client, lease, seq, t_ms, axes, self.clock())
+            self._lease, taken = self._lease.moved(client, lease, seq, t_ms, axes, self.clock())
             return taken
 
     def press(self, client: str, lease: str, what: str) -> bool:
         """Take in a button of a client; whether it was accepted."""
         with self._lock:
-            self._helm, taken = self._helm.press(client, lease, what, self.clock())
+            self._lease, taken = self._lease.press(client, lease, what, self.clock())
             return taken
 
     def may(self, client: str, lease: str) -> bool:
         """Whether this client has the controls."""
         with self._lock:
-            return self._helm.may(client, lease, self.clock())
+            return self._lease.may(client, lease, self.clock())
 
     def read(self, time_s: float) -> Controls | None:
         """The holder's sticks now; None without a holder, or if the lease has lapsed."""
@@ -243,16 +243,16 @@ class ControlMailbox:
             self._read_device(time_s)
         with self._lock:
             now_s = self.clock()
-            self._helm = helm = self._helm.tick(now_s)
-            pressed = helm.pressed
+            self._lease = lease = self._lease.tick(now_s)
+            pressed = lease.pressed
             if pressed:
-                self._helm = replace(helm, pressed=())
-            if not helm.held(now_s):
+                self._lease = replace(lease, pressed=())
+            if not lease.held(now_s):
                 return Controls(axes=np.zeros(5), pressed=pressed) if pressed else None
-            hands = helm.hands
-            if hands.seq >= 0 and (helm.lease or "", hands.seq) != self._flown:
-                self._flown, self._unflown_s = (helm.lease or "", hands.seq), hands.came_s
-            return Controls(axes=helm.axes(now_s), pressed=pressed)
+            sticks = lease.sticks
+            if sticks.seq >= 0 and (lease.lease or "", sticks.seq) != self._flown:
+                self._flown, self._unflown_s = (lease.lease or "", sticks.seq), sticks.came_s
+            return Controls(axes=lease.axes(now_s), pressed=pressed)
 
     def flown(self) -> None:
         """Thrusts were sent, which answer the sticks read before."""

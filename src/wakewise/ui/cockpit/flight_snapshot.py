@@ -25,7 +25,7 @@ LOOKS_S = 2.0
 """Time for which the true water is measured after a request."""
 TRUE_EVERY_S, SILT_EVERY_S = 0.5, 1.0
 MEAN_OF = 10
-"""Steps over which commanded thrusts are averaged for the gauges: small ones are sent as pulses."""
+"""Steps over which commanded thrusts are averaged for the readout: small ones are sent as pulses."""
 _SOLVES = 3000
 _LEAST_ASKED_M_S = 0.005
 
@@ -35,7 +35,7 @@ class FlightSnapshot:
     """One step of a flight as it is shown.
 
     `thrusts_N`, shape (n,), are the commanded ones in the mean of the last steps; `true_m_s`, shape (points,), the
-    speed that the thrusters gave the water at the gauges' points when it was last asked, None where nobody knows.
+    speed that the thrusters gave the water at the readout's points when it was last asked, None where nobody knows.
     """
 
     step: Step

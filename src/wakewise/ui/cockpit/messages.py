@@ -182,7 +182,7 @@ def _press(told: dict[str, Any]) -> ButtonPress:
     return ButtonPress(what=what, lease=_word(told, "lease"))
 
 
-def _desk(told: dict[str, Any]) -> SettingsChange:
+def _settings(told: dict[str, Any]) -> SettingsChange:
     changes = told.get("set")
     if not isinstance(changes, dict) or not 0 < len(changes) <= _FIELDS:
         raise _InvalidError("set must be an object of fields and values")
@@ -226,7 +226,7 @@ _READERS: dict[str, Callable[[dict[str, Any]], Message]] = {
     "consent": _consent,
     "sticks": _sticks,
     "press": _press,
-    "desk": _desk,
+    "settings": _settings,
     "seen": _seen,
     "designate": _designate,
     "proposal": _proposal,

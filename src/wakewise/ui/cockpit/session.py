@@ -88,7 +88,7 @@ class CockpitSession:
         scene: bool = False,
     ) -> None:
         self._parts = scenario if isinstance(scenario, Parts) else scenario.parts()
-        self.mailbox, self.desk = ControlMailbox(device=device), OperatorState(OperatorSettings(watch_target=False))
+        self.mailbox, self.operator = ControlMailbox(device=device), OperatorState(OperatorSettings(watch_target=False))
         self._device, self._scene_wanted = device, scene
         self._scene: ViserScene | None = None
         self._fallback: str | None = None
@@ -99,9 +99,9 @@ class CockpitSession:
         self._camera = LiveCamera(self._parts.scenario, self._parts.given.get("target")) if pictures else None
         self.live: LiveFlight | None = None
         self._pilot: AssistedPilot | None = None
-        self._gauges: WakeReadout | None = None
-        self.lookout: SnapshotRecorder | None = None
-        self._instruments: StateEncoder | None = None
+        self._readout: WakeReadout | None = None
+        self.snapshots: SnapshotRecorder | None = None
+        self._encoder: StateEncoder | None = None
         self._guide: LiveCoverage | None = None
         self._tracking: TargetTracking | None = None
         self._described: dict[str, Any] = {}
@@ -154,29 +154,29 @@ class CockpitSession:
         ranges = {name: list(ends) for name, ends in RANGES.items()} | {"mode": list(MODES), "method": list(WAYS)}
         told = nothing | self._described
         url = None if self._scene is None else self._scene.url
-        return told | {"desk": self._desk() | {"ranges": ranges}, "scene_url": url, "preparing": self.preparing}
+        return told | {"settings": self._settings() | {"ranges": ranges}, "scene_url": url, "preparing": self.preparing}
 
     def state(self) -> dict[str, Any] | None:
         """State of the flight; None before the first step."""
-        lookout, instruments, live, pilot = self.lookout, self._instruments, self.live, self._pilot
-        if lookout is None or instruments is None or live is None or pilot is None or not self.flying:
+        snapshots, encoder, live, pilot = self.snapshots, self._encoder, self.live, self._pilot
+        if snapshots is None or encoder is None or live is None or pilot is None or not self.flying:
             return None
-        lookout.look()
-        now = lookout.now
+        snapshots.look()
+        now = snapshots.now
         if now is None:
             return None
         controls, step = pilot.controls or CENTRED, now.step
         X_WC = step.estimate.X_WB @ live.parts.vehicle.X_BC_at(step.tilt_rad)
-        return instruments.read(now) | {
-            "mode": self.desk.state.mode,
-            "desk": self._desk(),
+        return encoder.read(now) | {
+            "mode": self.operator.state.mode,
+            "settings": self._settings(),
             "controls": rounded(controls.axes, 3),
             "coverage": self._guide.told(X_WC) if self._guide is not None else None,
             "target": None if self._tracking is None else target_message(self._tracking, step.time_s, X_WC),
             "photos": len(live.exposures),
             "loop": {
                 "behind_ms": number(1e3 * live.behind_s, 2),
-                "solve_ms_p99": number(lookout.solve_ms_p99, 2),
+                "solve_ms_p99": number(snapshots.solve_ms_p99, 2),
                 "stick_to_thrust_ms_p99": number(self.mailbox.stick_to_thrust_ms_p99, 1),
             },
         }
@@ -190,7 +190,7 @@ class CockpitSession:
 
     def change_settings(self, changes: dict[str, Any]) -> None:
         """Change the operator's settings; raises InputError if a value is out of range."""
-        self.desk.set(**changes)
+        self.operator.set(**changes)
 
     def designate(self, box: tuple[float, float, float, float] | None, frame: int) -> None:
         """Designate a box of a picture as the target; raises InputError where no pictures are drawn."""
@@ -210,7 +210,7 @@ class CockpitSession:
 
     def picture(self) -> CameraPicture | None:
         """The camera picture now."""
-        now = self.lookout.now if self.lookout is not None else None
+        now = self.snapshots.now if self.snapshots is not None else None
         if now is None or self._camera is None:
             return None
         silt = now.silt if now.silt is not self._silt_shown else None
@@ -262,19 +262,19 @@ class CockpitSession:
         self._say_preparing("making the parts of the flight")
         parts = self._parts
         self.flights += 1
-        if self._gauges is None:
-            self._gauges = WakeReadout.of(parts)
-            self._described = static_description(parts, self._gauges)
+        if self._readout is None:
+            self._readout = WakeReadout.of(parts)
+            self._described = static_description(parts, self._readout)
         self._say_preparing("making pilot and controllers")
-        pilot = assisted_pilot(parts, self.mailbox, self.desk)
+        pilot = assisted_pilot(parts, self.mailbox, self.operator)
         flown = parts.replace(pilot=pilot)
         methods = region_methods(flown)
         flown = flown.replace(controller=switched_controller(flown, lambda: pilot.state.method, methods))
-        self._gauges.disturbances(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))  # kernels are read now
-        self._gauges.predicted_m_s(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))
-        lookout = SnapshotRecorder(
+        self._readout.disturbances(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))  # kernels are read now
+        self._readout.predicted_m_s(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))
+        snapshots = SnapshotRecorder(
             parts.vehicle,
-            self._gauges.true_points_W_m,
+            self._readout.true_points_W_m,
             1.0 / parts.control.rate_hz,
             self.mailbox.flown,
             lambda: pilot.velocity_W_m_s,
@@ -283,10 +283,10 @@ class CockpitSession:
         if self._guided:
             self._say_preparing("looking for views of the target")
             self._guide = LiveCoverage(parts)
-        live = LiveFlight(flown, folder=self._free_folder(), paced=self._paced, watch=lookout)
+        live = LiveFlight(flown, folder=self._free_folder(), paced=self._paced, watch=snapshots)
         self._begin_tracking(parts, methods)
-        self._pilot, self.lookout, self.live = pilot, lookout, live
-        self._instruments = StateEncoder(self._gauges, lookout)
+        self._pilot, self.snapshots, self.live = pilot, snapshots, live
+        self._encoder = StateEncoder(self._readout, snapshots)
         return live
 
     def _begin_tracking(self, parts: Parts, methods: RegionMethods) -> None:
@@ -343,20 +343,20 @@ class CockpitSession:
 
     def _open_scene(self, live: LiveFlight) -> None:
         """Serve the 3D scene, after the first step, which it would delay."""
-        if self._scene_wanted and self._scene is None and self._gauges is not None:
-            self._scene = open_scene(live.parts.vehicle, self._gauges.points_W_m)
+        if self._scene_wanted and self._scene is None and self._readout is not None:
+            self._scene = open_scene(live.parts.vehicle, self._readout.points_W_m)
             self._scene_wanted = self._scene is not None
             self.edition += 1
 
     def _show_scene(self) -> None:
         """Update the scene at its interval while a page is open."""
-        lookout, instruments, now_s = self.lookout, self._instruments, time.monotonic()
-        if self._scene is None or lookout is None or instruments is None or lookout.now is None:
+        snapshots, encoder, now_s = self.snapshots, self._encoder, time.monotonic()
+        if self._scene is None or snapshots is None or encoder is None or snapshots.now is None:
             return
-        if now_s < self._shown_s + SCENE_EVERY_S or not lookout.looked_at:
+        if now_s < self._shown_s + SCENE_EVERY_S or not snapshots.looked_at:
             return
-        self._shown_s, step = now_s, lookout.now.step
-        self._scene.show(step.estimate.X_WB, lookout.now.thrusts_N, instruments.predicted_m_s)
+        self._shown_s, step = now_s, snapshots.now.step
+        self._scene.show(step.estimate.X_WB, snapshots.now.thrusts_N, encoder.predicted_m_s)
 
     def _close(self, live: LiveFlight) -> None:
         """Report the end of a flight."""
@@ -367,7 +367,7 @@ class CockpitSession:
         if live.folder is not None and (live.folder / "steps.parquet").exists():
             self.flown.append(live.folder)
             self._say(f"the flight is over; it is kept in {live.folder}")
-        self.desk.set(mode="hold")
+        self.operator.set(mode="hold")
 
     def _await_next(self) -> None:
         """Wait until the holder of the controls starts another flight."""
@@ -378,7 +378,7 @@ class CockpitSession:
             controls = self.mailbox.read(0.0)
             asked = [what for what in (controls.pressed if controls is not None else ()) if what in MODES]
             if asked:
-                self.desk.press(asked[-1])
+                self.operator.press(asked[-1])
                 self._began_s = time.monotonic()
                 return
 
@@ -408,6 +408,6 @@ class CockpitSession:
             self.preparing = what
             self.edition += 1
 
-    def _desk(self) -> dict[str, Any]:
-        state = self.desk.state
+    def _settings(self) -> dict[str, Any]:
+        state = self.operator.state
         return asdict(state) | {"regime": tracking_regime(state.w_track)}

@@ -97,11 +97,11 @@ class WakeReadout:
         return np.asarray(np.linalg.norm(velocity, axis=1))
 
 
-POINTS_EVERY, GAUGES_EVERY = 5, 2
+POINTS_EVERY, READOUT_EVERY = 5, 2
 """States between two evaluations of all points, and of D: with a current these cost most of the time."""
 
 
-def static_description(parts: Parts, gauges: WakeReadout) -> dict[str, Any]:
+def static_description(parts: Parts, readout: WakeReadout) -> dict[str, Any]:
     """Scenario, vehicle and target, for a new client."""
     scenario, vehicle, target = parts.scenario, parts.vehicle, parts.surveyed_target
     return {
@@ -119,7 +119,7 @@ def static_description(parts: Parts, gauges: WakeReadout) -> dict[str, Any]:
             ],
         },
         "target": {
-            "points_W_m": [rounded(point, 4) for point in gauges.points_W_m],
+            "points_W_m": [rounded(point, 4) for point in readout.points_W_m],
             "centre_W_m": rounded(target.centre_W_m, 4),
             "radius_m": number(target.radius_m, 4),
             "bed_z_m": number(target.bed_z_m, 4),
@@ -141,25 +141,25 @@ def scenario_description(parts: Parts) -> dict[str, Any]:
 
 
 class StateEncoder:
-    """Encodes the snapshots of one flight. `predicted_m_s` is the wash at the gauges' points as last read."""
+    """Encodes the snapshots of one flight. `predicted_m_s` is the wash at the readout's points as last read."""
 
-    def __init__(self, gauges: WakeReadout, lookout: SnapshotRecorder) -> None:
-        self._gauges, self._lookout = gauges, lookout
-        self._both: deque[tuple[float, float]] = deque(maxlen=round(WINDOW_S / SAMPLED_S / GAUGES_EVERY))
-        self.predicted_m_s = np.zeros(len(gauges.points_W_m))
+    def __init__(self, readout: WakeReadout, snapshots: SnapshotRecorder) -> None:
+        self._readout, self._snapshots = readout, snapshots
+        self._both: deque[tuple[float, float]] = deque(maxlen=round(WINDOW_S / SAMPLED_S / READOUT_EVERY))
+        self.predicted_m_s = np.zeros(len(readout.points_W_m))
         self._now = (math.nan, math.nan)
         self._count = 0
 
     def read(self, now: FlightSnapshot) -> dict[str, Any]:
         """State of the flight without settings, controls, coverage and photographs."""
         step, estimate = now.step, now.step.estimate
-        if self._count % GAUGES_EVERY == 0:
-            self._now = self._gauges.disturbances(estimate, now.thrusts_N)
+        if self._count % READOUT_EVERY == 0:
+            self._now = self._readout.disturbances(estimate, now.thrusts_N)
             if math.isfinite(sum(self._now)):
                 self._both.append(self._now)
         flown, direct = self._now
         if self._count % POINTS_EVERY == 0:
-            self.predicted_m_s = self._gauges.predicted_m_s(estimate, now.thrusts_N)
+            self.predicted_m_s = self._readout.predicted_m_s(estimate, now.thrusts_N)
         self._count += 1
         roll, pitch, heading = (math.degrees(angle) for angle in euler_from_quat(estimate.X_WB.q))
         R_BW = estimate.X_WB.R.T
@@ -168,11 +168,11 @@ class StateEncoder:
             "thrusts_N": rounded(step.command.thrusts_N, 3),
             "commanded_m_s": rounded(R_BW @ now.asked_W_m_s, 4),
             "velocity_m_s": rounded(R_BW @ now.velocity_W_m_s, 4),
-            "deviation_pct": number(self._lookout.deviation_pct, 1),
+            "deviation_pct": number(self._snapshots.deviation_pct, 1),
             "disturbance": number(flown, 8),
             "direct_disturbance": number(direct, 8),
-            "rms_m_s": number(self._gauges.rms_m_s(flown), 6),
-            "direct_rms_m_s": number(self._gauges.rms_m_s(direct), 6),
+            "rms_m_s": number(self._readout.rms_m_s(flown), 6),
+            "direct_rms_m_s": number(self._readout.rms_m_s(direct), 6),
             "saved_pct": number(self.saved_pct, 1),
             "predicted_m_s": rounded(self.predicted_m_s, 4),
             "true_m_s": None if now.true_m_s is None else rounded(now.true_m_s, 4),
@@ -197,7 +197,7 @@ class StateEncoder:
         if not self._both:
             return None
         flown, direct = np.mean(self._both, axis=0)
-        still = self._gauges.rms_m_s(float(direct)) < STILL_M_S
+        still = self._readout.rms_m_s(float(direct)) < STILL_M_S
         return None if still else 100.0 * (1.0 - float(flown / direct))
 
 

@@ -417,12 +417,12 @@ those that there are. Estimates."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VehicleFlight:
-    """What flies at sea: the parts, what reckons the figures, the desk, and the parts without their output gate."""
+    """What flies at sea: parts, wash figures, settings of the operator, and the parts without their output gate."""
 
     parts: Parts
     bare: Parts
     figures: WashFigures
-    desk: OperatorState
+    operator: OperatorState
     methods: RegionMethods
     turn: FlightOwnership = field(default_factory=FlightOwnership)
 
@@ -431,7 +431,7 @@ class VehicleFlight:
         """Whether the mission flies, or was left and can be gone on with."""
         pilot = self.parts.pilot
         assert isinstance(pilot, EngagedPilot)  # see `join_vehicle`
-        return self.desk.state.mode == "scan" or pilot.inner.mission_s > 0.0
+        return self.operator.state.mode == "scan" or pilot.inner.mission_s > 0.0
 
     def retarget(self, parts: Parts, estimate: BodyState) -> None:
         """Fly by the target, region and surroundings of these parts from the next step on.
@@ -528,10 +528,10 @@ def join_vehicle(
     check_start(parts.vehicle, region, state_of(start), around, what="here")
     if gate.target_W_m is None:
         gate.target_W_m = target.centre_W_m
-    desk = OperatorState(OperatorSettings(mode="operator"))
+    operator = OperatorState(OperatorSettings(mode="operator"))
     if parts.finds:
-        raise InputError("pilot: only hands fly at sea")
-    inner = assisted_pilot(parts, GroundStationInput(gate=gate), desk, OperatorSettings(mode="operator"))
+        raise InputError("pilot: a session with a vehicle is flown by sticks only")
+    inner = assisted_pilot(parts, GroundStationInput(gate=gate), operator, OperatorSettings(mode="operator"))
     flown = parts.replace(pilot=inner)
     methods = region_methods(flown)
     flown = flown.replace(controller=switched_controller(flown, lambda: inner.state.method, methods))
@@ -543,7 +543,7 @@ def join_vehicle(
         parts=whole,
         bare=parts,
         figures=WashFigures(parts=parts, gate=gate, turn=turn, flown_N=flown_N),
-        desk=desk,
+        operator=operator,
         methods=methods,
         turn=turn,
     )

@@ -395,7 +395,7 @@ class VehicleSession:
         """Has the flight go by a target of a box, or by its first one."""
 
         def follow(found: BoxedTarget | None) -> None:
-            if sea.desk.state.mode == "scan":
+            if sea.operator.state.mode == "scan":
                 raise InputError("box: the mission flies, hold first")
             sea.retarget(sea.bare if found is None else _parts_of(found, sea), self._estimate())
 

@@ -164,7 +164,7 @@ def selected_w_tracks(wished: tuple[float, ...] | None) -> tuple[float, ...]:
     Raises
     ------
     InputError
-        If one is beyond what the desk's dial has.
+        If one is beyond the range of the settings.
     """
     least, most = RANGES["w_track"]
     for value in wished or ():

@@ -250,10 +250,10 @@ def operated(parts: Parts, world: str, pilot: str, seed: int, w_track: float) ->
     water = water_of(world, seed)
     course, target = COURSES[course_of(world, pilot, seed)], parts.surveyed_target
     standoff_m = parts.scenario.mission.standoff_m
-    dt_s, hands = 1.0 / parts.control.rate_hz, None
+    dt_s, simulated = 1.0 / parts.control.rate_hz, None
     if pilot == "human":
         parts = parts.replace(route=look_route(target.centre_W_m, water.azimuth_rad, standoff_m))
-        hands = SimulatedOperatorInput(
+        simulated = SimulatedOperatorInput(
             reference=RoutePilot(route=parts.route, aim=parts.aim),
             X_BC=parts.vehicle.X_BC,
             target_W_m=target.centre_W_m,
@@ -265,7 +265,7 @@ def operated(parts: Parts, world: str, pilot: str, seed: int, w_track: float) ->
         route = operator_route(target.centre_W_m, course.duration_s)
         parts = parts.replace(start=BodyState(X_WB=X_WB), route=route)
     begin = OperatorSettings(mode="operator", w_track=w_track, watch_target=course.watches)
-    source: ControlSource = hands or CourseInput(course, begin.share)
+    source: ControlSource = simulated or CourseInput(course, begin.share)
     parts = parts.replace(pilot=assisted_pilot(parts, source, OperatorState(begin), begin))
     return parts.replace(controller=ControllerProbe(parts.controller))
 
@@ -315,7 +315,7 @@ def by_sticks(pilot: AssistedPilot) -> Array:
     """Velocity in W that the sticks point at now, before it is reached at a vehicle's pace, shape (3,)."""
     if pilot.controls is None:
         return np.zeros(3)
-    full_m_s = FULL_M_S * pilot.desk.state.share
+    full_m_s = FULL_M_S * pilot.operator.state.share
     return level_frame(float(pilot.motion.angles_rad[2])) @ (full_m_s * pilot.controls.axes[:3])
 
 

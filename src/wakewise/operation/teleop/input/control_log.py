@@ -1,6 +1,6 @@
 """Record of an operator's inputs in a flight, for analysis and replay.
 
-A table with the columns `time_s`, the five axes, `pressed` (names, separated by commas) and `desk` (the settings as
+A table with the columns `time_s`, the five axes, `pressed` (names, separated by commas) and `settings` (the settings as
 JSON). It has a row at each change, which holds until the next one, and a last one at the end. Without inputs the axes
 are null. The file is Parquet or CSV; a teleoperated flight writes `controls.parquet` into its folder.
 """
@@ -33,24 +33,24 @@ class ControlLogWriter:
 
     _rows: array[float] = field(default_factory=lambda: array("d"), init=False)
     _pressed: dict[int, str] = field(default_factory=dict, init=False)
-    _desks: dict[int, str] = field(default_factory=dict, init=False)
+    _settings_rows: dict[int, str] = field(default_factory=dict, init=False)
     _axes: tuple[float, ...] | None = field(default=None, init=False)
-    _desk: Mapping[str, Any] | None = field(default=None, init=False)
+    _settings: Mapping[str, Any] | None = field(default=None, init=False)
     _last_s: float = field(default=0.0, init=False)
 
-    def take(self, time_s: float, controls: Controls | None, desk: Mapping[str, Any]) -> None:
+    def take(self, time_s: float, controls: Controls | None, settings: Mapping[str, Any]) -> None:
         """Take in the inputs and settings of a step."""
         axes = _NOBODY if controls is None else tuple(controls.axes.tolist())
         pressed = () if controls is None else controls.pressed
         same = self._axes is axes or (axes is not _NOBODY and self._axes == axes)
-        if not same or pressed or desk != self._desk:
+        if not same or pressed or settings != self._settings:
             row = len(self._rows) // (1 + len(CONTROL_AXES))
             if pressed:
                 self._pressed[row] = ",".join(pressed)
-            if desk != self._desk:
-                self._desks[row] = json.dumps(dict(desk))
+            if settings != self._settings:
+                self._settings_rows[row] = json.dumps(dict(settings))
             self._rows.extend((time_s, *axes))
-            self._axes, self._desk = axes, desk
+            self._axes, self._settings = axes, settings
         self._last_s = time_s
 
     def frame(self) -> pl.DataFrame:
@@ -62,9 +62,9 @@ class ControlLogWriter:
         columns = {name: wide[:, k] for k, name in enumerate(("time_s", *CONTROL_AXES))}
         words = {
             name: [said.get(k) for k in range(len(wide))]
-            for name, said in (("pressed", self._pressed), ("desk", self._desks))
+            for name, said in (("pressed", self._pressed), ("settings", self._settings_rows))
         }
-        frame = pl.DataFrame({**columns, **words}, schema_overrides={"pressed": pl.String, "desk": pl.String})
+        frame = pl.DataFrame({**columns, **words}, schema_overrides={"pressed": pl.String, "settings": pl.String})
         return frame.with_columns(pl.col(CONTROL_AXES).fill_nan(None))
 
     def write(self, path: Path) -> None:
@@ -83,7 +83,7 @@ class ControlLog(TimedControls):
     """
 
     def __init__(self, frame: pl.DataFrame, what: str = "trace") -> None:
-        times_s, rows, self._desks = _checked(frame, what)
+        times_s, rows, self._settings_rows = _checked(frame, what)
         super().__init__(times_s, rows, before=None)
 
     @property
@@ -96,10 +96,10 @@ class ControlLog(TimedControls):
         held = super().read(time_s)
         return None if time_s > self.end_s + 1e-9 else held
 
-    def desk_at(self, time_s: float) -> Mapping[str, Any] | None:
+    def settings_at(self, time_s: float) -> Mapping[str, Any] | None:
         """The settings at `time_s`; None if they are not in the record."""
         at = int(np.searchsorted(self._times_s, time_s + 1e-9, side="right")) - 1
-        return self._desks[at] if at >= 0 else None
+        return self._settings_rows[at] if at >= 0 else None
 
 
 def read_trace(path: Path) -> ControlLog:
@@ -128,19 +128,20 @@ def _checked(
     if not (np.isfinite(times_s).all() and np.all(np.diff(times_s) > 0.0) and times_s[0] >= 0.0):
         raise InputError(f"{what}: time_s must increase from 0 or more")
     words = {
-        name: frame[name].to_list() if name in frame.columns else [None] * frame.height for name in ("pressed", "desk")
+        name: frame[name].to_list() if name in frame.columns else [None] * frame.height
+        for name in ("pressed", "settings")
     }
     rows: list[Controls | None] = []
-    desks: list[Mapping[str, Any] | None] = []
-    desk: Mapping[str, Any] | None = None
-    for k, (axes, pressed, said) in enumerate(zip(wide[:, 1:], words["pressed"], words["desk"], strict=True), 1):
+    all_settings: list[Mapping[str, Any] | None] = []
+    settings: Mapping[str, Any] | None = None
+    for k, (axes, pressed, said) in enumerate(zip(wide[:, 1:], words["pressed"], words["settings"], strict=True), 1):
         try:
             names = tuple(str(pressed).split(",")) if pressed else ()
             rows.append(None if np.isnan(axes).all() and not names else Controls(axes=axes, pressed=names))
-            desk = json.loads(said) if said else desk
+            settings = json.loads(said) if said else settings
         except (InputError, ValueError) as fault:
             raise InputError(f"{what}: row {k}: {fault}") from fault
-        if desk is not None and not isinstance(desk, dict):
-            raise InputError(f"{what}: row {k}: desk must be an object of JSON")
-        desks.append(desk)
-    return times_s, rows, desks
+        if settings is not None and not isinstance(settings, dict):
+            raise InputError(f"{what}: row {k}: settings must be an object of JSON")
+        all_settings.append(settings)
+    return times_s, rows, all_settings

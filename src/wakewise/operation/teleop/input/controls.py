@@ -58,7 +58,7 @@ class ControlSource(Protocol):
     """A source of inputs.
 
     A source that depends on the vehicle has a method `look(time_s, estimate, share)`, called before each read with the
-    share of the largest speeds at full stick. A replay has `desk_at(time_s)`: the settings at that time, by field.
+    share of the largest speeds at full stick. A replay has `settings_at(time_s)`: the settings at that time, by field.
     """
 
     def read(self, time_s: float) -> Controls | None:

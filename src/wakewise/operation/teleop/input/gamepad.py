@@ -135,7 +135,7 @@ class Gamepad:
         with self._lock:
             if not self._armed and not axes.any():
                 self._armed = True
-                self._say("info", f"gamepad {pad.name}: sticks are centred, hands fly")
+                self._say("info", f"gamepad {pad.name}: sticks are centred and have effect")
             self._pressed.extend(self._mapping.buttons[name] for name in sorted(held - self._held))
             self._axes, self._held, self._heard_s = axes, held, time.monotonic()
 

@@ -120,5 +120,5 @@ def read_input(path: Path) -> ControlSource:
     Raises InputError if its ending is none of `READERS`, or it cannot be read.
     """
     if path.suffix not in READERS:
-        raise InputError(f"{path}: hands are read from {', '.join(READERS)}")
+        raise InputError(f"{path}: controls are read from {', '.join(READERS)}")
     return READERS[path.suffix](path)

@@ -4,7 +4,7 @@ import { banner } from "./banner.js";
 import { Camera } from "./camera.js";
 import { Coverage } from "./coverage.js";
 import { Designation } from "./designate.js";
-import { Desk, pressed } from "./desk.js";
+import { FlightSettings, pressed } from "./settings.js";
 import { HELP as PAD_HELP, Pads } from "./gamepad.js";
 import { Helm } from "./helm.js";
 import { Thrusts, figures, millimetres, put } from "./instruments.js";
@@ -31,7 +31,7 @@ const token = () => decodeURIComponent(location.hash.replace(/^#(token=)?/, ""))
 const link = new Link(() => ({ type: "hello", token: token(), name: name(), wants: "watch", ...(Helm.last() ? { lease: Helm.last() } : {}) }));
 const helm = new Helm(link);
 const notes = new Notes($("notes"));
-const desk = new Desk(helm);
+const settings = new FlightSettings(helm);
 const thrusts = new Thrusts($("thrusts"));
 const target = new Target($("target"), $("scale"));
 const coverage = new Coverage({ canvas: $("patches"), share: $("share"), next: $("next") });
@@ -47,7 +47,7 @@ const now = { link: "connecting", said: "", mode: "hold", preparing: "" };
 const show = () => banner({ ...now, helm, sending: sticks.sending });
 
 const attentive = () => !document.hidden && document.hasFocus();
-const pads = new Pads({ press: act, nudge: (steps) => desk.nudge(steps), say: (level, text) => notes.add(level, text) });
+const pads = new Pads({ press: act, nudge: (steps) => settings.nudge(steps), say: (level, text) => notes.add(level, text) });
 const touch = new Touch(document.querySelector(".touch"));
 const keyboard = new Keyboard({ act: onKey, stop });
 const sticks = new Sticks({ link, helm, sources: [keyboard, pads, touch], attentive, changed: show });
@@ -70,7 +70,7 @@ function act(what) {
 const KEYS = {
   KeyO: () => act("operator"), KeyH: () => act("hold"), KeyM: () => act("scan"), KeyC: () => act("capture"), KeyP: () => act("precise"),
   Minus: () => act("gain_down"), NumpadSubtract: () => act("gain_down"), Equal: () => act("gain_up"), NumpadAdd: () => act("gain_up"),
-  BracketLeft: () => desk.nudge(-1), BracketRight: () => desk.nudge(1), KeyX: () => desk.swap(), KeyG: changeHelm, KeyV: nextWash,
+  BracketLeft: () => settings.nudge(-1), BracketRight: () => settings.nudge(1), KeyX: () => settings.swap(), KeyG: changeHelm, KeyV: nextWash,
   KeyL: () => theme.next(), KeyT: () => designation.middle(), KeyB: () => designation.propose(),
   KeyK: () => designation.answer("accept"), KeyN: () => designation.answer("refuse"), Escape: () => designation.forget(),
 };
@@ -117,7 +117,7 @@ const takers = {
     $("scenario").title = [...parts, words(scenario.target, 40)].filter(Boolean).join(" · ");
     thrusts.place(message.vehicle?.thrusters);
     target.place(message.target);
-    desk.place(message.desk);
+    settings.place(message.settings);
     offerScene(message.scene_url);
     show();
   },
@@ -127,7 +127,7 @@ const takers = {
     if (helm.why && mine !== helm.mine) notes.add("info", helm.why);
   },
   state(message) {
-    now.mode = words(message.mode, 20) || words(message.desk?.mode, 20) || "hold";
+    now.mode = words(message.mode, 20) || words(message.settings?.mode, 20) || "hold";
     document.body.dataset.mode = now.mode;
     notes.at(message.time_s);
     $("time").textContent = clock(message.time_s);
@@ -139,7 +139,7 @@ const takers = {
     thrusts.update(message.thrusts_N);
     target.update(message);
     showWash();
-    desk.update(message.desk ?? {}, message);
+    settings.update(message.settings ?? {}, message);
     coverage.update(message);
     designation.update(message.target ?? null);
     washes.add(message.time_s, [millimetres(message.rms_m_s), millimetres(message.direct_rms_m_s)]);
@@ -279,7 +279,7 @@ $("scene-button").addEventListener("click", () => {
 
 // A phone has no room for gain beside the modes.
 const narrow = matchMedia("(max-width: 720px)");
-const placeGain = () => (narrow.matches ? document.querySelector(".desk") : document.querySelector(".acts")).append(document.querySelector(".finer"));
+const placeGain = () => (narrow.matches ? document.querySelector(".settings") : document.querySelector(".acts")).append(document.querySelector(".finer"));
 narrow.addEventListener("change", placeGain);
 placeGain();
 

@@ -59,7 +59,7 @@ export class Helm extends EventTarget {
   }
 
   set(changes) {
-    return this.mine && this.#link.send({ type: "desk", set: changes, lease: this.lease });
+    return this.mine && this.#link.send({ type: "settings", set: changes, lease: this.lease });
   }
 
   /** A box of picture `frame` that holds the target, or "clear". */

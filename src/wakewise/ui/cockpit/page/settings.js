@@ -15,7 +15,7 @@ export function regime(w_track) {
   return w_track > 10 ? "transit" : w_track < 2 ? "delicate" : "work";
 }
 
-export class Desk {
+export class FlightSettings {
   state = {};
   #helm;
   #touched = new Map();
@@ -37,25 +37,25 @@ export class Desk {
   }
 
   /** Ranges of a `welcome`. */
-  place(desk) {
-    const range = desk?.ranges?.w_track, gain = desk?.ranges?.gain;
+  place(settings) {
+    const range = settings?.ranges?.w_track, gain = settings?.ranges?.gain;
     if (Array.isArray(range) && range[0] > 0 && range[1] > range[0]) this.#range = range;
     if (Array.isArray(gain) && gain[1] > gain[0]) [this.#gain.min, this.#gain.max] = gain;
-    this.update(desk);
+    this.update(settings);
   }
 
-  /** The desk of a `state`. What a finger is on stays where the finger is. */
-  update(desk, figures = {}) {
-    if (desk === null || typeof desk !== "object") return;
-    this.state = { ...desk };
-    const w_track = finite(desk.w_track), gain = finite(desk.gain);
+  /** The settings of a `state`. What a finger is on stays where the finger is. */
+  update(settings, figures = {}) {
+    if (settings === null || typeof settings !== "object") return;
+    this.state = { ...settings };
+    const w_track = finite(settings.w_track), gain = finite(settings.gain);
     if (w_track !== null && !this.#busy("w_track")) this.#dial.value = this.#place(w_track);
     if (gain !== null && !this.#busy("gain")) this.#gain.value = gain;
     this.#words(figures);
-    pressed("[data-method]", (button) => button.dataset.method === desk.method);
-    pressed("[data-assist]", (button) => desk[button.dataset.assist] === true);
-    pressed("#precise", () => desk.precise === true);
-    document.body.dataset.method = desk.method === "direct" ? "direct" : "wake-aware";
+    pressed("[data-method]", (button) => button.dataset.method === settings.method);
+    pressed("[data-assist]", (button) => settings[button.dataset.assist] === true);
+    pressed("#precise", () => settings.precise === true);
+    document.body.dataset.method = settings.method === "direct" ? "direct" : "wake-aware";
   }
 
   /** Turn w_track by steps. */
