@@ -148,8 +148,8 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
     from wakewise.core.jit.precompile import compile_kernels
     from wakewise_ardusub.link.connection import Endpoint
     from wakewise_ardusub.link.transports import MavlinkCodec, UdpTransport
-    from wakewise_ardusub.session.link_join import SEA
     from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession
+    from wakewise_ardusub.session.vehicle_flight import SEA
     from wakewise_ardusub.sitl.inprocess_session import fly_piloted
 
     compile_kernels(("plan", "fly"), options.progress)

@@ -17,8 +17,8 @@ from wakewise_ardusub.link.engagement_fsm import EngagementLimits
 from wakewise_ardusub.link.transports import MavlinkCodec, open_transport
 from wakewise_ardusub.physics.physics import PulseTable
 from wakewise_ardusub.physics.surface import FreeWater
-from wakewise_ardusub.session.link_join import SEA
 from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession
+from wakewise_ardusub.session.vehicle_flight import SEA
 from wakewise_ardusub.sitl.inprocess_session import (
     MavlinkSender,
     ScriptedGroundStation,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.interfaces import Measurement
-from wakewise_ardusub.session.link_join import EARLY, ArduSubPlant
+from wakewise_ardusub.session.vehicle_plant import EARLY, ArduSubPlant
 
 
 @dataclass

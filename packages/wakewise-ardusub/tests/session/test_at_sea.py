@@ -22,8 +22,10 @@ from wakewise_ardusub.link.message_state import attitude_of
 from wakewise_ardusub.link.protocol import ALT_HOLD, STABILIZE
 from wakewise_ardusub.link.session_log import SessionLog, read_journal
 from wakewise_ardusub.session.cameras import CAMERAS_FILE
-from wakewise_ardusub.session.link_join import SEA, LinkThread, join_vehicle, run_warm_up
+from wakewise_ardusub.session.link_thread import LinkThread
 from wakewise_ardusub.session.session import ProtectedRegion, VehicleSession, ball, ball_points
+from wakewise_ardusub.session.vehicle_flight import SEA, join_vehicle
+from wakewise_ardusub.session.warm_up import run_warm_up
 from wakewise_ardusub.sitl.companion_harness import CompanionHarness
 from wakewise_ardusub.sitl.inprocess_session import InProcessSession
 
@@ -261,7 +263,7 @@ def test_what_fails_beside_the_flight_is_journalled_and_its_thread_ends(tmp_path
         lines = read_journal(tmp_path / "sea" / "journal.jsonl")[0]
         return [line["amiss"] for line in lines if line["event"] == "figures"]
 
-    monkeypatch.setattr("wakewise_ardusub.session.link_join.patches_of", no_patches)
+    monkeypatch.setattr("wakewise_ardusub.session.wash_figures.patches_of", no_patches)
     session.sea.figures.photographed(session.sea.parts.start.X_WB)
     until(told, "a line in the journal", 10.0)
     assert told() == ["ValueError: no surface"]

@@ -1,6 +1,6 @@
 """A wrench in, thrusts out: topics and parameters joined to `wakewise_ardusub.ros`, which does the work.
 
-Nothing is reckoned here: fields of messages are copied into plain numbers and back.
+Nothing is computed here: fields of messages are copied into plain numbers and back.
 """
 
 from __future__ import annotations

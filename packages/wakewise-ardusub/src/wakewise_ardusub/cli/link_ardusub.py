@@ -197,8 +197,8 @@ def ardusub(
     from wakewise_ardusub.link.tracking_commands import checked_box
     from wakewise_ardusub.link.transports import MavlinkCodec
     from wakewise_ardusub.session.cameras import parse_camera
-    from wakewise_ardusub.session.link_join import SEA
     from wakewise_ardusub.session.session import VehicleSession
+    from wakewise_ardusub.session.vehicle_flight import SEA
     from wakewise_ardusub.session.video_stream import VideoSource
 
     vehicle_at = parse_connection(connection)

@@ -234,7 +234,7 @@ class OutputGate:
             version, _ = known.named_value(protocol.VERSION_NAME, now_s)
             acts, acts_s = known.named_value(protocol.ENGAGED_NAME, now_s)
             place, estimate = known.place_W_m, self._estimate
-            # Judged at every message: plain numbers are reckoned several times faster than arrays of three.
+            # Judged at every message: plain numbers are computed several times faster than arrays of three.
             speeds = [math.hypot(*known.velocity_W_m_s)]
             if estimate is not None:
                 speeds.append(math.hypot(*estimate.nu_B[:3].tolist()))

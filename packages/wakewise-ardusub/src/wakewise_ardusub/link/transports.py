@@ -310,21 +310,21 @@ class RelayTransport:
 
     def __init__(self, most: int = 4096) -> None:
         self._waiting: deque[bytes] = deque(maxlen=most)
-        self._came = Condition()
+        self._arrived = Condition()
         self.out: Any = None
         """Sends bytes to the vehicle; set once the relay is there."""
 
     def put(self, data: bytes) -> None:
         """A datagram went by."""
-        with self._came:
+        with self._arrived:
             self._waiting.append(data)
-            self._came.notify()
+            self._arrived.notify()
 
     def receive(self, timeout_s: float) -> bytes:
         """All that went by since."""
-        with self._came:
+        with self._arrived:
             if not self._waiting:
-                self._came.wait(timeout_s)
+                self._arrived.wait(timeout_s)
             data = b"".join(self._waiting)
             self._waiting.clear()
             return data

@@ -23,7 +23,7 @@ from wakewise.scene.targets import Region
 from wakewise.wake import InfluenceModel
 
 MOST_POINTS = 400
-"""Points of a target that are reckoned with; of more, every n-th is taken with n times its weight."""
+"""Points of a target that are used; of more, every n-th is taken with n times its weight."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -6,7 +6,9 @@ is the current pose; each engagement starts from there. A step belongs to the en
 requested; thrusts of another engagement are not sent (`wakewise_ardusub.link.output_gate`).
 
 - `session.py`: from a connection to a flight; the protected region. Read this first.
-- `link_join.py`: plant, pilot, controller and estimator on the link; wash figures; the warm-up.
+- `vehicle_flight.py`: a scenario's parts joined to the vehicle. `vehicle_plant.py`: plant and world. `engagement.py`:
+  pilot, controller and estimator that take turns with the pilot. `link_thread.py`: reception of messages.
+- `wash_figures.py`: disturbance, savings and coverage for ground stations. `warm_up.py`: the chain, run without output.
 - `boxed_target.py`: the target that is designated by a box in the picture. `video_stream.py`, `video_tracking.py`:
   the camera's stream, in which it is mapped and tracked.
 - `camera_mount.py`: the joint that tilts the camera.

@@ -66,9 +66,8 @@ class MountControl:
         """Whether a mount that was reported is not any more."""
         return self.reported and self.gate.clock() - self.gate.known.mount_pitch[1] > SILENT_S
 
-    @property
-    def angle_rad(self) -> float:
-        """Angle of the joint now, as reported, at the joint's rate, or stated."""
+    def current_angle_rad(self) -> float:
+        """Angle of the joint now, as reported, limited by the joint's rate since the last call, or stated."""
         joint = self.vehicle.tilt
         if joint is None or not self.reported:
             return self.stated_rad
@@ -82,7 +81,7 @@ class MountControl:
 
     def X_BC(self) -> Pose:
         """Where the camera is in the body now."""
-        return _tilted(self.vehicle, self.angle_rad)
+        return _tilted(self.vehicle, self.current_angle_rad())
 
     def ask_kind(self) -> None:
         """Ask the autopilot what kind of mount it has."""
@@ -127,7 +126,7 @@ class MountControl:
         """The angle, for people."""
         whence = "" if self.reported else " (stated)"
         silent = ", mount not heard" if self.silent else ""
-        return f"camera {math.degrees(self.angle_rad):+.0f} deg{whence}{silent}"
+        return f"camera {math.degrees(self.current_angle_rad()):+.0f} deg{whence}{silent}"
 
 
 def _tilted(vehicle: Vehicle, angle_rad: float) -> Pose:

@@ -40,14 +40,9 @@ from wakewise_ardusub.link.session_log import JOURNAL_FILE, SessionLog
 from wakewise_ardusub.session.boxed_target import MAPPED, BoxDesignation, BoxedTarget, Follow, mapped_target
 from wakewise_ardusub.session.camera_mount import GIVES, WAITS_S, MountControl
 from wakewise_ardusub.session.cameras import MakeCamera, note_view
-from wakewise_ardusub.session.link_join import (
-    LinkThread,
-    MessageReceiver,
-    VehicleFlight,
-    join_vehicle,
-    run_warm_up,
-    surroundings_of_target,
-)
+from wakewise_ardusub.session.link_thread import LinkThread, MessageReceiver
+from wakewise_ardusub.session.vehicle_flight import VehicleFlight, join_vehicle, surroundings_of_target
+from wakewise_ardusub.session.warm_up import run_warm_up
 
 if TYPE_CHECKING:
     from wakewise_ardusub.session.video_stream import VideoSource
@@ -375,7 +370,7 @@ class VehicleSession:
             self.boxes.take(message)
 
     def _watch(self, step: Step, truth_provider: TruthProvider | None) -> None:
-        """What is reckoned and told at each step."""
+        """What is computed and told at each step."""
         X_WC = step.estimate.X_WB @ self.mount.X_BC()
         if self.tracking is not None and not self.mount.silent:
             self.tracking.note(self._flight().pace.due_s(step.time_s), X_WC, step.estimate)

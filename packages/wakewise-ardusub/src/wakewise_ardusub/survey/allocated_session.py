@@ -182,7 +182,7 @@ class AllocatedTransectSession(TransectSession):
             velocity,
             self.known.attitude,
             self.known.rates_rad_s,
-            now_s - self._came["position"],
+            now_s - self._last_s["position"],
             self.current_W_m_s,
         )
 
@@ -221,11 +221,11 @@ class AllocatedTransectSession(TransectSession):
         heard = known.heartbeat_s > self._since_s
         there = self._hold_mode == ALT_HOLD and released
         if there or (heard and (known.mode not in own or known.armed is False)):
-            self._turn("ended" if self.finished or self.refused or self._quits else "waiting", self.why)
+            self._enter("ended" if self.finished or self.refused or self._quits else "waiting", self.why)
         elif over_s > ASKS_FOR_S:
             words = "POSHOLD was refused, ALT_HOLD drifts with the current" if heard else "the autopilot did not answer"
-            self._turn("ended", f"{self.why}; {words}")
-        elif released and now_s - self._came["mode"] >= ASK_S:
+            self._enter("ended", f"{self.why}; {words}")
+        elif released and now_s - self._last_s["mode"] >= ASK_S:
             self._request(self._hold_mode, now_s)
 
     def _post(self, name: str, fields: Mapping[str, Any]) -> None:

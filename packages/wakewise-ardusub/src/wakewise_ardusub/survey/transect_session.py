@@ -163,9 +163,10 @@ class TransectSession:
         self._reached, self._least_m = False, 0.0
         """Whether it is at its leg's altitude; the lowest altitude asked for, 0 until one was reached."""
         self._place: tuple[Array, Array] | None = None
-        self._came = dict.fromkeys(
+        self._last_s = dict.fromkeys(
             ("position", "doppler", "range", "turn", "beat", "asked", "parameters", "mode", "told", "looked"), -math.inf
         )
+        """When each was last received, sent or done."""
         self._history: deque[tuple[float, float, float]] = deque(maxlen=200)
         self._placed, self._takes_acceleration, self._facts = True, False, SurveyFacts(armed=None, mode=None)
         self._since_s, self._hold_mode, self._hold = clock(), GUIDED, np.zeros(3)
@@ -183,7 +184,7 @@ class TransectSession:
         if said.system != self.known.system:
             return
         if said.name == "VISION_POSITION_DELTA":  # what a Doppler log's driver sends, whatever its component
-            self._came["doppler"] = now_s
+            self._last_s["doppler"] = now_s
         elif said.name == "DISTANCE_SENSOR":
             self._ranged(now_s)
         elif said.component == AUTOPILOT_COMPONENT:
@@ -200,7 +201,7 @@ class TransectSession:
             numbers = np.array([float(get[key]) for key in ("x", "y", "z", "vx", "vy", "vz")])
             if not np.isfinite(numbers).all():
                 raise ValueError
-            self._place, self._came["position"] = (numbers[:3], numbers[3:]), now_s
+            self._place, self._last_s["position"] = (numbers[:3], numbers[3:]), now_s
             self._history.append((now_s, float(numbers[2]), math.cos(tilt_of(self.known))))
         elif name == "EKF_STATUS_REPORT":
             flags = int(get["flags"])
@@ -224,7 +225,7 @@ class TransectSession:
         _, depth, upright = before[-1]
         after = self.track.take(at_s, depth + distance * upright)
         if after.taken != self.track.taken:
-            self._came["range"] = now_s
+            self._last_s["range"] = now_s
         self.track = after
 
     # What people do.
@@ -233,7 +234,7 @@ class TransectSession:
         """The operator's consent: asks for GUIDED and begins, or goes on after a pause; what it does, in words."""
         now_s = self._clock()
         if self.state == "paused":
-            self._turn("flying", "resumed")
+            self._enter("flying", "resumed")
             return "goes on"
         self._judge(now_s)
         if self.state != "ready":
@@ -245,7 +246,7 @@ class TransectSession:
         mode = self.options.limits.mode
         if self.known.mode == mode:
             return self._engage(now_s)
-        self._turn("asked", f"{MODES[mode]} requested")
+        self._enter("asked", f"{MODES[mode]} requested")
         self._request(mode, now_s)
         return self.why
 
@@ -257,7 +258,7 @@ class TransectSession:
         """Brake by the plan's bound and hold the place until `consent`."""
         if self.state != "flying":
             return f"not paused: {self.state}"
-        self._turn("paused", "paused by the operator")
+        self._enter("paused", "paused by the operator")
         return "pauses"
 
     def abort(self, why: str) -> None:
@@ -266,7 +267,7 @@ class TransectSession:
         if self.state in ENGAGED:
             self._let_go(why, self._clock())
         elif self.state != "holding":
-            self._turn("ended", why)
+            self._enter("ended", why)
 
     @property
     def finished(self) -> bool:
@@ -288,16 +289,16 @@ class TransectSession:
         now_s = self._clock()
         self._beat(now_s)
         self._judge(now_s)
-        self._came["turn"] = now_s
+        self._last_s["turn"] = now_s
         self._begin_by_mode(now_s)
         self._mode_before = self.known.mode
         if self.state == "asked" and now_s - self._since_s > ASKS_FOR_S:
-            self._turn("waiting", f"{MODES[self.options.limits.mode]} was refused")
+            self._enter("waiting", f"{MODES[self.options.limits.mode]} was refused")
         elif self.state == "holding":
             self._hold_on(now_s)
-        if self.state in ENGAGED[1:] and now_s - self._came["told"] >= PERIOD_S - 1e-3:
-            dt_s = min(now_s - self._came["told"], 2.0 * PERIOD_S)
-            self._came["told"] = now_s
+        if self.state in ENGAGED[1:] and now_s - self._last_s["told"] >= PERIOD_S - 1e-3:
+            dt_s = min(now_s - self._last_s["told"], 2.0 * PERIOD_S)
+            self._last_s["told"] = now_s
             self._stream(now_s, dt_s)
 
     def _begin_by_mode(self, now_s: float) -> None:
@@ -307,7 +308,7 @@ class TransectSession:
 
     def facts(self, now_s: float) -> SurveyFacts:
         """What is known now, as it is judged."""
-        known, came = self.known, self._came
+        known, last_s = self.known, self._last_s
         engaged = self.state in ENGAGED
         overtaken = engaged and known.takeover_s > self._since_s and self.state != "asked"
         place = None if self._place is None else self._place[0]
@@ -318,20 +319,20 @@ class TransectSession:
             armed=known.armed,
             mode=self.options.limits.mode if self.state == "asked" else known.mode,
             mode_name=known.mode_name,
-            telemetry_s=now_s - max(known.attitude_s, came["position"]),
-            position_s=now_s - came["position"],
-            doppler_s=math.nan if came["doppler"] < 0.0 else now_s - came["doppler"],
+            telemetry_s=now_s - max(known.attitude_s, last_s["position"]),
+            position_s=now_s - last_s["position"],
+            doppler_s=math.nan if last_s["doppler"] < 0.0 else now_s - last_s["doppler"],
             placed=self._placed,
             sticks_s=math.inf if sticks is None else now_s - sticks.came_s,
             station_s=now_s - ground_s if math.isfinite(ground_s) and now_s - ground_s < GROUND_STATION_S else math.inf,
             stick=0.0 if sticks is None else float(np.nanmax(np.abs(np.append(sticks.axes, 0.0)))),
-            range_s=now_s - came["range"],
+            range_s=now_s - last_s["range"],
             altitude_m=math.nan if bed is None or place is None else bed[0] - float(place[2]),
             depth_m=math.nan if place is None else float(place[2]),
             off_m=self._off_m(place),
             takeover=known.takeover if overtaken else "",
             rival=known.duplicate if now_s - known.duplicate_s < REMEMBERED_S else "",
-            turn_s=now_s - came["turn"] if engaged else 0.0,
+            turn_s=now_s - last_s["turn"] if engaged else 0.0,
         )
 
     def _off_m(self, place: Array | None) -> float:
@@ -349,9 +350,9 @@ class TransectSession:
                 self._let_go(lacks, now_s)
         elif self.state in ("waiting", "ready"):
             if lacks and (self.state == "ready" or lacks != self.why):
-                self._turn("waiting", lacks)
+                self._enter("waiting", lacks)
             elif not lacks and self.state == "waiting":
-                self._turn("ready", "")
+                self._enter("ready", "")
 
     def _amiss(self, facts: SurveyFacts) -> str:
         if self.state in ENGAGED:
@@ -361,8 +362,8 @@ class TransectSession:
 
     def _no_way(self, now_s: float) -> str:
         """Once a second: what is wrong with the lines from here, so that it is told before anybody consents."""
-        if self._place is not None and now_s - self._came["looked"] >= 1.0:
-            self._came["looked"], self._lines_fault = now_s, ""
+        if self._place is not None and now_s - self._last_s["looked"] >= 1.0:
+            self._last_s["looked"], self._lines_fault = now_s, ""
             try:
                 self._plan_from(self._place[0][:2], self.known.attitude[2], np.zeros(2), self._anchor)
             except InputError as fault:
@@ -375,8 +376,8 @@ class TransectSession:
         place = self._place[0].copy()
         self._hold, self._pulses, self._reached, self._least_m = place, [], False, 0.0
         self._depth = DepthShaper.at(float(place[2]), self.options.pace.speed_m_s)
-        self._came["told"], self._settled_s = -math.inf, now_s
-        self._turn("settling", "")
+        self._last_s["told"], self._settled_s = -math.inf, now_s
+        self._enter("settling", "")
 
     def _begin(self, now_s: float) -> None:
         """The plan, from the current that the hold tells; or the rest of the plan of before."""
@@ -399,7 +400,7 @@ class TransectSession:
             self.warning = warning_of(plan, current)
             told = {"current": words, "warning": self.warning, "centre": plan.centre_W_m}
             self._write("plan", legs=len(plan.legs), line_m=plan.line_m, **told)
-        self._turn("flying", "")
+        self._enter("flying", "")
 
     def _moves(self) -> bool:
         """Whether the vehicle is not at rest where it is to hold."""
@@ -505,46 +506,46 @@ class TransectSession:
         self._hold_mode = hold_mode(self._facts, self.options.limits)
         flown = self.state == "asked" or self.known.mode == self.options.limits.mode
         flown = flown and self.known.armed is not False
-        self._turn("holding" if flown else "waiting", why)
+        self._enter("holding" if flown else "waiting", why)
         if flown:
-            self._came["mode"] = now_s + GIVES_WAY_S if self._facts.takeover else -math.inf
+            self._last_s["mode"] = now_s + GIVES_WAY_S if self._facts.takeover else -math.inf
             self._hold_on(now_s)
 
     def _hold_on(self, now_s: float) -> None:
         """Ask until the mode has changed; what POSHOLD refuses, ALT_HOLD may give."""
         heard = self.known.heartbeat_s > self._since_s
         if heard and (self.known.mode != GUIDED or self.known.armed is False):
-            self._turn("ended" if self.finished or self.refused or self._quits else "waiting", self.why)
+            self._enter("ended" if self.finished or self.refused or self._quits else "waiting", self.why)
         elif now_s - self._since_s > ASKS_FOR_S:
-            self._turn("ended", f"{self.why}; the autopilot did not answer, its own time-out stops the vehicle")
-        elif now_s - self._came["mode"] >= ASK_S:
+            self._enter("ended", f"{self.why}; the autopilot did not answer, its own time-out stops the vehicle")
+        elif now_s - self._last_s["mode"] >= ASK_S:
             refused = self.known.heartbeat_s > self._since_s + 2.0 * ASK_S
             self._request(ALT_HOLD if refused else self._hold_mode, now_s)
 
     # What goes out.
 
-    def _turn(self, state: State, why: str) -> None:
+    def _enter(self, state: State, why: str) -> None:
         if (state, why) != (self.state, self.why):
             self._write("state", state=state, why=why)
         self.state, self.why, self._since_s = state, why, self._clock()
 
     def _request(self, mode: int, now_s: float) -> None:
-        self._came["mode"] = now_s
+        self._last_s["mode"] = now_s
         self._command(SET_MODE, 1.0, float(mode))
 
     def _beat(self, now_s: float) -> None:
-        if now_s - self._came["beat"] >= HEARTBEAT_PERIOD_S:
-            self._came["beat"] = now_s
+        if now_s - self._last_s["beat"] >= HEARTBEAT_PERIOD_S:
+            self._last_s["beat"] = now_s
             self._post("heartbeat", heartbeat(self.known.session))
         if math.isinf(self.known.heartbeat_s) or self.state in ("flying", "paused"):
             return  # nobody is there, or no address is known
         unknown = [name for name in self._motors.needs if name not in self.known.parameters]
-        if unknown and now_s - self._came["parameters"] >= PARAMETERS_S:
-            self._came["parameters"] = now_s
+        if unknown and now_s - self._last_s["parameters"] >= PARAMETERS_S:
+            self._last_s["parameters"] = now_s
             for name in unknown[: 2 * MOST_PARAMETERS]:
                 self._post("param_request_read", parameter_request(self.known.system, name))
-        if now_s - self._came["asked"] >= AGAIN_S:
-            self._came["asked"] = now_s
+        if now_s - self._last_s["asked"] >= AGAIN_S:
+            self._last_s["asked"] = now_s
             for number, rate_hz in _RATES_HZ.items():
                 self._command(SET_MESSAGE_INTERVAL, float(number), 1e6 / rate_hz)
             self._command(REQUEST_MESSAGE, float(AUTOPILOT_VERSION))
