@@ -230,14 +230,14 @@ class LinePilot:
             hull_W_m_s=v_line_m_s,
         )
         pace = np.array([speed_m_s, 0.0, 0.0])
-        wish = CameraMotion(
+        goal_view = CameraMotion(
             p_W_m=np.array([self._ahead_m, 0.0, -ALTITUDE_M]),
             heading_rad=0.0,
             v_W_m_s=pace,
             turn_rad_s=0.0,
             hull_W_m_s=pace,
         )
-        self._state, asked = steer(self.person, self._state, 1.0 / LOOP_HZ, view, wish)
+        self._state, asked = steer(self.person, self._state, 1.0 / LOOP_HZ, view, goal_view)
         x, y = (_stick_for(float(asked[k]), *self._pushes[k]) for k in (0, 1))
         down, turned = self._nudged(asked[2:] / (GAIN * self.person.sticks.full[2:]))
         return round(1e3 * x), round(1e3 * y), round(500.0 - 500.0 * down), round(1e3 * turned)

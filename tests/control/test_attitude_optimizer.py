@@ -45,7 +45,7 @@ def flown(controller, goal_at, seconds, down_N):
     return state, commands
 
 
-def test_only_a_camera_with_a_joint_is_posed_and_a_wish_that_cannot_be_is_refused():
+def test_only_a_camera_with_a_joint_is_posed_and_a_request_that_cannot_be_is_refused():
     """Null is where there is a joint; false nowhere; true on a fixed camera is refused by its field."""
     assert make().attitude is not None and make(optimize_attitude=True).attitude is not None
     assert make(optimize_attitude=False).attitude is None
@@ -59,11 +59,11 @@ def test_heavy_it_leans_and_the_camera_keeps_its_pose_on_the_way():
     goal = looking(HEAVY, np.radians(20.0))
     state, commands = flown(make(), lambda _: goal, 12.0, 5.0)
     assert abs(state.pitch_offset_rad) > np.radians(4.0)
-    wished = goal.X_WB @ HEAVY.X_BC_at(goal.tilt_rad)
+    desired = goal.X_WB @ HEAVY.X_BC_at(goal.tilt_rad)
     for before, after in pairwise(commands):
         camera = after.goal.X_WB @ HEAVY.X_BC_at(after.goal.tilt_rad)
-        np.testing.assert_allclose(camera.p_m, wished.p_m, atol=1e-9)
-        np.testing.assert_allclose(camera.R, wished.R, atol=1e-9)
+        np.testing.assert_allclose(camera.p_m, desired.p_m, atol=1e-9)
+        np.testing.assert_allclose(camera.R, desired.R, atol=1e-9)
         assert HEAVY.tilt.low_rad <= after.goal.tilt_rad <= HEAVY.tilt.high_rad
         assert abs(after.goal.tilt_rad - before.goal.tilt_rad) <= RATE_RAD_S * DT + 1e-12
         moved = after.goal.X_WB.p_m - before.goal.X_WB.p_m
@@ -119,7 +119,7 @@ def test_a_mission_that_tilts_to_a_stop_takes_the_lean_with_it():
     state, tilts = pushed, []
     for k in range(700):
         goal = goal_at(k * DT)
-        # It always wishes to the lower stop.
+        # It always asks for the lower stop.
         state, command = controller.step(
             replace(state, pitch_target_rad=low, attitude_search=None), DT, loaded(goal, 0.0), goal
         )

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from wakewise.control.gain_margins import Axis, Gains, margins, open_loop, stable_gain_scale, vehicle_axes, wished_gains
+from wakewise.control.gain_margins import (
+    Axis,
+    Gains,
+    desired_gains,
+    margins,
+    open_loop,
+    stable_gain_scale,
+    vehicle_axes,
+)
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
 
@@ -72,7 +80,7 @@ def test_the_gain_margin_is_where_the_loop_goes_unstable():
 def test_moments_get_the_bandwidth_of_forces():
     """K (I + I_a)/(m + m_a) leaves gain over inertia unchanged, axis by axis."""
     axes = vehicle_axes(load_vehicle("paper"))
-    gains = wished_gains(axes, PAPER_GAINS)
+    gains = desired_gains(axes, PAPER_GAINS)
     for i in range(3):
         assert gains[3 + i].kp / axes[3 + i].mass == pytest.approx(gains[i].kp / axes[i].mass)
 
@@ -85,17 +93,17 @@ def test_scaled_gains_keep_their_margins_and_no_faster_ones_do(name):
     scale = stable_gain_scale(vehicle, PAPER_GAINS, 0.02, 0.12, 0.04)
     lag = float(vehicle.time_constants_s.max())
     assert np.all((scale > 0.2) & (scale <= 1.0))
-    for i, (axis, wished, s) in enumerate(zip(axes, wished_gains(axes, PAPER_GAINS), scale, strict=True)):
+    for i, (axis, desired, s) in enumerate(zip(axes, desired_gains(axes, PAPER_GAINS), scale, strict=True)):
         delay = 0.12 if i < 3 else 0.04
-        assert margins(axis, wished.slowed(float(s)), 0.02, lag, delay).enough
+        assert margins(axis, desired.slowed(float(s)), 0.02, lag, delay).enough
         if s < 1.0:
-            assert not margins(axis, wished.slowed(1.03 * float(s)), 0.02, lag, delay).enough
+            assert not margins(axis, desired.slowed(1.03 * float(s)), 0.02, lag, delay).enough
 
 
 def test_the_papers_gains_are_too_stiff_for_the_papers_vehicle():
     """With 0.1 s of thruster lag and 40 ms of estimate delay no axis keeps 40 deg; surge is left about 20."""
     axes = vehicle_axes(load_vehicle("paper"))
-    found = [margins(a, g, 0.02, 0.1, 0.04) for a, g in zip(axes, wished_gains(axes, PAPER_GAINS), strict=True)]
+    found = [margins(a, g, 0.02, 0.1, 0.04) for a, g in zip(axes, desired_gains(axes, PAPER_GAINS), strict=True)]
     assert not any(m.enough for m in found)
     assert np.degrees(found[0].phase_rad) == pytest.approx(20.0, abs=2.0)
 

@@ -101,10 +101,10 @@ def test_the_posed_twist_is_the_derivative_of_the_posed_pose(hinge):
 def test_a_lean_is_reached_within_rate_and_acceleration_and_without_overshoot():
     """From rest, turned back on the way, and over less than one step's way; it then stays."""
     dt = 0.02
-    for wished, back in ((0.6, 0.6), (-0.9, 0.1), (1e-5, 1e-5), (0.3, -0.2)):
+    for desired, back in ((0.6, 0.6), (-0.9, 0.1), (1e-5, 1e-5), (0.3, -0.2)):
         lean, rate, ways = 0.0, 0.0, []
         for k in range(1500):
-            to = wished if k < 100 else back
+            to = desired if k < 100 else back
             before, was = lean, rate
             lean, rate = offset_step(lean, rate, to, dt)
             ways.append(lean)
@@ -112,7 +112,7 @@ def test_a_lean_is_reached_within_rate_and_acceleration_and_without_overshoot():
             assert abs(rate - was) <= ACCELERATION_RAD_S2 * dt + 1e-12
             assert abs(lean - before) <= RATE_RAD_S * dt + 1e-12
         assert (lean, rate) == (back, 0.0)
-        assert max(ways) <= max(wished, back, 0.0) + 1e-3 and min(ways) >= min(wished, back, 0.0) - 1e-3
+        assert max(ways) <= max(desired, back, 0.0) + 1e-3 and min(ways) >= min(desired, back, 0.0) - 1e-3
 
 
 def test_leans_stay_between_the_stops():

@@ -22,7 +22,7 @@ def test_a_place_is_come_to_at_rest_within_the_bounds(rate):
 
 
 def test_what_moves_is_caught_up_with_and_then_followed_exactly():
-    """A wished value on a sine: from half a radian behind, exact within a few seconds."""
+    """A desired value on a sine: from half a radian behind, exact within a few seconds."""
     value, rate, off = 0.5, 0.0, []
     for k in range(1, 500):
         t = 0.02 * k

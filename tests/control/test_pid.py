@@ -51,7 +51,7 @@ def test_the_kernel_equals_its_twin():
 
 
 def test_at_the_goal_only_the_feed_forward_is_left():
-    """On the goal, moving as wished, the wrench is just what keeps the twist as it is: no acceleration is left."""
+    """On the goal, moving as desired, the wrench is just what keeps the twist as it is: no acceleration is left."""
     X, nu = Pose(np.array([1.0, 2.0, 0.5]), quat_from_euler(0.1, -0.3, 1.0)), np.array([0.1, 0, 0, 0, 0, 0.2])
     _, wrench = TRACKER.wrench(TRACKER.init(), 0.02, BodyState(X_WB=X, nu_B=nu), Goal(X_WB=X, nu_B=nu))
     np.testing.assert_allclose(acceleration(TRACKER.body, X.q, nu, wrench, np.zeros(3)), 0.0, atol=1e-12)

@@ -101,10 +101,10 @@ def test_a_vehicle_in_the_water_keeps_its_thrusts_whatever_is_set(
 ) -> None:
     """The variable is for simulated worlds, which wait; where the deadline is enforced it is not heeded."""
     planner: Any = Asked(KeyError())
-    for value, wished in (("1", True), ("0", False), ("", False)):
+    for value, desired in (("1", True), ("0", False), ("", False)):
         monkeypatch.setenv(STRICT, value)
-        assert is_strict() is wished
-        assert with_failsafe(Method(None), VEHICLE, ControlSettings()).failsafe.strict is wished
+        assert is_strict() is desired
+        assert with_failsafe(Method(None), VEHICLE, ControlSettings()).failsafe.strict is desired
         assert with_failsafe(Method(None), VEHICLE, ControlSettings(), enforce=True).failsafe.strict is False
         assert PlanFailsafe(planner=planner, deadline_s=1.0).strict is False
     monkeypatch.setenv(STRICT, "1")

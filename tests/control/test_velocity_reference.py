@@ -1,4 +1,4 @@
-"""An operator's wish as a goal: at the vehicle's place, moving as asked, looking where asked."""
+"""An operator's command as a goal: at the vehicle's place, moving as asked, looking where asked."""
 
 import numpy as np
 import pytest
@@ -58,12 +58,12 @@ def test_an_obedience_that_means_nothing_is_refused(bad):
 
 def test_a_command_is_reached_at_bounded_acceleration():
     """Never faster than allowed, and there in the end."""
-    v, wished = np.zeros(3), np.array([0.1, 0.0, -0.05])
+    v, desired = np.zeros(3), np.array([0.1, 0.0, -0.05])
     for _ in range(200):
-        new = limit_acceleration(v, wished, 0.02, 0.1)
+        new = limit_acceleration(v, desired, 0.02, 0.1)
         assert np.linalg.norm(new - v) <= 0.1 * 0.02 + 1e-12
         v = new
-    np.testing.assert_allclose(v, wished)
+    np.testing.assert_allclose(v, desired)
 
 
 def test_the_commanded_place_waits_for_a_vehicle_that_is_held_up():
@@ -77,23 +77,23 @@ def test_the_commanded_place_waits_for_a_vehicle_that_is_held_up():
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_shaped_velocity_keeps_both_bounds_and_arrives(seed):
-    """Wishes that change at random: acceleration and jerk stay within bounds, and a wish that stays is reached."""
+    """Commands that change at random: acceleration and jerk stay within bounds, and a command that stays is reached."""
     rng, dt_s, hardest, jerk = np.random.default_rng(seed), 0.02, 0.2, 0.8
-    v, a, wished = np.zeros(3), np.zeros(3), np.zeros(3)
+    v, a, desired = np.zeros(3), np.zeros(3), np.zeros(3)
     for k in range(600):
         if k < 300 and k % 15 == 0:
-            wished = rng.uniform(-0.3, 0.3, 3)
-        before, (v, new) = v, limit_jerk(v, a, wished, dt_s, hardest, jerk)
+            desired = rng.uniform(-0.3, 0.3, 3)
+        before, (v, new) = v, limit_jerk(v, a, desired, dt_s, hardest, jerk)
         assert np.linalg.norm(v - before) <= hardest * dt_s * (1.0 + 1e-9)
         assert np.linalg.norm(new - a) <= jerk * dt_s * (1.0 + 1e-6)
         a = new
-    assert np.array_equal(v, wished) and not a.any()
+    assert np.array_equal(v, desired) and not a.any()
 
 
 def test_a_shaped_velocity_does_not_overshoot():
     """From rest to 0.1 m/s it grows and stays there, but for the twentieth of a millimetre a second of a last step."""
-    v, a, wished, way = np.zeros(3), np.zeros(3), np.array([0.1, 0.0, 0.0]), [0.0]
+    v, a, desired, way = np.zeros(3), np.zeros(3), np.array([0.1, 0.0, 0.0]), [0.0]
     for _ in range(60):
-        v, a = limit_jerk(v, a, wished, 0.02, 0.2, 0.8)
+        v, a = limit_jerk(v, a, desired, 0.02, 0.2, 0.8)
         way.append(v[0])
     assert np.all(np.diff(way) > -5e-5) and max(way) < 0.1 + 5e-5 and way[-1] == 0.1

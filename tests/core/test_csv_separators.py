@@ -1,4 +1,4 @@
-"""A table whose columns are parted by another sign than a comma is refused by that reason, whoever reads it."""
+"""A table whose columns are separated by another sign than a comma is refused by that reason, whoever reads it."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_another_sign_is_named(tmp_path: Path, who: str, sign: str) -> None:
     read, text = READERS[who]
     path = tmp_path / "table.csv"
     path.write_text(text.replace(",", sign), encoding="utf-8")
-    with pytest.raises(InputError, match=r"parted by (semicolons|tabs), commas are needed") as fault:
+    with pytest.raises(InputError, match=r"separated by (semicolons|tabs), commas are needed") as fault:
         read(path)
     assert "\n" not in str(fault.value)
 

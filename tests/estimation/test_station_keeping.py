@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.control import ControlSettings, Gains, make_controller, make_pid, vehicle_axes, wished_gains
+from wakewise.control import ControlSettings, Gains, desired_gains, make_controller, make_pid, vehicle_axes
 from wakewise.core.geometry import Pose, quat_from_euler, quat_from_rotvec, quat_multiply
 from wakewise.core.interfaces import BodyState, Goal, Measurement
 from wakewise.estimation import ErrorStateFilter
@@ -104,8 +104,8 @@ def test_the_loop_keeps_its_phase_margin_in_flight(name):
     vehicle, settings = load_vehicle(name), ControlSettings()
     axes, scale = vehicle_axes(vehicle)[:3], make_pid(vehicle, settings).gain_scale[:3]
     # Above the corner of the PD the loop is kd/(m s): it crosses one there.
-    wished = wished_gains(vehicle_axes(vehicle), Gains(kp=0.0, kd=settings.kd_N_s_m, ki=0.0))
-    crossover = max(g.kd * s / axis.mass for g, s, axis in zip(wished[:3], scale, axes, strict=True))
+    desired = desired_gains(vehicle_axes(vehicle), Gains(kp=0.0, kd=settings.kd_N_s_m, ki=0.0))
+    crossover = max(g.kd * s / axis.mass for g, s, axis in zip(desired[:3], scale, axes, strict=True))
     late = round(np.radians(15.0) / crossover * settings.rate_hz)
     assert late >= 1
     errors, _ = hold(name, "dp", trim_N=0.0, current_m_s=0.0, late_steps=late, seconds=30.0)

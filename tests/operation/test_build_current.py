@@ -52,9 +52,9 @@ def test_the_water_that_is_checked_is_the_water_that_is_flown(seed, monkeypatch)
     ambient = parts.world.tank().ambient
     route, X_BC = parts.route, parts.vehicle.X_BC
     for row, time_s in zip(passed[0], np.linspace(0.0, route.duration_s, len(passed[0])), strict=True):
-        wished = route.body(float(time_s), X_BC)
-        current = ambient.velocity(wished.X_WB.p_m[None], float(time_s))[0]
-        np.testing.assert_allclose(row, current @ wished.X_WB.R - wished.nu_B[:3], atol=1e-12)
+        desired = route.body(float(time_s), X_BC)
+        current = ambient.velocity(desired.X_WB.p_m[None], float(time_s))[0]
+        np.testing.assert_allclose(row, current @ desired.X_WB.R - desired.nu_B[:3], atol=1e-12)
 
 
 def test_no_controller_is_told_the_current_that_the_tank_has():

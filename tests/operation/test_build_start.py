@@ -114,13 +114,13 @@ def test_names_are_numbers_where_there_are_none():
 def test_the_start_is_off_by_what_is_said():
     """2 cm and 0.03 rad per axis, standard deviation, over many draws; and a flight does begin off its start."""
     parts = load_scenario("quick", None, {"method": "dp"}).parts()
-    wished = parts.start.X_WB
+    desired = parts.start.X_WB
     kept = {name: getattr(parts, name) for name in ("vehicle", "target", "region", "route", "start")}
     found = [true_start(parts.replace(seed=seed, **kept)).X_WB for seed in range(600)]
-    off_m = np.array([X.p_m - wished.p_m for X in found])
-    turn = np.array([rotvec_from_quat(quat_multiply(quat_conjugate(wished.q), X.q)) for X in found])
+    off_m = np.array([X.p_m - desired.p_m for X in found])
+    turn = np.array([rotvec_from_quat(quat_multiply(quat_conjugate(desired.q), X.q)) for X in found])
     np.testing.assert_allclose(off_m.std(axis=0), 0.02, rtol=0.1)
     np.testing.assert_allclose(turn.std(axis=0), 0.03, rtol=0.1)
     np.testing.assert_allclose(off_m.mean(axis=0), 0.0, atol=0.003)
-    off = np.linalg.norm(parts.world.tank().state.X_WB.p_m - wished.p_m)
+    off = np.linalg.norm(parts.world.tank().state.X_WB.p_m - desired.p_m)
     assert 0.002 < off < 0.1

@@ -1,4 +1,4 @@
-"""Who wishes: the mission's pilot carries what the mission promises of its places."""
+"""Pilots: the mission's carries what the mission promises of its places."""
 
 import pytest
 

@@ -42,7 +42,7 @@ def test_the_vehicle_stays_level_while_its_camera_looks_down(flight: Flight) -> 
 
 
 def test_the_measured_tilt_has_the_trials_own_error(flight: Flight) -> None:
-    """One offset for all readings, drawn with 0.02 rad, and a noise of 0.002 rad; the first guess is the wish."""
+    """One offset for all readings, drawn with 0.02 rad, and a noise of 0.002 rad; the first is exact."""
     error = np.radians(columns(flight, "est") - columns(flight, "true"))
     assert error[0] == 0.0
     assert 1e-4 < abs(error[1:].mean()) < 0.08

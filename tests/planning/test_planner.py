@@ -155,8 +155,8 @@ def test_obedience_is_the_dial_of_the_tracking_weights():
         other.load(replace(asked, tracking_weight_scale=1.0))
         assert dial.cost(START) == other.cost(START)
     turned = Planner(model()).plan(replace(asked, tracking_weight_scale=4.0), START)
-    wished = asked.reference[-1, :3]
-    off = [np.linalg.norm(plan.states[-1, :3] - wished) for plan in (turned, usual.plan(asked, START))]
+    desired = asked.reference[-1, :3]
+    off = [np.linalg.norm(plan.states[-1, :3] - desired) for plan in (turned, usual.plan(asked, START))]
     assert off[0] < off[1]
 
 

@@ -25,8 +25,8 @@ def pulses(step: int) -> list[int]:
     turn = 1 if step < ASTERN_S * RATE_HZ else -1
     ahead = (-1, -1, 1, 1, 0, 0, 0, 0)
     down = (0, 0, 0, 0, 1, 1, 1, 1)
-    wished = [100 * turn * a + 60 * d for a, d in zip(ahead, down, strict=True)]
-    return [1500 + d * w for d, w in zip(DIRECTIONS, wished, strict=True)] + [0] * 8
+    desired = [100 * turn * a + 60 * d for a, d in zip(ahead, down, strict=True)]
+    return [1500 + d * w for d, w in zip(DIRECTIONS, desired, strict=True)] + [0] * 8
 
 
 def _stick(t: float) -> int:

@@ -38,13 +38,13 @@ def test_the_thrust_of_a_pulse_asks_for_a_pulse_with_that_thrust(pulses: list[in
 
 @given(st.lists(st.floats(-80.0, 80.0), min_size=8, max_size=8), volts)
 @settings(max_examples=60, deadline=None)
-def test_a_wish_becomes_the_nearest_thrust_that_a_whole_pulse_holds(wished: list[float], supply_V: float) -> None:
+def test_a_demand_becomes_the_nearest_thrust_that_a_whole_pulse_holds(desired: list[float], supply_V: float) -> None:
     """No other whole pulse comes nearer to what the thruster would deliver, whichever way the motor is turned."""
-    wish = np.array(wished)
-    pulses = pulses_of_thrusts(HEAVY, wish, DIRECTIONS, supply_V)
+    demand = np.array(desired)
+    pulses = pulses_of_thrusts(HEAVY, demand, DIRECTIONS, supply_V)
     assert (pulses == np.rint(pulses)).all()
     curve = library_curve("t200")
-    delivered = DIRECTIONS * curve.delivered_N(DIRECTIONS * wish, supply_V)
+    delivered = DIRECTIONS * curve.delivered_N(DIRECTIONS * demand, supply_V)
     error = np.abs(thrusts_of_pulses(HEAVY, pulses, DIRECTIONS, supply_V) - delivered)
     every = np.arange(1100.0, 1901.0)
     best = [np.abs(d * curve.thrust_N(every, supply_V) - t).min() for d, t in zip(DIRECTIONS, delivered, strict=True)]
@@ -66,19 +66,20 @@ def test_no_pulse_lies_in_the_dead_band() -> None:
 
 def test_less_voltage_wants_a_longer_way_from_the_middle() -> None:
     """The same thrust at 12 V and at 16 V are different pulses, and the same thrust."""
-    wish = np.full(8, 15.0)
+    demand = np.full(8, 15.0)
     for supply_V in (12.0, 16.0):
-        pulses = pulses_of_thrusts(HEAVY, wish, np.ones(8), supply_V)
-        assert thrusts_of_pulses(HEAVY, pulses, np.ones(8), supply_V) == pytest.approx(wish, abs=0.1)
+        pulses = pulses_of_thrusts(HEAVY, demand, np.ones(8), supply_V)
+        assert thrusts_of_pulses(HEAVY, pulses, np.ones(8), supply_V) == pytest.approx(demand, abs=0.1)
     assert (
-        pulses_of_thrusts(HEAVY, wish, np.ones(8), 12.0)[0] > pulses_of_thrusts(HEAVY, wish, np.ones(8), 16.0)[0] + 20
+        pulses_of_thrusts(HEAVY, demand, np.ones(8), 12.0)[0]
+        > pulses_of_thrusts(HEAVY, demand, np.ones(8), 16.0)[0] + 20
     )
 
 
 def test_a_turned_motor_has_everything_turned() -> None:
     """Pulses are mirrored about the middle only as far as the table is; limits change sides."""
-    wish = np.full(8, 20.0)
-    forward, turned = (pulses_of_thrusts(HEAVY, wish, d * np.ones(8), 16.0) for d in (1.0, -1.0))
+    demand = np.full(8, 20.0)
+    forward, turned = (pulses_of_thrusts(HEAVY, demand, d * np.ones(8), 16.0) for d in (1.0, -1.0))
     assert (forward > 1500.0).all()
     assert (turned < 1500.0).all()
     assert (np.abs(turned - 1500.0) > np.abs(forward - 1500.0)).all()
@@ -91,15 +92,17 @@ def test_a_turned_motor_has_everything_turned() -> None:
 @given(st.lists(st.floats(-60.0, 60.0), min_size=8, max_size=8))
 @example([0.25] + [0.0] * 7)
 @settings(max_examples=60, deadline=None)
-def test_without_a_table_thrusts_go_in_proportion(wished: list[float]) -> None:
+def test_without_a_table_thrusts_go_in_proportion(desired: list[float]) -> None:
     """Limits, least thrusts and directions hold as well; half a microsecond of rounding is left."""
-    wish = np.array(wished)
-    pulses = pulses_of_thrusts(PLAIN, wish, DIRECTIONS, 0.0)
+    demand = np.array(desired)
+    pulses = pulses_of_thrusts(PLAIN, demand, DIRECTIONS, 0.0)
     low, high = limits_of_motors(PLAIN, DIRECTIONS, 0.0)
     made = thrusts_of_pulses(PLAIN, pulses, DIRECTIONS, 0.0)
     step = np.maximum(high, -low) / 400.0
-    assert (np.abs(made - np.clip(wish, low, high)) <= 0.5 * step + 0.25 + 1e-9).all()  # half a least thrust beside it
-    assert (pulses[np.abs(wish) < 0.19] == 1500.0).all()
+    assert (
+        np.abs(made - np.clip(demand, low, high)) <= 0.5 * step + 0.25 + 1e-9
+    ).all()  # half a least thrust beside it
+    assert (pulses[np.abs(demand) < 0.19] == 1500.0).all()
     assert pulses_of_thrusts(
         PLAIN, thrusts_of_pulses(PLAIN, pulses, DIRECTIONS, 0.0), DIRECTIONS, 0.0
     ) == pytest.approx(pulses)

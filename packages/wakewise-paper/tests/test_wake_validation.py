@@ -131,7 +131,7 @@ def test_a_calibrated_model_describes_the_swirling_lattice_jet():
 @needs_oracle
 @pytest.mark.parametrize(("case", "limit_pct"), [("swirl", 5.0), ("free", 8.0)])
 def test_two_grids_of_the_lattice_agree(case, limit_pct):
-    """Axis speed at 0.3 m on 7 and 10 cells per diameter: within the wished 5 % with swirl, within 8 % without."""
+    """Axis speed at 0.3 m on 7 and 10 cells per diameter: within the desired 5 % with swirl, within 8 % without."""
     assert load_mean_field(case).figures["grid_convergence_pct"] <= limit_pct
 
 

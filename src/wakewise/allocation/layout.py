@@ -165,7 +165,7 @@ def parse_priority(text: str) -> tuple[tuple[int, ...], ...]:
     wrong = [letter for letter in named if letter not in AXES or named.count(letter) > 1]
     if wrong or not named:
         what = f"'{wrong[0]}' {'twice' if wrong[0] in AXES else 'unknown'}" if wrong else "no axes"
-        raise InputError(f"priority '{text}': {what}, allowed: each of X, Y, Z, K, M, N once, groups parted by commas")
+        raise InputError(f"priority '{text}': {what}, allowed: X, Y, Z, K, M, N once each, groups separated by commas")
     rest = tuple(letter for letter in AXES if letter not in named)
     return tuple(tuple(AXES.index(letter) for letter in group) for group in [*groups, rest] if group)
 

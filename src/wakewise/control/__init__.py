@@ -23,7 +23,7 @@ Start reading in `pipeline.py` and `methods.py`.
 - `settings.py`: what a user may set.
 """
 
-from wakewise.control.gain_margins import Gains, vehicle_axes, wished_gains
+from wakewise.control.gain_margins import Gains, desired_gains, vehicle_axes
 from wakewise.control.methods import MAKERS, METHODS, ControlTask, make_controller
 from wakewise.control.null_space_allocation import vehicle_layout
 from wakewise.control.pid import Pid, PidState, make_pid
@@ -41,11 +41,11 @@ __all__ = [
     "PidState",
     "Pipeline",
     "PipelineState",
+    "desired_gains",
     "make_controller",
     "make_pid",
     "vehicle_axes",
     "vehicle_layout",
-    "wished_gains",
     "with_failsafe",
     "with_pwm",
 ]

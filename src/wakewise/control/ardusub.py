@@ -1,7 +1,7 @@
 """`ardusub`: the loops and the mixer that such vehicles are shipped with, holding the mission's pose.
 
 ArduSub's POSHOLD as its parameters and public source describe it (release 4; our own code). Horizontally: distance
-times PSC_POSXY_P is a velocity, its error in a PID a wished acceleration, and the angle whose tangent is that over g,
+times PSC_POSXY_P is a velocity, its error in a PID a desired acceleration, and the angle whose tangent is that over g,
 over 45 degrees, a demand. Vertically: distance times PSC_POSZ_P, velocity times PSC_VELZ_P, and a PI of acceleration
 for the throttle. Attitude: angle times ATC_ANG_*_P is a rate, its error in a PID a demand. `motor_mix.py` makes pulses
 of them.
@@ -140,8 +140,8 @@ class ArduSubStage(MotionStage):
     ) -> tuple[ArduSubState, Array]:
         """Demands of roll, pitch and yaw, shape (3,)."""
         q_BG = quat_multiply(quat_conjugate(estimate.X_WB.q), goal.X_WB.q)
-        wished = ANGLE_P * self.lowered[:3] * rotvec_from_quat(q_BG) + matrix_from_quat(q_BG) @ goal.nu_B[3:]
-        error = wished - estimate.nu_B[3:]
+        desired = ANGLE_P * self.lowered[:3] * rotvec_from_quat(q_BG) + matrix_from_quat(q_BG) @ goal.nu_B[3:]
+        error = desired - estimate.nu_B[3:]
         share = _share(dt_s, RATE_D_HZ)
         slope = state.rate_slope + share * ((error - state.rate_error) / dt_s - state.rate_slope)
         total = state.rate_sum
@@ -165,7 +165,7 @@ class ArduSubStage(MotionStage):
         if grows:
             total = total + VELOCITY_I * low[:2] * error * dt_s
             total = total * min(1.0, VELOCITY_IMAX_M_S2 / max(float(np.linalg.norm(total)), 1e-9))
-        wished_W = low[:2] * (VELOCITY_P[:2] * error + VELOCITY_D * slope) + total
+        desired_W = low[:2] * (VELOCITY_P[:2] * error + VELOCITY_D * slope) + total
         before_W = v_W if state.v_W_m_s is None else state.v_W_m_s
         off_a = VELOCITY_P[2] * low[2] * error_W[2] - (v_W[2] - before_W[2]) / dt_s
         climb_error = state.climb_error + _share(dt_s, CLIMB_HZ) * (off_a - state.climb_error)
@@ -174,7 +174,7 @@ class ArduSubStage(MotionStage):
             climb = float(np.clip(climb + CLIMB_I * climb_error * dt_s, -CLIMB_IMAX, CLIMB_IMAX))
         _, _, heading_rad = euler_from_quat(estimate.X_WB.q)
         c, s = math.cos(heading_rad), math.sin(heading_rad)
-        ahead, aside = c * wished_W[0] + s * wished_W[1], c * wished_W[1] - s * wished_W[0]
+        ahead, aside = c * desired_W[0] + s * desired_W[1], c * desired_W[1] - s * desired_W[0]
         demands = np.array(
             [
                 np.clip(math.atan(ahead / GRAVITY_M_S2) / LEAN_RAD, -1.0, 1.0),

@@ -170,7 +170,7 @@ REFERENCE_MASS_KG = 11.3
 """Mass with added mass, mean over surge, sway and heave, of the vehicle that the paper's gains are for."""
 
 
-def wished_gains(axes: tuple[Axis, ...], forces: Gains) -> tuple[Gains, ...]:
+def desired_gains(axes: tuple[Axis, ...], forces: Gains) -> tuple[Gains, ...]:
     """Gains of all six axes, with the bandwidth of the given ones on the paper's vehicle.
 
     Forces are scaled by the vehicle's mean mass over that one's, moments further by (I + I_a)/(m + m_a) of the axis.
@@ -196,11 +196,11 @@ def stable_gain_scale(
     axes = vehicle_axes(vehicle)
     lag = float(np.max(vehicle.time_constants_s))
     scales = np.ones(6)
-    for i, (axis, wished) in enumerate(zip(axes, wished_gains(axes, forces), strict=True)):
+    for i, (axis, desired) in enumerate(zip(axes, desired_gains(axes, forces), strict=True)):
         delay_s = force_delay_s if i < 3 else moment_delay_s
-        if max(wished.kp, wished.kd, wished.ki) <= 0.0:
+        if max(desired.kp, desired.kd, desired.ki) <= 0.0:
             continue
-        found = axis_scale(axis, wished, dt_s, lag, delay_s)
+        found = axis_scale(axis, desired, dt_s, lag, delay_s)
         if found is None:
             raise InputError(
                 f"gains {forces.kp:g}/{forces.kd:g}/{forces.ki:g}: axis {'XYZKMN'[i]} of '{vehicle.name}' has no "
@@ -211,11 +211,11 @@ def stable_gain_scale(
 
 
 @lru_cache(maxsize=256)
-def axis_scale(axis: Axis, wished: Gains, dt_s: float, lag_s: float, delay_s: float) -> float | None:
+def axis_scale(axis: Axis, desired: Gains, dt_s: float, lag_s: float, delay_s: float) -> float | None:
     """Largest bandwidth factor of one axis with enough margin: a coarse search downwards, then halving."""
 
     def enough(scale: float) -> bool:
-        return margins(axis, wished.slowed(scale), dt_s, lag_s, delay_s).enough
+        return margins(axis, desired.slowed(scale), dt_s, lag_s, delay_s).enough
 
     tried = [float(s) for s in np.geomspace(1.0, 0.01, 25)]
     good = next((s for s in tried if enough(s)), None)

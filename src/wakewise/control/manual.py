@@ -73,15 +73,15 @@ class ManualStage(MotionStage):
     def step(self, state: PipelineState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PipelineState, Demand]:
         """Decide the wrench for the next `dt_s` seconds."""
         before = state.manual or ManualState(person=begin(self.person))
-        wish = CameraMotion.of(goal.X_WB, goal.nu_B, self.X_BC)
+        goal_view = CameraMotion.of(goal.X_WB, goal.nu_B, self.X_BC)
         now = CameraMotion.of(estimate.X_WB, estimate.nu_B, self.X_BC)
-        person, asked = steer(self.person, before.person, dt_s, now, wish, self._watched(goal))
+        person, asked = steer(self.person, before.person, dt_s, now, goal_view, self._watched(goal))
         manual = replace(before, person=person)
         pid, manual, wrench = self._autopilot(state, manual, dt_s, estimate, goal, asked)
         return replace(state, pid=pid, manual=manual, goal_nu=goal.nu_B), Demand(wrench_B=wrench)
 
     def _watched(self, goal: Goal) -> Array:
-        """What the wished picture has in its middle, shape (3,): on its axis, as far as the target is."""
+        """What the desired picture has in its middle, shape (3,): on its axis, as far as the target is."""
         X_WC = goal.X_WB @ self.X_BC
         axis_W = X_WC.R[:, 2]
         return np.asarray(X_WC.p_m + axis_W * float((self.middle_W_m - X_WC.p_m) @ axis_W))

@@ -203,13 +203,13 @@ class MpcStage(MotionStage):
         if state.plan_force_W_N is not None:
             correction[:3] += (matrix_from_quat(nominal[3:7]) - estimate.X_WB.R).T @ state.plan_force_W_N
         planned = plan.commands_N[_stage(plan, state.plan_age_s, stage_s)]
-        wished = planned + gain @ correction
-        thrusts = np.minimum(np.maximum(wished, model.table.lower), model.table.upper)
+        desired = planned + gain @ correction
+        thrusts = np.minimum(np.maximum(desired, model.table.lower), model.table.upper)
         if not np.isfinite(thrusts).all():
             words = self.planner.incidents.count("not finite", "correction not finite")
             path = Goal(X_WB=Pose(nominal[:3], nominal[3:7]), nu_B=nominal[7:])
             return self._without_plan(replace(state, plan=None, plan_trouble=words), dt_s, estimate, path)
-        over = float(np.abs(wished - thrusts).max())
+        over = float(np.abs(desired - thrusts).max())
         trouble = state.plan_trouble
         if over > 1e-9 and trouble is None:
             trouble = self.planner.incidents.count("saturated", f"thrusters saturated: {over:.1f} N cut off")

@@ -122,9 +122,9 @@ class OperatorModel:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OperatorModelState:
-    """What a person carries on: count of steps, what was seen and wished (newest first), hands and habits.
+    """What a person carries on: count of steps, what was seen and desired (newest first), hands and habits.
 
-    `seen` and `wished`, shape (n, 11), rows as `CameraMotion.row`; the rest, shape (4,): `hand` what the hands make of
+    `seen` and `desired`, shape (n, 11), rows as `CameraMotion.row`; the rest, shape (4,): `hand` what the hands make of
     it, `trim` the steady push that was learned, `drift` the error of the eye now, `last` and `unseen_s` the offset last
     seen and how long ago, `pushed` where the sticks are and `owed` what they fell short of, both shares of full stick,
     `square` and `rate_square` what is seen, squared and averaged, `minded` the axes that are minded, for `until_s`
@@ -133,7 +133,7 @@ class OperatorModelState:
 
     steps: int
     seen: Array
-    wished: Array
+    desired: Array
     hand: Array
     trim: Array
     drift: Array
@@ -207,7 +207,7 @@ def begin(person: OperatorModel) -> OperatorModelState:
     return OperatorModelState(
         steps=1,
         seen=none,
-        wished=none,
+        desired=none,
         hand=zero,
         trim=zero,
         drift=eye,
@@ -228,28 +228,28 @@ def steer(
     state: OperatorModelState,
     dt_s: float,
     view: CameraMotion,
-    wish: CameraMotion,
+    goal_view: CameraMotion,
     watch_W_m: Array | None = None,
 ) -> tuple[OperatorModelState, Array]:
     """One step of a person at the sticks.
 
-    `view` is the camera as it is now, which the person sees later, `wish` where the person would like to have it, and
-    `watch_W_m`, shape (3,), what the camera is to be kept on; None: the wished heading. Gives the next state, and what
+    `view` is the camera as it is now, which the person sees later, `goal_view` where it is desired, and `watch_W_m`,
+    shape (3,), what the camera is to be kept on; None: the desired heading. Gives the next state, and what
     the sticks ask for, shape (4,): N, m/s, rad/s as `StickDeflection` says, in the vehicle's level frame (forward along
     its heading).
     """
     late, later = round((person.delay_s - NEUROMUSCULAR_S) / dt_s), round(person.video_s / dt_s)
     seen = np.concatenate([view.row[None], state.seen])[: late + later + 1]
-    wished = np.concatenate([wish.row[None], state.wished])[: late + 1]
+    desired = np.concatenate([goal_view.row[None], state.desired])[: late + 1]
     noise = _noise(person, state.steps)
     keep = math.exp(-dt_s / person.drift_s)
     drift = keep * state.drift + math.sqrt(1.0 - keep * keep) * person.drift * noise[:4]
-    next_state = replace(state, steps=state.steps + 1, seen=seen, wished=wished, drift=drift)
+    next_state = replace(state, steps=state.steps + 1, seen=seen, desired=desired, drift=drift)
     if len(seen) <= late + later:
         # Nothing has come through yet.
         return next_state, np.zeros(4)
 
-    offset, rate, ahead, far_m = _offsets(seen[-1], wished[-1], watch_W_m)
+    offset, rate, ahead, far_m = _offsets(seen[-1], desired[-1], watch_W_m)
     scale = np.array([far_m, far_m, far_m, 1.0])
     offset = offset - scale * drift
     pressing = np.minimum(np.abs(state.last) / (scale * person.step), MOST_PRESSING) + state.unseen_s / LOOK_S
@@ -322,20 +322,20 @@ def _crossover(margin_rad: float, late_s: Array, coast_s: Array, lead_s: Array) 
     return low
 
 
-def _offsets(seen: Array, wished: Array, watch_W_m: Array | None) -> tuple[Array, Array, Array, float]:
-    """Wish less view in the level frame of the view, its rate, the wish's own rate, shape (4,) each; the distance."""
+def _offsets(seen: Array, desired: Array, watch_W_m: Array | None) -> tuple[Array, Array, Array, float]:
+    """Goal less view in the level frame of the view, its rate, the goal's own rate, shape (4,) each; the distance."""
     c, s = math.cos(seen[3]), math.sin(seen[3])
     level = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    heading, far_m, turn = wished[3], 1.0, wished[7]
+    heading, far_m, turn = desired[3], 1.0, desired[7]
     if watch_W_m is not None:
         away = watch_W_m - seen[:3]
         flat_m = math.hypot(away[0], away[1])
-        ahead = away[0] * math.cos(wished[3]) + away[1] * math.sin(wished[3])
+        ahead = away[0] * math.cos(desired[3]) + away[1] * math.sin(desired[3])
         if ahead > 0.0 and flat_m < FARTHEST_M:
             heading, far_m = math.atan2(away[1], away[0]), float(np.linalg.norm(away))
-    offset = np.append(level @ (wished[:3] - seen[:3]), math.remainder(heading - seen[3], 2.0 * math.pi))
-    rate = np.append(level @ (wished[4:7] - seen[4:7]), turn - seen[7])
-    return offset, rate, np.append(level @ wished[8:11], turn), far_m
+    offset = np.append(level @ (desired[:3] - seen[:3]), math.remainder(heading - seen[3], 2.0 * math.pi))
+    rate = np.append(level @ (desired[4:7] - seen[4:7]), turn - seen[7])
+    return offset, rate, np.append(level @ desired[8:11], turn), far_m
 
 
 def _beyond(values: Array, step: Array) -> Array:

@@ -48,7 +48,7 @@ class OperatorPopulation:
         How well the place on the circle, the distance, the level (shares of the distance) and the target in the middle
         are kept by eye, without a scale: rms of an error that lasts `drift_s`. Estimates.
     pace
-        Speed that a person starts with over the one that is wished. Estimate.
+        Speed that a person starts with over the one that is desired. Estimate.
     trim_s
         How fast a steady push is learned. Estimate: a few corrections.
     gain

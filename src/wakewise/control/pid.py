@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.control.gain_margins import Gains, stable_gain_scale, vehicle_axes, wished_gains
+from wakewise.control.gain_margins import Gains, desired_gains, stable_gain_scale, vehicle_axes
 from wakewise.control.settings import ControlSettings
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.interfaces import BodyState, Goal
@@ -52,7 +52,7 @@ class Pid:
     """Gains, limits of the integral, and the nominal vehicle behind the feed-forward; make one with `make_pid`.
 
     `kp`, `kd`, `ki`, shape (6,): N/m, N s/m, N/(m s) for forces and Nm/rad, Nm s/rad, Nm/(rad s) for moments.
-    `integral_limit`, shape (6,), in N and Nm. `gain_scale`, shape (6,), is the share of the wished bandwidth that the
+    `integral_limit`, shape (6,), in N and Nm. `gain_scale`, shape (6,), is the share of the desired bandwidth that the
     margins allowed.
     """
 
@@ -171,7 +171,7 @@ def make_pid(vehicle: Vehicle, settings: ControlSettings, *, slowed: bool = True
     dt_s = 1.0 / settings.rate_hz
     forces = Gains(kp=settings.kp_N_m, kd=settings.kd_N_s_m, ki=settings.ki_N_m_s)
     scale = stable_gain_scale(vehicle, forces, dt_s, ESTIMATOR_LAG_S, GYRO_LAG_S) if slowed else np.ones(6)
-    gains = [g.slowed(float(s)) for g, s in zip(wished_gains(vehicle_axes(vehicle), forces), scale, strict=True)]
+    gains = [g.slowed(float(s)) for g, s in zip(desired_gains(vehicle_axes(vehicle), forces), scale, strict=True)]
     reach = np.minimum(-vehicle.thrust_lower_N, vehicle.thrust_upper_N)
     limit = INTEGRAL_SHARE * (np.abs(vehicle.allocation_matrix) @ reach)
     # The force integral lives in the world, where any body axis may have to supply it.

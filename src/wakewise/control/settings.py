@@ -68,7 +68,7 @@ class AllocationSettings(Settings):
 class ControlSettings(Settings):
     """Rate, gains and weights of the controllers.
 
-    Gains. The paper's PID has 150 N/m, 80 N s/m and 20 N/(m s). They are wishes for its vehicle: others get the same
+    Gains. The paper's PID has 150 N/m, 80 N s/m and 20 N/(m s). They suit its vehicle: others get the same
     bandwidth by their mass, moments by their inertia, and each axis is slowed until its loop keeps its margins
     (`gain_margins.stable_gain_scale`). How late the estimate is, is said in `pid`.
 
@@ -82,9 +82,9 @@ class ControlSettings(Settings):
     """
 
     rate_hz: float = Field(default=50.0, description="control steps per second (Hz)", ge=5.0, le=500.0)
-    kp_N_m: float = Field(default=150.0, description="wished proportional gain of forces (N/m)", ge=0.0, le=2000.0)
-    kd_N_s_m: float = Field(default=80.0, description="wished derivative gain of forces (N s/m)", ge=0.0, le=2000.0)
-    ki_N_m_s: float = Field(default=20.0, description="wished integral gain of forces (N/(m s))", ge=0.0, le=500.0)
+    kp_N_m: float = Field(default=150.0, description="desired proportional gain of forces (N/m)", ge=0.0, le=2000.0)
+    kd_N_s_m: float = Field(default=80.0, description="desired derivative gain of forces (N s/m)", ge=0.0, le=2000.0)
+    ki_N_m_s: float = Field(default=20.0, description="desired integral gain of forces (N/(m s))", ge=0.0, le=500.0)
     wake: WakeSettings = Field(default=WakeSettings(), description="the wake model that the controller believes in")
     superposition: Superposition = Field(
         default="coherent",

@@ -90,18 +90,18 @@ def pulsed(
 
 @njit
 def _pulses(
-    running: Array, owed: Array, wished: Array, dt: float, shortest: Array, least_forward: float, least_reverse: float,
+    running: Array, owed: Array, desired: Array, dt: float, shortest: Array, least_forward: float, least_reverse: float,
     levels: Array,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
     """Which way each thruster runs, what it owes, and its thrust, shape (n,) each; arguments as for `pulsed`."""
-    n = wished.size
+    n = desired.size
     ways, owes, thrusts = np.zeros(n), np.empty(n), np.zeros(n)
     for i in range(n):
-        span, wish = max(shortest[i], dt), wished[i]
-        if wish >= least_forward or wish <= -least_reverse:
-            ways[i] = 1.0 if wish >= least_forward else -1.0
-            # What is owed is made up for over a pulse; the way the thruster runs stays that of the wish.
-            level = wish + owed[i] / span
+        span, demand = max(shortest[i], dt), desired[i]
+        if demand >= least_forward or demand <= -least_reverse:
+            ways[i] = 1.0 if demand >= least_forward else -1.0
+            # What is owed is made up for over a pulse; the way the thruster runs stays that of the demand.
+            level = demand + owed[i] / span
             if not level * ways[i] > 0.0:
                 level = least_forward if ways[i] > 0.0 else -least_reverse
             thrusts[i] = nearest(level, least_forward, least_reverse, levels)
@@ -112,5 +112,5 @@ def _pulses(
                 ways[i] = 1.0 if owed[i] >= least_forward * span else -1.0
             if ways[i] != 0.0:
                 thrusts[i] = least_forward if ways[i] > 0.0 else -least_reverse
-        owes[i] = owed[i] + (wish - thrusts[i]) * dt
+        owes[i] = owed[i] + (demand - thrusts[i]) * dt
     return ways, owes, thrusts

@@ -116,11 +116,11 @@ class WeightedAllocator:
             thrusts_N = found if sweep == 0 else 0.5 * (thrusts_N + found)
         return thrusts_N
 
-    def _blended(self, least_N: Array, wished_N: Array) -> Array:
-        """The largest tenth of the way from the least to the wished thrusts that limits and power allow."""
+    def _blended(self, least_N: Array, desired_N: Array) -> Array:
+        """The largest tenth of the way from the least to the desired thrusts that limits and power allow."""
         most_W = POWER_RATIO * float(self.law.power_W(least_N)) + EXTRA_W
         for tenths in range(10, 0, -1):
-            thrusts_N = least_N + tenths / 10.0 * (wished_N - least_N)
+            thrusts_N = least_N + tenths / 10.0 * (desired_N - least_N)
             inside = (thrusts_N >= self.layout.lower_N) & (thrusts_N <= self.layout.upper_N)
             if inside.all() and float(self.law.power_W(thrusts_N)) <= most_W:
                 return thrusts_N

@@ -17,7 +17,7 @@ def other_separator(names: Iterable[str] | None) -> str:
     line = ",".join(names or ())
     for sign, word in ((";", "semicolons"), ("\t", "tabs")):
         if sign in line:
-            return f" (its columns are parted by {word}, commas are needed)"
+            return f" (its columns are separated by {word}, commas are needed)"
     return ""
 
 

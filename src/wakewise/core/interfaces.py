@@ -109,7 +109,7 @@ class Measurement:
 class Goal:
     """What the mission or the pilot wants now.
 
-    `nu_B` is the wished twist, expressed in the goal's own body frame, shape (6,). `tilt_rad` is the wished angle
+    `nu_B` is the desired twist, expressed in the goal's own body frame, shape (6,). `tilt_rad` is the desired angle
     of the camera's joint, positive upwards, 0 where the camera is fixed. `tracking_weight_scale`, more than 0, is how
     closely the goal is to be followed where that can be traded for still water: planners weigh their tracking by this
     many times what their settings say; other methods follow as closely as they can. `max_tracking_deviation` is the
@@ -287,7 +287,7 @@ class Estimator(Protocol, Generic[S]):
 class Plant(Protocol):
     """The vehicle in its water: simulated tank, autopilot or sea.
 
-    One whose camera has a joint may have a method `aim(tilt_rad)`, which is called before each step with the wished
+    One whose camera has a joint may have a method `aim(tilt_rad)`, which is called before each step with the desired
     angle, and hands the angle that it measured over with the step's measurements. Without it the camera is fixed.
     `push(wrench_B)`, where there is one, pushes it from outside the water until the next call: N, N m, body frame.
     """

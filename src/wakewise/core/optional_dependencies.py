@@ -80,7 +80,7 @@ class OptionalDependencies:
         return None
 
     def how_to_install(self, extras: str) -> str:
-        """What to type in the clone's folder for some extras, parted by commas."""
+        """What to type in the clone's folder for some extras, separated by commas."""
         return f"pip install -e '{self.folder}[{extras}]' (in the clone's folder)"
 
     def _line(self, what: str, packages: list[str], extras: list[str]) -> str:

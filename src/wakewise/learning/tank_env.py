@@ -107,11 +107,11 @@ class _Flight:
             speeds = np.asarray(self.tank.excess_velocity(self.points))
             self.wash = float(np.sqrt(self.weights @ (speeds**2).sum(axis=1)))
 
-    def _pulses(self, robot: Vehicle, wished_N: Array) -> Array:
+    def _pulses(self, robot: Vehicle, desired_N: Array) -> Array:
         if robot.thrust_steps is None:
-            return wished_N
+            return desired_N
         self.running, self.owed, sent = pulsed(
-            self.running, self.owed, wished_N, self.task.dt_s, robot.thrust_steps, robot.time_constants_s
+            self.running, self.owed, desired_N, self.task.dt_s, robot.thrust_steps, robot.time_constants_s
         )
         return np.clip(sent, robot.thrust_lower_N, robot.thrust_upper_N)
 

@@ -183,7 +183,7 @@ class FlightRecorder:
         """True camera poses until now, the last of them now; the first of the flight stand for those before it."""
         last = len(self._recent) - 1
         rows = [self._recent[max(0, last - self._every * k)] for k in reversed(range(self.metered))]
-        # The last three numbers of a row are the camera's tilt, true, measured and wished.
+        # The last three numbers of a row are the camera's tilt, true, measured and desired.
         return tuple(Pose(row[1:4], row[4:8]) @ self._mount(math.radians(float(row[-3]))) for row in rows)
 
     @property

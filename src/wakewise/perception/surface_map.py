@@ -188,9 +188,9 @@ def _apart(frames: Sequence[Keyframe], centre_W_m: Array) -> list[Keyframe]:
     """The latest keyframes at about `APART_RAD` from the last one."""
     turned = [turned_about(centre_W_m, frames[-1].X_WC.p_m, frame.X_WC.p_m) for frame in frames[:-1]]
     found = []
-    for wished in APART_RAD:
+    for desired in APART_RAD:
         fits = [
-            k for k, angle in enumerate(turned) if abs(angle - wished) < SLACK_RAD and frames[k].picture is not None
+            k for k, angle in enumerate(turned) if abs(angle - desired) < SLACK_RAD and frames[k].picture is not None
         ]
         found += [frames[k] for k in fits[-1:]]
     return found

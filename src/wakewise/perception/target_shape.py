@@ -184,11 +184,11 @@ def middle_depth(depth_m: Array, aside_m: Array, half_m: float) -> tuple[float, 
     """
     chord = np.sqrt(np.maximum(half_m**2 - aside_m**2, 0.0))
     J = np.stack([np.ones_like(chord), -chord], axis=1)
-    prior, wish = np.diag([0.0, 1.0 / NEARER_STD**2]), np.array([0.0, NEARER / NEARER_STD**2])
+    prior, offset = np.diag([0.0, 1.0 / NEARER_STD**2]), np.array([0.0, NEARER / NEARER_STD**2])
     spread = 0.3 * half_m
     for _ in range(2):
         H = J.T @ J / (CORRELATED * spread**2) + prior
-        found = np.linalg.solve(H, J.T @ depth_m / (CORRELATED * spread**2) + wish)
+        found = np.linalg.solve(H, J.T @ depth_m / (CORRELATED * spread**2) + offset)
         spread = max(float(np.std(depth_m - J @ found)), 0.1 * half_m)
     near, far = np.quantile(depth_m, (TAIL, 1.0 - TAIL))
     through = float(np.clip(((far - near) / (2.0 * half_m) - SEEN_THROUGH[0]) / np.diff(SEEN_THROUGH)[0], 0.0, 1.0))

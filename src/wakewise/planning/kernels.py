@@ -243,10 +243,10 @@ def rotation(state: Array, R: Array) -> None:
 
 
 @njit(apart=True)
-def attitude_cost(state: Array, wished: Array, weight: float, tolerance: float, g: Array, H: Array) -> float:
+def attitude_cost(state: Array, desired: Array, weight: float, tolerance: float, g: Array, H: Array) -> float:
     """Add weight max(0, |e| - tolerance)^2, e = 2 vec(q_ref^-1 q), to gradient g and Gauss-Newton H by the turn."""
     w, x, y, z = state[3], state[4], state[5], state[6]
-    a, b, c, d = wished[3], -wished[4], -wished[5], -wished[6]
+    a, b, c, d = desired[3], -desired[4], -desired[5], -desired[6]
     ew = a * w - b * x - c * y - d * z
     sign = 1.0 if ew >= 0.0 else -1.0
     ew *= sign
@@ -328,17 +328,17 @@ def horizon(
         assign(gx[:6], g[:6])
         gx[6:] = 0.0
         if k > 0:
-            wished = case.reference[k]
+            desired = case.reference[k]
             along = h * weights[W_PATH] + (weights[W_TRACK] if k == N else 0.0)
             for r in range(3):
-                e = state[r] - wished[r]
+                e = state[r] - desired[r]
                 parts[1] += along * e * e
                 gx[r] += 2.0 * along * e
                 H[r, r] += 2.0 * along
             turned = h * weights[W_ATTITUDE] + (weights[W_ATTITUDE] if k == N else 0.0)
-            parts[2] += attitude_cost(state, wished, turned, weights[TOLERANCE], gx, H)
+            parts[2] += attitude_cost(state, desired, turned, weights[TOLERANCE], gx, H)
             for r in range(6):
-                e = state[7 + r] - wished[7 + r]
+                e = state[7 + r] - desired[7 + r]
                 parts[3] += h * weights[W_TWIST] * e * e
                 gx[6 + r] = 2.0 * h * weights[W_TWIST] * e
             value, closest = add_barrier(

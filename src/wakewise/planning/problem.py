@@ -85,7 +85,7 @@ class PlanProblem:
     state: Array  # shape (13,): position, quaternion (w, x, y, z) and twist now
     thrusts_N: Array  # shape (n,): what the thrusters give now
     command_N: Array  # shape (n,): what they were last told
-    reference: Array  # shape (N + 1, 13): wished states at the ends of the stages, the first one for now
+    reference: Array  # shape (N + 1, 13): desired states at the ends of the stages, the first one for now
     # Wrench that the vehicle's model does not explain, shape (3,) each; its force keeps its direction in the world.
     force_W_N: Array = field(default_factory=lambda: np.zeros(3))
     moment_B_Nm: Array = field(default_factory=lambda: np.zeros(3))
@@ -141,7 +141,7 @@ with this time constant, as a change does that may end at any moment."""
 
 
 def reference_of(goal: Goal, stages: int, stage_s: float, change_B: Array | None = None) -> Array:
-    """Wished states at the ends of the stages: position, quaternion and twist.
+    """Desired states at the ends of the stages: position, quaternion and twist.
 
     The goal's twist is carried on in its own body frame over `stages` of `stage_s`. `change_B`, shape (6,), is how fast
     it changes, in the body frame; it fades with `RAMP_S` (None: no change). Gives shape (stages + 1, 13), the first row

@@ -88,7 +88,7 @@ def test_every_module_is_imported_and_kernels_are_run_line_by_line(tmp_path: Pat
         np.testing.assert_allclose(found[name], values, rtol=1e-9, atol=1e-9, err_msg=name)
 
 
-@pytest.mark.parametrize(("value", "wished"), [("1", True), ("0", False), ("", False), (None, False)])
-def test_the_variable_is_read_as_numba_reads_it(value: str | None, wished: bool) -> None:
+@pytest.mark.parametrize(("value", "desired"), [("1", True), ("0", False), ("", False), (None, False)])
+def test_the_variable_is_read_as_numba_reads_it(value: str | None, desired: bool) -> None:
     """Nothing and 0 compile."""
-    assert is_interpreted({} if value is None else {"NUMBA_DISABLE_JIT": value}) is wished
+    assert is_interpreted({} if value is None else {"NUMBA_DISABLE_JIT": value}) is desired

@@ -101,7 +101,7 @@ def test_what_was_begun_is_waited_for_and_not_made_twice(folder, monkeypatch):
 
 
 def test_what_is_there_is_skipped_and_no_process_is_begun(folder, monkeypatch):
-    """Mesh and colours that are newer than what they are made of stay; without a wish for a mesh nothing is said."""
+    """Mesh and colours that are newer than what they are made of stay; unless a mesh is asked for, nothing is said."""
     monkeypatch.setattr(surface.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was begun"))
     for name in ("mesh.ply", "mesh.glb"):
         (folder / name).touch()

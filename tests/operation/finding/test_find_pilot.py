@@ -385,7 +385,7 @@ def test_without_a_target_the_mission_gives_up() -> None:
 
 
 def test_goals_have_the_velocity_of_their_own_motion() -> None:
-    """The wished twist agrees with the difference of wished positions, also while the centre moves."""
+    """The desired twist agrees with the difference of desired positions, also while the centre moves."""
     parts = SCENARIO.parts()
     pilot = parts.pilot
     estimate = BodyState(X_WB=parts.start.X_WB, target=target_at(parts.target.centre_W_m))

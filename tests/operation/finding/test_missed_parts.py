@@ -303,9 +303,9 @@ def test_a_route_passes_all_views_in_order(here: Array, places: list[Array]) -> 
     assert route.legs[0].start == pytest.approx(here)
     assert [leg.name for leg in route.legs] == [f"view {number + 1}" for number in range(len(places))]
     for place, opens_s in zip(places, route.exposures_s, strict=True):
-        pose, wished = route.camera(float(opens_s))[0], camera_pose(CENTRE, *place.tolist())
-        assert np.allclose(pose.p_m, wished.p_m, atol=1e-6)
-        assert np.allclose(pose.R, wished.R, atol=1e-6)
+        pose, desired = route.camera(float(opens_s))[0], camera_pose(CENTRE, *place.tolist())
+        assert np.allclose(pose.p_m, desired.p_m, atol=1e-6)
+        assert np.allclose(pose.R, desired.R, atol=1e-6)
     assert (np.diff(route.exposures_s) >= 0.0).all()
     assert route.duration_s == pytest.approx(float(route.exposures_s[-1]) + LAST_S)
 
@@ -371,7 +371,7 @@ AHEAD = replace(CHOOSER, aim=CameraAim(X_BC=Pose(np.array([0.2, 0.0, 0.0]), quat
 
 @pytest.mark.parametrize("floor_z_m", [2.5, 1.2, 1.1, 1.05])
 def test_an_orbit_is_raised_until_the_hull_is_clear_of_the_floor(floor_z_m: float) -> None:
-    """No higher than needed, by the steps that are tried; as wished where that is clear, and then nothing is below."""
+    """No higher than needed, by the steps that are tried; as desired where that is clear, and then nothing is below."""
     chooser = replace(AHEAD, bounds=replace(AHEAD.bounds, high_W_m=np.array([3.0, 2.5, floor_z_m])))
     elevation_deg, below = chooser.clear_elevation_deg(estimate(), 20.0)
 

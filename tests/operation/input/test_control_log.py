@@ -28,11 +28,11 @@ def test_what_was_written_is_played_back(tmp_path, ending):
     trace = read_trace(tmp_path / f"controls.{ending}")
     for _ in range(2):
         for k in range(60):
-            there, wished = trace.read(0.02 * k), hands(k)
-            assert (there is None) == (wished is None)
-            if there is not None and wished is not None:
-                np.testing.assert_array_equal(there.axes, wished.axes)
-                assert there.pressed == wished.pressed
+            there, desired = trace.read(0.02 * k), hands(k)
+            assert (there is None) == (desired is None)
+            if there is not None and desired is not None:
+                np.testing.assert_array_equal(there.axes, desired.axes)
+                assert there.pressed == desired.pressed
             assert trace.settings_at(0.02 * k) == all_settings[k >= 33]
         assert trace.read(1.3) is None
 

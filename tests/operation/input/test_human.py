@@ -42,11 +42,11 @@ def view(place=(0.0, 0.0, 0.0), heading=0.0, velocity=(0.0, 0.0, 0.0), turn=0.0)
     return CameraMotion(p_W_m=np.array(place), heading_rad=heading, v_W_m_s=v, turn_rad_s=turn, hull_W_m_s=v)
 
 
-def pushes(who: OperatorModel, views, wishes) -> np.ndarray:
+def pushes(who: OperatorModel, views, goal_views) -> np.ndarray:
     """What the sticks ask for, step by step, shape (n, 4)."""
     state, out = begin(who), []
-    for seen, wished in zip(views, wishes, strict=True):
-        state, asked = steer(who, state, DT_S, seen, wished)
+    for seen, desired in zip(views, goal_views, strict=True):
+        state, asked = steer(who, state, DT_S, seen, desired)
         out.append(asked)
     return np.array(out)
 
@@ -56,14 +56,14 @@ def first_answer_s(asked: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_step_in_the_wish_is_answered_no_sooner_than_the_delay(seed):
+def test_a_step_in_the_goal_is_answered_no_sooner_than_the_delay(seed):
     """Nothing moves for the delay less the hand's lag; what the vehicle does is seen later still, by the video."""
     who = person(seed, **{**PLAIN, "pace": (1.0, 1.0)})
     still, away, n = view(), view((0.2, -0.1, 0.05), 0.3), 150
-    by_wish = first_answer_s(pushes(who, [still] * n, [still] * 50 + [away] * (n - 50))) - 50 * DT_S
+    by_goal = first_answer_s(pushes(who, [still] * n, [still] * 50 + [away] * (n - 50))) - 50 * DT_S
     by_view = first_answer_s(pushes(who, [still] * 50 + [away] * (n - 50), [still] * n)) - 50 * DT_S
-    assert who.delay_s - 0.1 - DT_S <= by_wish <= who.delay_s + 0.1
-    assert by_view - by_wish == pytest.approx(who.video_s, abs=1.5 * DT_S)
+    assert who.delay_s - 0.1 - DT_S <= by_goal <= who.delay_s + 0.1
+    assert by_view - by_goal == pytest.approx(who.video_s, abs=1.5 * DT_S)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2, 3])
@@ -77,11 +77,11 @@ def test_the_open_loop_falls_by_20_dB_a_decade_about_its_crossover(axis):
         t = DT_S * np.arange(4 * period)
         wave, slope = 0.01 * np.sin(omega * t), 0.01 * omega * np.cos(omega * t)
         unit = np.eye(3)[axis] if axis < 3 else np.zeros(3)
-        wishes = [
+        goal_views = [
             view(unit * x, x if axis == 3 else 0.0, unit * v, v if axis == 3 else 0.0)
             for x, v in zip(wave, slope, strict=True)
         ]
-        asked = pushes(who, [view()] * len(t), wishes)[2 * period :, axis]
+        asked = pushes(who, [view()] * len(t), goal_views)[2 * period :, axis]
         answer = 2.0 * np.mean(asked * np.exp(-1j * omega * t[2 * period :])) / (0.01 / 1j)
         s = 1j * omega
         vehicle = 1.0 / (STICKS.inertia[axis] * s**2 + STICKS.drag[axis] * s) if axis < 2 else 1.0 / s
@@ -113,8 +113,8 @@ def test_a_vehicle_that_coasts_for_ever_is_steered_with_less_gain():
 def test_two_draws_of_one_seed_are_one_person():
     """Person and pushes follow from the seed alone; another seed is someone else."""
     rng = np.random.default_rng(0)
-    wishes = [view(0.1 * rng.normal(size=3), 0.1) for _ in range(200)]
-    flights = [pushes(person(seed), [view()] * 200, wishes) for seed in (5, 5, 6)]
+    goal_views = [view(0.1 * rng.normal(size=3), 0.1) for _ in range(200)]
+    flights = [pushes(person(seed), [view()] * 200, goal_views) for seed in (5, 5, 6)]
     np.testing.assert_array_equal(flights[0], flights[1])
     assert person(5).delay_s == person(5).delay_s != person(6).delay_s
     assert not np.array_equal(flights[0], flights[2])
@@ -131,9 +131,9 @@ def test_small_offsets_are_let_be():
 def test_few_axes_are_minded_at_a_time():
     """With four axes off, no more than two are worked at once, and each gets its turn."""
     who = person(7, **{**PLAIN, "attended": 2})
-    state, wished, minded = begin(who), view((0.3, 0.3, 0.3), 0.5), []
+    state, desired, minded = begin(who), view((0.3, 0.3, 0.3), 0.5), []
     for _ in range(600):
-        state, _ = steer(who, state, DT_S, view(), wished)
+        state, _ = steer(who, state, DT_S, view(), desired)
         minded.append(state.minded)
     counts = np.sum(minded, axis=1)
     assert counts.max() == 2 and np.all(np.any(minded, axis=0))
@@ -160,7 +160,7 @@ def test_noise_grows_with_what_is_seen():
 
 
 def test_the_camera_is_kept_on_the_target():
-    """Beside the wished place the wished heading is no longer the one that shows the target in the middle."""
+    """Beside the desired place the desired heading is no longer the one that shows the target in the middle."""
     who, watch = person(3, **PLAIN), np.array([1.0, 0.0, 0.0])
     state = begin(who)
     for _ in range(100):

@@ -8,12 +8,12 @@ from wakewise.operation.teleop.arbitration import BRAKING_M_S2, filtered_velocit
 DT_S = 0.02
 
 
-def led(v, wish, until=lambda v: False):
-    """Speeds, step by step, until they are the wish's or as told; and the largest change of acceleration a second."""
+def led(v, command, until=lambda v: False):
+    """Speeds, step by step, until as commanded or as told; and the largest change of acceleration a second."""
     v, a, speeds, jerk = np.array(v), np.zeros(3), [], 0.0
-    while not (np.array_equal(v, wish) or until(v)):
+    while not (np.array_equal(v, command) or until(v)):
         before = a
-        v, a = filtered_velocity(v, a, np.array(wish), DT_S)
+        v, a = filtered_velocity(v, a, np.array(command), DT_S)
         jerk = max(jerk, np.linalg.norm(a - before) / DT_S)
         speeds.append(np.linalg.norm(v))
     return speeds, jerk

@@ -83,13 +83,13 @@ def test_the_deadband_is_the_makers(maker: np.ndarray) -> None:
         assert np.all(T200.thrust_N(np.linspace(silent.min(), silent.max(), 57), voltage) == 0.0)
 
 
-def test_no_thrust_is_the_neutral_pulse_and_small_wishes_are_rounded() -> None:
-    """Below half the first step a wish becomes none, above half it becomes the first step, on each side."""
+def test_no_thrust_is_the_neutral_pulse_and_small_demands_are_rounded() -> None:
+    """Below half the first step a demand becomes none, above half it becomes the first step, on each side."""
     low, high = T200.first_step_N(16.0)
-    wishes = np.array([0.0, 0.49 * high, 0.51 * high, 0.49 * low, 0.51 * low])
-    assert T200.pwm_us(wishes, 16.0).tolist() == [1500.0, 1500.0, 1532.0, 1500.0, 1468.0]
-    assert T200.delivered_N(wishes, 16.0).tolist() == [0.0, 0.0, high, 0.0, low]
-    assert T200.power_W(wishes, 16.0)[[0, 1, 3]].tolist() == [0.0, 0.0, 0.0]
+    demands = np.array([0.0, 0.49 * high, 0.51 * high, 0.49 * low, 0.51 * low])
+    assert T200.pwm_us(demands, 16.0).tolist() == [1500.0, 1500.0, 1532.0, 1500.0, 1468.0]
+    assert T200.delivered_N(demands, 16.0).tolist() == [0.0, 0.0, high, 0.0, low]
+    assert T200.power_W(demands, 16.0)[[0, 1, 3]].tolist() == [0.0, 0.0, 0.0]
     assert T200.thrust_N(1529.0, 16.0) == high
 
 
@@ -103,18 +103,18 @@ def test_a_thruster_saturates_at_its_limits_and_pushes_less_in_reverse() -> None
 
 
 @given(st.floats(10.0, 20.0), st.lists(st.floats(-80.0, 80.0), min_size=2, max_size=8))
-def test_maps_never_fall_and_wishes_come_true(voltage: float, wishes: list[float]) -> None:
-    """At any voltage more wish never gives less pulse or thrust; what is delivered is what the pulse gives."""
-    wished = np.sort(np.array(wishes))
-    pulse = T200.pwm_us(wished, voltage)
-    delivered = T200.delivered_N(wished, voltage)
+def test_maps_never_fall_and_demands_are_met(voltage: float, demands: list[float]) -> None:
+    """At any voltage more demand never gives less pulse or thrust; what is delivered is what the pulse gives."""
+    desired = np.sort(np.array(demands))
+    pulse = T200.pwm_us(desired, voltage)
+    delivered = T200.delivered_N(desired, voltage)
     assert np.all(np.diff(pulse) >= 0.0)
     assert np.all(np.diff(delivered) >= 0.0)
     assert np.allclose(T200.thrust_N(pulse, voltage), delivered, atol=1e-9)
     low, high = T200.limits_N(voltage)
-    inside = (wished >= low) & (wished <= high) & (np.abs(wished) > 0.6)
-    assert np.allclose(delivered[inside], wished[inside], atol=1e-9)
-    assert np.all(T200.power_W(wished, voltage) >= 0.0)
+    inside = (desired >= low) & (desired <= high) & (np.abs(desired) > 0.6)
+    assert np.allclose(delivered[inside], desired[inside], atol=1e-9)
+    assert np.all(T200.power_W(desired, voltage) >= 0.0)
 
 
 def test_between_voltages_the_curve_lies_between_and_grows(maker: np.ndarray) -> None:

@@ -15,7 +15,7 @@ def test_a_curves_facts_hold_the_limits_and_both_look_ups() -> None:
     assert facts["limits_N"] == [-39.91, 51.44]
     assert facts["deadband_us"] == [1472.0, 1528.0]
     assert [row["thrust_N"] for row in facts["thrusts"]] == [10.0, 51.44, 0.0]
-    assert [row["wished_N"] for row in facts["thrusts"]] == [10.0, 51.44, 0.1]
+    assert [row["desired_N"] for row in facts["thrusts"]] == [10.0, 51.44, 0.1]
     assert facts["pulses"][0] == {"pwm_us": 1500.0, "thrust_N": 0.0, "rpm": 0.0, "power_W": 0.0}
     assert facts["table"][0]["pwm_us"] == 1100.0
     assert facts["table"][-1]["thrust_N"] == 51.44

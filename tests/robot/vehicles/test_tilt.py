@@ -40,10 +40,10 @@ def test_the_slide_is_the_derivative_of_the_place() -> None:
 
 
 @given(st.floats(-0.8, 0.6), st.floats(-3.0, 3.0), st.floats(0.0, 2.0))
-def test_the_joint_keeps_its_rate_and_its_stops(tilt_rad: float, wished_rad: float, dt_s: float) -> None:
-    """It goes towards the wish or the stop before it, no faster than it can, and never past it."""
-    after = JOINT.towards(tilt_rad, wished_rad, dt_s)
-    goal = min(max(wished_rad, -0.8), 0.6)
+def test_the_joint_keeps_its_rate_and_its_stops(tilt_rad: float, desired_rad: float, dt_s: float) -> None:
+    """It goes towards the desired angle or the stop before it, no faster than it can, and never past it."""
+    after = JOINT.towards(tilt_rad, desired_rad, dt_s)
+    goal = min(max(desired_rad, -0.8), 0.6)
     assert abs(after - tilt_rad) <= dt_s + 1e-12
     assert abs(after - goal) == pytest.approx(max(abs(goal - tilt_rad) - dt_s, 0.0), abs=1e-12)
 

@@ -89,7 +89,7 @@ def test_auto_takes_the_joint_where_there_is_one() -> None:
     assert goal.tilt_rad == 0.0
 
 
-def test_the_pilot_tells_the_wished_tilt() -> None:
+def test_the_pilot_tells_the_desired_tilt() -> None:
     """With the pose that goes with it."""
     aim = aim_of(HEAVY)
     goal = RoutePilot(route=ROUTE, aim=aim).goal(20.0, None)

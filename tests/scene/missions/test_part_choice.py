@@ -38,8 +38,8 @@ def test_what_is_not_mapped_and_what_is_seen_poorly_is_chosen() -> None:
     need = need_of(points, covered, np.zeros(2), SIZE)
     parts = choose_parts(need, 0.25, 1, 6)
     assert len(parts) == 2
-    for wished in ((-0.5, 0.4), (0.5, -0.5)):
-        assert np.linalg.norm(parts - wished, axis=1).min() < 0.15
+    for desired in ((-0.5, 0.4), (0.5, -0.5)):
+        assert np.linalg.norm(parts - desired, axis=1).min() < 0.15
 
 
 def test_steep_relief_is_chosen_though_it_is_seen_well() -> None:

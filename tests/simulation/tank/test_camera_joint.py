@@ -16,7 +16,7 @@ def camera(seed=0, joint=JOINT, start=0.0, **sensors):
     return CameraJoint(joint, start, SensorSettings(**sensors), np.random.default_rng(seed))
 
 
-def test_the_joint_turns_at_its_rate_to_the_wish_or_its_stop() -> None:
+def test_the_joint_turns_at_its_rate_to_the_desired_angle_or_its_stop() -> None:
     """0.02 rad in a fiftieth of a second, and no farther than the stop."""
     one = camera()
     one.aim(-2.0)
@@ -44,14 +44,14 @@ def test_the_encoder_errs_as_it_is_said_to() -> None:
 
 
 def test_a_fixed_camera_measures_nothing() -> None:
-    """And stands at zero whatever is wished."""
+    """And stands at zero whatever is desired."""
     fixed = camera(joint=None, start=0.4)
     fixed.aim(0.5)
     assert fixed.turn(1.0, 1.0) == ()
     assert fixed.tilt_rad == 0.0
 
 
-def test_a_wish_that_is_no_number_is_not_followed() -> None:
+def test_an_angle_that_is_no_number_is_not_followed() -> None:
     """The joint goes on to where it was last told."""
     one = camera()
     one.aim(0.1)

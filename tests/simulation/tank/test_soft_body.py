@@ -268,14 +268,14 @@ def test_the_drag_on_the_whole_is_told():
     """A loose rod that is held has the drag of its width; a stem that has come to rest has nearly as much."""
     stream = Stream([0.1, 0.0, 0.0])
     held = UnanchoredTarget(weight_N=1e3, friction=0.6)
-    wished = 0.5 * 1.2 * WATER * 2 * R * LENGTH * 0.1**2
+    desired = 0.5 * 1.2 * WATER * 2 * R * LENGTH * 0.1**2
     for body in (
         TargetMotion(rod(), TargetCompliance(drag=1.2, loose=held), WATER, stream),
         swaying(rod(), tissue(), stream),
     ):
         assert body.posture().drag_N == 0.0  # no step has been made
         body.step(stream, DT)
-        assert body.posture().drag_N == pytest.approx(wished, rel=0.05)
+        assert body.posture().drag_N == pytest.approx(desired, rel=0.05)
 
 
 def test_the_posture_tells_of_the_surface():

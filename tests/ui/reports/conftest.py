@@ -108,7 +108,7 @@ def make_trial(folder: Path, *, seed: int = 7, wash: float = 1.0, method: str = 
         haze = float(np.clip(0.15 + 0.5 * k / len(shots) + 0.05 * rng.random(), 0, 0.9))
         cv2.imwrite(str(folder / "images" / name), _photograph(rng, haze, float(azimuth[i])))
         X_WC = Pose.from_matrix(body[i].R @ R_BC, true[i])
-        wished = Pose.from_matrix(look_at(goal[i], CENTRE_W_M) @ R_BC, goal[i])
+        desired = Pose.from_matrix(look_at(goal[i], CENTRE_W_M) @ R_BC, goal[i])
         row: dict[str, object] = {"name": name, "time_s": time_s[i]}
         for prefix in ("est", "true"):
             row |= {f"{prefix}_{axis}_m": X_WC.p_m[j] for j, axis in enumerate("xyz")}
@@ -116,8 +116,8 @@ def make_trial(folder: Path, *, seed: int = 7, wash: float = 1.0, method: str = 
         rows.append(row | {"sharpness": 220 * (1 - haze) + 10 * rng.random(), "turbidity_per_m": turbidity[i]})
         planned.append(
             {"name": name}
-            | {f"{axis}_m": wished.p_m[j] for j, axis in enumerate("xyz")}
-            | {f"q{axis}": wished.q[j] for j, axis in enumerate("wxyz")}
+            | {f"{axis}_m": desired.p_m[j] for j, axis in enumerate("xyz")}
+            | {f"q{axis}": desired.q[j] for j, axis in enumerate("wxyz")}
         )
     pl.DataFrame(rows).write_csv(folder / "images.csv")
     pl.DataFrame(planned).write_csv(folder / "planned.csv")

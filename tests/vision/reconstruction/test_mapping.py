@@ -54,7 +54,7 @@ def test_every_way_puts_the_cameras_where_they_were(matched, tmp_path, changes, 
     assert capfd.readouterr().err == ""
 
 
-def test_a_closer_wish_cuts_what_sticks_out(matched, tmp_path):
+def test_a_closer_limit_cuts_what_sticks_out(matched, tmp_path):
     """Asked for less than COLMAP leaves, observations are cut until it is met, or it is said that it is not."""
     plain = mapped(matched, tmp_path / "a")
     close = mapped(matched, tmp_path / "b", reprojection_px=0.8 * plain["reprojection_px"])

@@ -109,9 +109,9 @@ def thrusts_of_pulses(vehicle: MotorDrivenVehicle, pulses_us: Array, directions:
 
 
 def pulses_of_thrusts(vehicle: Vehicle, thrusts_N: Array, directions: Array, supply_V: float) -> Array:
-    """Whole pulses for wished thrusts, both shape (n,) or (k, n), none of them in the dead band.
+    """Whole pulses for desired thrusts, both shape (n,) or (k, n), none of them in the dead band.
 
-    They give the nearest thrusts that can be held: a wish below the least becomes none or the least, whichever is
+    They give the nearest thrusts that can be held: a demand below the least becomes none or the least, whichever is
     nearer, and one beyond the limits the limit.
 
     Raises
@@ -119,21 +119,21 @@ def pulses_of_thrusts(vehicle: Vehicle, thrusts_N: Array, directions: Array, sup
     InputError
         If a thrust is not finite or the voltage lies outside the vehicle's table.
     """
-    wished = directions * np.asarray(thrusts_N, dtype=np.float64)
-    if not np.all(np.isfinite(wished)):
+    desired = directions * np.asarray(thrusts_N, dtype=np.float64)
+    if not np.all(np.isfinite(desired)):
         raise InputError(f"thrusts {np.asarray(thrusts_N).tolist()} N: every one must be finite")
     curve = _curve(vehicle)
     if curve is None:
         forward, reverse = vehicle.least_thrusts_N
-        least, limit = (np.where(wished > 0.0, a, b) for a, b in ((forward, reverse), _own_limits(vehicle)))
-        size = np.minimum(np.where(np.abs(wished) < 0.5 * least, 0.0, np.maximum(np.abs(wished), least)), limit)
+        least, limit = (np.where(desired > 0.0, a, b) for a, b in ((forward, reverse), _own_limits(vehicle)))
+        size = np.minimum(np.where(np.abs(desired) < 0.5 * least, 0.0, np.maximum(np.abs(desired), least)), limit)
         share = np.divide(size, limit, out=np.zeros_like(size), where=limit > 0.0)
-        return np.asarray(np.rint(MIDDLE_US + FULL_US * np.sign(wished) * share))
-    exact = curve.pwm_us(wished, supply_V)
+        return np.asarray(np.rint(MIDDLE_US + FULL_US * np.sign(desired) * share))
+    exact = curve.pwm_us(desired, supply_V)
     low, high = curve.pulse_limits_us(supply_V)
     # Of the whole pulses about the exact one, that with the nearest thrust: rounding alone may end in the dead band.
     around = np.clip(np.stack([np.floor(exact), np.ceil(exact)]), np.ceil(low), np.floor(high))
-    best = np.abs(curve.thrust_N(around, supply_V) - curve.delivered_N(wished, supply_V)).argmin(axis=0)
+    best = np.abs(curve.thrust_N(around, supply_V) - curve.delivered_N(desired, supply_V)).argmin(axis=0)
     return np.asarray(np.take_along_axis(around, best[None], axis=0)[0])
 
 

@@ -104,11 +104,11 @@ def test_a_fresh_autopilot_is_no_go_until_the_script_is_on_it() -> None:
     assert facts.parameters[protocol.ENABLE_PARAMETER] == 0.0
 
 
-def test_thrusts_that_are_wished_arrive_in_the_water() -> None:
+def test_thrusts_that_are_desired_arrive_in_the_water() -> None:
     """The output for the autopilot's own parameters, the message, the script and the table give the thrusts back."""
     wire = _installed()
     output = motor_output(HEAVY, read_parameters(wire))
-    wished = np.array([9.0, -6.0, 4.0, -3.0, 12.0, -9.0, 2.5, 0.0])
+    desired = np.array([9.0, -6.0, 4.0, -3.0, 12.0, -9.0, 2.5, 0.0])
     send_command(wire, 400, 1.0)
     set_parameter(wire, protocol.ENABLE_PARAMETER, 1.0)
     for i in range(10):
@@ -118,14 +118,14 @@ def test_thrusts_that_are_wished_arrive_in_the_water() -> None:
             group_mlx=protocol.THRUST_GROUP,
             target_system=1,
             target_component=1,
-            controls=list(output.controls(wished)),
+            controls=list(output.controls(desired)),
         )
         for _ in range(5):
             wire.loop()
     assert wire.autopilot.armed
     assert wire.autopilot.overridden
-    assert wire.autopilot.pulses_us[:8] == tuple(output.pulses_us(wished))
-    assert output.delivered_N(np.array(wire.autopilot.pulses_us[:8], dtype=float)) == pytest.approx(wished, abs=0.12)
+    assert wire.autopilot.pulses_us[:8] == tuple(output.pulses_us(desired))
+    assert output.delivered_N(np.array(wire.autopilot.pulses_us[:8], dtype=float)) == pytest.approx(desired, abs=0.12)
     silent = 0
     while wire.autopilot.overridden:
         wire.loop()

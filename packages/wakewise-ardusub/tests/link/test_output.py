@@ -23,16 +23,16 @@ def output() -> MotorOutput:
 
 
 @pytest.mark.parametrize("battery_V", [13.2, 14.8, 16.5, float("nan")])
-def test_thrusts_come_out_of_the_script_as_they_were_wished(output: MotorOutput, battery_V: float) -> None:
-    """Allocation's thrusts, the message, the script itself and the table: within half a microsecond of the wish."""
-    wished = np.array([12.0, -8.0, 5.0, -3.0, 20.0, -15.0, 1.0, 0.0])
+def test_thrusts_come_out_of_the_script_as_they_were_desired(output: MotorOutput, battery_V: float) -> None:
+    """Allocation's thrusts, the message, the script itself and the table: within half a microsecond of the demand."""
+    desired = np.array([12.0, -8.0, 5.0, -3.0, 20.0, -15.0, 1.0, 0.0])
     bench = Bench()
     bench.load()
     bench.enable()
-    bench.step(thrusts(list(output.controls(wished, battery_V)), 10))
+    bench.step(thrusts(list(output.controls(desired, battery_V)), 10))
     pulses = np.array([bench.pulses[channel] for channel in range(8)], dtype=float)
-    assert pulses == pytest.approx(output.pulses_us(wished, battery_V))
-    assert output.delivered_N(pulses, battery_V) == pytest.approx(wished, abs=0.12)
+    assert pulses == pytest.approx(output.pulses_us(desired, battery_V))
+    assert output.delivered_N(pulses, battery_V) == pytest.approx(desired, abs=0.12)
     assert pulses[7] == 1500.0
 
 

@@ -65,7 +65,7 @@ class Small:
             told: dict[str, Any] = json.loads(answer.read())
         return told
 
-    def wish(self, what: str) -> tuple[int, dict[str, Any]]:
+    def command(self, what: str) -> tuple[int, dict[str, Any]]:
         try:
             with ASK(urllib.request.Request(self.address + what, method="POST"), timeout=10) as answer:
                 return answer.status, json.loads(answer.read())
@@ -170,17 +170,17 @@ def test_a_meter_speaks_first_to_a_server_only(craft_file: Path) -> None:
 
 
 def test_a_page_may_mark_a_target_and_begin_anew(craft_file: Path) -> None:
-    """A mark needs the vehicle's place; a wish that nobody knows is none."""
+    """A mark needs the vehicle's place; a command that nobody knows is none."""
     with (
         small("--connection", free_ends(), "--craft", str(craft_file)) as meter,
         Vehicle(meter.port) as vehicle,
     ):
-        assert meter.wish("mark")[0] == 409
+        assert meter.command("mark")[0] == 409
         meter.until(vehicle, lambda state: state["can_mark"] and state["running_instants"] > 2)
-        assert meter.wish("mark") == (200, {"done": True})
+        assert meter.command("mark") == (200, {"done": True})
         assert meter.until(vehicle, lambda state: state["marked"])["points"] == "of a mark in the world"
-        assert meter.wish("unmark")[0] == 200
-        assert meter.wish("begin")[0] == 200
+        assert meter.command("unmark")[0] == 200
+        assert meter.command("begin")[0] == 200
         assert not meter.until(vehicle, lambda state: not state["marked"])["marked"]
 
 

@@ -33,11 +33,11 @@ class Stage:
     def __init__(self) -> None:
         self.state: dict[str, Any] = dict(LIVE)
         self.past: dict[str, Any] = {"until_s": 99, "flown_mm_s": [None, 10.0, 14.0], "gentle_mm_s": [None, 5.0, 6.0]}
-        self.wished: list[str] = []
-        self.server = MeterServer(lambda: self.state, lambda: self.past, self._wish)
+        self.desired: list[str] = []
+        self.server = MeterServer(lambda: self.state, lambda: self.past, self._command)
 
-    def _wish(self, what: str) -> str | None:
-        self.wished.append(what)
+    def _command(self, what: str) -> str | None:
+        self.desired.append(what)
         self.state = self.state | {"marked": what == "mark"}
         return None
 
@@ -131,12 +131,12 @@ def test_the_page_marks_a_target_and_lets_it_go(opened: Any, stage: Stage) -> No
     page = opened()
     page.until("document.querySelector('#mark').textContent === 'Mark the target here'")
     page.click("#mark")
-    until(lambda: stage.wished == ["mark"], "the mark")
+    until(lambda: stage.desired == ["mark"], "the mark")
     page.until("document.querySelector('#mark').getAttribute('aria-pressed') === 'true'")
     page.click("#mark")
-    until(lambda: stage.wished == ["mark", "unmark"], "the mark to go")
+    until(lambda: stage.desired == ["mark", "unmark"], "the mark to go")
     page.click("#begin")
-    until(lambda: stage.wished[-1] == "begin", "the new beginning")
+    until(lambda: stage.desired[-1] == "begin", "the new beginning")
     stage.state |= {"can_mark": False, "marked": False}
     page.until("document.querySelector('#mark').hidden")
 
@@ -147,6 +147,6 @@ def test_a_server_that_is_gone_is_said(opened: Any, stage: Stage) -> None:
     stage.server.stop()
     page.until("document.body.dataset.link === 'lost'")
     assert page.text("#link") == "No answer"
-    stage.server = MeterServer(lambda: stage.state, lambda: stage.past, stage._wish, port=stage.server.port)
+    stage.server = MeterServer(lambda: stage.state, lambda: stage.past, stage._command, port=stage.server.port)
     stage.server.start()
     page.until("document.body.dataset.link === 'live'")

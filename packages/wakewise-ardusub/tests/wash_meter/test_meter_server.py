@@ -1,4 +1,4 @@
-"""Who may look at a meter's page, and who may wish something of it."""
+"""Who may look at a meter's page, and who may command something of it."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ WISHED: list[str] = []
 ASK = urllib.request.build_opener(urllib.request.ProxyHandler({})).open
 
 
-def wish(what: str) -> str | None:
+def command(what: str) -> str | None:
     WISHED.append(what)
     return "no place" if what == "mark" else None
 
 
 def make(host: str = "127.0.0.1", *, token: bool = True) -> MeterServer:
-    return MeterServer(lambda: {"why_not": None}, lambda: {"flown_mm_s": []}, wish, host, token=token)
+    return MeterServer(lambda: {"why_not": None}, lambda: {"flown_mm_s": []}, command, host, token=token)
 
 
 @pytest.fixture(scope="module")
@@ -67,8 +67,8 @@ def test_the_page_and_all_its_parts_are_served(server: MeterServer) -> None:
     assert got(server, "/nothing")[0] == 404
 
 
-def test_the_state_is_told_and_wishes_are_done(server: MeterServer) -> None:
-    """JSON both ways; a wish that cannot be done says why, one that is none is not there."""
+def test_the_state_is_told_and_commands_are_done(server: MeterServer) -> None:
+    """JSON both ways; a command that cannot be done says why, one that is none is not there."""
     assert json.loads(got(server, "/state.json")[2]) == {"why_not": None}
     assert json.loads(got(server, "/history.json")[2]) == {"flown_mm_s": []}
     WISHED.clear()
@@ -80,7 +80,7 @@ def test_the_state_is_told_and_wishes_are_done(server: MeterServer) -> None:
     assert WISHED == ["begin", "mark"]
 
 
-def test_another_sites_page_sees_and_wishes_nothing(server: MeterServer) -> None:
+def test_another_sites_page_sees_and_commands_nothing(server: MeterServer) -> None:
     """Foreign host names and origins are refused; only what ground stations read is shared."""
     for path, method in (("/state.json", "GET"), ("/begin", "POST"), ("/", "GET")):
         assert got(server, path, method, Host="evil.example")[0] == 403
@@ -93,7 +93,7 @@ def test_another_sites_page_sees_and_wishes_nothing(server: MeterServer) -> None
 
 
 def test_from_elsewhere_the_token_opens_it_unless_everybody_may() -> None:
-    """Files lie open, state and wishes do not; with --no-token they do, and other sites are refused all the same."""
+    """Files lie open, state and commands do not; with --no-token they do, and other sites are refused all the same."""
     rov = RequestOrigin(address="10.0.0.7", host="rov.local:8765", origin=None)
     closed, everybody = make("0.0.0.0"), make("0.0.0.0", token=False)
     try:
@@ -132,7 +132,7 @@ def test_ground_stations_are_told_by_their_schema(server: MeterServer) -> None:
 def test_a_port_that_is_taken_is_said_in_one_line(server: MeterServer) -> None:
     """With the way out."""
     with pytest.raises(InputError, match=r"--port \d+ at 127.0.0.1: .*give another --port"):
-        MeterServer(dict, dict, wish, port=server.port)
+        MeterServer(dict, dict, command, port=server.port)
 
 
 def dialled(server: MeterServer, says: bytes) -> socket.socket:

@@ -74,7 +74,7 @@ class TransectRoute(Route):
     heading_rad: float
 
     def camera(self, time_s: float) -> tuple[Pose, Array, Array]:
-        """Wished camera pose X_WC, its velocity and its angular velocity in W (shape (3,) each)."""
+        """Desired camera pose X_WC, its velocity and its angular velocity in W (shape (3,) each)."""
         place, velocity_W = self.on_sphere(time_s)
         ahead = np.array([np.cos(self.heading_rad), np.sin(self.heading_rad), 0.0])
         right = np.array([-ahead[1], ahead[0], 0.0])

@@ -65,8 +65,8 @@ def test_worlds_and_targets_take_turns():
 def test_other_worlds_are_flown_on_each_third_seed():
     """So that a budget buys pairs in the paper's own set-up; alone, another world is flown on every seed."""
 
-    def seeds(world, **wish):
-        blocks = blocks_of("success", TableRequest(trials=7, **wish))
+    def seeds(world, **request):
+        blocks = blocks_of("success", TableRequest(trials=7, **request))
         return [block[0].seed for block in blocks if block[0].world == world]
 
     assert seeds("pump-tank") == [3001, 3002, 3003, 3004, 3005, 3006, 3007]
@@ -94,27 +94,27 @@ def test_silt_has_the_same_coral_and_method_in_clear_water_beside_it():
     assert fields[0] == fields[1] and (clear[0].world, silted[0].world) == ("pump-tank", "caco3")
 
 
-def test_wishes_narrow_a_table():
+def test_requests_narrow_a_table():
     """Worlds, methods and targets by name; what cannot be flown in the world of nothing stays."""
-    wish = TableRequest(trials=1, worlds=("reef",), methods=("mpc-smooth",), targets=("plate",))
-    (block,) = blocks_of("dynamic", wish)
+    request = TableRequest(trials=1, worlds=("reef",), methods=("mpc-smooth",), targets=("plate",))
+    (block,) = blocks_of("dynamic", request)
     assert [(plan.world, plan.method, plan.target) for plan in block] == [("reef", "mpc-smooth", "plate")]
     (solver,) = blocks_of("solver", TableRequest(trials=5, worlds=("reef",)))
     assert solver[0].world == NOWHERE
 
 
 @pytest.mark.parametrize(
-    ("wish", "words"),
+    ("request", "words"),
     [
         (TableRequest(trials=1, worlds=("atlantis",)), "--world: 'atlantis'"),
         (TableRequest(trials=1, methods=("magic",)), "--methods: 'magic'"),
         (TableRequest(trials=1, targets=("unicorn",)), "--targets: 'unicorn'.*brain"),
     ],
 )
-def test_an_unknown_name_is_refused_with_what_would_do(wish, words):
+def test_an_unknown_name_is_refused_with_what_would_do(request, words):
     """Before anything is flown."""
     with pytest.raises(InputError, match=words):
-        blocks_of("station", wish)
+        blocks_of("station", request)
 
 
 def test_the_varied_missions_of_success_are_drawn_by_the_seed_alone():

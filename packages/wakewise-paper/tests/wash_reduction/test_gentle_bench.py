@@ -141,7 +141,7 @@ def test_wrong_currents_are_flown_where_water_runs():
     assert {key[0] for key in trials if key[1] == WRONG} == {"world/kelp", "orbit/paper"}
 
 
-def test_wishes_are_checked():
+def test_requests_are_checked():
     """Names that do not exist and numbers out of range are refused with what is allowed."""
     with pytest.raises(InputError, match="allowed: dp"):
         gentle.run(BenchOptions(methods=("magic",)))

@@ -198,7 +198,7 @@ def test_a_mean_over_rows_keeps_what_is_straight_and_takes_noise_away():
     assert np.abs(smoothed(noise, 3)[1:-1]).max() == pytest.approx(1 / 3)
 
 
-def test_the_bench_tells_the_bound_where_it_is_wished(monkeypatch, tmp_path, capsys):
+def test_the_bench_tells_the_bound_where_it_is_desired(monkeypatch, tmp_path, capsys):
     """Beside the flights; kept like them."""
     row = {"dp_m_s": 0.03, "least_m_s": 0.03, "least_power_W": 5.0, "rule_m_s": 0.01, "rule_energy": 1.2}
     row |= {"belief_m_s": 0.01, "belief_energy": 1.1, "belief_any_m_s": 0.01, "belief_any_energy": 1.5}

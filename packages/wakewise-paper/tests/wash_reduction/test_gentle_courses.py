@@ -1,4 +1,4 @@
-"""Courses of the gentle bench: where the camera is wished to be, and that the hull clears bed and target."""
+"""Courses of the gentle bench: where the camera is desired to be, and that the hull clears bed and target."""
 
 import numpy as np
 import pytest

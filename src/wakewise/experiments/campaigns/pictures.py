@@ -65,13 +65,13 @@ def _keep_photographs(place: Path, folder: Path) -> None:
         return
     times = listed["time_s"].to_numpy() - float(listed["time_s"][0])
     kept = []
-    for wished in PICTURES_AT_S:
-        row = int(np.argmin(np.abs(times - wished)))
+    for desired in PICTURES_AT_S:
+        row = int(np.argmin(np.abs(times - desired)))
         image = read_picture(place / "images" / listed["name"][row])
         if image is None:
             continue
         size = (WIDE_PX, round(WIDE_PX * image.shape[0] / image.shape[1]))
-        name = f"photograph-{wished:g}s.jpg"
+        name = f"photograph-{desired:g}s.jpg"
         coded = cv2.imencode(".jpg", cv2.resize(image, size, interpolation=cv2.INTER_AREA))[1]
         with whole_file(folder / name) as temporary:
             temporary.write_bytes(coded.tobytes())

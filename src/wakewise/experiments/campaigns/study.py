@@ -155,12 +155,12 @@ def numbers(figures: Figures) -> dict[str, float | None]:
     return {name: value for name, value in figures.items() if not isinstance(value, str)}
 
 
-def selected(what: str, wished: Sequence[str] | None, allowed: Sequence[str]) -> tuple[str, ...]:
+def selected(what: str, requested: Sequence[str] | None, allowed: Sequence[str]) -> tuple[str, ...]:
     """The chosen names in the order of `allowed`; all if None.
 
     Raises InputError if one is not allowed.
     """
-    for name in wished or ():
+    for name in requested or ():
         if name not in allowed:
             raise InputError(f"{what}: '{name}' is not known, allowed: {', '.join(allowed)}")
-    return tuple(name for name in allowed if wished is None or name in wished)
+    return tuple(name for name in allowed if requested is None or name in requested)

@@ -42,7 +42,7 @@ MEASURES = (
     ComparisonMetric("completeness_pct", "% of the surface", 1.0, False),
     ComparisonMetric("target_speed_mean_m_s", "mm/s of water at the target", 1e3, True),
     ComparisonMetric("exposure_speed_mean_m_s", "mm/s while the shutter is open", 1e3, True),
-    ComparisonMetric("position_rmse_mm", "mm off the wished place", 1.0, True),
+    ComparisonMetric("position_rmse_mm", "mm off the desired place", 1.0, True),
     ComparisonMetric("energy_kJ", "kJ of the thrusters", 1.0, True),
 )
 """What a table shows by default and a page judges by, as far as trials have it."""
@@ -156,7 +156,7 @@ def group_table(found: Results, by: Sequence[str] = (), figures: Sequence[str] =
     for name in figures:
         if known and name not in known:
             raise InputError(f"--figures: '{name}' is in no trial, allowed: {', '.join(known)}")
-    wished = tuple(figures) or tuple(measure.figure for measure in MEASURES if measure.figure in known)
+    requested = tuple(figures) or tuple(measure.figure for measure in MEASURES if measure.figure in known)
     groups: dict[tuple[str | int, ...], list[TrialRecord]] = {}
     for one in found.made:
         groups.setdefault(tuple(one.entry.factors.get(name, "") for name in by), []).append(one)
@@ -165,7 +165,7 @@ def group_table(found: Results, by: Sequence[str] = (), figures: Sequence[str] =
         row: dict[str, Any] = dict(zip(by, names, strict=True))
         counted = Counter(one.state for one in members)
         row |= {"trials": len(members), "done": counted["done"], "failed": counted["failed"], "figures": {}}
-        for name in wished:
+        for name in requested:
             row["figures"][name] = _share(name, members) if name in SHARES else _mean(name, members, by)
         rows.append(row)
     return rows

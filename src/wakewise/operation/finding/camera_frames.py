@@ -62,7 +62,7 @@ class CameraFrames:
         return measurements + due
 
     def aim(self, tilt_rad: float) -> None:
-        """Wish an angle of the camera's joint."""
+        """Command an angle of the camera's joint."""
         if (aim := getattr(self._plant, "aim", None)) is not None:
             aim(tilt_rad)
 

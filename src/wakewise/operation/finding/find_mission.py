@@ -58,13 +58,13 @@ class FindPilot:
         find: FindSettings,
         chooser: ViewChooser | None = None,
     ) -> None:
-        self._aim, self._wished, self._find, self._chooser = aim, mission, find, chooser
+        self._aim, self._requested, self._find, self._chooser = aim, mission, find, chooser
         self._start, self._assumed_m = start, assumed_m
         self.begin()
 
     def begin(self) -> None:
         """Forget an earlier flight: what is known at the start of one."""
-        self._mission = self._wished
+        self._mission = self._requested
         self.centre_W_m = self._start.p_m + self._assumed_m * self._start.R[:, 2]
         self._here = on_sphere(self._start.p_m - self.centre_W_m)
         self._last_s = 0.0
@@ -150,7 +150,7 @@ class FindPilot:
         way = target.centre_W_m - self.centre_W_m
         far = float(np.linalg.norm(way))
         step = way if far <= FOLLOWS_M_S * dt_s else way * (FOLLOWS_M_S * dt_s / far)
-        # In the last centimetre it closes in by a share, so that the wished velocity is smooth.
+        # In the last centimetre it closes in by a share, so that the desired velocity is smooth.
         step = step * min(1.0, far / 0.01) if far < 0.01 else step
         self.centre_W_m = self.centre_W_m + step
         return np.asarray(step / dt_s)
@@ -221,13 +221,13 @@ class FindPilot:
         if self._chooser is None:
             return
         before, now = self._mission.elevations_deg, []
-        for wished_deg in self._wished.elevations_deg:
-            elevation_deg, below = self._chooser.clear_elevation_deg(target, wished_deg)
+        for desired_deg in self._requested.elevations_deg:
+            elevation_deg, below = self._chooser.clear_elevation_deg(target, desired_deg)
             now.append(elevation_deg)
             if below and elevation_deg not in before:
                 log.warning(
                     "orbit at %g deg raised to %g deg: the hull would come nearer to %s than mission.clearance_m",
-                    wished_deg, elevation_deg, below,
+                    desired_deg, elevation_deg, below,
                 )  # fmt: skip
         self._mission = self._mission.model_copy(update={"elevations_deg": tuple(now)})
 

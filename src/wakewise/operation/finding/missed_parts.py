@@ -120,16 +120,16 @@ class ViewChooser:
         mount = self.aim.mount(self.aim.tilt(pitch)[0]).inverse()
         return gaps_of(X_WC @ mount, self.size_m, self.bounds, solid_W_m)
 
-    def clear_elevation_deg(self, target: TargetEstimate, wished_deg: float) -> tuple[float, str]:
-        """Lowest elevation from the wished one on at which the orbit keeps the clearance, and what is below it.
+    def clear_elevation_deg(self, target: TargetEstimate, desired_deg: float) -> tuple[float, str]:
+        """Lowest elevation from the desired one on at which the orbit keeps the clearance, and what is below it.
 
-        What is below is "" where the wished one is clear. The bounds are known, the target as far as it is mapped, else
-        as a ball.
+        What is below is "" if the desired one is clear. Bounds are known, the target as far as it is mapped, else as
+        a ball.
         """
         ball = target.centre_W_m + hull_corners(np.full(3, 2.0 * target.radius_m / math.sqrt(3.0)))
         known = (target.surface_W_m, target.points_W_m, ball)
         solid = next(points for points in known if points is not None and len(points))
-        clearance_m, elevation_deg, below = self.mission.clearance_m, wished_deg, ""
+        clearance_m, elevation_deg, below = self.mission.clearance_m, desired_deg, ""
         # Higher up, the surface and the walls are no farther.
         least = {"the floor": clearance_m, "the target": clearance_m + MAPPED_MARGIN_M}
         azimuths = (2.0 * math.pi / CHECKED * np.arange(CHECKED)).tolist()

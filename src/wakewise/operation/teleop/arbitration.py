@@ -205,17 +205,17 @@ def steer_attitude(
     """
     turn, rise, place = float(axes[3]), float(axes[4]), motion.place_W_m
     yaw = float(motion.angles_rad[2])
-    wished = AttitudeReference(angles_rad=np.array([0.0, 0.0, yaw]), rates_rad_s=np.zeros(3), tilt_rad=motion.tilt_rad)
+    desired = AttitudeReference(angles_rad=np.array([0.0, 0.0, yaw]), rates_rad_s=np.zeros(3), tilt_rad=motion.tilt_rad)
     if state.watch_target:
-        wished = camera_on_target(place, motion.velocity_W_m_s, yaw, target_W_m, aim, dt_s)
-    new = step_angle(motion, 0, wished, dt_s)
+        desired = camera_on_target(place, motion.velocity_W_m_s, yaw, target_W_m, aim, dt_s)
+    new = step_angle(motion, 0, desired, dt_s)
     by_hand = turn != 0.0 or not state.watch_target
-    new = step_rate(new, 2, turn * FULL_RAD_S * state.share, dt_s) if by_hand else step_angle(new, 2, wished, dt_s)
+    new = step_rate(new, 2, turn * FULL_RAD_S * state.share, dt_s) if by_hand else step_angle(new, 2, desired, dt_s)
     if rise == 0.0 and state.watch_target:
-        return step_tilt(step_angle(new, 1, wished, dt_s), wished, dt_s, aim)
+        return step_tilt(step_angle(new, 1, desired, dt_s), desired, dt_s, aim)
     rate = rise * TILT_RAD_S * state.gain
     if aim.joint is not None:
-        level = replace(wished, angles_rad=np.zeros(3), rates_rad_s=np.zeros(3))
+        level = replace(desired, angles_rad=np.zeros(3), rates_rad_s=np.zeros(3))
         return turn_tilt_joint(step_angle(new, 1, level, dt_s), rate, dt_s, aim)
     pitch = float(motion.angles_rad[1])
     return step_rate(new, 1, 0.0 if abs(pitch) >= STEEPEST_RAD and rate * pitch > 0.0 else rate, dt_s)
@@ -241,15 +241,15 @@ def steer_position(
     if sphere.frame is None or state.orbit != sphere.orbits:
         sphere = StickFrame(frame=frame, orbits=state.orbit)
     swing = swing if state.orbit else np.zeros(3)
-    wish = FULL_M_S * state.share * np.asarray(axes[:3])
+    command = FULL_M_S * state.share * np.asarray(axes[:3])
     if state.orbit and elevation_rad(eye, target_W_m) > HIGHEST_RAD:
-        wish[2] = max(wish[2], 0.0)
+        command[2] = max(command[2], 0.0)
     before = frame if sphere.frame is None else sphere.frame
     now = before.T @ (motion.velocity_W_m_s + swing)
     range_m = None
     if state.orbit:
-        wish[0], range_m = _at_range(wish[0], now[0], sphere.range_m, float(np.linalg.norm(eye - target_W_m)))
-    answer, change = filtered_velocity(now, sphere.change_m_s2, wish, dt_s)
+        command[0], range_m = _at_range(command[0], now[0], sphere.range_m, float(np.linalg.norm(eye - target_W_m)))
+    answer, change = filtered_velocity(now, sphere.change_m_s2, command, dt_s)
     velocity = frame @ answer - swing
     blocked_by = None
     if keep_off is not None:
@@ -257,8 +257,8 @@ def steer_position(
         velocity, _ = keep_off.allowed(motion.X_WB, velocity, motion.omega_B_rad_s)
         if not np.array_equal(velocity, free):
             change = np.zeros(3)  # the collision limit is no acceleration of the sticks, so it does not continue
-        if wish.any():  # the obstacle of the command, not of the velocity that is already reduced
-            _, blocked_by = keep_off.allowed(motion.X_WB, frame @ wish - swing, motion.omega_B_rad_s)
+        if command.any():  # the obstacle of the command, not of the velocity that is already reduced
+            _, blocked_by = keep_off.allowed(motion.X_WB, frame @ command - swing, motion.omega_B_rad_s)
     # Near the zenith the frame turns faster than a velocity may.
     velocity = limit_acceleration(motion.velocity_W_m_s, velocity, dt_s, HARDEST_M_S2)
     place = limit_lead(motion.place_W_m, 0.5 * (motion.velocity_W_m_s + velocity), estimate, dt_s)
@@ -268,21 +268,21 @@ def steer_position(
     )
 
 
-def filtered_velocity(now_m_s: Array, change_m_s2: Array, wish_m_s: Array, dt_s: float) -> tuple[Array, Array]:
+def filtered_velocity(now_m_s: Array, change_m_s2: Array, command_m_s: Array, dt_s: float) -> tuple[Array, Array]:
     """Commanded velocity and acceleration after one step, with limited jerk; shape (3,) each, in the sticks' frame.
 
     No vehicle follows a step of the command; without the limit it would compensate the lag with thrust.
     """
-    slower = np.linalg.norm(wish_m_s) < np.linalg.norm(now_m_s)
+    slower = np.linalg.norm(command_m_s) < np.linalg.norm(now_m_s)
     return limit_jerk(
-        now_m_s, change_m_s2, wish_m_s, dt_s, BRAKING_PEAK_M_S2 if slower else FASTER_PEAK_M_S2, JERK_M_S3
+        now_m_s, change_m_s2, command_m_s, dt_s, BRAKING_PEAK_M_S2 if slower else FASTER_PEAK_M_S2, JERK_M_S3
     )
 
 
-def _at_range(wish: float, now: float, kept_m: float | None, range_m: float) -> tuple[float, float | None]:
+def _at_range(command: float, now: float, kept_m: float | None, range_m: float) -> tuple[float, float | None]:
     """Commanded speed towards the centre, and the radius that is held; None while the stick is deflected."""
-    if wish != 0.0 or (kept_m is None and abs(now) > SLOW_M_S):
-        return wish, None
+    if command != 0.0 or (kept_m is None and abs(now) > SLOW_M_S):
+        return command, None
     kept_m = range_m if kept_m is None else kept_m
     return min(max(RANGE_PER_S * (range_m - kept_m), -RANGE_M_S), RANGE_M_S), kept_m
 

@@ -158,9 +158,9 @@ class AssistedPilot:
         if not first:
             self._move(state, CENTRED if controls is None else controls, time_s, estimate)
         self._weigh(estimate)
-        wished = math.log(state.w_track / PAPER_W_TRACK)
+        desired = math.log(state.w_track / PAPER_W_TRACK)
         most = math.inf if first else DIAL_PER_S * self.dt_s
-        self._dial += min(max(wished - self._dial, -most), most)
+        self._dial += min(max(desired - self._dial, -most), most)
         scale = math.exp(self._dial)
         return self.motion.goal(
             tracking_weight_scale=scale, max_tracking_deviation=deviation_limit(PAPER_W_TRACK * scale)

@@ -128,21 +128,21 @@ def step_tilt(motion: MotionReference, reference: AttitudeReference, dt_s: float
     return replace(motion, tilt_rad=aim.joint.within(tilt), tilt_rad_s=rate)
 
 
-def turn_tilt_joint(motion: MotionReference, wished_rad_s: float, dt_s: float, aim: CameraAim) -> MotionReference:
+def turn_tilt_joint(motion: MotionReference, desired_rad_s: float, dt_s: float, aim: CameraAim) -> MotionReference:
     """The motion with its camera's joint turned at a reference rate, as far as its stops."""
     if aim.joint is None:
         return motion
     most = aim.joint.rate_rad_s
-    rate = limit_slew(motion.tilt_rad_s, min(max(wished_rad_s, -most), most), dt_s, TILT_RAD_S2)
+    rate = limit_slew(motion.tilt_rad_s, min(max(desired_rad_s, -most), most), dt_s, TILT_RAD_S2)
     asked = motion.tilt_rad + 0.5 * (motion.tilt_rad_s + rate) * dt_s
     tilt = aim.joint.within(asked)
     return replace(motion, tilt_rad=tilt, tilt_rad_s=rate if tilt == asked else 0.0)
 
 
-def step_rate(motion: MotionReference, k: int, wished_rad_s: float, dt_s: float) -> MotionReference:
+def step_rate(motion: MotionReference, k: int, desired_rad_s: float, dt_s: float) -> MotionReference:
     """The motion with angle number k turned at a reference rate, which is reached at `TURN_RAD_S2`."""
     before = float(motion.rates_rad_s[k])
-    rate = limit_slew(before, wished_rad_s, dt_s, TURN_RAD_S2)
+    rate = limit_slew(before, desired_rad_s, dt_s, TURN_RAD_S2)
     return _with_angle(motion, k, float(motion.angles_rad[k]) + 0.5 * (before + rate) * dt_s, rate)
 
 

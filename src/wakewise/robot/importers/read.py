@@ -75,7 +75,7 @@ def import_vehicle(
     "+x"; see `make_draft`. `matrix`: YAML file with the matrix that the project ships; kept beside the geometry for
     comparison. `packages`: folders of packages that are not found near the file. `arguments`: values of xacro and
     Stonefish arguments. `skip_missing`: leave out xacro includes that are not there, with a note, instead of refusing
-    the file. `rows`: what the six rows of a matrix are, in the file's order: names parted by commas, such as
+    the file. `rows`: what the six rows of a matrix are, in the file's order: names separated by commas, such as
     "roll,pitch,yaw,x,y,z". Returns in FRD. What the file does not hold is None and listed in `missing`; `notes` says
     what was decided and why. Raises InputError in one line with file and line, for anything that cannot be read or is
     not a vehicle.

@@ -231,7 +231,7 @@ def number(text: str, place: SourceLocation, what: str) -> float:
 
 
 def numbers(text: str, place: SourceLocation, what: str, count: int | None = None) -> Array:
-    """Turn text of numbers parted by blanks or commas into an array; `count` fixes how many."""
+    """Turn text of numbers separated by blanks or commas into an array; `count` fixes how many."""
     parts = text.replace(",", " ").split()
     if count is not None and len(parts) != count:
         raise PlacedError(f"{place}: {what} has {len(parts)} numbers, must have {count}")

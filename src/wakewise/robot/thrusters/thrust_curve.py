@@ -1,4 +1,4 @@
-"""What one thruster makes of a pulse at a supply voltage: thrust, speed, power, and the pulse for a wish.
+"""What one thruster makes of a pulse at a supply voltage: thrust, speed, power, and the pulse for a demand.
 
 What thrusts a thruster can hold: none below its least, and above it those of whole steps of the command.
 
@@ -65,7 +65,7 @@ class ThrustCurve:
     outermost pulse and a thrust beyond the limits as the limit: that is how a thruster saturates.
 
     Between `silent_us` and `first_us` (4 us apart in a fine table) the thruster is taken to run at its slowest. A
-    wished thrust below the first one that can be held is rounded to none or to that first step, whichever is nearer.
+    desired thrust below the first one that can be held is rounded to none or to that first step, whichever is nearer.
 
     `supply_V`, shape (v,): increasing. `neutral_us`: the pulse that is sent for no thrust. `notes`: what was found and
     done when the table was read, one sentence each. Raises InputError from every method: if a pulse or thrust is not
@@ -102,7 +102,7 @@ class ThrustCurve:
         return thrust
 
     def pwm_us(self, thrust_N: ArrayLike, supply_V: float | None = None) -> Array:
-        """Pulse for wished thrusts of any shape; where a thrust has several, the one nearest to neutral."""
+        """Pulse for desired thrusts of any shape; where a thrust has several, the one nearest to neutral."""
         return self._along(
             thrust_N,
             supply_V,
@@ -111,7 +111,7 @@ class ThrustCurve:
         )
 
     def delivered_N(self, thrust_N: ArrayLike, supply_V: float | None = None) -> Array:
-        """Thrust that a wished thrust turns into: limited, and rounded below the first step; any shape."""
+        """Thrust that a desired thrust turns into: limited, and rounded below the first step; any shape."""
         return self._signed("thrust_N", thrust_N, supply_V)
 
     def rpm(self, thrust_N: ArrayLike, supply_V: float | None = None) -> Array:
@@ -173,15 +173,15 @@ class ThrustCurve:
         return mix
 
     def _along(self, thrust_N: ArrayLike, supply_V: float | None, value: Along, *, at_rest: float) -> Array:
-        """Read `value` off each side where the wished thrust lies on it."""
-        wished = _finite(thrust_N, "thrust")
+        """Read `value` off each side where the desired thrust lies on it."""
+        desired = _finite(thrust_N, "thrust")
         mix = self._mix(supply_V)
-        result = np.full_like(wished, at_rest)
+        result = np.full_like(desired, at_rest)
         for sign, side in self._sides():
             thrusts = mix(side.thrust_N)
-            target = np.clip(sign * wished, thrusts[0], thrusts[-1])
+            target = np.clip(sign * desired, thrusts[0], thrusts[-1])
             # Half the first step is where it is as near as nothing; a curve that starts at zero has no step.
-            runs = (sign * wished > 0.0) & (sign * wished >= 0.5 * thrusts[0]) & (thrusts[-1] > 0.0)
+            runs = (sign * desired > 0.0) & (sign * desired >= 0.5 * thrusts[0]) & (thrusts[-1] > 0.0)
             result = np.where(runs, value(sign, side, _shares(target, thrusts, side.share), mix), result)
         return result
 
@@ -219,7 +219,7 @@ def _finite(value: ArrayLike, what: str) -> Array:
 PULSE_STEP_US = 1.0
 """Autopilots state servo pulses in whole microseconds (MAVLink, message SERVO_OUTPUT_RAW: uint16, us)."""
 
-_TOLERANCE_N = 1e-9  # a wish for the least thrust itself is met however it was rounded
+_TOLERANCE_N = 1e-9  # a demand for the least thrust itself is met however it was rounded
 _NO_LEVELS = frozen([], (0,), "levels_N")
 
 
@@ -265,20 +265,22 @@ class ThrustSteps:
         """`levels_N` as kernels take them: empty where all thrusts beyond the least are held."""
         return _NO_LEVELS if self.levels_N is None else self.levels_N
 
-    def delivered_N(self, wished_N: ArrayLike) -> Array:
-        """Thrusts that wished thrusts of any shape turn into: none below the least, else the nearest step."""
-        thrusts = np.array(wished_N, dtype=np.float64, order="C")
+    def delivered_N(self, desired_N: ArrayLike) -> Array:
+        """Thrusts that desired thrusts of any shape turn into: none below the least, else the nearest step."""
+        thrusts = np.array(desired_N, dtype=np.float64, order="C")
         _deliver(thrusts.reshape(-1), self.levels, self.least_forward_N, self.least_reverse_N)
         return thrusts
 
-    def nearest_N(self, wished_N: ArrayLike) -> Array:
-        """The running thrusts nearest to wished ones of any shape, in the wish's own direction (0 counts as forward).
+    def nearest_N(self, desired_N: ArrayLike) -> Array:
+        """The running thrusts nearest to desired ones of any shape, in the same direction (0 counts as forward).
 
         The outermost step stands for all beyond it.
         """
-        wished = np.asarray(wished_N, dtype=np.float64)
-        forward = wished >= 0.0
-        beyond = np.where(forward, np.maximum(wished, self.least_forward_N), np.minimum(wished, -self.least_reverse_N))
+        desired = np.asarray(desired_N, dtype=np.float64)
+        forward = desired >= 0.0
+        beyond = np.where(
+            forward, np.maximum(desired, self.least_forward_N), np.minimum(desired, -self.least_reverse_N)
+        )
         if self.levels_N is None or not self.levels_N.size:
             return np.asarray(beyond)
         above = np.clip(np.searchsorted(self.levels_N, beyond), 1, max(self.levels_N.size - 1, 1))
@@ -290,18 +292,18 @@ class ThrustSteps:
 
 @njit
 def _deliver(thrusts_N: Array, levels_N: Array, least_forward_N: float, least_reverse_N: float) -> None:
-    """Turn wished thrusts, shape (n,), in place into those held: 0 in the gap, else as `ThrustSteps.nearest_N`."""
+    """Turn desired thrusts, shape (n,), in place into those held: 0 in the gap, else as `ThrustSteps.nearest_N`."""
     for i in range(thrusts_N.shape[0]):
-        wished = thrusts_N[i]
-        runs = wished >= least_forward_N - _TOLERANCE_N or wished <= -least_reverse_N + _TOLERANCE_N
-        thrusts_N[i] = nearest(wished, least_forward_N, least_reverse_N, levels_N) if runs else 0.0
+        desired = thrusts_N[i]
+        runs = desired >= least_forward_N - _TOLERANCE_N or desired <= -least_reverse_N + _TOLERANCE_N
+        thrusts_N[i] = nearest(desired, least_forward_N, least_reverse_N, levels_N) if runs else 0.0
 
 
 @njit
-def nearest(wished_N: float, least_forward_N: float, least_reverse_N: float, levels_N: Array) -> float:
-    """`ThrustSteps.nearest_N` of one wish; of no levels all are held."""
-    forward, last = wished_N >= 0.0, levels_N.shape[0] - 1
-    found = max(wished_N, least_forward_N) if forward else min(wished_N, -least_reverse_N)
+def nearest(desired_N: float, least_forward_N: float, least_reverse_N: float, levels_N: Array) -> float:
+    """`ThrustSteps.nearest_N` of one demand; of no levels all are held."""
+    forward, last = desired_N >= 0.0, levels_N.shape[0] - 1
+    found = max(desired_N, least_forward_N) if forward else min(desired_N, -least_reverse_N)
     if last < 0:
         return float(found)
     above = min(max(np.searchsorted(levels_N, found), 1), max(last, 1))

@@ -29,14 +29,14 @@ def usual_voltage(curve: ThrustCurve) -> float:
 def curve_facts(
     curve: ThrustCurve, supply_V: float, thrusts_N: Sequence[float] = (), pulses_us: Sequence[float] = ()
 ) -> dict[str, Any]:
-    """Limits, deadband and a short table at a voltage, and what wished thrusts and pulses give.
+    """Limits, deadband and a short table at a voltage, and what desired thrusts and pulses give.
 
-    Raises InputError if the voltage lies outside the table, or a wished value is not finite or beyond what the table
+    Raises InputError if the voltage lies outside the table, or a desired value is not finite or beyond what the table
     holds.
     """
     at = curve.voltage(supply_V)
     low, high = curve.limits_N(at)
-    _within(curve, at, "wished thrust", thrusts_N, (low, high), "N")
+    _within(curve, at, "desired thrust", thrusts_N, (low, high), "N")
     _within(curve, at, "pulse", pulses_us, curve.pulse_limits_us(at), "us")
     first_low, first_high = curve.first_step_N(at)
     steps = np.linspace(0.0, 1.0, ROWS_PER_SIDE)
@@ -46,7 +46,7 @@ def curve_facts(
         for key in ("rpm", "power_W")
         if getattr(curve.forward, key) is None or getattr(curve.reverse, key) is None
     }
-    wished = np.asarray(thrusts_N, dtype=np.float64)
+    desired = np.asarray(thrusts_N, dtype=np.float64)
     return {
         "name": curve.name,
         "source": curve.source,
@@ -59,7 +59,8 @@ def curve_facts(
         "first_step_N": [first_low, first_high],
         "table": _rows(curve, at, np.unique(thrusts), why),
         "thrusts": [
-            {"wished_N": float(value), **row} for value, row in zip(wished, _rows(curve, at, wished, why), strict=True)
+            {"desired_N": float(value), **row}
+            for value, row in zip(desired, _rows(curve, at, desired, why), strict=True)
         ],
         "pulses": [
             {**row, "pwm_us": float(pulse)}
@@ -123,11 +124,11 @@ def lag_facts(fit: LagFit) -> dict[str, Any]:
     }
 
 
-def _rows(curve: ThrustCurve, supply_V: float, wished_N: Array, why: dict[str, str]) -> list[dict[str, float | None]]:
-    delivered, pulse = curve.delivered_N(wished_N, supply_V), curve.pwm_us(wished_N, supply_V)
-    missing = [None] * wished_N.size
-    rpm = missing if "rpm" in why else curve.rpm(wished_N, supply_V).tolist()
-    power = missing if "power_W" in why else curve.power_W(wished_N, supply_V).tolist()
+def _rows(curve: ThrustCurve, supply_V: float, desired_N: Array, why: dict[str, str]) -> list[dict[str, float | None]]:
+    delivered, pulse = curve.delivered_N(desired_N, supply_V), curve.pwm_us(desired_N, supply_V)
+    missing = [None] * desired_N.size
+    rpm = missing if "rpm" in why else curve.rpm(desired_N, supply_V).tolist()
+    power = missing if "power_W" in why else curve.power_W(desired_N, supply_V).tolist()
     return [
         {"pwm_us": p, "thrust_N": t, "rpm": n, "power_W": w}
         for p, t, n, w in zip(pulse.tolist(), delivered.tolist(), rpm, power, strict=True)

@@ -53,9 +53,9 @@ class TiltJoint:
         """The angle nearest to a commanded one between the stops."""
         return min(max(tilt_rad, self.low_rad), self.high_rad)
 
-    def towards(self, tilt_rad: float, wished_rad: float, dt_s: float) -> float:
+    def towards(self, tilt_rad: float, desired_rad: float, dt_s: float) -> float:
         """The angle after a time at the joint's rate towards a commanded angle or its stop."""
-        way = self.within(wished_rad) - tilt_rad
+        way = self.within(desired_rad) - tilt_rad
         return tilt_rad + math.copysign(min(abs(way), self.rate_rad_s * dt_s), way)
 
     def mount(self, X_BC: Pose, tilt_rad: float) -> Pose:

@@ -147,7 +147,7 @@ class Route:
         return min(max(bisect_right(self._starts, time_s) - 1, 0), len(self.legs) - 1)
 
     def camera(self, time_s: float) -> tuple[Pose, Array, Array]:
-        """Wished camera pose X_WC, its velocity and its angular velocity in W (shape (3,) each)."""
+        """Desired camera pose X_WC, its velocity and its angular velocity in W (shape (3,) each)."""
         leg, fraction, speed = self._progress(time_s)
         place = ((1 - fraction) * leg.start + fraction * leg.end).tolist()
         v_W, omega_W = camera_twist(*place, *(speed * (leg.end - leg.start)).tolist())
@@ -155,7 +155,7 @@ class Route:
         return camera_pose(centre + fraction * leg.shift_W_m, *place), v_W + speed * leg.shift_W_m, omega_W
 
     def tilt(self, time_s: float, aim: CameraAim | Pose) -> tuple[float, float]:
-        """Wished angle of the camera's joint and its rate; zeros where it is not aimed with."""
+        """Desired angle of the camera's joint and its rate; zeros where it is not aimed with."""
         if isinstance(aim, Pose):
             return 0.0, 0.0
         (_, elevation, _), (_, elevation_rate, _) = (numbers.tolist() for numbers in self.on_sphere(time_s))
@@ -167,7 +167,7 @@ class Route:
         return BodyState(X_WB=X_WB, nu_B=nu_B)
 
     def reference(self, time_s: float, aim: CameraAim) -> tuple[Pose, Array, float]:
-        """Wished pose of a body, its twist, shape (6,), and the angle of the camera's joint.
+        """Desired pose of a body, its twist, shape (6,), and the angle of the camera's joint.
 
         As `camera` and `tilt`, in plain numbers, because each control step calls it.
         """

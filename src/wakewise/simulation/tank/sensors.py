@@ -202,17 +202,17 @@ class CameraJoint:
         self._bias_rad = float(rng.normal(0.0, settings.tilt_bias_rad))
         self.tilt_rad = 0.0 if joint is None else joint.within(tilt_rad)
         """Where it truly stands."""
-        self._wished_rad = self.tilt_rad
+        self._desired_rad = self.tilt_rad
 
     def aim(self, tilt_rad: float) -> None:
         """Set the reference angle; one that is not finite is ignored."""
         if np.isfinite(tilt_rad):
-            self._wished_rad = tilt_rad
+            self._desired_rad = tilt_rad
 
     def turn(self, time_s: float, dt_s: float) -> tuple[Measurement, ...]:
         """Turn for `dt_s` until `time_s`; what the encoder then says, nothing where there is no joint."""
         if self._joint is None:
             return ()
-        self.tilt_rad = self._joint.towards(self.tilt_rad, self._wished_rad, dt_s)
+        self.tilt_rad = self._joint.towards(self.tilt_rad, self._desired_rad, dt_s)
         read = self.tilt_rad + self._bias_rad + float(self._rng.normal(0.0, self._noise_rad))
         return (Measurement(time_s=time_s, tilt_rad=read),)

@@ -266,7 +266,7 @@ class Tank:
         self._plant.push_B = np.array(wrench_B, dtype=np.float64)
 
     def aim(self, tilt_rad: float) -> None:
-        """Wish an angle of the camera's joint; a fixed camera does not mind."""
+        """Command an angle of the camera's joint; without effect on a fixed camera."""
         self._joint.aim(tilt_rad)
 
     @property

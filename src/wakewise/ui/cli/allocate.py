@@ -227,7 +227,7 @@ def _thrusts(text: str, count: int) -> Array:
     try:
         thrusts = np.array([float(part) for part in text.split(",")])
     except ValueError:
-        raise InputError(f"--previous {text}: not numbers parted by commas") from None
+        raise InputError(f"--previous {text}: not numbers separated by commas") from None
     if len(thrusts) != count or not np.all(np.isfinite(thrusts)):
         raise InputError(f"--previous {text}: {len(thrusts)} numbers, allowed: {count} finite ones, one per thruster")
     return thrusts

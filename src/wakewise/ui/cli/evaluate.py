@@ -162,7 +162,7 @@ def evaluate(
 
         figures, definitions = figures | about, definitions | SPLAT_DEFINITIONS
     why = {key: "camera positions were not given (--cameras)" for key, value in figures.items() if value is None}
-    why |= {key: "ICP was not wished for" for key in why if key.startswith("icp_")}
+    why |= {key: "ICP was not requested" for key in why if key.startswith("icp_")}
     why |= {key: "the model is no mesh" for key in why if key == "model_faults"}
     shares = (
         f"within {share['threshold_mm']:.3g} mm: {share['accuracy_pct']:.1f} % of the model, "

@@ -24,7 +24,7 @@ def thruster(
         typer.Option("--supply-V", help="Supply voltage, within the table; 16, or the nearest there is, if not given."),
     ] = None,
     thrust: Annotated[
-        list[float] | None, typer.Option(metavar="N", help="Wished thrust to look up; may be repeated.")
+        list[float] | None, typer.Option(metavar="N", help="Desired thrust to look up; may be repeated.")
     ] = None,
     pwm: Annotated[list[float] | None, typer.Option(metavar="US", help="Pulse to look up; may be repeated.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Also write an SVG drawing to this file.")] = None,
@@ -48,10 +48,10 @@ def thruster(
     typer.echo(f"limits {facts['limits_N'][0]:z.2f} to {facts['limits_N'][1]:+z.2f} N")
     typer.echo(f"no thrust from {facts['deadband_us'][0]:g} to {facts['deadband_us'][1]:g} us, both included")
     low, high = facts["first_step_N"]
-    typer.echo(f"smallest thrusts held {low:z.2f} and {high:+z.2f} N; a smaller wish becomes that or none, by half")
+    typer.echo(f"smallest thrusts held {low:z.2f} and {high:+z.2f} N; a smaller demand becomes that or none, by half")
     _print_rows("curve", facts["table"])
     if facts["thrusts"]:
-        _print_rows("for wished thrusts", facts["thrusts"], wished=True)
+        _print_rows("for desired thrusts", facts["thrusts"], desired=True)
     if facts["pulses"]:
         _print_rows("for pulses", facts["pulses"])
     for note in (*facts["notes"], *facts["why"].values()):
@@ -109,8 +109,8 @@ def lag(
         typer.echo(f"  {model['name']:<34}averaged R2 {model['r2']:.4f}   BIC {model['bic']:.1f}")
 
 
-def _print_rows(title: str, rows: list[dict[str, Any]], *, wished: bool = False) -> None:
-    columns = {"wished N": ("wished_N", 2)} if wished else {}
+def _print_rows(title: str, rows: list[dict[str, Any]], *, desired: bool = False) -> None:
+    columns = {"desired N": ("desired_N", 2)} if desired else {}
     columns |= {"pulse us": ("pwm_us", 0), "thrust N": ("thrust_N", 2), "rpm": ("rpm", 0), "power W": ("power_W", 1)}
     cells = [
         [None if row[key] is None else f"{row[key]:z.{digits}f}" for key, digits in columns.values()] for row in rows

@@ -139,7 +139,7 @@ class SnapshotRecorder:
         if not followed:
             return None
         asked, had = (np.array(column) for column in zip(*followed, strict=True))
-        wished = float(np.mean(np.sum(asked**2, axis=1)))
-        if wished < _LEAST_ASKED_M_S**2:
+        desired = float(np.mean(np.sum(asked**2, axis=1)))
+        if desired < _LEAST_ASKED_M_S**2:
             return None
-        return 100.0 * float(np.sqrt(np.mean(np.sum((had - asked) ** 2, axis=1)) / wished))
+        return 100.0 * float(np.sqrt(np.mean(np.sum((had - asked) ** 2, axis=1)) / desired))

@@ -89,8 +89,8 @@ def plan_and_side(trial: Trial, narrow: bool = False) -> Figure | None:
             axes.quiver(*eyes.T, *views.T, color=CORAL, angles="xy", scale_units="xy", scale=1, width=0.0032, zorder=4)
             axes.plot(*eyes.T, "o", color=CORAL, markersize=3, label="photograph")
         if trial.planned:
-            wished = flat(np.array([pose.p_m for pose in trial.planned]))
-            axes.plot(*wished.T, "+", color=MUTED, markersize=6, label="planned viewpoint")
+            desired = flat(np.array([pose.p_m for pose in trial.planned]))
+            axes.plot(*desired.T, "+", color=MUTED, markersize=6, label="planned viewpoint")
         axes.set_aspect("equal", adjustable="datalim")
     side.axhline(0.0, color=INK, linewidth=1.2)
     side.annotate(

@@ -81,11 +81,11 @@ def brightness(
 
 def converged_gain(seen: Sequence[float]) -> float:
     """Gain after views of this brightness at gain 1, oldest first, METERED_EVERY_S apart; settled on the first."""
-    wished = [math.log(TARGET / max(value, 1e-6)) for value in seen]
+    desired = [math.log(TARGET / max(value, 1e-6)) for value in seen]
     stays = (1.0 - SPEED) ** (FRAMES_PER_S * METERED_EVERY_S)
-    log_gain = wished[0]
-    for wish in wished[1:]:
-        log_gain = wish + stays * (log_gain - wish)
+    log_gain = desired[0]
+    for value in desired[1:]:
+        log_gain = value + stays * (log_gain - value)
     return math.exp(log_gain)
 
 
@@ -94,9 +94,9 @@ def split_gain(gain: float, settings: ImagingSettings) -> ExposureSetting:
 
     `settings.gain` at `settings.exposure_s` is the sensor unamplified.
     """
-    wished_s = settings.exposure_s * gain / settings.gain
-    exposure_s = min(max(wished_s, SHORTEST_S), LONGEST_S)
-    amplification = min(max(wished_s / exposure_s, 1.0), MOST_AMPLIFIED)
+    desired_s = settings.exposure_s * gain / settings.gain
+    exposure_s = min(max(desired_s, SHORTEST_S), LONGEST_S)
+    amplification = min(max(desired_s / exposure_s, 1.0), MOST_AMPLIFIED)
     return ExposureSetting(
         exposure_s=exposure_s,
         gain=settings.gain * amplification * exposure_s / settings.exposure_s,

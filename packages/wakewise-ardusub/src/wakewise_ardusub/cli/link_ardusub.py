@@ -372,7 +372,7 @@ def _numbers(text: str, option: str, form: str, count: int) -> tuple[float, ...]
     except ValueError:
         found = ()
     if len(found) != count or not all(map(math.isfinite, found)):
-        raise InputError(f"{option} {text!r}: must be {form}, {count} finite numbers parted by commas")
+        raise InputError(f"{option} {text!r}: must be {form}, {count} finite numbers separated by commas")
     if option == "--depths" and not found[0] < found[1]:
         raise InputError(f"{option} {text!r}: the least depth must be less than the most")
     return found

@@ -183,7 +183,7 @@ def _motor_numbers(motors: str | None) -> list[int] | None:
         return None
     parts = [part.strip() for part in motors.split(",")]
     if not all(part.isascii() and part.isdigit() for part in parts) or len(set(parts)) != len(parts):
-        raise InputError(f"--motors {motors!r}: must be different numbers from 1, parted by commas, such as 1,3")
+        raise InputError(f"--motors {motors!r}: must be different numbers from 1, separated by commas, such as 1,3")
     return [int(part) for part in parts]
 
 

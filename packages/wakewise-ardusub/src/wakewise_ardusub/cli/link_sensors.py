@@ -45,7 +45,7 @@ def sensors(
 ) -> None:
     """Show what depth sensor, inertial unit and senders of poses say, live: values, rates, and what goes wrong.
 
-    A pose is a line of JSON, {"t": s, "p": [north, east, down], "q": [w, x, y, z]}, or of the same numbers parted by
+    A pose is a line of JSON, {"t": s, "p": [north, east, down], "q": [w, x, y, z]}, or of the same numbers separated by
     commas (docs/sensors.md). With --json the figures at the end are printed; give --seconds.
     """
     from wakewise.core.errors import InputError

@@ -512,8 +512,8 @@ def _hearing(facts: CheckInputs) -> Iterator[CheckResult]:
     ground = first_of(facts.parameters, GROUND_NAMES)
     asked = f"MANUAL_CONTROL of system {ground[1]:g}" if ground else "MANUAL_CONTROL of the ground station"
     if heard is None:
-        for what, wish in (("pilot's sticks", asked), ("pose", "a position"), ("MAVLink", "version 2")):
-            yield _unknown(what, wish, facts)
+        for what, expected in (("pilot's sticks", asked), ("pose", "a position"), ("MAVLink", "version 2")):
+            yield _unknown(what, expected, facts)
         return
     found = ", ".join(f"{n / heard.seconds:.1f} a second of system {who}" for who, n in sorted(heard.sticks.items()))
     good = any(ground is None or who == round(ground[1]) for who in heard.sticks)

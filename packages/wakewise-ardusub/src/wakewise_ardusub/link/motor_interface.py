@@ -45,7 +45,7 @@ class MotorOutput:
         freeze(self, directions=(len(self.vehicle.thrusters),))
 
     def pulses_us(self, thrusts_N: Array, battery_V: float = math.nan) -> Array:
-        """Whole pulses for wished thrusts, shape (n,), at the battery's voltage; unknown, the vehicle file's.
+        """Whole pulses for desired thrusts, shape (n,), at the battery's voltage; unknown, the vehicle file's.
 
         Raises
         ------
@@ -56,7 +56,7 @@ class MotorOutput:
         return pulses_of_thrusts(self.vehicle, thrusts_N, self.directions, supply_in_table(self.vehicle, battery_V))
 
     def controls(self, thrusts_N: Array, battery_V: float = math.nan) -> Array:
-        """Wished thrusts, shape (n,), as `controls` of SET_ACTUATOR_CONTROL_TARGET, shape (8,); NaN without a motor."""
+        """Thrusts, shape (n,), as `controls` of SET_ACTUATOR_CONTROL_TARGET, shape (8,); NaN without a motor."""
         pulses = self.pulses_us(thrusts_N, battery_V)
         filled = np.full(SLOTS, np.nan)
         filled[: pulses.size] = (pulses - MIDDLE_US) / FULL_US

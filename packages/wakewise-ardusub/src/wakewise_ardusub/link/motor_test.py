@@ -93,7 +93,7 @@ def planned_turns(
     output = motor_output(vehicle, parameters)
     count, chosen = len(vehicle.thrusters), chosen_motors(vehicle, motors)
     supply_V = supply_in_table(vehicle, float("nan"))
-    # A pulse above the middle for every motor, so the wish is along the axis as the motor itself turns.
+    # A pulse above the middle for every motor, so the demand is along the axis as the motor itself turns.
     own = pulses_of_thrusts(vehicle, SHARE * vehicle.thrust_upper_N, np.ones(count), supply_V)
     turns = []
     for motor in chosen:

@@ -85,7 +85,7 @@ def mounting(axes: Sequence[str] = AXES) -> Array:
     told = ",".join(axes)
     unknown = [axis for axis in axes if axis not in _DIRECTIONS]
     if len(axes) != 3 or unknown:
-        raise InputError(f"axes '{told}': three of {', '.join(_DIRECTIONS)} are needed, parted by commas")
+        raise InputError(f"axes '{told}': three of {', '.join(_DIRECTIONS)} are needed, separated by commas")
     R_BS = np.array([_DIRECTIONS[axis] for axis in axes]).T
     if round(float(np.linalg.det(R_BS))) != 1:
         raise InputError(f"axes '{told}': make no right-handed set; the default is {','.join(AXES)}")

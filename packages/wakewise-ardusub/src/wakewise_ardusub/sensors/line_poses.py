@@ -213,7 +213,7 @@ def _csv(text: str) -> Mapping[str, Any]:
     try:
         values = [float(cell) if cell else None for cell in cells]
     except ValueError:
-        raise InputError(f"'{text[:60]}': not numbers parted by commas") from None
+        raise InputError(f"'{text[:60]}': not numbers separated by commas") from None
     told: dict[str, Any] = {"t": values[0], "p": values[1:4]}
     if len(values) > 4:
         told["q"] = values[4:8]

@@ -23,7 +23,7 @@ SILENT_S = 2.0
 ASKS_S, AGAIN_S = 0.2, 1.0
 """How soon another angle is asked for, and the same one again that did not come."""
 LEAST_RAD, OFF_RAD = math.radians(0.5), math.radians(2.0)
-"""A wished angle that differs by less from the last is not sent; a reported one by more has not come."""
+"""A desired angle that differs by less from the last is not sent; a reported one by more has not come."""
 GIVES = 3
 """How often the mount is given back: a message may be lost."""
 TYPE_PARAMETER, STABILIZED = "MNT1_TYPE", 1.0
@@ -97,18 +97,18 @@ class MountControl:
             return vehicle
         return replace(vehicle, X_BC=_tilted(vehicle, self.stated_rad), tilt=None)
 
-    def ask(self, wished_rad: float, engaged: bool) -> None:
+    def ask(self, desired_rad: float, engaged: bool) -> None:
         """Steer the mount towards an angle while engaged; else give it back to the pilot."""
         if not engaged:
             self.give_back()
         elif self.reported and not self.silent:
             known, now_s = self.gate.known, self.gate.clock()
             stabilized = known.parameters.get(TYPE_PARAMETER, STABILIZED) == STABILIZED
-            asked_rad = wished_rad + (known.attitude[1] if stabilized and math.isfinite(known.attitude[1]) else 0.0)
+            asked_rad = desired_rad + (known.attitude[1] if stabilized and math.isfinite(known.attitude[1]) else 0.0)
             if self._asked is not None:
                 before_rad, before_s = self._asked
                 other = abs(asked_rad - before_rad) >= LEAST_RAD and now_s - before_s >= ASKS_S
-                again = abs(known.mount_pitch[0] - wished_rad) > OFF_RAD and now_s - before_s >= AGAIN_S
+                again = abs(known.mount_pitch[0] - desired_rad) > OFF_RAD and now_s - before_s >= AGAIN_S
                 if not other and not again:
                     return
             self._asked, self._gives = (asked_rad, now_s), GIVES

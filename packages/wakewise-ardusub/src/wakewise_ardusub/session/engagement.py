@@ -45,7 +45,7 @@ class GroundStationInput:
 
 @dataclass(kw_only=True, eq=False)
 class EngagedPilot:
-    """A `Pilot`: the assisted one while engaged, on its own clock; else the vehicle is wished to be where it is.
+    """A `Pilot`: the assisted one while engaged, on its own clock; else the vehicle is desired to be where it is.
 
     `photographed`: called with the step's time and estimate for each photograph. `mount`: of its camera, which is where
     the pilot had turned it as an engagement begins.

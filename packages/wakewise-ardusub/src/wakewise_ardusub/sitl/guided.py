@@ -137,12 +137,12 @@ def horizontal_demands(
     target: GuidedTarget, total: Array, motion: PhysicsState, parameters: ParameterTable, dt_s: float
 ) -> tuple[Array, float, float]:
     """The velocity loop's integral, shape (2,), m/s2, and the forward and lateral demands, each in [-1, 1]."""
-    wished = target.velocity_W_m_s[:2]
+    desired = target.velocity_W_m_s[:2]
     if target.place_W_m is not None:
         catch_up = parameters.value("PSC_POSXY_P", otherwise=1.0) * (target.place_W_m - motion.p_WB_m)[:2]
         most = 1e-2 * parameters.value("WPNAV_SPEED", otherwise=50.0)
-        wished = wished + catch_up * min(1.0, most / max(float(np.hypot(*catch_up)), 1e-9))
-    error = wished - motion.v_W_m_s[:2]
+        desired = desired + catch_up * min(1.0, most / max(float(np.hypot(*catch_up)), 1e-9))
+    error = desired - motion.v_W_m_s[:2]
     most = 1e-2 * parameters.value("PSC_VELXY_IMAX", otherwise=1000.0)
     total = np.clip(total + parameters.value("PSC_VELXY_I", otherwise=0.5) * error * dt_s, -most, most)
     asked = target.acceleration_W_m_s2[:2] + parameters.value("PSC_VELXY_P", otherwise=1.0) * error + total

@@ -187,9 +187,9 @@ def _attitude(
     largest = math.radians(parameters.value("ANGLE_MAX", otherwise=4500.0) * 1e-2)
     steered = abs(demands.yaw) > CENTRED
     heading = angles[2] if steered or loops.heading_rad is None else loops.heading_rad
-    wished = (demands.roll * largest, demands.pitch * largest, heading)
+    desired = (demands.roll * largest, demands.pitch * largest, heading)
     p = [parameters.value(f"ATC_ANG_{axis}_P", otherwise=6.0) for axis in _AXES]
-    rates = np.array([p[i] * _wrapped(wished[i] - angles[i]) for i in range(3)])
+    rates = np.array([p[i] * _wrapped(desired[i] - angles[i]) for i in range(3)])
     if steered:
         rates[2] = demands.yaw * YAW_RATE_RAD_S * parameters.value("ACRO_YAW_P", otherwise=3.375) / 3.375
     error = rates - motion.omega_B_rad_s
@@ -213,12 +213,12 @@ def _depth(
     dead = 1e-3 * parameters.value("THR_DZ", otherwise=100.0)
     steered = abs(throttle) > dead
     held = depth if steered or loops.depth_m is None else loops.depth_m
-    wished = sinks_m_s + parameters.value("PSC_POSZ_P", otherwise=3.0) * (held - depth)
+    desired = sinks_m_s + parameters.value("PSC_POSZ_P", otherwise=3.0) * (held - depth)
     if steered:
-        wished = -throttle * parameters.value("PILOT_SPEED_UP", otherwise=50.0) / _CM
+        desired = -throttle * parameters.value("PILOT_SPEED_UP", otherwise=50.0) / _CM
     # Gains of the last loop count per mille of the throttle's half range for cm/s2.
     scale = _PER_MILLE * _CM
-    missing = parameters.value("PSC_VELZ_P", otherwise=8.0) * (wished - down)
+    missing = parameters.value("PSC_VELZ_P", otherwise=8.0) * (desired - down)
     most = _PER_MILLE * parameters.value("PSC_ACCZ_IMAX", otherwise=100.0) * 2.0
     total = loops.climb_sum + scale * parameters.value("PSC_ACCZ_I", otherwise=0.1) * missing * dt_s
     total = max(-most, min(most, total))

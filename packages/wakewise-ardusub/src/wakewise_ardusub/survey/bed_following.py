@@ -3,7 +3,7 @@
 `BedTrack` holds the bed's depth at the times of its measurement (vehicle's depth then, plus distance) over a window. It
 fits a line by least squares with Huber weights (Huber 1964, doi 10.1214/aoms/1177703732) and extrapolates it to the
 present: so the delay costs nothing on a constant slope. A value far from that line is refused unless several in
-a row agree with each other, as at a step. `DepthShaper` turns the wished depth into one that moves with bounded speed
+a row agree with each other, as at a step. `DepthShaper` turns the desired depth into one that moves with bounded speed
 and acceleration, critically damped, with the bed's own slope fed forward.
 """
 

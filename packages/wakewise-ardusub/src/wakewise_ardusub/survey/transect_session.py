@@ -433,8 +433,8 @@ class TransectSession:
             if bed is None or self._facts.range_s > 0.5 * self.options.limits.range_s:
                 self._depth = self._depth.resting(dt_s)
             else:
-                wished = max(bed[0] - self.altitude_m, self.options.limits.least_depth_m)
-                self._depth = self._depth.towards(wished, bed[1], dt_s)
+                desired = max(bed[0] - self.altitude_m, self.options.limits.least_depth_m)
+                self._depth = self._depth.towards(desired, bed[1], dt_s)
             asked_m = self.altitude_m
             self._reached |= abs(self._facts.altitude_m - asked_m) < REACHED_M
             self._reached &= self._facts.altitude_m > LOW * asked_m

@@ -145,7 +145,7 @@ class MeterLoop:
             self.wire = MavlinkSocket(settings.ends)
             stack.callback(self.wire.close)
             where = (settings.host, settings.port)
-            self.server = MeterServer(self.state, self._past, self._wish, *where, token=settings.token)
+            self.server = MeterServer(self.state, self._past, self._command, *where, token=settings.token)
             stack.pop_all()
 
     def run(self) -> dict[str, Any]:
@@ -188,7 +188,7 @@ class MeterLoop:
         with self._lock:
             return self.history.told()
 
-    def _wish(self, what: str) -> str | None:
+    def _command(self, what: str) -> str | None:
         with self._lock:
             if what == "mark":
                 return self.meter.mark(self._reading.time_s)

@@ -149,7 +149,7 @@ def window(wanted: BoolArray) -> tuple[slice, slice]:
 
 
 def _read_photo(path: Path, camera: pycolmap.Camera, photo_px: int) -> tuple[Bytes, float]:
-    """Colours, red first, averaged down where the photo is longer than wished; and the scale."""
+    """Colours, red first, averaged down where the photo is longer than desired; and the scale."""
     if not path.is_file():
         raise InputError(f"{path}: does not exist; --photos must name the folder that the model was made from")
     image = decode(path.read_bytes(), str(path))

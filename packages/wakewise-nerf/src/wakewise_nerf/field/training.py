@@ -76,8 +76,8 @@ class TrainingState:
             group["lr"] = group["first_rate"] * settings.last_rate ** (step / settings.steps)
         self.optimiser.step()
         change = settings.samples_per_step / max(seen.points, 1)
-        wished = round(self.rays * min(max(change, 0.5), 2.0))
-        self.rays = min(max(wished, min(FEWEST_RAYS, settings.rays)), settings.rays)
+        desired = round(self.rays * min(max(change, 0.5), 2.0))
+        self.rays = min(max(desired, min(FEWEST_RAYS, settings.rays)), settings.rays)
         self.step += 1
         if self.step % settings.occupancy_every == 0 or self.step == settings.warmup_steps:
             chance = torch.Generator(device=self.device).manual_seed(_seed(settings.random_seed, 1, step))

@@ -144,7 +144,7 @@ SEEDS, GRID_SEEDS = 3, 1
 """At the paper's w_track, and at the others where only the script flies: unless more are asked for."""
 
 
-def selected_worlds(wished: tuple[str, ...] | None) -> tuple[str, ...]:
+def selected_worlds(requested: tuple[str, ...] | None) -> tuple[str, ...]:
     """Worlds to fly in.
 
     Raises
@@ -152,13 +152,13 @@ def selected_worlds(wished: tuple[str, ...] | None) -> tuple[str, ...]:
     InputError
         If one is not known.
     """
-    for name in wished or ():
+    for name in requested or ():
         if name not in world_names():
             raise InputError(f"worlds: '{name}' is not known, allowed: {', '.join(world_names())}")
-    return DEFAULT_WORLDS if wished is None else tuple(dict.fromkeys(wished))
+    return DEFAULT_WORLDS if requested is None else tuple(dict.fromkeys(requested))
 
 
-def selected_w_tracks(wished: tuple[float, ...] | None) -> tuple[float, ...]:
+def selected_w_tracks(requested: tuple[float, ...] | None) -> tuple[float, ...]:
     """Weights to fly, in order.
 
     Raises
@@ -167,10 +167,10 @@ def selected_w_tracks(wished: tuple[float, ...] | None) -> tuple[float, ...]:
         If one is beyond the range of the settings.
     """
     least, most = RANGES["w_track"]
-    for value in wished or ():
+    for value in requested or ():
         if not least <= value <= most:
             raise InputError(f"w_tracks: {value:g}, must be from {least:g} to {most:g}")
-    return W_TRACKS if wished is None else tuple(sorted(set(wished)))
+    return W_TRACKS if requested is None else tuple(sorted(set(requested)))
 
 
 def planned_trials(
@@ -221,7 +221,7 @@ _engine = ProcessExecutor
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
-    """Fly what is wished and not known yet; a table per world and w_track, the claim, the paper's world.
+    """Fly what is requested and not known yet; a table per world and w_track, the claim, the paper's world.
 
     Raises
     ------

@@ -43,7 +43,7 @@ from wakewise_paper.reproduction.worlds import water
 
 COLUMNS = (
     ("target_speed_mean_m_s", "wash at the target", "mm/s", 1e3),
-    ("position_rmse_mm", "distance from the wished place", "mm", 1.0),
+    ("position_rmse_mm", "distance from the desired place", "mm", 1.0),
     ("roll_pitch_rms_deg", "roll and pitch", "deg", 1.0),
     ("energy_kJ", "energy", "kJ", 1.0),
     ("sign_flips_per_s", "reversals", "1/s", 1.0),
@@ -120,7 +120,7 @@ class ReproduceOptions:
             raise InputError(f"--budget {self.budget_s:g} s, must be more than 0")
 
     @property
-    def wish(self) -> TableRequest:
+    def request(self) -> TableRequest:
         """What is asked of each table."""
         trials = self.trials or (MOST_TRIALS if self.budget_s is not None else 1)
         return TableRequest(
@@ -200,7 +200,7 @@ def reproduce(names: Sequence[str], folder: Path, options: ReproduceOptions) -> 
     _check_methods(names, options.methods)
     for world in options.worlds or ():
         water(world)
-    tables = [_Growing(name, blocks_of(name, _fitting(name, options.wish))) for name in names]
+    tables = [_Growing(name, blocks_of(name, _fitting(name, options.request))) for name in names]
     open_store(folder)  # one of another version is refused before kernels are compiled and a plan is written
     for table in tables:
         table.block_s = TABLE[table.name].block_s
@@ -226,12 +226,12 @@ def _check_methods(names: Sequence[str], methods: Sequence[str] | None) -> None:
             raise InputError(f"--methods: '{method}' is not in {where}, {known}")
 
 
-def _fitting(name: str, wish: TableRequest) -> TableRequest:
-    """What is wished of one table: methods that only others have say nothing of it."""
-    if wish.methods is None:
-        return wish
-    own = tuple(method for method in wish.methods if method in TABLE[name].methods)
-    return replace(wish, methods=own or wish.methods)
+def _fitting(name: str, request: TableRequest) -> TableRequest:
+    """What is requested of one table: methods that only others have say nothing of it."""
+    if request.methods is None:
+        return request
+    own = tuple(method for method in request.methods if method in TABLE[name].methods)
+    return replace(request, methods=own or request.methods)
 
 
 def _within(tables: list[_Growing], folder: Path, options: ReproduceOptions, began: float) -> None:

@@ -93,7 +93,7 @@ class TrialCell:
     method: str
     target: str
     seed: int
-    wish: TableRequest
+    request: TableRequest
 
     def fields(self) -> dict[str, Any]:
         """Fields of the scenario, by dotted name."""
@@ -129,7 +129,7 @@ class TableDefinition:
     every_third: tuple[str, ...] = ()
 
 
-def blocks_of(name: str, wish: TableRequest) -> Iterator[Block]:
+def blocks_of(name: str, request: TableRequest) -> Iterator[Block]:
     """Blocks of a table, seed by seed, worlds and targets in turn.
 
     Raises
@@ -139,31 +139,33 @@ def blocks_of(name: str, wish: TableRequest) -> Iterator[Block]:
     """
     table = TABLE[name]
     waters = (NOWHERE,) if table.worlds == (NOWHERE,) else water_names()
-    worlds = _known("--world", wish.worlds, name, waters, table.worlds)
-    methods = _known("--methods", wish.methods, name, table.methods, table.methods)
-    wished = None if wish.targets is None or not table.has_targets else tuple(_target(t) for t in wish.targets)
-    return _blocks(name, wish, worlds, methods, {world: wished or table.targets(world) for world in worlds})
+    worlds = _known("--world", request.worlds, name, waters, table.worlds)
+    methods = _known("--methods", request.methods, name, table.methods, table.methods)
+    requested = None if request.targets is None or not table.has_targets else tuple(_target(t) for t in request.targets)
+    return _blocks(name, request, worlds, methods, {world: requested or table.targets(world) for world in worlds})
 
 
 def _blocks(
     name: str,
-    wish: TableRequest,
+    request: TableRequest,
     worlds: tuple[str, ...],
     methods: tuple[str, ...],
     targets: Mapping[str, tuple[str, ...]],
 ) -> Iterator[Block]:
     table = TABLE[name]
     every_third = table.every_third if set(worlds) - set(table.every_third) else ()
-    for seed in range(wish.first_seed, wish.first_seed + (1 if table.once else wish.trials)):
-        flown = [world for world in worlds if world not in every_third or (seed - wish.first_seed) % SEED_STRIDE == 0]
+    for seed in range(request.first_seed, request.first_seed + (1 if table.once else request.trials)):
+        flown = [
+            world for world in worlds if world not in every_third or (seed - request.first_seed) % SEED_STRIDE == 0
+        ]
         for number in range(max(len(targets[world]) for world in flown)):
             for world in (world for world in flown if number < len(targets[world])):
                 target = targets[world][number]
-                yield tuple(_planned(name, world, method, target, seed, wish) for method in methods)
+                yield tuple(_planned(name, world, method, target, seed, request) for method in methods)
 
 
-def _planned(table: str, world: str, method: str, target: str, seed: int, wish: TableRequest) -> PlannedTrial:
-    task = TABLE[table].task(TrialCell(world=world, method=method, target=target, seed=seed, wish=wish))
+def _planned(table: str, world: str, method: str, target: str, seed: int, request: TableRequest) -> PlannedTrial:
+    task = TABLE[table].task(TrialCell(world=world, method=method, target=target, seed=seed, request=request))
     factors: dict[str, str | int] = {
         "method": method,
         "target": target,
@@ -190,14 +192,14 @@ def _target(name: str) -> str:
 
 
 def _known(
-    option: str, wished: tuple[str, ...] | None, table: str, allowed: tuple[str, ...], default: tuple[str, ...]
+    option: str, requested: tuple[str, ...] | None, table: str, allowed: tuple[str, ...], default: tuple[str, ...]
 ) -> tuple[str, ...]:
-    if wished is None or allowed == (NOWHERE,):
+    if requested is None or allowed == (NOWHERE,):
         return default
-    for name in wished:
+    for name in requested:
         if name not in allowed:
             raise InputError(f"{option}: '{name}' is not in table {table}, allowed: {', '.join(allowed)}")
-    return tuple(dict.fromkeys(wished))
+    return tuple(dict.fromkeys(requested))
 
 
 def _scan(cell: TrialCell) -> Task:
@@ -220,7 +222,7 @@ def _station(cell: TrialCell) -> Task:
 
 
 def _flow(cell: TrialCell) -> Task:
-    return _flown(cell, "round", _ROUND, {PIV: {"instants": 3, "duration_s": cell.wish.duration_s}})
+    return _flown(cell, "round", _ROUND, {PIV: {"instants": 3, "duration_s": cell.request.duration_s}})
 
 
 def _ablated(cell: TrialCell) -> Task:
@@ -249,7 +251,7 @@ def _flown(
         cell.fields() | dict(own or {}),
         setup=setup,
         probes={flights.DISTURBANCE_SERIES: {}} | dict(probes or {}),
-        duration_s=cell.wish.duration_s,
+        duration_s=cell.request.duration_s,
         sources=_FLIGHT,
     )
     return replace(trial.task, name=cell.name(what))
@@ -265,7 +267,7 @@ def _operated(cell: TrialCell) -> Task:
     if cell.world == PAPER:
         trial = paper_trial(cell.target, who, cell.seed, w_track)
     else:
-        trial = operator_trial(cell.world, cell.target, who, cell.seed, w_track, duration_s=cell.wish.duration_s)
+        trial = operator_trial(cell.world, cell.target, who, cell.seed, w_track, duration_s=cell.request.duration_s)
     return replace(trial.task, name=cell.name("operator"))
 
 

@@ -67,7 +67,7 @@ MECHANISM_SEEDS = 3
 """Mechanisms fly the first seeds only, which have all trims and all sides once."""
 
 
-def selected_mechanisms(wished: tuple[str, ...] | None) -> tuple[str, ...]:
+def selected_mechanisms(requested: tuple[str, ...] | None) -> tuple[str, ...]:
     """Names of the mechanisms to switch; none if not given, `all` for all.
 
     Raises
@@ -75,7 +75,7 @@ def selected_mechanisms(wished: tuple[str, ...] | None) -> tuple[str, ...]:
     InputError
         If one is not known.
     """
-    names = () if wished is None or wished == ("none",) else wished
+    names = () if requested is None or requested == ("none",) else requested
     for name in names:
         if name not in (*MECHANISMS, "all"):
             raise InputError(f"mechanisms: '{name}' is not known, allowed: none, all, {', '.join(MECHANISMS)}")
@@ -130,7 +130,7 @@ METHODS = (
 """The first is what the others are held against."""
 
 
-def flown_methods(wished: tuple[str, ...] | None) -> tuple[tuple[str, ...], dict[str, str]]:
+def flown_methods(requested: tuple[str, ...] | None) -> tuple[tuple[str, ...], dict[str, str]]:
     """Methods to fly, in the bench's order, and why others are not.
 
     Raises
@@ -138,10 +138,10 @@ def flown_methods(wished: tuple[str, ...] | None) -> tuple[tuple[str, ...], dict
     InputError
         If a name is none of the bench's.
     """
-    selected("methods", wished, METHODS)
+    selected("methods", requested, METHODS)
     reasons: dict[str, str] = {}
     for name in METHODS:
-        if wished is not None and name not in wished:
+        if requested is not None and name not in requested:
             reasons[name] = "this method was left out"
         elif name.removesuffix(TRIM) not in MAKERS:
             reasons[name] = "there is no such method yet"
@@ -157,9 +157,9 @@ def run(options: BenchOptions) -> dict[str, Any]:
         If a scenario, method or mechanism is not known.
     """
     began = time.monotonic()
-    wished = options.scenarios
-    scenarios = names_of(None if wished is None else tuple(name for name in wished if name != PAPER))
-    with_paper = wished is None or PAPER in wished
+    requested = options.scenarios
+    scenarios = names_of(None if requested is None else tuple(name for name in requested if name != PAPER))
+    with_paper = requested is None or PAPER in requested
     methods, reasons = flown_methods(options.methods)
     mechanisms = selected_mechanisms(options.mechanisms)
     trials = planned_trials(scenarios, methods, mechanisms, options.seeds)

@@ -154,8 +154,8 @@ def fields_of(name: str) -> tuple[dict[str, Any], dict[str, FieldDistribution]]:
     return world.values, world.randomize
 
 
-def names_of(wished: tuple[str, ...] | None) -> tuple[str, ...]:
-    """Full names of the scenarios wished, in the bench's order: `orbit/paper`, `world/mud`; all if None.
+def names_of(requested: tuple[str, ...] | None) -> tuple[str, ...]:
+    """Full names of the scenarios requested, in the bench's order: `orbit/paper`, `world/mud`; all if None.
 
     `orbit` stands for both vehicles, `worlds` for all worlds of the library.
 
@@ -168,7 +168,7 @@ def names_of(wished: tuple[str, ...] | None) -> tuple[str, ...]:
     groups["worlds"] = tuple(WORLD + name for name in world_names())
     every = tuple(full for names in groups.values() for full in names)
     chosen: set[str] = set()
-    for name in every if wished is None else wished:
+    for name in every if requested is None else requested:
         if name not in groups and name not in every:
             raise InputError(f"scenarios: '{name}' is not known, allowed: {', '.join((*groups, *every))}, paper")
         chosen |= set(groups.get(name, (name,)))

@@ -124,7 +124,7 @@ def test_what_is_met_is_told_of_one_set_up_at_a_time(tables):
     own = found[titles[0]]
     assert any("wash at the target, less than dp-paper" in line and "too few pairs (n = 4)" in line for line in own)
     assert any("energy, less than dp-paper" in line and "(0.330 times" not in line for line in found[titles[1]])
-    assert any("the estimated place from the wished one" in line and "1.80 mm" in line for line in own)
+    assert any("the estimated place from the desired one" in line and "1.80 mm" in line for line in own)
     assert any("order of the methods" in line and "manual > mpc" in line for line in own)
     assert any("largest roll or pitch" in line and "by every method here" in line for line in own)
     assert any("R2 near the axis" in line for line in found["Not met in flow oracle"])

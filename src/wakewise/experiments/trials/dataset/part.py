@@ -32,7 +32,7 @@ from wakewise.scene.targets import read_mesh
 _KNOWN = re.compile(
     r"time_s|exposing|fallback|leg|disturbance|name|sharpness|(est|goal|wrench|load)_\w+|command_\d+_N|ardusub_\w+"
 )
-_WHOSE = {"true": "true", "est": "estimated", "goal": "wished"}
+_WHOSE = {"true": "true", "est": "estimated", "goal": "desired"}
 _STATE = {
     "x_m": "north of the body's origin, m", "y_m": "east of the body's origin, m", "z_m": "its depth, m",
     "qw": "attitude quaternion from body to world, w", "qx": "the same, x", "qy": "the same, y", "qz": "the same, z",

@@ -148,9 +148,9 @@ def _widened(low: float, high: float) -> tuple[float, float]:
     return (low - room if low < 0.0 else low), high + room
 
 
-def _ticks(low: float, high: float, wished: int) -> list[float]:
+def _ticks(low: float, high: float, desired: int) -> list[float]:
     """Round numbers, multiples of 1, 2 or 5 times a power of ten, in a range."""
-    step = round_step((high - low) / wished)
+    step = round_step((high - low) / desired)
     return [round(k * step, 10) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 

@@ -1,4 +1,4 @@
-// The gentle meter's page: asks its server five times a second how it stands, and shows it. It can wish three things of
+// The gentle meter's page: asks its server five times a second how it stands, and shows it. It can command three things of
 // the meter (mark a target, take the mark away, begin the sums anew) and nothing of the vehicle.
 
 import { Past } from "./past.js";
@@ -49,9 +49,9 @@ function showThrusters(state) {
   const largest = Math.max(1, ...flown.map(Math.abs), ...gentle.map(Math.abs));
   reach = Math.max(largest, 0.98 * reach);
   bars.forEach(({ row, bar, thrust, share }, i) => {
-    const now = finite(flown[i]), wish = finite(gentle[i]), part = finite(shares[i]);
+    const now = finite(flown[i]), command = finite(gentle[i]), part = finite(shares[i]);
     bar.style.setProperty("--flown", (now ?? 0) / reach);
-    bar.style.setProperty("--gentle", (wish ?? 0) / reach);
+    bar.style.setProperty("--gentle", (command ?? 0) / reach);
     thrust.textContent = shown(now, 1, "N");
     share.textContent = part === null ? "–" : `${shown(part, 0)}\u202f%`;
     row.classList.toggle("strong", (part ?? 0) >= 25);
@@ -107,7 +107,7 @@ function show(state) {
   past.add(state.second, state.second_mm_s);
 }
 
-async function wish(what) {
+async function command(what) {
   try {
     await ask(what, "POST");
   } catch (fault) {
@@ -115,8 +115,8 @@ async function wish(what) {
     $("note").hidden = false;
   }
 }
-$("mark").addEventListener("click", () => wish($("mark").getAttribute("aria-pressed") === "true" ? "unmark" : "mark"));
-$("begin").addEventListener("click", () => wish("begin"));
+$("mark").addEventListener("click", () => command($("mark").getAttribute("aria-pressed") === "true" ? "unmark" : "mark"));
+$("begin").addEventListener("click", () => command("begin"));
 
 let whole = false;
 async function turn() {
