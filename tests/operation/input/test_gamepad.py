@@ -60,7 +60,7 @@ def test_a_lost_gamepad_is_nobody_until_it_is_back_and_centred() -> None:
         pad.axis(1, 0.0)
         until(lambda: axes(hands) == [0.0] * 5)
         assert [words.split(": ")[1].split(";")[0] for _, words in hands.notes()] == [
-            "found", "sticks are centred and have effect", "lost", "found", "sticks are centred, hands fly",
+            "found", "sticks are centred and have effect", "lost", "found", "sticks are centred and have effect",
         ]  # fmt: skip
         pad.unplug()
         until(lambda: hands.name is None)
