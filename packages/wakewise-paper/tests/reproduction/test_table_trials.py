@@ -104,17 +104,17 @@ def test_requests_narrow_a_table():
 
 
 @pytest.mark.parametrize(
-    ("request", "words"),
+    ("asked", "words"),
     [
         (TableRequest(trials=1, worlds=("atlantis",)), "--world: 'atlantis'"),
         (TableRequest(trials=1, methods=("magic",)), "--methods: 'magic'"),
         (TableRequest(trials=1, targets=("unicorn",)), "--targets: 'unicorn'.*brain"),
     ],
 )
-def test_an_unknown_name_is_refused_with_what_would_do(request, words):
+def test_an_unknown_name_is_refused_with_what_would_do(asked, words):
     """Before anything is flown."""
     with pytest.raises(InputError, match=words):
-        blocks_of("station", request)
+        blocks_of("station", asked)
 
 
 def test_the_varied_missions_of_success_are_drawn_by_the_seed_alone():
