@@ -84,7 +84,8 @@ def bad_inputs(base: Path) -> dict[str, tuple[list[str], str]]:
         "cut": (["measure", str(broken)], "cut short"),
         "unit": (["measure", good, "--unit-m", "-1"], "--unit-m"),
         "direction": (["measure", good, "--bed", "0", "0", "0", "0"], "--bed"),
-        "scale": (["compare-models", good, str(colony(base / "inches.ply", 39.37))], "different scale"),
+        "scale": (["compare-models", good, str(colony(base / "inches.ply", 39.37))], "give both their scale"),
+        "millimetres": (["compare-models", good, str(colony(base / "mm.ply", 1000.0))], "convert one of them"),
         "picture": (["compare-models", good, good, "--out", str(base / "a.jpg")], ".png"),
         "second": (["compare-models", good, str(points)], "without faces"),
         "folder out": (["measure", good, "--out", str(base / "empty")], "empty: is a folder"),
@@ -95,7 +96,7 @@ def bad_inputs(base: Path) -> dict[str, tuple[list[str], str]]:
 
 NAMES = (
     "none", "points", "folder", "no mesh", "no scale", "no bed", "box", "nan box", "nan", "cut", "unit", "direction",
-    "scale", "picture", "second", "folder out", "folder json", "down",
+    "scale", "millimetres", "picture", "second", "folder out", "folder json", "down",
 )  # fmt: skip
 
 

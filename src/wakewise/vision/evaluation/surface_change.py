@@ -134,9 +134,15 @@ def compare_models(
     A, B, near = _surfaces(first, second, eyes, rng)
     found = register(A, B, align_scale)
     if not align_scale and abs(found.free_scale - 1.0) > 0.01 * MOST_SCALE_PCT:
+        thousandth = any(abs(found.free_scale * unit - 1.0) < 0.05 for unit in (1e-3, 1e3))
+        what = (
+            "one is in millimetres and one in metres: convert one of them"
+            if thousandth
+            else "give both their scale (reconstruct --bar or --fixes)"
+        )
         raise InputError(
-            f"models of different scale: the second fits at {found.free_scale:.4g} times its size; give both their "
-            "scale (--bar, --fixes; --unit-m for a mesh in other units), or fit it with --align-scale"
+            f"models of different scale: the second fits at {found.free_scale:.4g} times its size; {what}, or fit it "
+            "with --align-scale"
         )
     there = B.moved(found.similarity)
     there = there.only(near(there.points_m))
