@@ -71,6 +71,11 @@ def _heard(**fields: Any) -> CheckInputs:
     return dataclasses.replace(RIGHT, heard=dataclasses.replace(HEARD, **fields))
 
 
+def _unheard(facts: CheckInputs) -> CheckInputs:
+    """A parameter file alone, without a connection."""
+    return dataclasses.replace(facts, heard=None)
+
+
 def _bad(facts: CheckInputs) -> list[CheckResult]:
     return [row for row in check(facts) if row.verdict == "no-go" or (row.verdict == "unknown" and row.needed)]
 
@@ -96,6 +101,7 @@ def test_a_vehicle_on_which_all_is_right_goes() -> None:
         (_with(MAV_SYSID=3.0), "system id (MAV_SYSID)", "--system 3"),
         (_with(SERVO8_FUNCTION=59.0), "motors (SERVOn_FUNCTION)", "8 thrusters"),
         (_with(SERVO9_FUNCTION=33.0), "motors (SERVOn_FUNCTION)", "motor 1 is on channels [1, 9]"),
+        (_unheard(_with(**{f"SERVO{i}_FUNCTION": None for i in range(1, 9)})), "motors", ""),
         (_with(MOT_3_DIRECTION=0.0), "directions (MOT_n_DIRECTION)", "--motor-test"),
         (_with(MOT_3_DIRECTION=None), "directions (MOT_n_DIRECTION)", ""),
         (_with(MOT_PWM_TYPE=5.0), "pulses (MOT_PWM_TYPE)", "plain pulses"),

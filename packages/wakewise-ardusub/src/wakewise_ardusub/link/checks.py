@@ -394,7 +394,7 @@ def _motors(facts: CheckInputs) -> Iterator[CheckResult]:
         return
     channels = channels_of_motors(facts.parameters)
     if not any(name.startswith("SERVO") for name in facts.parameters):
-        yield _unknown("motors", asked, facts, "no SERVOn_FUNCTION is known")
+        yield _unknown("motors", asked, facts, "no SERVOn_FUNCTION is known", needed=True)
         return
     found = ", ".join(f"{motor} on {'+'.join(map(str, at))}" for motor, at in channels.items()) or "none"
     if channels == {motor: [motor] for motor in range(1, len(channels) + 1)} and channels:
