@@ -24,6 +24,7 @@ help:
 	@echo "make figures  the README's animation, from two flights; a minute or two"
 	@echo "make docs    regenerate pages from the code, and build the site: docs/_build/html/index.html"
 	@echo "make notebooks  run the notebooks of examples/notebooks"
+	@echo "make clean   remove the virtual environment and built packages; results in runs stay"
 	@echo "make lock    resolve requirements.lock anew (needs uv, which setup installs)"
 
 setup: $(STAMP)
@@ -126,4 +127,4 @@ lock: setup
 	$(BIN)/uv pip compile docs/requirements.in --constraint requirements.lock --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o docs/requirements.lock
 
 clean:
-	rm -rf $(VENV) runs dist
+	rm -rf $(VENV) dist
