@@ -14,14 +14,14 @@ ROOT = Path(__file__).parents[3]
 
 
 def test_the_documentation_is_what_commands_and_settings_say() -> None:
-    """docs/commands.md and docs/scenario.md are up to date; `make docs` writes them anew."""
+    """docs/commands.md and docs/scenario.md are up to date; `tools/write_docs.py` writes them."""
     sys.path.insert(0, str(ROOT / "tools"))
     try:
         from write_docs import DOCS, PAGES
     finally:
         sys.path.pop(0)
     for name, text in PAGES.items():
-        assert (DOCS / name).read_text(encoding="utf-8") == text(), f"docs/{name} is stale: run make docs"
+        assert (DOCS / name).read_text(encoding="utf-8") == text(), f"docs/{name} is stale: run tools/write_docs.py"
 
 
 def _leaves(tree: dict[str, object], prefix: str = "") -> list[str]:
