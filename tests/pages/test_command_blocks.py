@@ -99,7 +99,7 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Run(r"wakewise film runs/\w+", slow=True),
     Run(r"wakewise export runs/colony --to nerfstudio", slow=True),
     Elsewhere(r"wakewise export .*--to dataset.*", "tests/experiments/trials/dataset/test_dataset.py", '"dataset"'),
-    Run(r"wakewise reconstruct PHOTOS .*", slow=True, shows="verdict"),
+    Run(r"wakewise reconstruct PHOTOS( .*)?", slow=True, shows="verdict"),
     Elsewhere(r"wakewise reconstruct photos/ .*--bar .*", "tests/vision/reconstruction/test_scale_stage.py", "bars"),
     Elsewhere(r"wakewise reconstruct \w+/ .*--fixes .*", "tests/vision/reconstruction/test_scale_by_fixes.py", "fixes"),
     Never(r"wakewise reconstruct runs/sea-.*", "needs the photographs of a real dive; PHOTOS stand for them above"),

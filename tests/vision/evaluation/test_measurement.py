@@ -189,6 +189,20 @@ def test_a_mesh_that_is_coarse_for_its_colony_is_told() -> None:
     assert [line for line in lines if "lowest 8.3 mm are extrapolated" in line]
 
 
+@pytest.mark.parametrize(("radius_m", "told"), [(0.02, True), (0.005, False)])
+def test_surface_over_the_colony_that_is_not_joined_to_it_is_told(radius_m: float, told: bool) -> None:
+    """A ball above a hemisphere is in no figure; a warning names its height, unless it is small beside the colony."""
+    loose = trimesh.creation.icosphere(3, radius_m)
+    loose.apply_translation(0.07 * UP)
+    mesh = joined(bed(), hemisphere(), Mesh(np.asarray(loose.vertices), np.asarray(loose.faces)))
+    found, plane, _ = measure(mesh, MeasuringRule(), np.random.default_rng(0))
+    assert found.height_mm == pytest.approx(50.0, rel=0.01)
+    lines = measuring_warnings(mesh, MeasuringRule(), found, plane)
+    assert [line.partition(" above")[0] for line in lines] == (
+        ["the surface is broken: 50 cm2 about the colony, up to 90 mm"] * told
+    )
+
+
 def test_a_given_normal_that_points_down_is_told() -> None:
     """A foot of 0.1 mm below the bed would pass for a colony, with all of the real one below."""
     mesh = joined(noisy(bed(), np.random.default_rng(0)), hemisphere())

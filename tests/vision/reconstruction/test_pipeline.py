@@ -88,7 +88,7 @@ def test_a_new_sparse_model_leaves_nothing_of_the_old_ones_surface(model, tmp_pa
     changed = reconstruct(folder, out, SETTINGS, focal_px=FOCAL, request=until)
     assert changed.scale is None
     assert not any((out / name).exists() for name in ("dense.ply", "mesh.ply", "mesh.glb", "report.html"))
-    assert {path.stem for path in (out / "stages").iterdir()} == {"match", "map"}
+    assert {path.stem for path in (out / "stages").iterdir()} == {"match", "map", "photos"}
 
 
 def test_second_run_skips_and_a_changed_setting_does_not(model):

@@ -215,6 +215,7 @@ def judge(
             reference_positions=photos.references,
             reference_rotations=photos.rotations,
             region=(target.centre_W_m, REGION_SHARE * target.radius_m),
+            replace=True,
             progress=progress,
         ).summary()
         figures |= {key: model[key] for key in _MODEL_FIGURES}

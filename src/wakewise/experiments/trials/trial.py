@@ -267,6 +267,7 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
             reference_positions=dict(zip(names, centres, strict=True)),
             reference_rotations=dict(zip(names, rotations, strict=True)),
             region=region,
+            replace=True,
             progress=progress,
         )
         summary: dict[str, Any] = model.summary()

@@ -83,8 +83,13 @@ def logged(out: Path) -> Iterator[RunLog]:
 
 MOST_NAMED = 5
 """Photos that are named one by one on the screen; the JSON has all."""
-Photos = Annotated[Path, typer.Argument(help="Folder of photographs (JPEG, PNG or TIFF), or a film.")]
-Out = Annotated[Path, typer.Option("--out", help="Folder for the model.")]
+COARSE_CELL = 2.2
+"""Cell of the mesh, in point spacings, above which it is told: only its bound across the subject makes it so."""
+Photos = Annotated[Path, typer.Argument(help="Folder of photographs (JPEG, PNG, TIFF or BMP), or a film.")]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", help="Folder for the model; runs/NAME of the photographs' if not given.", show_default=False),
+]
 References = Annotated[
     Path | None,
     typer.Option(
@@ -129,7 +134,7 @@ NoMesh = Annotated[bool, typer.Option("--no-mesh", help="Stop at the dense cloud
 
 def reconstruct_photos(
     photos: Photos,
-    out: Out = Path("runs/photos"),
+    out: Out = None,
     reference_cameras: References = None,
     cameras: Known = None,
     focal_px: Focal = None,
@@ -174,6 +179,7 @@ def reconstruct_photos(
     lenses, patterns = _lenses(camera), pairs("--lens", "NAME=PATTERN such as left='L_*'", lens) or None
     references = read_reference_cameras(reference_cameras) if reference_cameras else None
     known = read_known_cameras(cameras) if cameras else None
+    out = out or Path("runs") / photos.resolve().stem
     photos = frames_of(photos, out)
     if look:
         look_first(photos, out, settings.threads, json)
@@ -226,7 +232,7 @@ def verdict(model: Model) -> str:
         return "verdict: doubtful, " + "; ".join(model.warnings)
     return (
         f"verdict: sound, {model.registered_images} of {model.images} photos at {model.reprojection_px:.2f} px "
-        f"({model.reprojection_uncut_px:.2f} px before {model.cut_pct:.0f} % of the observations were cut)"
+        f"({model.reprojection_uncut_px:.2f} px with the observations that were cut, {model.cut_pct:.1f} %)"
     )
 
 
@@ -265,6 +271,11 @@ def remarks(model: Model) -> list[str]:
         out.append(f"the photos fell apart: {others} photos make models of their own; photograph what is between")
     if model.suspicion is not None:
         out.append(model.suspicion)
+    if model.mesh_cell_mm and model.point_spacing_mm and model.mesh_cell_mm > COARSE_CELL * model.point_spacing_mm:
+        out.append(
+            f"the mesh has cells of {model.mesh_cell_mm:.2g} mm, the points are {model.point_spacing_mm:.2g} mm apart: "
+            "thin parts are broken or lost; give --region about the subject"
+        )
     return out
 
 

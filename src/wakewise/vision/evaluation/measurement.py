@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, KDTree, QhullError
 from scipy.spatial.distance import pdist, squareform
 
-from wakewise.core.arrays import Array, BoolArray
+from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.jit.njit import njit
 from wakewise.scene.targets import Mesh
@@ -51,6 +51,8 @@ LEAST_BEHIND = 0.01
 """Share of a surface's area that must face down in all, for the colony to lie behind the faces."""
 TOP, LEAST_TOP_FACES = 0.1, 10
 """Fewer triangles than this in the uppermost tenth of the height are a spike or a stray one."""
+MOST_LOOSE = 0.05
+"""Share of the colony's area above which pieces over it that are not joined to it are told."""
 SHORTEST_MM, LONGEST_MM = 5.0, 20_000.0
 CELLS = 1500
 """Cells of the raster of an outline along its longer side."""
@@ -165,6 +167,13 @@ def measuring_warnings(mesh: Mesh, rule: MeasuringRule, size: ColonySize, bed: B
             f"the height rests on {top} triangles: a spike, perhaps; the rest is no higher than {rest_mm:.0f} mm; give "
             "--box with --colony, or clean the model"
         )
+    loose = _loose_faces(part, bed, cut_m, faces)
+    if (area := float(part.face_areas_m2[loose].sum())) > MOST_LOOSE * float(colony.face_areas_m2.sum()):
+        reach_mm = 1e3 * float(bed.to_plane(part.vertices_m)[:, 2][part.faces[loose]].max())
+        out.append(
+            f"the surface is broken: {1e4 * area:.0f} cm2 about the colony, up to {reach_mm:.0f} mm above the bed, are "
+            "not joined to it and not in the figures; a model made with --region about it is finer"
+        )
     ends_m = open_edges_m(part, bed, 1.5 * cut_m, faces)
     if ends_m > MOST_OPEN * length[0]:
         out.append(
@@ -172,6 +181,17 @@ def measuring_warnings(mesh: Mesh, rule: MeasuringRule, size: ColonySize, bed: B
             "has holes; what is missing is not in the figures"
         )
     return out
+
+
+def _loose_faces(mesh: Mesh, bed: BedFit, cut_m: float, colony: BoolArray) -> IntArray:
+    """Faces above the cut that are not of the colony and lie near it: within its bounding rectangle and height, each doubled."""
+    corners = bed.to_plane(mesh.vertices_m)[mesh.faces]
+    inside = corners[colony].reshape(-1, 3)
+    low, high = inside[:, :2].min(axis=0), inside[:, :2].max(axis=0)
+    middle = corners.mean(axis=1)
+    over = (np.abs(middle[:, :2] - 0.5 * (low + high)) <= high - low).all(axis=1)
+    over &= (middle[:, 2] > 2.0 * cut_m) & (middle[:, 2] < 2.0 * float(inside[:, 2].max()))
+    return np.flatnonzero(over & ~colony)
 
 
 def _behind(surface: Mesh, bed: BedFit) -> list[str]:

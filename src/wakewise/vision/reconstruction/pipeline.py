@@ -21,7 +21,7 @@ from wakewise.core.run_lock import exclusive_run
 from wakewise.vision.reconstruction.dense.dense_points import densify, patch_match, require_cuda
 from wakewise.vision.reconstruction.outputs.clouds import read_cloud, write_cloud
 from wakewise.vision.reconstruction.outputs.meshing import FIGURES as MESH_FIGURES
-from wakewise.vision.reconstruction.outputs.meshing import mesh_model
+from wakewise.vision.reconstruction.outputs.meshing import mesh_model, mesh_warnings
 from wakewise.vision.reconstruction.photos.known_cameras import KnownCameras, match_known, match_references
 from wakewise.vision.reconstruction.photos.lens_groups import LensGroup, group_photos, known_groups, named_lenses
 from wakewise.vision.reconstruction.photos.lenses import Lens
@@ -30,6 +30,7 @@ from wakewise.vision.reconstruction.photos.photo_folder import (
     Photo,
     PhotoStore,
     read_photos,
+    record_photos,
     unsupported_files,
     without_duplicates,
 )
@@ -208,14 +209,15 @@ class Model:
     pairs, verified_pairs, posed_pairs: image pairs matched, verified, and verified along epipolar lines of known poses.
     mapping: one of `MAPPINGS`; poses_refused: why known poses were not used. reprojection_px: mean over the
     observations kept; reprojection_uncut_px: before the last cuts, which took cut_pct of them. reprojection_met: the
-    mean is below the settings' bound and there are no warnings; warnings: reasons against the model, by the figures
-    of `ModelEvidence`. second_opinion_pct: displacement of the cameras, of their spread, if each photo has intrinsics
-    of its own. lenses: name, focal length, size and photos of each; lenses_split: photos that seemed to share one did
-    not. left_out: each unregistered photo, its best partner and their matches. sub_models: registered photos of each
-    model; the first is kept. duplicates: photos with the bytes of another. passed_over: files that are not read, by
-    kind. cameras_rmse_mm: distance of registered cameras from their references after the similarity. suspicion: set if
-    lengths cannot be metres. scale_bars, scale_fixes: see `scale.stage`. stages_s: duration of each stage when it ran;
-    `skipped`: finished before. wall_s: this call. Lengths are None for a model without scale.
+    mean is below the settings' bound and nothing in `ModelEvidence` speaks against the model; warnings: reasons against
+    the model by that evidence, and against its surface. second_opinion_pct: displacement of the cameras, of their
+    spread, if each photo has intrinsics of its own. lenses: name, focal length, size and photos of each; lenses_split:
+    photos that seemed to share one did not. left_out: each unregistered photo, its best partner and their matches.
+    sub_models: registered photos of each model; the first is kept. duplicates: photos with the bytes of another.
+    passed_over: files that are not read, by kind. cameras_rmse_mm: distance of registered cameras from their references
+    after the similarity. suspicion: set if lengths cannot be metres. scale_bars, scale_fixes: see `scale.stage`.
+    stages_s: duration of each stage when it ran; `skipped`: finished before. wall_s: this call. Lengths are None for a
+    model without scale.
     """
 
     images: int
@@ -261,6 +263,8 @@ class Model:
     mesh_vertices: int | None
     mesh_faces: int | None
     mesh_points_left_out: int | None
+    mesh_cell_mm: float | None
+    mesh_bare_pct: float | None
     wall_s: float
     stages_s: dict[str, float]
     skipped: tuple[str, ...]
@@ -307,6 +311,7 @@ def reconstruct(
     region: tuple[Array, float] | None = None,
     known: KnownCameras | None = None,
     request: ReconstructionRequest | None = None,
+    replace: bool = False,
     progress: Progress = no_progress,
 ) -> Model:
     """Photos to a model in `out`: database.db, sparse/, dense.ply, mesh.ply, reconstruction.json.
@@ -318,7 +323,8 @@ def reconstruct(
     scale and frame. `reference_rotations`: R_WC, shape (3, 3), by photo name, in the same frame: pairs are then chosen,
     matched and mapped from the poses, if the settings allow it and the poses fit. `region`: centre, shape (3,), and
     radius, in m in the frame of the references, of the dense model. `known`: poses and intrinsics instead of references
-    and lenses, fixed or initial as the settings say. `progress` is called with (done, total, note) of each stage.
+    and lenses, fixed or initial as the settings say. `replace`: a model of other photos in `out`. `progress` is called
+    with (done, total, note) of each stage.
 
     Raises InputError if the photos, references, pairs or region cannot be used; StageError if too little of it fits
     together; EnvironmentFailure if the disk is full, or a file cannot be read or written.
@@ -377,7 +383,7 @@ def reconstruct(
         fixed=fixed,
         region=_region(region, references),
     )
-    results = _run_stages(job, out, progress)
+    results = _run_stages(job, out, replace, progress)
     figures: dict[str, Any] = dict.fromkeys(LATER)
     for result in results.values():
         figures |= result.figures
@@ -387,7 +393,8 @@ def reconstruct(
     ]
     by_fixes = figures["scale_fixes"] is not None and figures["scale_fixes"]["used"]
     if references is None and request.bars is None and not by_fixes:
-        figures["point_spacing_mm"] = None
+        figures["point_spacing_mm"] = figures["mesh_cell_mm"] = None
+    figures["warnings"] = figures["warnings"] + mesh_warnings(figures)
     model = Model(
         images=len(found) + len(without_pose),
         duplicates=duplicates,
@@ -401,7 +408,7 @@ def reconstruct(
     return model
 
 
-def _run_stages(job: _Inputs, out: Path, progress: Progress) -> dict[str, StageResult]:
+def _run_stages(job: _Inputs, out: Path, replace: bool, progress: Progress) -> dict[str, StageResult]:
     """Run the requested stages, each unless it was done with the same input."""
     make_folder(out)
     settings, request, region = job.settings, job.request, job.region
@@ -410,6 +417,7 @@ def _run_stages(job: _Inputs, out: Path, progress: Progress) -> dict[str, StageR
     placed = None if job.references is None else {name: place.tolist() for name, place in job.references.items()}
     results: dict[str, StageResult] = {}
     with exclusive_run(out):
+        record_photos(out, job.photos, replace=replace)
         key = stage_key(
             settings,
             "match",

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import struct
 import threading
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.errors import EnvironmentFailure, InputError
+from wakewise.core.files import write_json
 from wakewise.core.threads import in_order
 from wakewise.vision.image_decoding import AS_STORED, decode_picture
 
@@ -88,6 +91,18 @@ class Photo:
     height: int
     digest: str
     camera: str = ""
+
+
+def record_photos(out: Path, photos: Sequence[Photo], *, replace: bool) -> None:
+    """Write the digests of a model's photos into its folder.
+
+    Raises InputError if it holds a model of other photos, none of which is among these, unless that may be replaced.
+    """
+    path, found = out / "stages" / "photos.json", sorted(photo.digest for photo in photos)
+    made = path.is_file() and (out / "reconstruction.json").is_file()
+    if made and not replace and set(json.loads(path.read_bytes())).isdisjoint(found):
+        raise InputError(f"{out}: holds a model of other photos, these need a folder of their own; give another")
+    write_json(path, found)
 
 
 class PhotoStore:
