@@ -97,6 +97,29 @@ def test_a_small_object_is_judged_by_its_size_and_faults_are_said(capsys: Capsys
     assert "5 faces come twice" in said.err and "--thresholds" in said.err
 
 
+def test_the_bed_of_a_trial_is_that_of_its_scenario(capsys: Capsys) -> None:
+    """Sand in the cloud counts as error without the bed's depth, and not with the scenario beside the model."""
+    truth = trimesh.creation.icosphere(4, 0.06)
+    truth.apply_translation([0, 0, 0.95])
+    truth.export("truth.ply")
+    on_ball = np.asarray(truth.vertices)
+    sand = np.random.default_rng(0).uniform([-0.09, -0.09, 0.999], [0.09, 0.09, 1.001], (len(on_ball), 3))
+    trimesh.PointCloud(np.concatenate([on_ball, sand])).export("dense.ply")
+    arguments = ["evaluate", "dense.ply", "--reference", "truth.ply", "--no-icp", "--json"]
+    assert run(arguments) == 0
+    without = json.loads(capsys.readouterr().out)
+    assert run([*arguments, "--bed-z", "1"]) == 0
+    given = json.loads(capsys.readouterr().out)
+    assert given["rmse_mm"] < 0.1 < without["rmse_mm"]
+    Path("scenario.yaml").write_text("tank: {size_m: [3.0, 3.0, 1.0]}\n")
+    assert run(arguments) == 0
+    found = capsys.readouterr()
+    assert json.loads(found.out) == given and "1 m, from scenario.yaml" in found.err
+    Path("scenario.yaml").write_text("tank: {size_m: [3.0, 3.0, 0.05]}\n")
+    assert run(arguments) == 2
+    assert "--bed-z" in capsys.readouterr().err
+
+
 def test_a_cloud_is_a_reference_too(capsys: Capsys) -> None:
     """Points without faces, in millimetres: measured point to point, with the spacing beside it."""
     ball("mesh.ply", 60.0)

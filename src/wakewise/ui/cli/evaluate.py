@@ -38,8 +38,8 @@ Cameras = Annotated[
 ]  # fmt: skip
 Bed = Annotated[
     float | None,
-    typer.Option("--bed-z", metavar="M", help="Height of the bed (z down); what is near it does not count.",
-                 show_default=False),
+    typer.Option("--bed-z", metavar="M", help="Depth of the bed (z down), near which nothing counts; if not given, "
+                 "that of scenario.yaml beside the model.", show_default=False),
 ]  # fmt: skip
 NoIcp = Annotated[bool, typer.Option("--no-icp", help="Do not refine the alignment before measuring.")]
 Colours = Annotated[
@@ -143,6 +143,7 @@ def evaluate(
     if reference is None:
         figures, definitions = _against_depths(points, depth_maps, cameras)
     else:
+        bed_z = _bed_of_trial(cloud) if bed_z is None else bed_z
         try:
             figures, definitions, aligned, error_mm = _against_reference(
                 cloud, points, reference, cameras, bed_z, unit_m, thresholds, not no_icp
@@ -170,6 +171,21 @@ def evaluate(
         for share in figures.get("shares", ())
     )
     _print_figures(json, f"{cloud} against {reference or depth_maps}", figures, why, definitions, {}, *shares)
+
+
+def _bed_of_trial(model: Path) -> float | None:
+    """Depth of the bed by the scenario beside a trial's model, None without one."""
+    scenario = model.parent / "scenario.yaml"
+    if not scenario.is_file():
+        return None
+    from wakewise.operation import read_scenario
+
+    try:
+        bed_z = read_scenario(scenario).tank.size_m[2]
+    except InputError as fault:
+        raise InputError(f"{fault}; --bed-z gives the bed's depth instead") from None
+    typer.echo(f"wakewise: bed at z = {bed_z:g} m, from {scenario} (--bed-z)", err=True)
+    return bed_z
 
 
 def _points(
