@@ -182,6 +182,7 @@ def test_a_folder_that_holds_something_is_not_replaced(trial: Path, tmp_path: Pa
         (["export", "empty", "--to", "tum"], "no steps.parquet"),
         (["export", "empty", "--to", "rosbag2"], "no steps.parquet"),
         (["export", "empty", "--to", "colmap"], "no images.csv"),
+        (["export", "model", "--to", "colmap"], "no trial; its COLMAP model is in model/sparse"),
         (["export", "broken", "--to", "tum"], "no Parquet"),
         (["export", "--to", "auv_controllers"], "--vehicle NAME"),
         (["export", "trial", "--to", "auv_controllers", "--vehicle", "paper"], "no trial"),
@@ -197,6 +198,8 @@ def test_bad_words_are_one_line(
     (trial.parent / "empty").mkdir()
     (trial.parent / "broken").mkdir()
     (trial.parent / "broken" / "steps.parquet").write_text("no table")
+    (trial.parent / "model").mkdir()
+    (trial.parent / "model" / "reconstruction.json").write_text("{}")
     before = sorted(trial.parent.rglob("*"))
     assert run(words) == 2
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("wakewise:")]

@@ -85,6 +85,8 @@ def export_trial(
         need("wakewise export --to rosbag2", "ros")
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; give that of a trial")
+    if (folder / "reconstruction.json").is_file() and not (folder / "scenario.yaml").is_file():
+        raise InputError(f"{folder}: is a model of photographs, no trial; its COLMAP model is in {folder / 'sparse'}")
     if to == "qgc-plan":
         return _plan(folder, out or folder / "export" / "route.plan", origin)
     if origin is not None:
