@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 DOCS = Path(__file__).parents[2] / "docs"
 NUMBER = r"-?\d+\.?\d*(?:e-?\d+)?"
@@ -42,6 +43,21 @@ def test_the_python_of_a_page_prints_what_the_page_shows(page, rel, tmp_path, mo
         if shown:
             assert_alike(out.getvalue(), shown, rel)
     assert any(shown for _, shown in blocks(page))
+
+
+def test_a_model_is_turned_to_east_north_up(tmp_path, monkeypatch):
+    """The page's matrix is that of its Python: a point 1 north, 2 east, 3 down; the inside of a mesh stays inside."""
+    monkeypatch.chdir(tmp_path)
+    solid = trimesh.creation.box((1.0, 1.0, 1.0))
+    solid.apply_translation([1.0, 2.0, 3.0])
+    solid.export("mesh.ply")
+    ((code, _),) = blocks("scale.md")
+    exec(code, {})
+    turned = trimesh.load("mesh-z-up.ply", process=False)
+    np.testing.assert_allclose(turned.bounds.mean(axis=0), [2.0, 1.0, -3.0])
+    assert turned.volume > 0.9
+    pasted = re.search(r"^```text\n(0 .*?)^```$", (DOCS / "scale.md").read_text(), re.MULTILINE | re.DOTALL)
+    assert pasted and re.findall(r"-?\d", pasted[1]) == re.findall(r"-?\d", code.split("transform(")[1].split(")")[0])
 
 
 def test_a_wrong_number_would_be_found():
