@@ -75,7 +75,7 @@ def bad_inputs(base: Path) -> dict[str, tuple[list[str], str]]:
         "none": (["measure", str(base / "missing.ply")], "no such file"),
         "points": (["measure", str(points)], "without faces"),
         "folder": (["measure", str(base / "empty")], "reconstruction.json"),
-        "no mesh": (["measure", str(folder(base / "bare", scale=1.0))], "no mesh"),
+        "no mesh": (["measure", str(folder(base / "bare", scale=1.0))], "without --until"),
         "no scale": (["measure", str(unscaled)], "no scale"),
         "no bed": (["measure", str(ball)], "bed"),
         "box": (["measure", good, "--box", "5", "5", "5", "6", "6", "6"], "--box"),

@@ -66,11 +66,11 @@ def read_model(path: Path, unit_m: float | None = None) -> FinishedModel:
         return FinishedModel(name=str(path), mesh=_scaled(_mesh(path), unit_m or 1.0), unit_m=unit_m or 1.0)
     figures = _figures(path)
     if not (path / "mesh.ply").is_file():
-        raise InputError(f"{path}: holds no mesh (mesh.ply); `wakewise reconstruct` without --no-mesh makes it")
+        raise InputError(f"{path}: holds no mesh (mesh.ply); reconstruct without --until and --no-mesh")
     if figures.get("scale") is None and not _metric_by(figures) and unit_m is None:
         raise InputError(
-            f"{path}: the model has no scale, so it has no lengths; reconstruct with --bar, --fixes or "
-            "--reference-cameras, or say how long its unit is (--unit-m)"
+            f"{path}: the model has no scale; reconstruct with --bar, --fixes or --reference-cameras, or give the "
+            "length of its unit (--unit-m)"
         )
     unit = unit_m or 1.0
     mesh = _scaled(_mesh(path / "mesh.ply"), unit)
