@@ -52,6 +52,7 @@ def test_the_page_says_what_the_files_say():
     """Verdict, bars, each photograph, what was cut; names of files are text, not markup."""
     page = model_page("reef", FIGURES, FACTS, None)
     assert "A sound model of 2 of 3 photographs" in page
+    assert "0.55 px with outliers (4 %)" in page
     assert "500.00 ± 0.50 mm" in page
     assert "+1.00 mm" in page
     assert "none; 7 matches with bb.jpg" in page

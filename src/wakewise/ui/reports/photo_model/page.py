@@ -300,7 +300,7 @@ def _tiles(figures: dict[str, Any]) -> list[str]:
     features = f"in {fixed(figures.get('track_length'), 1)} photos each"
     return [
         tile("photographs placed", _count(placed), f"of {_count(images)}", "have a place in the model", state),
-        tile("error", fixed(figures.get("reprojection_px"), 2), "px", f"mean; {uncut} before {cut} % was cut"),
+        tile("error", fixed(figures.get("reprojection_px"), 2), "px", f"mean; {uncut} px with outliers ({cut} %)"),
         scale_tile(figures),
         tile("sparse points", _count(figures.get("points")), "", features),
         tile("dense points", _count(dense), "", "not asked for" if dense is None else note),
