@@ -2,12 +2,14 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trimesh
 
 from wakewise.ui.cli.main import run
+from wakewise.ui.cli.reconstruct_options import scale_lines
 
 Capsys = pytest.CaptureFixture[str]
 
@@ -118,6 +120,13 @@ def test_the_bed_of_a_trial_is_that_of_its_scenario(capsys: Capsys) -> None:
     Path("scenario.yaml").write_text("tank: {size_m: [3.0, 3.0, 0.05]}\n")
     assert run(arguments) == 2
     assert "--bed-z" in capsys.readouterr().err
+
+
+def test_a_model_without_scale_says_what_gives_one() -> None:
+    """One line that names the options."""
+    (line,) = scale_lines(SimpleNamespace(scale=None, scale_bars=None, scale_fixes=None))
+    assert line.startswith("scale: none; --bar, --fixes")
+    assert scale_lines(SimpleNamespace(scale=1.0, scale_bars=None, scale_fixes=None)) == []
 
 
 def test_a_cloud_is_a_reference_too(capsys: Capsys) -> None:

@@ -131,6 +131,8 @@ def write_report_of(out: Path, photos: Path) -> None:
 
 def scale_lines(model: Model) -> list[str]:
     """What bars and fixes say, a line each."""
+    if model.scale is None and model.scale_bars is None and model.scale_fixes is None:
+        return ["scale: none; --bar, --fixes or --reference-cameras give one"]
     return [*_bar_lines(model.scale_bars), *_fix_lines(model.scale_fixes)]
 
 

@@ -285,9 +285,7 @@ class Model:
             "poses_refused": "the model came from known poses, or none were given, or hardly a pair fitted them",
         }
         why = {
-            key: reason.get(key, "no reference cameras were given, so the model has no scale")
-            for key, value in figures.items()
-            if value is None
+            key: reason.get(key, "no reference cameras were given") for key, value in figures.items() if value is None
         }
         if self.mapping == MAPPINGS["known"]:
             why |= {

@@ -325,8 +325,8 @@ def why_unused(placed: Georeference) -> str | None:
     if placed.uncertainty_pct <= MOST_UNSURE_PCT:
         return None
     how = f"{placed.uncertainty_pct:.0f} %" if placed.uncertainty_pct < 1e3 else "more than tenfold"
-    what = "differ by more than their uncertainty" if placed.turned else "differ in depth, and not all along one line"
-    return f"the scale would be uncertain by {how}, {MOST_UNSURE_PCT:g} % is the most; photos must {what}"
+    what = "photos must be farther apart" if placed.turned else "depths must differ more, and not along one line"
+    return f"uncertain by {how}, above {MOST_UNSURE_PCT:g} %: {what}"
 
 
 def figures(placed: Georeference, fixes: PositionFixes, used: bool, checks: bool) -> dict[str, Any]:
