@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 from collections import defaultdict
 from pathlib import Path
 
@@ -48,6 +49,27 @@ def test_the_library_does_not_grow() -> None:
     assert len([path for path in library if path.name != "__init__.py"]) <= 441
     lines = sum(len(path.read_text(encoding="utf-8").splitlines()) for path in library)
     assert lines <= 85_767 + 6_850 + 1_720 + 1_475 + 960
+
+
+def test_every_distribution_holds_a_readme_and_the_licence_and_names_the_same_authors() -> None:
+    """Each project has its page and a copy of the one licence; all files that name authors name the same."""
+    projects = [ROOT, *sorted(page.parent for page in ROOT.glob("packages/*/pyproject.toml")), ROOT / "benchmarks"]
+    authors = set()
+    for folder in projects:
+        project = tomllib.loads((folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+        assert (project["readme"], project["license-files"]) == ("README.md", ["LICENSE"]), folder
+        assert project["name"] in (folder / "README.md").read_text(encoding="utf-8").lower()
+        assert (folder / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes(), folder
+        authors |= {author["name"] for author in project["authors"]}
+    (author,) = authors
+    ardusub = ROOT / "packages" / "wakewise-ardusub"
+    for path, named in (
+        (ROOT / "CITATION.cff", f"  - name: {author}\n"),
+        (ROOT / "docs" / "conf.py", f'author = "{author}"'),
+        (ardusub / "ros2" / "wakewise_ros" / "package.xml", f">{author}</maintainer>"),
+        (ardusub / "extensions" / "blueos" / "Dockerfile", f'"name": "{author}"'),
+    ):
+        assert named in path.read_text(encoding="utf-8"), path
 
 
 def test_few_lines_are_excused_from_ruff_and_mypy() -> None:
