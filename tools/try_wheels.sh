@@ -7,7 +7,7 @@ set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-for package in . packages/wakewise-ardusub packages/wakewise-paper packages/wakewise-nerf; do
+for package in . packages/wakewise-ardusub packages/wakewise-paper packages/wakewise-nerf benchmarks; do
     "$root/.venv/bin/uv" build --quiet --out-dir "$work/dist" "$root/$package"
 done
 cd "$work" # not beside the sources
@@ -22,9 +22,11 @@ for python in "$@"; do
 import sys, wakewise as ww
 print(sys.version.split()[0], 'core:', ww.fly(ww.Scenario.preset('quick'), duration_s=2.0))"
     env/bin/wakewise vehicle show bluerov2-heavy --quiet >/dev/null
-    install "$wheel[all]" dist/wakewise_ardusub-*.whl dist/wakewise_paper-*.whl
+    # Without its extra, wakewise-nerf brings no PyTorch, which is gigabytes: it is imported and shows its help.
+    install "$wheel[all]" dist/wakewise_*.whl
+    env/bin/python -c "import wakewise_nerf.field, wakewise_benchmarks"
     env/bin/wakewise target show brain --out brain.svg --quiet >/dev/null
-    for command in scan reconstruct link reproduce; do env/bin/wakewise $command --help >/dev/null; done
+    for command in scan reconstruct link reproduce nerf bench; do env/bin/wakewise $command --help >/dev/null; done
     echo "extras and packages: commands run"
     rm -rf env
     "$python" -m venv env
