@@ -12,11 +12,11 @@ unexport PYTHONDONTWRITEBYTECODE
 help:
 	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs, cockpit, ros, gamepad and links (LGPL), dask, detector, learning, tools for tests"
 	@echo "make scan    fly, photograph, reconstruct and judge a coral; leaves runs/quick/report.html"
-	@echo "make test    ruff, spelling, mypy, the import contract and the tests but the slow ones"
+	@echo "make check   ruff, spelling, mypy and the import contracts"
+	@echo "make test    the same, and the tests but the slow ones; as root on Debian it installs Chromium for them"
 	@echo "make test-all  the same with the slow ones"
 	@echo "make pytest  the tests of make test alone"
 	@echo "make coverage  coverage per package; kernels count, run without a compiler"
-	@echo "make check   the same without the tests"
 	@echo "make bench   speed and quality, side by side with a peer"
 	@echo "make bench-history  speed in short, compared with the last time on this processor, kept in docs/benchmarks"
 	@echo "make nightly  test-all, docs, notebooks, coverage and bench-history"
@@ -24,8 +24,8 @@ help:
 	@echo "make figures  the README's animation, from two flights; a minute or two"
 	@echo "make docs    regenerate pages from the code, and build the site: docs/_build/html/index.html"
 	@echo "make notebooks  run the notebooks of examples/notebooks"
-	@echo "make clean   remove the virtual environment and built packages; results in runs stay"
 	@echo "make lock    resolve requirements.lock anew (needs uv, which setup installs)"
+	@echo "make clean   remove the virtual environment and built packages; results in runs stay"
 
 setup: $(STAMP)
 
