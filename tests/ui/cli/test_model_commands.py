@@ -52,6 +52,10 @@ def test_evaluate_prints_figures_with_their_definitions_and_colours_errors(capsy
         (["evaluate", "model.ply", "--reference", "away.ply"], 1, "--bed-z"),
         (["evaluate", "model.ply", "--reference", "truth.ply", "--bed-z", "-1"], 2, "--bed-z"),
         (["evaluate", "model.ply", "--reference", "truth.ply", "--thresholds", "1,x"], 2, "--thresholds 'x'"),
+        (["evaluate", ".", "--reference", "truth.ply"], 2, "is no file of points; give one such as dense.ply"),
+        (["evaluate", "model.glb", "--reference", "truth.ply"], 2, "is no file of points"),
+        (["evaluate", "mm.ply", "--reference", "truth.ply"], 2, "a model must be in metres"),
+        (["evaluate", "model.ply", "--reference", "truth.ply", "--colours", "errors.obj"], 2, "must end in .ply"),
         (["calibrate", "gone"], 2, "holds no photos"),
         (["calibrate", ".", "--board", "eleven"], 2, "COLUMNSxROWS"),
         (["calibrate", ".", "--marker-mm", "9"], 2, "markers must"),
@@ -66,6 +70,7 @@ def test_what_cannot_be_done_is_told_in_one_line(arguments: list[str], code: int
     ball("model.ply", 0.06)
     ball("mm.ply", 60.0)
     ball("away.ply", 0.06, 0.5)
+    ball("model.glb", 0.06)
     assert run(arguments) == code
     captured = capsys.readouterr()
     assert captured.out == ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -51,8 +52,6 @@ Unit = Annotated[
     float,
     typer.Option("--unit-m", metavar="M", help="Length of the reference's unit in metres: 0.001 for millimetres."),
 ]
-
-
 Thresholds = Annotated[
     str | None,
     typer.Option("--thresholds", metavar="LIST", help="Distances at which shares are counted: mm, as 0.5,1,2, or "
@@ -133,6 +132,10 @@ def evaluate(
         raise InputError(f"--frame: '{frame}', allowed are reference, nerfstudio")
     if (reference is None) == (depth_maps is None):
         raise InputError("evaluate: give either --reference MESH or CLOUD, or --depth-maps NPZ with --cameras FOLDER")
+    if cloud.is_dir() or (cloud.suffix.lower() == ".glb" and mesh_samples is None):
+        raise InputError(f"{cloud}: is no file of points; give one such as dense.ply or mesh.ply")
+    if colours is not None and colours.suffix.lower() != ".ply":
+        raise InputError(f"--colours {colours}: must end in .ply")
     if not unit_m > 0.0:
         raise InputError(f"--unit-m {unit_m:g}: must be above 0")
     if depth_maps is not None and thresholds is not None:
@@ -152,9 +155,9 @@ def evaluate(
             from wakewise.vision.evaluation import ScaleError
 
             if isinstance(fault, ScaleError):
-                raise InputError(f"{fault} (--unit-m)") from None
+                raise InputError(f"{fault} The reference's unit: --unit-m; a model must be in metres") from None
             hint = "; if the model holds the bed that the object stands on, say where: --bed-z" if bed_z is None else ""
-            raise StageError(f"{fault}{hint}") from None
+            raise StageError(f"{fault}{hint}; model and reference must be in metres") from None
         if colours is not None:
             _write_errors(colours, aligned, error_mm)
     _remark(figures)
@@ -297,10 +300,8 @@ def _against_reference(
 
     mesh = None
     if reference.suffix.lower() in READABLE_SUFFIXES or not reference.is_file():
-        try:
+        with suppress(FacelessFileError):
             mesh = read_mesh(reference)
-        except FacelessFileError:
-            mesh = None
     if mesh is None:
         if cameras is not None:
             raise InputError(f"--cameras: what they saw of {reference} is not known, it has no faces")
@@ -320,10 +321,9 @@ def _against_reference(
         )
     except InputError as fault:
         raise InputError(f"{fault}; --bed-z {bed_z:g} is its height, z down" if bed_z is not None else fault) from None
-    try:
-        own: dict[str, int] | None = dataclasses.asdict(mesh_faults(read_mesh(cloud)))
-    except InputError:
-        own = None
+    own: dict[str, int] | None = None
+    with suppress(InputError):
+        own = dataclasses.asdict(mesh_faults(read_mesh(cloud)))
     more = {
         "extent_mm": extent_mm,
         "shares": [dataclasses.asdict(one) for one in compared.shares],
