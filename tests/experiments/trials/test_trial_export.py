@@ -170,6 +170,7 @@ def test_a_folder_that_holds_something_is_not_replaced(trial: Path, tmp_path: Pa
     [
         (["export"], "folder of a trial"),
         (["export", "nowhere", "--to", "tum"], "no such folder"),
+        (["export", "trial/images.csv", "--to", "colmap"], "is a file; give a trial's folder"),
         (["export", "trial", "--to", "blender"], "nerfstudio, colmap, tum, rosbag2, qgc-plan"),
         (["export", "trial", "--to", "tum", "--poses", "mine"], "true, estimated"),
         (["export", "trial", "--to", "tum", "--vehicle", "paper"], "--vehicle is for auv_controllers"),
@@ -181,7 +182,7 @@ def test_a_folder_that_holds_something_is_not_replaced(trial: Path, tmp_path: Pa
         (["export", "trial", "--to", "colmap", "--held-out", "1"], "one photograph in 2 and more"),
         (["export", "empty", "--to", "tum"], "no steps.parquet"),
         (["export", "empty", "--to", "rosbag2"], "no steps.parquet"),
-        (["export", "empty", "--to", "colmap"], "no images.csv"),
+        (["export", "empty", "--to", "colmap"], "no images.csv; give the folder of a trial"),
         (["export", "model", "--to", "colmap"], "no trial; its COLMAP model is in model/sparse"),
         (["export", "broken", "--to", "tum"], "no Parquet"),
         (["export", "--to", "auv_controllers"], "--vehicle NAME"),

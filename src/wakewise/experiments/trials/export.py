@@ -84,7 +84,7 @@ def export_trial(
     if to == "rosbag2":
         need("wakewise export --to rosbag2", "ros")
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder; give that of a trial")
+        raise InputError(f"{folder}: {'is a file' if folder.exists() else 'no such folder'}; give a trial's folder")
     if (folder / "reconstruction.json").is_file() and not (folder / "scenario.yaml").is_file():
         raise InputError(f"{folder}: is a model of photographs, no trial; its COLMAP model is in {folder / 'sparse'}")
     if to == "qgc-plan":
@@ -302,7 +302,7 @@ def _telemetry(steps: pl.DataFrame) -> ThrustRecord | None:
 def _images(folder: Path) -> pl.DataFrame:
     path = folder / "images.csv"
     if not path.is_file():
-        raise InputError(f"{folder}: holds no images.csv; no photographs have been taken yet (wakewise scan)")
+        raise InputError(f"{folder}: holds no images.csv; give the folder of a trial with photographs")
     try:
         table = pl.read_csv(path, schema_overrides={"name": pl.String})
     except (OSError, pl.exceptions.PolarsError):
