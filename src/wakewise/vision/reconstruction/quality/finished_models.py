@@ -95,7 +95,7 @@ def _mesh(path: Path) -> Mesh:
     try:
         read = read_mesh(path)
     except FacelessFileError:
-        raise InputError(f"{path}: holds points without faces; a surface is needed, mesh the points first") from None
+        raise InputError(f"{path}: holds points without faces; a mesh is needed, such as mesh.ply") from None
     joined = trimesh.Trimesh(read.vertices_m, read.faces, process=False)
     joined.merge_vertices(merge_tex=True, merge_norm=True)
     step = float(np.spacing(np.float32(np.abs(joined.vertices).max())))
