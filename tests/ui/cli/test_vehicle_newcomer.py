@@ -107,6 +107,19 @@ def test_a_vehicle_file_that_could_not_be_found_again_is_not_written(
     assert not Path("my_rov.txt").exists()
 
 
+def test_a_file_that_exists_is_replaced_only_where_it_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    """Its own input, above all: what somebody filled in by hand stays."""
+    Path("mine.yaml").write_text("name: mine\n", encoding="utf-8")
+    words = ["vehicle", "import", "my_rov.urdf", "--out", "mine.yaml"]
+    assert run(words) == 2
+    assert capsys.readouterr().err == (
+        "wakewise: --out mine.yaml: exists; give another name, or --force to replace it\n"
+    )
+    assert Path("mine.yaml").read_text(encoding="utf-8") == "name: mine\n"
+    assert run([*words, "--force"]) == 0
+    assert "my_rov" in Path("mine.yaml").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("name", "words"),
     [

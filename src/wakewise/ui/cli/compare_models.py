@@ -10,7 +10,7 @@ import typer
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import ProgressBars, answer, print_table, write_page
-from wakewise.ui.cli.options import Json, refuse_folder
+from wakewise.ui.cli.options import Json, check_file
 
 if TYPE_CHECKING:
     from wakewise.vision.evaluation.surface_change import SurfaceChange
@@ -63,7 +63,7 @@ def compare_models(
         if out.suffix.lower() != ".png":
             raise InputError(f"--out {out}: must end in .png")
         for path in (out, out.with_suffix(".json")):
-            refuse_folder(path)
+            check_file(path)
     models = [read_model(path, unit_m) for path in (first, second)]
     sigmas = [model.scale_sigma_pct or 0.0 for model in models]
     with ProgressBars().stage("compare"):

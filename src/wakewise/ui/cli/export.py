@@ -12,7 +12,7 @@ import typer
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import ProgressBars, answer, print_json
-from wakewise.ui.cli.options import Json, refuse_folder, seed_option
+from wakewise.ui.cli.options import Json, check_file, seed_option
 
 LISTED = 5
 """Trials that were left out are listed up to so many; DATASHEET.md lists all."""
@@ -207,7 +207,7 @@ def _allocation(vehicle: str, out: Path | None, frame: str) -> tuple[Path, dict[
 
     draft = load_draft(vehicle)
     path = out or Path(f"{Path(draft.name).name}-auv_controllers.yaml")
-    refuse_folder(path)
+    check_file(path)
     text = tam_yaml(draft.name, draft.thruster_names, draft.allocation_matrix, draft.thrust_limits_N, frame)
     write_text(path, text)
     return path, {"thrusters": len(draft.thruster_names)}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.ui.cli.console import ProgressBars, answer, interval, print_table
-from wakewise.ui.cli.options import Json, refuse_folder
+from wakewise.ui.cli.options import Json, check_file
 
 if TYPE_CHECKING:
     from wakewise.vision.reconstruction.quality.finished_models import FinishedModel
@@ -62,7 +62,7 @@ def measure(
     from wakewise.core.optional_dependencies import need
 
     need("wakewise measure", "photos")
-    refuse_folder(out)
+    check_file(out)
     import numpy as np
 
     from wakewise.core.files import write_json

@@ -25,6 +25,7 @@ Sets = Annotated[
         "--set", metavar="FIELD=VALUE", help="Change a field, such as mission.standoff_m=0.6; may be repeated."
     ),
 ]
+Force = Annotated[bool, typer.Option("--force", help="Replace a file that exists.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 
 
@@ -104,12 +105,14 @@ def pairs(option: str, form: str, given: list[str] | None) -> dict[str, str]:
     return found
 
 
-def refuse_folder(path: Path | None, option: str = "--out") -> None:
-    """Refuse a folder where a file is to be written, before any work; raises InputError."""
+def check_file(path: Path | None, option: str = "--out", force: bool = True) -> None:
+    """Refuse a folder where a file is to be written, and without `force` a file that exists; raises InputError."""
     from wakewise.core.errors import InputError
 
     if path is not None and path.is_dir():
         raise InputError(f"{option} {path}: is a folder, must be a file")
+    if path is not None and path.exists() and not force:
+        raise InputError(f"{option} {path}: exists; give another name, or --force to replace it")
 
 
 def listed(text: str | None) -> tuple[str, ...]:

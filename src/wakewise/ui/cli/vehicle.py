@@ -17,7 +17,7 @@ from wakewise.ui.cli.options import (
     VehicleFrame,
     XacroArguments,
     XacroPackages,
-    refuse_folder,
+    check_file,
 )
 from wakewise.ui.cli.vehicle_import import foreign_vehicle
 
@@ -74,8 +74,8 @@ def show(
 
     draft = foreign_vehicle(vehicle, frame, thrust_direction, package, arg, skip_missing, rows)
     facts = describe(draft)
-    refuse_folder(out)
-    refuse_folder(drawing, "--drawing")
+    check_file(out)
+    check_file(drawing, "--drawing")
     if out is not None:
         if out.suffix not in (".svg", ".html"):
             raise InputError(f"--out {out}: allowed are files that end in .svg or .html")

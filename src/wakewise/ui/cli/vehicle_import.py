@@ -11,6 +11,7 @@ import typer
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import answer, print_table
 from wakewise.ui.cli.options import (
+    Force,
     Json,
     MatrixRows,
     SkipMissing,
@@ -18,8 +19,8 @@ from wakewise.ui.cli.options import (
     VehicleFrame,
     XacroArguments,
     XacroPackages,
+    check_file,
     pairs,
-    refuse_folder,
 )
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ def import_file(
             "true.",
         ),
     ] = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Import a vehicle file of another project; say what it holds, what was decided, and what is missing.
@@ -65,10 +67,9 @@ def import_file(
     from wakewise.robot.vehicles import blank_fields, completed, draft_yaml, load_draft
     from wakewise.robot.vehicles.mixing import compare_matrix
 
-    if out is not None:
-        refuse_folder(out)
-        if out.suffix not in (".yaml", ".yml"):
-            raise InputError(f"--out {out}: must end in .yaml, by which a vehicle file is known")
+    check_file(out, "--out", force)
+    if out is not None and out.suffix not in (".yaml", ".yml"):
+        raise InputError(f"--out {out}: must end in .yaml, by which a vehicle file is known")
     draft = foreign_vehicle(str(file), frame, thrust_direction, package, arg, skip_missing, rows, matrix)
     draft = draft if like is None else completed(draft, load_draft(like))
     comparison = None
