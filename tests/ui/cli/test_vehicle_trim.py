@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -47,10 +48,26 @@ def test_a_flight_gives_the_ballast_of_the_next(tmp_path: Path, capsys: Capsys) 
     assert "add 4.5 N of float 5 cm forward of the middle" in shown and str(new) in shown
     later = load_scenario("quick", new, {})
     assert [block.float_N for block in later.ballast] == [-1.4, 4.5]
+    advised = shlex.split(shown.rpartition("fly with it: ")[2])
+    assert advised == ["wakewise", "scan", str(new), "--out", "runs/a-trimmed"]
     assert run(["vehicle", "trim", "--flight", str(folder), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["net_weight_N"] == pytest.approx(4.4, abs=0.01)
     assert told["ballast"] == [block.model_dump(mode="json") for block in later.ballast]
+
+
+def test_what_is_written_flies_as_the_flight_did_but_trimmed(tmp_path: Path, capsys: Capsys) -> None:
+    """Target, vehicle, world, seed and all else are the flight's; a file that exists stays unless --force is given."""
+    changes = {"target.kind": "plate", "vehicle": "bluerov2-heavy", "seed": 7, "tank.mismatch.trim_N": 3.0}
+    folder, new = flown(tmp_path / "a flight", 3.0, **changes), tmp_path / "its next.yaml"
+    words = ["--flight", str(folder), "--write", str(new)]
+    assert run(["vehicle", "trim", *words]) == 0
+    shown = capsys.readouterr().out
+    advised = shlex.split(shown.rpartition("fly with it: ")[2])
+    later, before = load_scenario("quick", Path(advised[2]), {}), load_scenario(None, folder / "scenario.yaml", {})
+    assert later.model_copy(update={"ballast": ()}) == before and later.ballast
+    assert "exists" in refusal(capsys, *words)
+    assert run(["vehicle", "trim", *words, "--force"]) == 0
 
 
 def test_a_vehicle_in_trim_is_left_alone(tmp_path: Path, capsys: Capsys) -> None:

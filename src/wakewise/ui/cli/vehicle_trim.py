@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from wakewise.ui.cli.console import answer, print_json, print_table
-from wakewise.ui.cli.options import Json
+from wakewise.ui.cli.options import Force, Json, check_file
 
 if TYPE_CHECKING:
     from wakewise.control.ballast_advice import TrimAdvice, TrimRow
@@ -30,8 +30,9 @@ def trim(
     ] = None,
     flight: Annotated[Path | None, typer.Option(help="Folder of a trial: trim from its hover.")] = None,
     write: Annotated[
-        Path | None, typer.Option(help="With --flight: scenario file with the ballast for the next.")
+        Path | None, typer.Option(help="With --flight: its scenario with the new ballast, as a file.")
     ] = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Advise on ballast: for a mission beforehand, or from the hover of a flight.
@@ -50,6 +51,7 @@ def trim(
         given = [name for name, value in others.items() if value is not None]
         if given:
             raise InputError(f"--flight: says what was flown and how heavy it was, {given[0]} does not go with it")
+        check_file(write, "--write", force)
         _from_flight(flight, write, json)
         return
     if write is not None:
@@ -59,16 +61,16 @@ def trim(
 
 def _from_flight(folder: Path, write: Path | None, json: bool) -> None:
     """Trim of a flight, and the scenario file that flies with it."""
-    import yaml
+    import shlex
 
     from wakewise.core.files import write_text
     from wakewise.operation.flight_trim import folder_trim
+    from wakewise.operation.scenario import dump_scenario
 
     parts, found = folder_trim(folder)
-    blocks = [*parts.scenario.ballast, *found.blocks]
+    trimmed = parts.scenario.model_copy(update={"ballast": (*parts.scenario.ballast, *found.blocks)})
     if write is not None:
-        tree = {"ballast": [block.model_dump(mode="json") for block in blocks]}
-        write_text(write, f"# {found.words}\n" + yaml.safe_dump(tree, sort_keys=False))
+        write_text(write, f"# {found.words}\n{dump_scenario(trimmed)}")
     figures = {
         "vehicle": parts.vehicle.name,
         "net_weight_N": found.heavy_N,
@@ -77,10 +79,12 @@ def _from_flight(folder: Path, write: Path | None, json: bool) -> None:
         "moment_starboard_Nm": float(found.moment_Nm[1]),
         "moment_std_Nm": [float(value) for value in found.moment_std_Nm],
         "blocks": [block.model_dump(mode="json") for block in found.blocks],
-        "ballast": [block.model_dump(mode="json") for block in blocks],
+        "ballast": [block.model_dump(mode="json") for block in trimmed.ballast],
         "advice": found.advice,
     }
-    written = None if write is None else f"ballast: {write} (fly with it: wakewise scan {write})"
+    # A folder of its own: that of the flight holds another trial.
+    fly = shlex.join(["wakewise", "scan", str(write), "--out", f"runs/{folder.resolve().name}-trimmed"])
+    written = None if write is None else f"written: {write}; fly with it: {fly}"
     answer(json, figures, f"{parts.vehicle.title}: {found.words}", written)
 
 
