@@ -73,6 +73,7 @@ def test_a_short_line_is_flown_over_loopback(
     assert autopilot.mode == POSHOLD
     assert autopilot.photographs == told["photographs"] == 2
     assert (tmp_path / "journal.jsonl").stat().st_size > 200
+    assert json.loads((tmp_path / "figures.json").read_text(encoding="utf-8")) == told
 
 
 @pytest.mark.slow
@@ -126,6 +127,21 @@ def test_a_part_of_an_orbit_is_flown_over_loopback(
     assert autopilot.mode == POSHOLD
     assert autopilot.photographs == told["photographs"] == 2
     assert euler_from_quat(autopilot.motion.q_WB)[2] == pytest.approx(-0.2 * math.pi, abs=0.1)
+
+
+@pytest.mark.parametrize("command", ["transect", "orbit"])
+def test_what_is_printed_is_kept_beside_the_journal(
+    command: str, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder has the figures as JSON, also of a survey that ended before its first line."""
+    monkeypatch.setattr("wakewise_ardusub.cli.link_survey._fly", lambda *given, **options: None)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    assert run(["link", command, "--connection", f"udpin:127.0.0.1:{port}", "--out", str(tmp_path), "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert told["finished"] is False
+    assert json.loads((tmp_path / "figures.json").read_text(encoding="utf-8")) == told
 
 
 def test_an_altitude_without_a_rangefinder_is_refused(

@@ -52,7 +52,7 @@ Consent = Annotated[
     typer.Option("--consent", help="Begin as soon as all is well: giving it is the consent, as Enter otherwise is."),
 ]
 Wait = Annotated[float, typer.Option(metavar="S", min=1.0, help="How long to wait until all is well.")]
-Out = Annotated[Path | None, typer.Option(help="A new folder for the journal; runs/NAME-TIME if not given.")]
+Out = Annotated[Path | None, typer.Option(help="A new folder for journal and figures; runs/NAME-TIME if not given.")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +81,7 @@ def fly_survey(
 ) -> None:
     """Check, connect, fly until it is over, and print the figures; `off_m` off the target place ends it."""
     from wakewise.core.errors import EnvironmentFailure, InputError
+    from wakewise.core.files import write_json
     from wakewise_ardusub.optional_dependencies import need
 
     need(f"wakewise link {given.name}", "links", only=("pymavlink",))
@@ -154,6 +155,7 @@ def fly_survey(
         finally:
             end_status_line()
     figures = {"folder": str(folder), **session.figures()}
+    write_json(folder / "figures.json", figures)
     if given.json:
         print_json(figures)
     else:

@@ -11,7 +11,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 
 FIGURE_MEANINGS = {
-    "folder": "journal of place, altitude and photographs",
+    "folder": "figures.json and a journal of place, altitude and photographs",
     "finished": "all of it was flown",
     "state": "of the session",
     "why": "what it ended by",
