@@ -99,6 +99,8 @@ def test_a_vehicle_on_which_all_is_right_goes() -> None:
         (_with(ARMING_CHECK=None, ARMING_SKIPCHK=-1.0), "arming checks (ARMING_SKIPCHK)", "ARMING_SKIPCHK"),
         (_with(SYSID_THISMAV=2.0), "system id (SYSID_THISMAV)", "--system 2"),
         (_with(MAV_SYSID=3.0), "system id (MAV_SYSID)", "--system 3"),
+        (_unheard(_with(SYSID_THISMAV=None)), "system id", ""),
+        (_unheard(_with(ARMING_CHECK=None)), "arming checks", ""),
         (_with(SERVO8_FUNCTION=59.0), "motors (SERVOn_FUNCTION)", "8 thrusters"),
         (_with(SERVO9_FUNCTION=33.0), "motors (SERVOn_FUNCTION)", "motor 1 is on channels [1, 9]"),
         (_unheard(_with(**{f"SERVO{i}_FUNCTION": None for i in range(1, 9)})), "motors", ""),

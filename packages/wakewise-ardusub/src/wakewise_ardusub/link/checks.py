@@ -353,7 +353,8 @@ def _firmware(facts: CheckInputs) -> Iterator[CheckResult]:
 def _system(facts: CheckInputs) -> Iterator[CheckResult]:
     found = first_of(facts.parameters, SYSTEM_NAMES)
     if found is None:
-        yield _unknown("system id", f"{facts.system}", facts, f"neither {' nor '.join(SYSTEM_NAMES)} is known")
+        nothing = f"neither {' nor '.join(SYSTEM_NAMES)} is known"
+        yield _unknown("system id", f"{facts.system}", facts, nothing, needed=True)
     else:
         yield _is(f"system id ({found[0]})", found[1], facts.system, f"say --system {found[1]:g}")
 
@@ -502,7 +503,8 @@ def _failsafes(facts: CheckInputs) -> Iterator[CheckResult]:
         return
     checks = facts.parameters.get("ARMING_CHECK")
     if checks is None:
-        yield _unknown("arming checks", "some", facts, "neither ARMING_CHECK nor ARMING_SKIPCHK is known")
+        nothing = "neither ARMING_CHECK nor ARMING_SKIPCHK is known"
+        yield _unknown("arming checks", "some", facts, nothing, needed=True)
     else:
         yield _row("arming checks (ARMING_CHECK)", "not 0", f"{checks:g}", checks != 0.0, "set ARMING_CHECK to 1: all")
 
