@@ -50,7 +50,7 @@ def test_the_program_of_the_page_drives_the_motors() -> None:
     try:
         exec(  # what the page shows is what is run
             compile(
-                program.replace("udpin:0.0.0.0:14550", f"udpin:127.0.0.1:{port}").replace("range(60)", "range(12)"),
+                program.replace("udpin:0.0.0.0:14560", f"udpin:127.0.0.1:{port}").replace("range(60)", "range(12)"),
                 "docs/ardusub.md",
                 "exec",
             ),

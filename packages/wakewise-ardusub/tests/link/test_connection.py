@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import socket
@@ -11,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from wakewise.core.errors import EnvironmentFailure, InputError, MissingExtra
-from wakewise_ardusub.link.connection import Connection, dialect, parse_connection
+from wakewise_ardusub.link.connection import Connection, cannot_open, dialect, parse_connection
 
 
 @pytest.mark.parametrize(
@@ -109,6 +110,14 @@ def test_a_port_that_is_taken_and_a_host_that_is_not_there() -> None:
         with pytest.raises(EnvironmentFailure, match="refused"):
             Connection(parse_connection(f"tcp:127.0.0.1:{nobody.getsockname()[1]}"))
     gc.collect()
+
+
+def test_the_ground_stations_port_is_said_to_be_taken_by_it() -> None:
+    """Of 14550 the line names QGroundControl and a port that is free of it; of other ports it does not."""
+    taken = OSError(errno.EADDRINUSE, "Address already in use")
+    said = str(cannot_open(parse_connection("udpin:0.0.0.0:14550"), taken))
+    assert "QGroundControl" in said and "14560" in said
+    assert "QGroundControl" not in str(cannot_open(parse_connection("udpin:0.0.0.0:14560"), taken))
 
 
 def test_a_file_is_heard_to_its_end(tmp_path: Path) -> None:

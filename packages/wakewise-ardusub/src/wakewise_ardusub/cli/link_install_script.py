@@ -19,7 +19,7 @@ def install_script(
         str | None,
         typer.Option(
             metavar="CONNECTION",
-            help="Put the script on the autopilot by MAVLink, such as udpin:0.0.0.0:14550; it is read back.",
+            help="Put the script on the autopilot by MAVLink, such as udpin:0.0.0.0:14560; it is read back.",
         ),
     ] = None,
     start: Annotated[
@@ -74,7 +74,7 @@ def install_script(
         typer.echo(f"next      {done if start else 'set SCR_ENABLE to 1 if it is not, and reboot the autopilot'}")
     else:
         if not written:
-            typer.echo("wakewise link install-script --upload udpin:0.0.0.0:14550 puts it on the autopilot; by hand:")
+            typer.echo("wakewise link install-script --upload udpin:0.0.0.0:14560 puts it on the autopilot; by hand:")
             typer.echo("0. wakewise link install-script --out .")
         for i, step in enumerate(BY_HAND, start=1):
             typer.echo(f"{i}. {step}")

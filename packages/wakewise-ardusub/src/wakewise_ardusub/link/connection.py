@@ -5,6 +5,7 @@ MAVLink 2 only, with the vehicle's own system id and component 191 (onboard comp
 
 from __future__ import annotations
 
+import errno
 import importlib
 import os
 import re
@@ -22,9 +23,11 @@ from wakewise_ardusub.optional_dependencies import need
 from wakewise_ardusub.sensors.devices import SerialPort
 
 CONNECTION_FORMS = (
-    "udpin:0.0.0.0:14550 (listen), udpout:192.168.2.2:14550, tcp:192.168.2.2:5777, serial:/dev/ttyACM0:115200 "
+    "udpin:0.0.0.0:14560 (listen), udpout:192.168.2.2:14550, tcp:192.168.2.2:5777, serial:/dev/ttyACM0:115200 "
     "or file:flight.tlog"
 )
+GROUND_STATION_PORT = 14550
+"""UDP port at which QGroundControl and other ground stations listen."""
 WAYS = ("udpin", "udpout", "tcp", "serial", "file")
 _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]*[A-Za-z0-9])?\Z")
 _BAUDS = (9600, 19200, 38400, 57600, 115200, 230400, 460800, 500000, 921600, 1000000, 1500000, 2000000)
@@ -49,6 +52,16 @@ class Endpoint:
         if self.way == "serial":
             return f"serial:{self.path}:{self.baud}"
         return f"{self.way}:{self.host}:{self.port}"
+
+
+def cannot_open(endpoint: Endpoint, fault: OSError) -> EnvironmentFailure:
+    """Why an endpoint could not be opened, as an error to raise."""
+    words = fault.strerror or str(fault)
+    if fault.errno == errno.EADDRINUSE:
+        words = "another program listens there already"
+        if endpoint.port == GROUND_STATION_PORT:
+            words += ", probably QGroundControl, whose port this is; take another, such as 14560"
+    return EnvironmentFailure(f"{endpoint.words}: {words}")
 
 
 def parse_connection(words: str, option: str = "--connection") -> Endpoint:
@@ -245,5 +258,4 @@ def _opened(endpoint: Endpoint, system: int) -> Any:
     try:
         return mavutil.mavlink_connection(device, dialect="ardupilotmega", **who)
     except OSError as fault:
-        taken = "another program listens there already" if fault.errno == 98 else (fault.strerror or str(fault))
-        raise EnvironmentFailure(f"{endpoint.words}: {taken}") from None
+        raise cannot_open(endpoint, fault) from None

@@ -16,7 +16,7 @@ from threading import Condition
 from typing import Any, Protocol
 
 from wakewise.core.errors import EnvironmentFailure, InputError
-from wakewise_ardusub.link.connection import Endpoint, dialect
+from wakewise_ardusub.link.connection import Endpoint, cannot_open, dialect
 from wakewise_ardusub.link.message_state import MavlinkMessage
 from wakewise_ardusub.link.protocol import COMPANION_COMPONENT
 from wakewise_ardusub.sensors.devices import SerialPort
@@ -107,7 +107,6 @@ def _next_mark(data: bytes, at: int) -> int:
 LARGEST = 65535
 _AT_ONCE = 4096
 _PATIENCE_S = 5.0
-_TAKEN = 98
 _HEARTBEAT = 0
 
 
@@ -144,7 +143,7 @@ def open_udp(endpoint: Endpoint) -> socket.socket:
         made.bind(at if endpoint.way == "udpin" else (_own_side(at[0]), 0))
     except OSError as fault:
         made.close()
-        raise _refused(endpoint, fault) from None
+        raise cannot_open(endpoint, fault) from None
     return made
 
 
@@ -226,7 +225,7 @@ def _tcp(endpoint: Endpoint) -> StreamTransport:
     try:
         made = socket.create_connection(_address(endpoint), timeout=_PATIENCE_S)
     except OSError as fault:
-        raise _refused(endpoint, fault) from None
+        raise cannot_open(endpoint, fault) from None
     made.settimeout(_PATIENCE_S)
     made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return StreamTransport(made, made.recv, made.sendall, made.close)
@@ -249,11 +248,6 @@ def _address(endpoint: Endpoint) -> tuple[str, int]:
 def _own_side(host: str) -> str:
     """Where to speak from: a program on this computer is spoken to from this computer alone."""
     return "127.0.0.1" if host.startswith("127.") else ""
-
-
-def _refused(endpoint: Endpoint, fault: OSError) -> EnvironmentFailure:
-    taken = "another program listens there already" if fault.errno == _TAKEN else str(fault.strerror or fault)
-    return EnvironmentFailure(f"{endpoint.words}: {taken}")
 
 
 class Transport(Protocol):
