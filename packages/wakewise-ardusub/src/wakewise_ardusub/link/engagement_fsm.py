@@ -224,7 +224,7 @@ class EngagementState:
             case "refused" if now_s - self.since_s >= REST_S:
                 return self._to("listening", now_s, "consent may be given anew" if not found else found[0].text)
             case "listening" if first is None:
-                return self._to("ready", now_s, "all is well, the operator's consent is missing")
+                return self._to("ready", now_s, "consent is missing")
             case "ready" if first is not None:
                 return self._to("listening", now_s, first.text, first.kind)
             case "listening" if first is not None and first.text != self.why:

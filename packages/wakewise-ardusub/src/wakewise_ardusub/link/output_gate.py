@@ -70,14 +70,14 @@ class FreshnessMargins:
         return dict(zip(AGE_NAMES, np.quantile(np.array(self._ages), QUANTILE, axis=0).tolist(), strict=True))
 
     def words(self, limits: EngagementLimits) -> str:
-        """For the status line: ages in ms against their limits, and trips."""
+        """For the status line: ages in ms, those above their limits marked by !, and trips."""
         most = dict(zip(AGE_NAMES, (limits.pose_s, limits.operator_s, limits.telemetry_s), strict=True))
         ages = [
             f"{what} {1e3 * age_s:.0f}{'!' if age_s > most[what] else ''}"
             for what, age_s in self.p99_s().items()
             if math.isfinite(age_s)
         ]
-        told = f"p99 ms {', '.join(ages)} of {1e3 * limits.pose_s:.0f}" if ages else ""
+        told = f"p99 ms {', '.join(ages)}" if ages else ""
         if self.trips:
             which = ", ".join(f"{kind} {count}" for kind, count in self.trips.most_common())
             told += f"{'  ' if told else ''}trips {self.trips.total()} ({which})"

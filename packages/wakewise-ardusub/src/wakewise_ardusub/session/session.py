@@ -244,18 +244,21 @@ class VehicleSession:
         }
 
     def line(self) -> str:
-        """How it stands, in one line for people."""
+        """How it stands, in one line for people; first what a terminal of 80 columns has to show."""
         gate, facts = self.gate, self.gate.facts()
         known, engagement = gate.known, gate.engagement
         armed = {True: "armed", False: "disarmed", None: "not heard"}[known.armed]
-        state = f"{engagement.state:<9}" + ("" if engagement.state == "engaged" else f" ({engagement.why})")
-        parts = [state, f"{known.mode_name or '-'} {armed}", f"pose {_age(facts.pose_s)}"]
-        if self.sea is not None and self.sea.figures.speeds_m_s is not None:
-            flown, least = (1e3 * speed for speed in self.sea.figures.speeds_m_s)
-            parts.append(f"water at the target {flown:.1f} mm/s rms, by least thrusts {least:.1f}")
+        live = self.live
+        parts = [engagement.state + ("" if engagement.state == "engaged" else f" ({engagement.why})")]
+        if live is None or live.preparing is not None:
+            parts.append(self.preparing if live is None else f"begins: {live.preparing}")
         margins = gate.margins.words(gate.limits)
         if margins:
             parts.append(margins)
+        parts += [f"{known.mode_name or '-'} {armed}", f"pose {_age(facts.pose_s)}"]
+        if self.sea is not None and self.sea.figures.speeds_m_s is not None:
+            flown, least = (1e3 * speed for speed in self.sea.figures.speeds_m_s)
+            parts.append(f"water at the target {flown:.1f} mm/s rms, by least thrusts {least:.1f}")
         if self.boxes is not None and self.vehicle.tilt is not None:
             parts.append(self.mount.words)
         if self._camera is not None and known.camera:
@@ -264,10 +267,7 @@ class VehicleSession:
             parts.append(self.boxes.target.words)
         if self.tracking is not None:
             parts.append(self.tracking.words())
-        live = self.live
-        if live is None or live.preparing is not None:
-            parts.append(self.preparing if live is None else f"begins: {live.preparing}")
-        else:
+        if live is not None and live.preparing is None:
             parts.append(f"loop {1e3 * live.pace.late_s():.1f} ms")
         return "  ".join(parts)
 
@@ -321,7 +321,7 @@ class VehicleSession:
             end_s = gate.clock() + WAITS_S
             while not self.mount.reported and gate.clock() < end_s and not self._over.wait(LOOK_S):
                 pass
-        self.preparing = "makes the parts"
+        self.preparing = "preparing"
         start = self._here()
         middle, radius, region = self.spare.found(start, self.vehicle.size_m[0], float(self.vehicle.X_BC.p_m[2]))
         gate.target_W_m = middle
@@ -340,9 +340,9 @@ class VehicleSession:
         if self.video is not None:
             from wakewise_ardusub.session.video_tracking import video_tracking  # OpenCV is an extra
 
-            self.preparing = "makes the tracker"
+            self.preparing = "preparing the tracker"
             self.tracking = video_tracking(self.video, sea.bare, gate.clock, self._protector(sea), self.folder)
-        self.preparing = "rehearses"
+        self.preparing = "warming up"
         took_s, period_s = run_warm_up(sea), 1.0 / sea.parts.control.rate_hz
         self.journal.write("rehearsed", step_ms=1e3 * took_s, period_ms=1e3 * period_s, target_W_m=middle)
         if took_s > period_s:
