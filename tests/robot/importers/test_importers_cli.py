@@ -53,6 +53,22 @@ def test_words_name_each_disagreement(file: Path, tmp_path: Path) -> None:
     assert [(d["thruster"], d["axis"]) for d in facts["mixing_disagreements"]] == [("right", "yaw")]
 
 
+def test_what_the_file_says_is_told_apart_from_estimates(file: Path) -> None:
+    """Each field has the name that a vehicle file has for it, and whether it is the file's, an estimate or missing."""
+    told = run(file, "--like", "bluerov2-heavy")
+    rows = {row[0].partition(",")[0]: row[2] for row in _cells(told) if len(row) == 3}
+    assert rows["body.mass_kg"] == rows["camera_lens.horizontal_fov_deg"] == "file"
+    assert rows["added_mass.translation_kg"] == "estimate"
+    assert [row[-1] for row in _cells(told) if row[0] == "left"] == ["~0.0287"]
+    rows = {row[0].partition(",")[0]: row[2] for row in _cells(run(file)) if len(row) == 3}
+    assert rows["added_mass.translation_kg"] == "missing"
+
+
+def _cells(told: str) -> list[list[str]]:
+    """The cells of the rows of all tables."""
+    return [[cell.strip() for cell in line.strip("│").split("│")] for line in told.splitlines() if line[:1] == "│"]
+
+
 def test_out_is_a_vehicle_file(file: Path, tmp_path: Path) -> None:
     """What is written can be read as a draft."""
     out = tmp_path / "new" / "rov.yaml"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cli.console import answer, print_table
+from wakewise.ui.cli.console import answer, format_value, print_table
 from wakewise.ui.cli.options import (
     Force,
     Json,
@@ -70,14 +71,14 @@ def import_file(
     check_file(out, "--out", force)
     if out is not None and out.suffix not in (".yaml", ".yml"):
         raise InputError(f"--out {out}: must end in .yaml, by which a vehicle file is known")
-    draft = foreign_vehicle(str(file), frame, thrust_direction, package, arg, skip_missing, rows, matrix)
-    draft = draft if like is None else completed(draft, load_draft(like))
+    found = foreign_vehicle(str(file), frame, thrust_direction, package, arg, skip_missing, rows, matrix)
+    draft = found if like is None else completed(found, load_draft(like))
     comparison = None
     if draft.thrusters and draft.shipped_matrix is not None:
         comparison = compare_matrix(draft, draft.shipped_matrix, str(matrix or file))
     if out is not None:
         write_text(out, draft_yaml(draft, blank_fields(draft)))
-    answer(json, _facts(draft, comparison, out), partial(_show, draft, comparison, out))
+    answer(json, _facts(draft, comparison, out), partial(_show, found, draft, comparison, out))
 
 
 def foreign_vehicle(
@@ -157,18 +158,19 @@ def _why(has_matrix: bool, comparison: MatrixComparison | None) -> dict[str, str
 
 
 def _numbers(draft: VehicleDraft) -> list[tuple[str, Any, str]]:
-    """Field, value as JSON holds it, and the value as people read it."""
+    """Field, value as JSON holds it, and the value as people read it, in the unit that a vehicle file has."""
+    from wakewise.robot.vehicles.draft import VEHICLE_WORDS
+
     rows: list[tuple[str, Any, str]] = []
-    for name in ("mass_kg", "displaced_volume_m3", "camera_fov_rad"):
+    for name in [name for name in VEHICLE_WORDS if name != "X_BC"]:
         value = getattr(draft, name)
-        rows.append((name, value, "—" if value is None else f"{value:.6g}"))
-    for name in ("size_m", "p_BG_m", "p_BB_m"):
-        value = getattr(draft, name)
-        rows.append((name, None if value is None else value.tolist(), "—" if value is None else _row(value)))
-    for name in ("inertia_kg_m2", "added_mass", "linear_damping", "quadratic_damping"):
-        value = getattr(draft, name)
-        diagonal = "—" if value is None else _row(value.diagonal()) + " (diagonal)"
-        rows.append((name, None if value is None else value.tolist(), diagonal))
+        if value is None:
+            rows.append((name, None, "—"))
+        elif isinstance(value, int | float):
+            rows.append((name, value, f"{math.degrees(value) if name.endswith('_rad') else value:.6g}"))
+        else:
+            shown = _row(value) if value.ndim == 1 else _row(value.diagonal()) + " (diagonal)"
+            rows.append((name, value.tolist(), shown))
     return rows
 
 
@@ -176,29 +178,34 @@ def _row(values: Any) -> str:
     return "  ".join(f"{value:.5g}" for value in values)
 
 
-def _show(draft: VehicleDraft, comparison: MatrixComparison | None, out: Path | None) -> None:
+def _show(found: VehicleDraft, draft: VehicleDraft, comparison: MatrixComparison | None, out: Path | None) -> None:
+    from wakewise.robot.vehicles.draft import THRUSTER_FIELDS, VEHICLE_WORDS
+
     typer.echo(f"{draft.title}\n")
-    fields = [(name, text) for name, _, text in _numbers(draft)]
-    print_table("t", ("field", "value"), fields, "found (body frame: x forward, y right, z down)")
+    fields = []
+    for name, value, text in _numbers(draft):
+        whence = "missing" if value is None else "estimate" if getattr(found, name) is None else "file"
+        fields.append((", ".join(VEHICLE_WORDS[name][1]), text, whence))
+    print_table("t", ("field", "value", "from"), fields, "vehicle (body frame: x forward, y right, z down)")
     if draft.thrusters:
         rows = []
-        for t in draft.thrusters:
+        for t, own in zip(draft.thrusters, found.thrusters or (None,) * len(draft.thrusters), strict=True):
             axis = " ".join(f"{value:+z.3f}" for value in t.axis_B)
-            limits = (t.max_forward_N, t.max_reverse_N, t.disk_area_m2, t.time_constant_s)
+            limits = [
+                f"~{format_value(value)}" if value is not None and getattr(own, name, None) is None else value
+                for name, value in ((name, getattr(t, name)) for name in THRUSTER_FIELDS)
+            ]
             rows.append((t.name, *(f"{v:z.3f}" for v in t.p_BT_m), axis, *limits))
         columns = ("name", "x m", "y m", "z m", "force axis", "forward N", "reverse N", "disk m2", "lag s")
-        print_table("tnnntn", columns, rows, "thrusters")
+        print_table("tnnntn", columns, rows, "thrusters (~: estimate)" if found is not draft else "thrusters")
     for note in draft.notes:
         typer.echo(f"  {note}")
     typer.echo(f"missing: {', '.join(draft.missing) or 'nothing'}")
     if comparison is not None:
         typer.echo(f"stated matrix: {comparison.agree} of {comparison.compared} entries agree with the geometry")
-        for disagreement in comparison.disagreements:
-            typer.echo(f"  {disagreement.text}")
-        for note in comparison.notes:
-            typer.echo(f"  {note}")
-    estimates = [origin for origin in draft.provenance if origin.estimate]
-    for origin in estimates:
+        for line in (*(disagreement.text for disagreement in comparison.disagreements), *comparison.notes):
+            typer.echo(f"  {line}")
+    for origin in [origin for origin in draft.provenance if origin.estimate]:
         typer.echo(f"estimate: {origin.group.replace('_', ' ')}: {' '.join(origin.source.split())}")
     if out is not None:
         how = "; its fields marked Missing are to be filled in (docs/vehicle-file.md)" if draft.missing else ""
