@@ -23,6 +23,9 @@ def parts():
     return ww.Scenario.preset("quick", **{"target.kind": "brain", "target.points": 60}).parts()
 
 
+NEEDED = "must answer a Command of 8 thrusts after its state"
+
+
 @dataclass
 class Foreign:
     """Does what it is told at every step, from the third on."""
@@ -55,8 +58,8 @@ def seven(good):
     [
         (raises, "theirs: raised ZeroDivisionError: no such thing (test_plugin_adapter.py:"),
         (nan, "theirs: raised NotFinite: thrusts_N: holds NaN"),
-        (seven, "theirs: raised TypeError: must answer a Command of 8 thrusts"),
-        (lambda good: good.thrusts_N, "theirs: raised TypeError: must answer a Command of 8 thrusts"),
+        (seven, f"theirs: raised TypeError: {NEEDED}, not Command of 7 thrusts"),
+        (lambda good: good.thrusts_N, f"theirs: raised TypeError: {NEEDED}, not ndarray (8,)"),
     ],
 )
 def test_nonsense_is_flown_by_pid_and_counted(act, words):
@@ -71,6 +74,14 @@ def test_nonsense_is_flown_by_pid_and_counted(act, words):
     thrusts = flight.steps.select(pl.selectors.starts_with("command_")).to_numpy()
     assert thrusts.shape == (20, 8) and np.isfinite(thrusts).all()
     assert flight.steps["est_x_m"].is_finite().all()
+
+
+def test_an_answer_without_a_state_says_what_is_needed():
+    """A Command alone, though it is right by itself."""
+    alone = Foreign(lambda good: good)
+    alone.step = lambda state, dt_s, estimate, goal: ww.Command(thrusts_N=np.full(8, 0.1), wrench_B=np.zeros(6))
+    flight = ww.fly(parts().replace(controller=alone), duration_s=SECONDS)
+    assert flight.steps["fallback"][2].startswith(f"theirs: raised TypeError: {NEEDED}, not Command of 8 thrusts")
 
 
 def test_thrusts_beyond_the_limits_are_cut_and_counted():

@@ -205,9 +205,13 @@ class PluginStage(MotionStage):
 
     def step(self, state: PipelineState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PipelineState, Demand]:
         """Ask the controller; raises TypeError if it does not answer a Command of so many thrusts."""
-        plugin, command = self.controller.step(state.plugin, dt_s, estimate, goal)
+        answer: Any = self.controller.step(state.plugin, dt_s, estimate, goal)
+        plugin, command = answer if isinstance(answer, tuple) and len(answer) == 2 else (None, None)
         if not isinstance(command, Command) or len(command.thrusts_N) != self.thrusters:
-            raise TypeError(f"must answer a Command of {self.thrusters} thrusts")
+            got = answer if command is None else command
+            given = f"of {len(got.thrusts_N)} thrusts" if isinstance(got, Command) else getattr(got, "shape", "")
+            words = f"must answer a Command of {self.thrusters} thrusts after its state, not"
+            raise TypeError(f"{words} {type(got).__name__} {given}".rstrip())
         return replace(state, plugin=plugin), Demand(
             wrench_B=command.wrench_B,
             thrusts_N=command.thrusts_N,
