@@ -6,7 +6,16 @@ from pydantic import ValidationError
 
 from wakewise.simulation.tank.grains import STRESS_INTENSITY
 from wakewise.simulation.tank.sediment import SiltProperties
-from wakewise.simulation.tank.settings import SILT_RANGES, SILTS, SiltSettings
+from wakewise.simulation.tank.settings import SILTS, SiltSettings
+
+_MUD_RANGES = {"grain_m": (5e-6, 15e-6), "settling_m_s": (5e-5, 1e-3), "erosion_kg_m2_s": (1e-5, 5e-4)}
+SILT_RANGES: dict[str, dict[str, tuple[float, float]]] = {
+    "silt": {"load_kg_m2": (0.03, 0.86), "grain_m": (10e-6, 40e-6), "erosion_kg_m2_s": (1e-5, 1e-4)},
+    "fresh-mud": _MUD_RANGES | {"threshold_Pa": (0.037, 0.305)},
+    "fluff": _MUD_RANGES | {"threshold_Pa": (0.025, 0.05), "load_kg_m2": (1.03, 1.3)},
+    "sand": {"grain_m": (1.3e-4, 5e-4)},
+}
+"""From (low, high) of each figure a world may draw; `load_kg_m2` of fluff counts the firm layer's 1.0 as well."""
 
 
 @pytest.mark.parametrize("kind", list(SILTS))

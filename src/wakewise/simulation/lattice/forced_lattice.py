@@ -245,11 +245,6 @@ class ForcedLattice:
         found: Array = interpolated(self.field_m_s() if field_m_s is None else field_m_s, self._bodies, at)
         return found
 
-    def momentum_N_s(self, density_kg_m3: float) -> Array:
-        """Momentum of all of the water in the box, shape (3,)."""
-        total: Array = self.field_m_s().astype(np.float64).sum((1, 2, 3)) * density_kg_m3 * self.cell_m**3
-        return total
-
     def holds(self, points_W_m: Array) -> bool:
         """Whether all points, shape (n, 3), are inside, a cell and more from the sides."""
         at = (np.asarray(points_W_m) - self.low_W_m) / self.cell_m
