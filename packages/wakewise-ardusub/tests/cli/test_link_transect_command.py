@@ -7,6 +7,7 @@ import math
 import socket
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from wakewise_ardusub.sitl.sea_sensors import Relief, SeaSensors, SensorErrors
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics, UdpEndpoint
 from wakewise_ardusub.sitl.udp_endpoints import run as run_stand_in
+from wakewise_ardusub.survey.transect_session import TransectSession
 
 Capture = pytest.CaptureFixture[str]
 
@@ -134,7 +136,11 @@ def test_what_is_printed_is_kept_beside_the_journal(
     command: str, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The folder has the figures as JSON, also of a survey that ended before its first line."""
-    monkeypatch.setattr("wakewise_ardusub.cli.link_survey._fly", lambda *given, **options: None)
+
+    def heard(session: TransectSession, codec: object, **options: object) -> None:
+        session.known = replace(session.known, messages=1)
+
+    monkeypatch.setattr("wakewise_ardusub.cli.link_survey._fly", heard)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -142,6 +148,17 @@ def test_what_is_printed_is_kept_beside_the_journal(
     told = json.loads(capsys.readouterr().out)
     assert told["finished"] is False
     assert json.loads((tmp_path / "figures.json").read_text(encoding="utf-8")) == told
+
+
+def test_a_survey_that_heard_nothing_leaves_no_folder(tmp_path: Path, capsys: Capture) -> None:
+    """One line that says so, and no journal without a word from the vehicle."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        where = f"udpin:127.0.0.1:{probe.getsockname()[1]}"
+    folder = tmp_path / "survey"
+    assert run(["link", "transect", "--connection", where, "--consent", "--wait", "1", "--out", str(folder)]) == 2
+    assert "nothing is heard from the autopilot" in capsys.readouterr().err.splitlines()[-1]
+    assert not folder.exists()
 
 
 def test_an_altitude_without_a_rangefinder_is_refused(

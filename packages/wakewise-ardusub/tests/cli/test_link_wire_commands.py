@@ -28,6 +28,7 @@ from wakewise_ardusub.link.script import parameters_text, script_text
 from wakewise_ardusub.physics.datagrams import PhysicsState
 from wakewise_ardusub.physics.physics import PulseTable
 from wakewise_ardusub.physics.surface import FreeWater
+from wakewise_ardusub.session.session import VehicleSession
 from wakewise_ardusub.sitl.own_parameters import own_parameters
 from wakewise_ardusub.sitl.simulated_autopilot import SimulatedAutopilot
 from wakewise_ardusub.sitl.udp_endpoints import InProcessPhysics, UdpEndpoint
@@ -276,15 +277,20 @@ def test_nobody_there_is_one_line(capsys: Capture, monkeypatch: pytest.MonkeyPat
     assert "no heartbeat of system 1" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("messages", [0, 1])
 def test_ctrl_c_ends_a_session_in_its_own_words(
-    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    messages: int, capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is how a session ends: code 0, what was let go of and where it is kept, nothing of going on; twice is once."""
+    """It is how a session ends: code 0, what was let go of and where it is kept, nothing of going on; twice is once.
+
+    Of a vehicle that was never heard nothing is kept.
+    """
 
     def interrupted(session: object, where: str) -> None:
         raise KeyboardInterrupt
 
-    def stopped(session: object, why: str) -> None:
+    def stopped(session: VehicleSession, why: str) -> None:
+        session.gate.known = dataclasses.replace(session.gate.known, messages=messages)
         signal.raise_signal(signal.SIGINT)  # an impatient second one
         assert why == "Ctrl-C"
 
@@ -296,5 +302,7 @@ def test_ctrl_c_ends_a_session_in_its_own_words(
         where = f"udpin:127.0.0.1:{probe.getsockname()[1]}"
     assert run(["link", "ardusub", "--connection", where, "--out", str(tmp_path / "sea")]) == 0
     told = capsys.readouterr().err
-    assert f"let go of the vehicle (Ctrl-C); kept: {tmp_path / 'sea'}" in told
+    kept, nothing = f"let go of the vehicle (Ctrl-C); kept: {tmp_path / 'sea'}", "nothing was heard"
+    assert (kept in told, nothing in told) == (bool(messages), not messages)
+    assert (tmp_path / "sea").exists() == bool(messages)
     assert "again" not in told

@@ -248,7 +248,11 @@ def ardusub(
         finally:
             with _uninterrupted():
                 session.stop(why)
-            _say(f"let go of the vehicle ({why}); kept: {folder}")
+            if session.gate.known.messages or session.fault is not None:
+                _say(f"let go of the vehicle ({why}); kept: {folder}")
+            else:
+                session.journal.discard()
+                _say(f"ended ({why}); nothing was heard, so nothing is kept")
     if session.fault is not None:
         raise session.fault
     if json:

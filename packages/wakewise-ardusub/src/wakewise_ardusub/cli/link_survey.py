@@ -44,7 +44,7 @@ RangeDelay = Annotated[
 Gap = Annotated[
     float, typer.Option(metavar="S", help="Longest drop-out of the rangefinder flown through at a held depth.")
 ]
-Fence = Annotated[float, typer.Option(metavar="M", help="Farthest from the start that a line may reach.")]
+Fence = Annotated[float, typer.Option(metavar="M", help="Farthest from the start that a line or an orbit may reach.")]
 VehicleName = Annotated[str, typer.Option(help="Library name or vehicle YAML file; its drag gives the current.")]
 System = Annotated[int, typer.Option(min=1, max=255, help="The vehicle's MAVLink system id.")]
 Consent = Annotated[
@@ -154,8 +154,11 @@ def fly_survey(
             _fly(session, codec, consent=given.consent, wait_s=given.wait)
         finally:
             end_status_line()
+            if not session.known.messages:
+                journal.discard()
     figures = {"folder": str(folder), **session.figures()}
-    write_json(folder / "figures.json", figures)
+    if session.known.messages:
+        write_json(folder / "figures.json", figures)
     if given.json:
         print_json(figures)
     else:

@@ -151,5 +151,5 @@ def _degrees(text: str) -> float:
     except ValueError:
         value = math.nan
     if not -360.0 <= value <= 360.0:
-        raise InputError(f"--heading {text!r}: must be degrees from north, here or current")
+        raise InputError(f"--heading {text!r}: must be degrees from north (-360 to 360), here or current")
     return math.radians(value)

@@ -12,6 +12,7 @@ import os
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,7 @@ class SessionLog:
     ) -> None:
         self.path, self._clock, self._wall = path, clock, wall
         self._lock = threading.Lock()
+        self._is_new = not path.exists()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file: int | None = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
@@ -84,6 +86,14 @@ class SessionLog:
             if self._file is not None:
                 os.close(self._file)
                 self._file = None
+
+    def discard(self) -> None:
+        """End, and remove a file that was begun here, with its folder where nothing else is in it."""
+        self.close()
+        if self._is_new:
+            with suppress(OSError):
+                self.path.unlink()
+                self.path.parent.rmdir()
 
 
 def read_journal(path: Path) -> tuple[list[dict[str, Any]], int]:
