@@ -102,7 +102,8 @@ def yaml_file(path: Path) -> Any:
     try:
         return read_yaml(text_of(path))
     except (OSError, UnicodeDecodeError, YamlError) as fault:
-        raise InputError(f"{path}: cannot be read as YAML ({' '.join(str(fault).split())})") from fault
+        why = getattr(fault, "strerror", None) or " ".join(str(fault).split())  # without the path once more
+        raise InputError(f"{path}: cannot be read as YAML ({why})") from fault
 
 
 class _StrictLoader(yaml.SafeLoader):

@@ -243,7 +243,7 @@ def fly(
 def _say_trim(parts: Parts, recorder: FlightRecorder) -> None:
     """Log the ballast that the settling hover asks for, before the first photograph; the flight goes on."""
     if (words := ballast_proposal(parts.vehicle, recorder.frame())) is not None:
-        log.warning("settling hover: %s; after a trial: wakewise vehicle trim --flight FOLDER --write FILE", words)
+        log.warning("settling hover: out of trim, %s; after a trial `wakewise vehicle trim` writes it down", words)
 
 
 def parts_of(flight: Parts | Scenario) -> Parts:

@@ -142,5 +142,5 @@ def check_current(parts: Parts, samples: int = 200) -> StationKeepingDemand | No
     )
     found = min((load for load in loads if load is not None), key=lambda load: load.share, default=None)
     if found is not None and found.share < 1.0:
-        raise InputError(f"tank: {vehicle.name} cannot hold its route, {found.said()}")
+        raise InputError(f"vehicle {vehicle.name}: cannot hold its route, {found.said()}")
     return found

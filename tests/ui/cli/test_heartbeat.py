@@ -25,6 +25,16 @@ def test_a_silent_stage_says_where_it_is_now_and_then(capfd, monkeypatch: pytest
     console._stderr.cache_clear()
 
 
+def test_a_stage_without_a_note_has_no_stray_comma(capfd, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Name and minutes alone."""
+    console._stderr.cache_clear()
+    monkeypatch.setattr(console, "HEARTBEAT_S", 0.05)
+    with ProgressBars().stage("mesh"):
+        time.sleep(0.2)
+    assert capfd.readouterr().err.startswith("  mesh, 0:00 min")
+    console._stderr.cache_clear()
+
+
 def test_a_stage_that_fails_stops_its_heartbeat(capfd, monkeypatch: pytest.MonkeyPatch) -> None:
     """No line after the error."""
     console._stderr.cache_clear()

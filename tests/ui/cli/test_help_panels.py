@@ -36,6 +36,31 @@ def test_h_is_help(words: list[str], capsys: pytest.CaptureFixture[str]) -> None
     assert said[0] == said[1] and "Usage: " in said[0]
 
 
+def test_help_as_a_word_is_help(capsys: pytest.CaptureFixture[str]) -> None:
+    """`wakewise help` and `wakewise help scan` say what --help says."""
+    for words in ([], ["scan"]):
+        assert run(["help", *words]) == run([*words, "--help"]) == 0
+        said = capsys.readouterr().out
+        assert said[: len(said) // 2] == said[len(said) // 2 :]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["allocate", "--points", "nix"], "wakewise: Missing option '--pose'.\n"),
+        (["cockpit", "--mapping", "nix"], "wakewise: nix: cannot be read as YAML (No such file or directory)\n"),
+        (
+            ["allocate", "--points", "nix", "--pose", *"000000", "--wrench", *"100000"],
+            "wakewise: --points nix: cannot be read as CSV, No such file or directory\n",
+        ),
+    ],
+)
+def test_what_is_missing_is_said_in_one_line(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without an error number, and with the name of what is missing once."""
+    assert run(words) == 2
+    assert capsys.readouterr().err == said
+
+
 def test_a_shell_can_complete_commands() -> None:
     """Asked as bash asks, the command names those that begin so."""
     asked = os.environ | {"_WAKEWISE_COMPLETE": "complete_bash", "COMP_WORDS": "wakewise re", "COMP_CWORD": "1"}

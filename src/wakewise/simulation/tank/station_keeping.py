@@ -59,7 +59,7 @@ class StationKeepingDemand:
             loads.append(f"water that passes at {speed:.2f} m/s drags with {drag_N:.1f} N in {_AXES[axis]}{worst}")
         loads += weighs
         able = f"{100.0 * self.share:.3g} % of that" if weighs else f"{self.share * drag_N:.1f} N there"
-        return f"{', '.join(loads)}, the thrusters hold {able} (margin {self.margin_pct:+.0f} %)"
+        return f"{', '.join(loads)}, the thrusters hold {able} (margin {self.margin_pct:z.0f} %)"
 
 
 def station_keeping_demand(

@@ -108,9 +108,9 @@ def _heartbeat(name: str, where: list[Any]) -> Iterator[None]:
         while not over.wait(HEARTBEAT_S):
             done, total, note = where
             took_s = round(time.perf_counter() - began)
-            share = f" {100.0 * done / total:.0f} %" if total else ""
+            told = (f" {100.0 * done / total:.0f} %" if total else "") + (f" {note}" if note else "")
             with suppress(OSError, ValueError):  # nobody reads on
-                _stderr().print(f"  {name}{share} {note}, {took_s // 60}:{took_s % 60:02} min", markup=False)
+                _stderr().print(f"  {name}{told}, {took_s // 60}:{took_s % 60:02} min", markup=False)
 
     thread = threading.Thread(target=beat, name="heartbeat", daemon=True)
     thread.start()

@@ -110,8 +110,9 @@ _NEXT_STEP = (
 _STOPPED = "stopped; what was finished is kept, run the same command again to go on"
 _BEGIN_ANEW = {
     "photos", "measure", "compare-models", "evaluate", "calibrate", "film", "target", "vehicle", "allocate", "link",
+    "cockpit",
 }  # fmt: skip
-"""Commands that write at their end and keep nothing of a run that was stopped."""
+"""Commands that do not go on with a run that was stopped."""
 
 
 def _show_version(value: bool) -> None:
@@ -148,6 +149,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     # Wherever it stands: the parser knows options of the program before the command's name only.
     rest = [word for word in words if word != QUIET]
+    rest = [*rest[1:], "--help"] if rest[:1] == ["help"] else rest
     try:
         with quiet_progress(len(rest) < len(words)):
             code = _commands()(args=rest, standalone_mode=False)
@@ -212,7 +214,7 @@ def _how_many(fault: typer.TyperException) -> str | None:
     """What an option of several values lacks: of too few, the next option is taken for one and told of as no number."""
     option = getattr(fault, "param", None)
     count = getattr(option, "nargs", 1)
-    if option is None or count < 2:
+    if option is None or count < 2 or type(fault).__name__ == "MissingParameter":
         return None
     return f"{option.opts[0]}: needs {count} numbers, {option.metavar}; one of those given is none"
 

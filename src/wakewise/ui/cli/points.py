@@ -31,7 +31,8 @@ def read_points(path: Path, vehicle: Vehicle, X_WB: Pose) -> tuple[Array, Array]
     try:
         rows = list(csv.reader(text_of(path, _MOST_BYTES, "utf-8-sig").splitlines(), strict=True))
     except (OSError, YamlError, UnicodeDecodeError, csv.Error) as fault:
-        raise InputError(f"--points {path}: cannot be read as CSV, {fault}") from None
+        why = getattr(fault, "strerror", None) or fault
+        raise InputError(f"--points {path}: cannot be read as CSV, {why}") from None
     head = [name.strip() for name in rows[0]] if rows else []
     if sorted(head) != sorted(columns):
         how = other_separator(head)
