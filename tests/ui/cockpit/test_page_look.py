@@ -109,7 +109,7 @@ def contrast(one: str, other: str) -> float:
 
 
 def test_wash_is_told_as_a_speed(standin: StandIn, spectate: Any) -> None:
-    """Root mean square over the target, in mm/s, as the gentle meter has it; what is not known is a dash."""
+    """Root mean square over the target, in mm/s, as the wash meter has it; what is not known is a dash."""
     page = spectate()
     page.until("/^\\d+\\.\\d+.mm.s$/.test(document.querySelector('[data-field=rms]').innerText)")
     standin.quiet = True

@@ -107,7 +107,7 @@ def test_every_label_leads_to_who_publishes_it(labels: dict[str, str]) -> None:
     assert (ROOT / labels["readme"].partition("{tag}/")[2]).samefile(FOLDER / "README.md")
     readme = (FOLDER / "README.md").read_text(encoding="utf-8")
     assert f"git tag {labels['version']}" in readme
-    assert f"wakewise-gentle-meter:{labels['version']}" in readme
+    assert f"wakewise-wash-meter:{labels['version']}" in readme
 
 
 def test_the_labels_are_what_blueos_reads(labels: dict[str, str]) -> None:
@@ -258,7 +258,7 @@ def test_nothing_is_built_without_who_publishes_it(
     else:
         tool.write_store(owner, tmp_path / "store")
         told = json.loads((tmp_path / "store" / "metadata.json").read_text(encoding="utf-8"))
-        assert told["docker"] == "reef-lab/wakewise-gentle-meter"
+        assert told["docker"] == "reef-lab/wakewise-wash-meter"
         assert "OWNER" not in json.dumps(told)
         assert len(list((tmp_path / "store").glob("*.png"))) == 2
 

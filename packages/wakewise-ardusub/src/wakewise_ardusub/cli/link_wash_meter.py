@@ -62,7 +62,7 @@ def wash_meter(
             "MOT_n_DIRECTION.",
         ),
     ] = None,
-    port: Annotated[int, typer.Option(help="Port of the page; 0 takes any that is free.", min=0, max=65535)] = 8765,
+    port: Annotated[int, typer.Option(help="Port of the page; 0 takes any that is free.", min=0, max=65535)] = 8766,
     host: Annotated[
         str,
         typer.Option(

@@ -57,7 +57,7 @@ def _say(line: str) -> None:
 def _options() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m wakewise_ardusub.wash_meter.embedded",
-        description="The gentle meter, for small computers. It listens to a vehicle and never commands it.",
+        description="The wash meter, for small computers. It listens to a vehicle and never commands it.",
     )
     parser.add_argument("--connection", required=True, help="udpin:HOST:PORT or udpout:HOST:PORT")
     parser.add_argument("--craft", required=True, type=Path, help="craft file of the vehicle")

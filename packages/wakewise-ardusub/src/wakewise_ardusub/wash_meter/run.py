@@ -31,7 +31,7 @@ from wakewise_ardusub.wash_meter.server import MeterServer
 from wakewise_ardusub.wash_meter.vehicle_listener import MavlinkSocket, VehicleListener
 
 TICK_S = 0.1
-PORT = 8765
+PORT = 8766
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -246,7 +246,7 @@ class MeterLoop:
     def _introduce(self) -> None:
         settings = self.settings
         ends = settings.ends
-        self.say(f"gentle meter: {' or '.join(self.server.addresses)} (Ctrl-C ends it)")
+        self.say(f"wash meter: {' or '.join(self.server.addresses)} (Ctrl-C ends it)")
         heard = f"listens at {ends.host}:{ends.port}" if ends.way == "udpin" else f"asks {ends.host}:{ends.port}"
         says = [
             *(["a heartbeat"] if settings.publish or ends.way != "udpin" else []),

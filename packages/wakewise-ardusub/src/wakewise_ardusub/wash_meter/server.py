@@ -17,9 +17,9 @@ from wakewise.ui.web.server import Site, WebServer
 
 PAGE = Path(__file__).with_name("page")
 OFFER = ServiceDescription(
-    name="Wakewise gentle meter",
+    name="Wakewise wash meter",
     description="What the thrusters do to the target's water, and what gentler thrusts would spare. Listens only.",
-    widget="Wakewise: gentle meter",
+    widget="Wakewise: wash meter",
 )
 PAGE_REQUESTS = ("mark", "unmark", "begin")
 

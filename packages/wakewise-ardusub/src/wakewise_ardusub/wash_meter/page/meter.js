@@ -1,4 +1,4 @@
-// The gentle meter's page: asks its server five times a second how it stands, and shows it. It can command three things of
+// The wash meter's page: asks its server five times a second how it stands, and shows it. It can command three things of
 // the meter (mark a target, take the mark away, begin the sums anew) and nothing of the vehicle.
 
 import { Past } from "./past.js";
