@@ -56,6 +56,13 @@ def test_a_flight_gives_the_ballast_of_the_next(tmp_path: Path, capsys: Capsys) 
     assert told["ballast"] == [block.model_dump(mode="json") for block in later.ballast]
 
 
+def test_a_flight_by_hand_is_flown_again_in_the_cockpit(tmp_path: Path, capsys: Capsys) -> None:
+    """A scan would refuse its pilot, who is nobody's record."""
+    words = ["--flight", str(flown(tmp_path / "a", 3.0, pilot="operator")), "--write", str(tmp_path / "next.yaml")]
+    assert run(["vehicle", "trim", *words]) == 0
+    assert "fly with it: wakewise cockpit " in capsys.readouterr().out
+
+
 def test_what_is_written_flies_as_the_flight_did_but_trimmed(tmp_path: Path, capsys: Capsys) -> None:
     """Target, vehicle, world, seed and all else are the flight's; a file that exists stays unless --force is given."""
     changes = {"target.kind": "plate", "vehicle": "bluerov2-heavy", "seed": 7, "tank.mismatch.trim_N": 3.0}

@@ -321,12 +321,12 @@ class LiveFlight:
         parts, folder = self.parts, self.folder
         compile_kernels(FLIGHT_JOBS, self._prepare)
         if self._checked:
-            self._prepare(0, 1, "holds parts and water against each other")
+            self._prepare(0, 1, "checking vehicle, route and water")
             _ = parts.preflight
         if folder is not None:
             write_or_check_scenario(folder, flown_by_hand(parts))
             write_truth(parts, folder)
-        self._prepare(0, 1, "fills the water")
+        self._prepare(0, 1, "preparing the water")
         plant, truth_provider = parts.world.begin()
         log = FlightLog(
             folder=None if folder is None else folder / PARTS, keep=folder is not None, beside=self._keep_controls

@@ -66,6 +66,7 @@ def _from_flight(folder: Path, write: Path | None, json: bool) -> None:
     from wakewise.core.files import write_text
     from wakewise.operation.flight_trim import folder_trim
     from wakewise.operation.scenario import dump_scenario
+    from wakewise.operation.trial_folder import BY_HAND
 
     parts, found = folder_trim(folder)
     trimmed = parts.scenario.model_copy(update={"ballast": (*parts.scenario.ballast, *found.blocks)})
@@ -82,8 +83,9 @@ def _from_flight(folder: Path, write: Path | None, json: bool) -> None:
         "ballast": [block.model_dump(mode="json") for block in trimmed.ballast],
         "advice": found.advice,
     }
+    command = "cockpit" if trimmed.pilot == BY_HAND and trimmed.control_log is None else "scan"
     # A folder of its own: that of the flight holds another trial.
-    fly = shlex.join(["wakewise", "scan", str(write), "--out", f"runs/{folder.resolve().name}-trimmed"])
+    fly = shlex.join(["wakewise", command, str(write), "--out", f"runs/{folder.resolve().name}-trimmed"])
     written = None if write is None else f"written: {write}; fly with it: {fly}"
     answer(json, figures, f"{parts.vehicle.title}: {found.words}", written)
 
