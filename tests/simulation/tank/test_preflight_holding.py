@@ -1,5 +1,7 @@
 """Whether a vehicle can hold: the margin is what the thrusters give over what drag asks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,8 @@ def test_the_margin_is_thrust_over_drag():
     assert found.drag_N == pytest.approx(drag[:3])
     assert found.share == pytest.approx(achievable_wrench(VEHICLE)[0, 1] / -drag[0], rel=1e-6)
     assert "0.50 m/s" in found.said()
-    assert f"{found.margin_pct:+.0f} %" in found.said()
+    assert f"(margin {found.margin_pct:.0f} %)" in found.said()
+    assert "(margin 0 %)" in replace(found, share=0.999).said()
 
 
 def test_the_hardest_stream_counts():
