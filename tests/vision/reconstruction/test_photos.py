@@ -1,6 +1,5 @@
 """What is and what is not a folder of photos; what is and what is not a table of cameras."""
 
-import json
 import os
 from pathlib import Path
 
@@ -11,14 +10,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from wakewise.core.errors import EnvironmentFailure, InputError
+from wakewise.core.files import write_json
 from wakewise.vision.reconstruction import match_references, read_photos, read_reference_cameras
 from wakewise.vision.reconstruction.photos.photo_folder import (
+    PHOTOS_FILE,
     Photo,
     PhotoStore,
     decode,
+    digests,
     jpeg_is_whole,
     png_is_whole,
-    record_photos,
+    refuse_other_photos,
     without_duplicates,
 )
 
@@ -228,16 +230,13 @@ def test_a_store_decodes_once_and_only_as_much_as_it_may_keep(tmp_path):
 
 
 def test_a_model_of_other_photos_is_not_replaced_unasked(tmp_path):
-    """Photos that share none with a finished model's are refused, and its record stays; more of the same are taken."""
+    """Photos that share none with a finished model's are refused; more of the same are taken."""
     first, more, other = (
         tuple(Photo(name=name, width=4, height=3, digest=f"{name}-digest") for name in names)
         for names in ("ab", "abc", "de")
     )
-    record_photos(tmp_path, other, replace=False)
-    record_photos(tmp_path, first, replace=False)  # no model came out of the others
-    (tmp_path / "reconstruction.json").write_text("{}")
+    refuse_other_photos(tmp_path, other)
+    write_json(tmp_path / PHOTOS_FILE, digests(first))
+    refuse_other_photos(tmp_path, more)
     with pytest.raises(InputError, match="holds a model of other photos"):
-        record_photos(tmp_path, other, replace=False)
-    record_photos(tmp_path, more, replace=False)
-    record_photos(tmp_path, other, replace=True)
-    assert json.loads((tmp_path / "stages" / "photos.json").read_text()) == ["d-digest", "e-digest"]
+        refuse_other_photos(tmp_path, other)

@@ -184,7 +184,7 @@ def measuring_warnings(mesh: Mesh, rule: MeasuringRule, size: ColonySize, bed: B
 
 
 def _loose_faces(mesh: Mesh, bed: BedFit, cut_m: float, colony: BoolArray) -> IntArray:
-    """Faces above the cut that are not of the colony and lie near it: within its bounding rectangle and height, each doubled."""
+    """Faces above the cut that are not of the colony and lie in its bounding box, which is doubled."""
     corners = bed.to_plane(mesh.vertices_m)[mesh.faces]
     inside = corners[colony].reshape(-1, 3)
     low, high = inside[:, :2].min(axis=0), inside[:, :2].max(axis=0)

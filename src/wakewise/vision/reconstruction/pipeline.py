@@ -27,10 +27,12 @@ from wakewise.vision.reconstruction.photos.lens_groups import LensGroup, group_p
 from wakewise.vision.reconstruction.photos.lenses import Lens
 from wakewise.vision.reconstruction.photos.masks import read_masks
 from wakewise.vision.reconstruction.photos.photo_folder import (
+    PHOTOS_FILE,
     Photo,
     PhotoStore,
+    digests,
     read_photos,
-    record_photos,
+    refuse_other_photos,
     unsupported_files,
     without_duplicates,
 )
@@ -402,6 +404,7 @@ def reconstruct(
         skipped=tuple(name for name, result in results.items() if result.skipped),
         **figures,
     )
+    write_json(out / PHOTOS_FILE, digests(found))
     write_json(out / "reconstruction.json", model.summary())
     return model
 
@@ -415,7 +418,8 @@ def _run_stages(job: _Inputs, out: Path, replace: bool, progress: Progress) -> d
     placed = None if job.references is None else {name: place.tolist() for name, place in job.references.items()}
     results: dict[str, StageResult] = {}
     with exclusive_run(out):
-        record_photos(out, job.photos, replace=replace)
+        if not replace:
+            refuse_other_photos(out, job.photos)
         key = stage_key(
             settings,
             "match",

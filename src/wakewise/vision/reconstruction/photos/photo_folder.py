@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.errors import EnvironmentFailure, InputError
-from wakewise.core.files import write_json
 from wakewise.core.threads import in_order
 from wakewise.vision.image_decoding import AS_STORED, decode_picture
 
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
 _MAKE, _MODEL, _EXIF, _FOCAL, _BODY_SERIAL, _LENS_MODEL = 0x010F, 0x0110, 0x8769, 0x920A, 0xA431, 0xA434
 
 
+PHOTOS_FILE = "stages/photos.json"
+"""In a model's folder: digests of its photos."""
 UNREADABLE = (OSError, SyntaxError, ValueError, LookupError, TypeError, ZeroDivisionError, struct.error)
 """What Pillow raises of pictures that only other decoders take, and of notes that are damaged."""
 
@@ -93,16 +94,16 @@ class Photo:
     camera: str = ""
 
 
-def record_photos(out: Path, photos: Sequence[Photo], *, replace: bool) -> None:
-    """Write the digests of a model's photos into its folder.
+def digests(photos: Sequence[Photo]) -> list[str]:
+    """Digests of photos' bytes, sorted, as `refuse_other_photos` reads them."""
+    return sorted(photo.digest for photo in photos)
 
-    Raises InputError if it holds a model of other photos, none of which is among these, unless that may be replaced.
-    """
-    path, found = out / "stages" / "photos.json", sorted(photo.digest for photo in photos)
-    made = path.is_file() and (out / "reconstruction.json").is_file()
-    if made and not replace and set(json.loads(path.read_bytes())).isdisjoint(found):
+
+def refuse_other_photos(out: Path, photos: Sequence[Photo]) -> None:
+    """Raise InputError if a folder holds a finished model of photos none of which is among these."""
+    path = out / PHOTOS_FILE
+    if path.is_file() and set(json.loads(path.read_bytes())).isdisjoint(digests(photos)):
         raise InputError(f"{out}: holds a model of other photos, these need a folder of their own; give another")
-    write_json(path, found)
 
 
 class PhotoStore:
