@@ -143,15 +143,16 @@ def test_poses_lead_to_ros_and_back(campaign: Path, tmp_path: Path) -> None:
 
 
 def test_check_sums_are_what_sha256sum_and_hashlib_say(campaign: Path, tmp_path: Path) -> None:
-    """Every file but two stands in SHA256SUMS; that list's own sum is in croissant.json."""
+    """SHA256SUMS has every file, its own sum is in croissant.json, and that file's in croissant.json.sha256."""
     folder = build_dataset(campaign, tmp_path / "reef", words()).path
     sums = dict(reversed(line.split("  ", 1)) for line in (folder / "SHA256SUMS").read_text().splitlines())
     here = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert set(sums) == here - {"SHA256SUMS", "croissant.json"}
+    assert set(sums) == here - {"SHA256SUMS", "croissant.json", "croissant.json.sha256"}
     for name, digest in sums.items():
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest
     if shutil.which("sha256sum"):
-        subprocess.run(["sha256sum", "--quiet", "-c", "SHA256SUMS"], cwd=folder, check=True)
+        for listed in ("SHA256SUMS", "croissant.json.sha256"):
+            subprocess.run(["sha256sum", "--quiet", "-c", listed], cwd=folder, check=True)
     assert check_dataset(folder).differences == ()
 
 
@@ -164,6 +165,8 @@ def test_check_sums_are_what_sha256sum_and_hashlib_say(campaign: Path, tmp_path:
         (lambda d: (d / "SHA256SUMS").write_text(""), "SHA256SUMS changed"),
         (lambda d: (d / "croissant.json").write_text("{}"), "is no Croissant metadata"),
         (lambda d: (d / "croissant.json").unlink(), "is no data set"),
+        (lambda d: _one_byte(d / "croissant.json", b"sc:Dataset", b"sc:dataset"), "croissant.json changed"),
+        (lambda d: (d / "croissant.json.sha256").unlink(), "croissant.json.sha256 missing"),
     ],
 )
 def test_whatever_is_changed_is_noticed(campaign: Path, tmp_path: Path, change: Any, said: str, capsys: Capsys) -> None:
@@ -175,6 +178,11 @@ def test_whatever_is_changed_is_noticed(campaign: Path, tmp_path: Path, change: 
     assert said in last
 
 
+def _one_byte(path: Path, old: bytes, new: bytes) -> None:
+    assert old in path.read_bytes()
+    path.write_bytes(path.read_bytes().replace(old, new, 1))
+
+
 def test_a_list_that_leads_elsewhere_is_refused(campaign: Path, tmp_path: Path) -> None:
     """A path of somebody else's making never leads out of the folder."""
     folder = build_dataset(campaign, tmp_path / "reef", words()).path
@@ -182,6 +190,8 @@ def test_a_list_that_leads_elsewhere_is_refused(campaign: Path, tmp_path: Path) 
     told = json.loads((folder / "croissant.json").read_text())
     told["distribution"][0]["sha256"] = hashlib.sha256((folder / "SHA256SUMS").read_bytes()).hexdigest()
     (folder / "croissant.json").write_text(json.dumps(told))
+    digest = hashlib.sha256((folder / "croissant.json").read_bytes()).hexdigest()
+    (folder / "croissant.json.sha256").write_text(f"{digest}  croissant.json\n")
     with pytest.raises(InputError, match="lies outside"):
         check_dataset(folder)
 

@@ -4,7 +4,7 @@
 - `part.py`: which folders are trials, one trial's share of a data set, which columns are known and what each means.
 - `statement.py`: licence, creators, name and answers, as given.
 - `metadata.py`: Croissant metadata from the template `croissant.json`; whether a data set is still what it was.
-- `checksums.py`: SHA256SUMS.
+- `checksums.py`: SHA256SUMS and `croissant.json.sha256`.
 """
 
 from typing import TYPE_CHECKING

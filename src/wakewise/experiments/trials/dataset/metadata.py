@@ -24,6 +24,7 @@ from wakewise.experiments.trials.dataset.statement import DatasetStatement
 from wakewise.experiments.trials.metrics import DEFINITIONS, UNITS
 
 METADATA, SHEET, TRIALS, FIGURES = "croissant.json", "DATASHEET.md", "trials.parquet", "truth/figures.parquet"
+METADATA_SUM = f"{METADATA}.sha256"
 _KINDS = {"Float64": "sc:Float", "Float32": "sc:Float", "Boolean": "sc:Boolean", "String": "sc:Text"}
 _PYTHON = {bool: "Boolean", int: "Int64", float: "Float64"}
 _FACTS = {
@@ -136,7 +137,7 @@ class ChecksumReport:
 
 
 def check_dataset(folder: Path, progress: Callable[..., None] = no_progress) -> ChecksumReport:
-    """Hold every file against its check sum, and the list of these against croissant.json.
+    """Hold every file against its check sum, the list of these against croissant.json, and that against its own.
 
     Raises InputError if the folder is no data set, or its metadata cannot be read.
     """
@@ -150,10 +151,18 @@ def check_dataset(folder: Path, progress: Callable[..., None] = no_progress) -> 
         raise InputError(f"{path}: is no Croissant metadata; it was changed") from None
     if SUMS not in wanted:
         raise InputError(f"{path}: does not name {SUMS}; it was changed")
-    if sha256_of(folder / SUMS) != wanted[SUMS]:
-        return ChecksumReport(files=0, bytes=0, differences=(ChecksumMismatch(SUMS, "changed"),))
+    own = folder / METADATA_SUM
+    broken = None
+    if not own.is_file():
+        broken = ChecksumMismatch(METADATA_SUM, "missing")
+    elif read_sums(own) != {METADATA: sha256_of(path)}:
+        broken = ChecksumMismatch(METADATA, f"changed, or {METADATA_SUM} was")
+    elif sha256_of(folder / SUMS) != wanted[SUMS]:
+        broken = ChecksumMismatch(SUMS, "changed")
+    if broken is not None:
+        return ChecksumReport(files=0, bytes=0, differences=(broken,))
     sums = read_sums(folder / SUMS)
-    found = differences(folder, sums, frozenset({METADATA, SUMS}), progress)
+    found = differences(folder, sums, frozenset({METADATA, METADATA_SUM, SUMS}), progress)
     told_wrong = [ChecksumMismatch(name, "other check sum in croissant.json") for name, digest in sorted(wanted.items())
                   if name != SUMS and sums.get(name) != digest]  # fmt: skip
     size = sum((folder / name).stat().st_size for name in sums if (folder / name).is_file())
