@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from command_blocks import ROOT, Line, command_lines
 
+from wakewise.core.errors import InputError
 from wakewise.ui.cli.main import run
 
 SHORT = [
@@ -93,7 +94,7 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Run(r"wakewise scan( --world reef( --seed 3)?)?", also=(*BRIEF, "--out", OWN), slow=True),
     Run(r"wakewise scan --method \S+( --set \S+)?", also=(*BRIEF, "--out", OWN), slow=True),
     Run(r"wakewise scan --target colony\.ply .*", also=tuple(BRIEF), slow=True),
-    Run(r"wakewise scan --set tank\.current\.velocity_m_s=.*", also=(*BRIEF, "--out", "runs/current"), slow=True),
+    Run(r"wakewise scan --set tank\.current\.velocity_m_s=.*", also=tuple(BRIEF), slow=True),
     Run(r"wakewise scan --resume runs/FOLDER", slow=True),
     Run(r"wakewise compare( .*--methods dp,wake-aware)?", also=(*BRIEF, "--out", OWN), slow=True),
     Run(r"wakewise film runs/\w+", slow=True),
@@ -473,3 +474,22 @@ def test_every_line_of_a_page_is_run_or_says_why_not() -> None:
             assert rule.words in (ROOT / rule.test).read_text(encoding="utf-8"), rule
         if isinstance(rule, Never):
             assert len(rule.why) > 10, rule
+
+
+def test_scans_of_a_page_go_to_folders_of_their_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Run one after the other, no line of the how-to page is refused for what a line before it left."""
+    folders: list[Path] = []
+
+    def told(_: object, folder: Path, *__: object) -> None:
+        folders.append(folder)
+        raise InputError("nothing is flown")
+
+    monkeypatch.setattr("wakewise.api.trial", told)
+    monkeypatch.chdir(tmp_path)
+    _colony(tmp_path)
+    lines = [line.words for line in LINES if line.page.endswith("howto.md") and line.words.startswith("wakewise scan")]
+    for words in lines:
+        if "--resume" not in words and "my_package" not in words:
+            assert run(shlex.split(words)[1:]) == 2
+    assert len(folders) >= 6
+    assert len(set(folders)) == len(folders)

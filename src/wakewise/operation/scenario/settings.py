@@ -7,6 +7,8 @@ defined in their own packages; the target's are here.
 from __future__ import annotations
 
 import dataclasses
+import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -293,13 +295,23 @@ def read_scenario(path: Path) -> Scenario:
     return check_scenario(read_tree(path), str(path))
 
 
-def differences(a: BaseModel, b: BaseModel, prefix: str = "") -> list[str]:
-    """Fields in which two settings differ, as 'name value, now value'."""
-    lines: list[str] = []
-    for name in type(a).model_fields:
-        old, new = getattr(a, name), getattr(b, name)
-        if isinstance(old, BaseModel) and isinstance(new, BaseModel):
-            lines += differences(old, new, f"{prefix}{name}.")
-        elif old != new:
-            lines.append(f"{prefix}{name} {old}, now {new}")
-    return lines
+def differences(a: BaseModel, b: BaseModel) -> list[str]:
+    """Fields in which two settings differ, as 'name value, now value', in the words of a scenario's file."""
+    old, new = (dict(_fields(model.model_dump(mode="json"))) for model in (a, b))
+    return [
+        f"{name} {_in_words(old.get(name))}, now {_in_words(new.get(name))}"
+        for name in old | new
+        if old.get(name) != new.get(name)
+    ]
+
+
+def _fields(tree: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            yield from _fields(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+def _in_words(value: Any) -> str:
+    return "not set" if value is None else value if isinstance(value, str) else json.dumps(value)
