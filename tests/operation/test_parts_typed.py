@@ -51,6 +51,30 @@ def test_what_cannot_be_a_part_is_refused_at_once(name, given):
     assert str(said.value).startswith(f"{name}: ") and "\n" not in str(said.value)
 
 
+class Nameless:
+    """Has the methods of a controller and of a world, and no name."""
+
+    def init(self):
+        return 0
+
+    def step(self, state, dt_s, estimate, goal):
+        return state, ww.Command(thrusts_N=np.zeros(8), wrench_B=np.zeros(6))
+
+    def begin(self):
+        pytest.fail("nothing is flown")
+
+
+@pytest.mark.parametrize("part", ["controller", "world"])
+@pytest.mark.parametrize("name", [None, "", 3])
+def test_a_part_that_tables_name_has_a_name(part, name):
+    """Said where it is given: after the flight its figures would be lost."""
+    given = Nameless()
+    if name is not None:
+        given.name = name
+    with pytest.raises(InputError, match=f"{part}: .* has no name"):
+        ww.Scenario.preset("quick").parts().replace(**{part: given})
+
+
 @pytest.mark.parametrize("seconds", [0, -1, 1e-9, 0.001, float("nan"), float("inf"), "1", True, [1.0]], ids=repr)
 def test_a_duration_is_at_least_one_step(seconds):
     """Less, or no number, is refused before anything is compiled."""

@@ -399,11 +399,13 @@ _METHODS: dict[str, tuple[str, ...]] = {
 
 
 def check_part(name: str, given: object) -> None:
-    """Raise InputError if a value cannot be the part of that name; its type or the missing methods are named."""
+    """Raise InputError if a value cannot be the part of that name; its type or what is missing is named."""
     if name in _RECORDS:
         instance_of(given, _RECORDS[name], name)
     else:
         has_methods(given, _METHODS[name], name, name)
+    if name in ("controller", "world") and not (isinstance(word := getattr(given, "name", None), str) and word):
+        raise InputError(f"{name}: {quoted(given)} has no name for tables, must have a text as its attribute name")
 
 
 def tank_bounds(scenario: Scenario) -> TankBounds:
