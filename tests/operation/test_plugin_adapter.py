@@ -10,7 +10,7 @@ import pytest
 import wakewise as ww
 from wakewise.control import with_failsafe
 from wakewise.control.pipeline import PluginStage
-from wakewise.core.errors import StageError
+from wakewise.core.errors import InputError, StageError
 from wakewise.operation.plugin_adapter import described
 
 pytestmark = pytest.mark.usefixtures("fallbacks_fly")
@@ -153,6 +153,30 @@ def test_memory_that_runs_out_is_blamed_on_no_part():
 
     with pytest.raises(MemoryError, match="214 GiB"):
         ww.fly(parts().replace(pilot=Pilot(), method="dp"), duration_s=SECONDS)
+
+
+def broken_begin():
+    raise RuntimeError("no water")
+
+
+@pytest.mark.parametrize(
+    ("begin", "words"),
+    [
+        (broken_begin, "does not begin, RuntimeError: no water"),
+        (lambda: None, "does not begin, TypeError: cannot unpack"),
+        (lambda: (None, None), "first of begin.*None has no step"),
+    ],
+)
+def test_a_world_that_does_not_begin_is_refused_by_name(begin, words):
+    """Whether it raises or gives no plant: the line says which part it is."""
+
+    class Dry:
+        name = "dry"
+
+    world = Dry()
+    world.begin = begin
+    with pytest.raises(InputError, match=rf"world dry \(.*Dry\): {words}"):
+        ww.fly(parts().replace(world=world, method="dp"), duration_s=0.1)
 
 
 def test_a_world_that_does_not_wait_has_the_deadline_enforced():

@@ -15,7 +15,7 @@ from typing import Any, TypedDict, cast
 
 import polars as pl
 
-from wakewise.core.checks import boolean, callable_of, finite_number, quoted
+from wakewise.core.checks import boolean, callable_of, finite_number, has_methods, quoted
 from wakewise.core.errors import InputError, StageError, WakewiseError
 from wakewise.core.interfaces import Plant, TruthProvider, no_progress
 from wakewise.core.jit.precompile import compile_kernels
@@ -215,7 +215,7 @@ def fly(
     else:
         check_initial_state(parts)
     progress(0, 1, "at the start")
-    plant, truth_provider = parts.world.begin()
+    plant, truth_provider = begin_world(parts)
     if parts.finds:
         pilot: Any = parts.pilot
         pilot.begin()
@@ -312,6 +312,24 @@ def loop_of(
         record=record,
         tilt_rad=parts.start_tilt_rad,
     )
+
+
+def begin_world(parts: Parts) -> tuple[Plant, TruthProvider | None]:
+    """The vehicle in its water at the start of a flight, and the truth where it is known.
+
+    Raises InputError if the world is from outside and does not begin.
+    """
+    told = parts.external_parts.get("world")
+    try:
+        plant, truth_provider = parts.world.begin()
+    except (WakewiseError, MemoryError):
+        raise
+    except Exception as fault:
+        if told is None:
+            raise
+        words = "begin() must give a plant, and a truth provider or None"
+        raise InputError(f"world {told}: does not begin, {type(fault).__name__}: {fault}; {words}") from fault
+    return has_methods(plant, ("step",), f"world {told}: first of begin()", "plant"), truth_provider
 
 
 @contextmanager
