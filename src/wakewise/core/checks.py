@@ -29,6 +29,11 @@ def quoted(value: object) -> str:
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
 
 
+def counted(number: int, what: str) -> str:
+    """A number of things as a message says it: 1 trial, 2 trials."""
+    return f"{number:,} {what}{'' if number == 1 else 's'}"
+
+
 def one_of(value: T, allowed: Sequence[T], name: str) -> T:
     """The value itself, if it is one of those that are allowed.
 

@@ -205,10 +205,7 @@ def fly(
     parts = parts_of(flight)
     route = parts.route
     _ = parts.vehicle, parts.estimator  # what cannot be used is refused before minutes of compiling
-    dt_s = 1.0 / parts.scenario.control.rate_hz
-    lasts_s = route.duration_s if duration_s is None else finite_number(duration_s, "duration_s")
-    if round(lasts_s / dt_s) < 1:
-        raise InputError(f"duration_s: {lasts_s:g}, must be at least one control step, {dt_s:g} s")
+    lasts_s = check_duration(route.duration_s if duration_s is None else duration_s, parts.scenario)
     compile_kernels(FLIGHT_JOBS, _Notice() if progress is no_progress else progress)
     if checked:
         _ = parts.preflight
@@ -238,6 +235,14 @@ def fly(
         over = pilot.done if parts.finds else never
         loop_of(parts, plant, truth_provider, record)(duration_s=lasts_s, progress=progress, stop=over)
     return Flight(parts, recorder)
+
+
+def check_duration(duration_s: float, scenario: Scenario) -> float:
+    """The duration of a flight, s; raises InputError if it is less than one control step."""
+    lasts_s, dt_s = finite_number(duration_s, "duration_s"), 1.0 / scenario.control.rate_hz
+    if round(lasts_s / dt_s) < 1:
+        raise InputError(f"duration_s: {lasts_s:g}, must be at least one control step, {dt_s:g} s")
+    return lasts_s
 
 
 def _say_trim(parts: Parts, recorder: FlightRecorder) -> None:

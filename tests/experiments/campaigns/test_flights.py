@@ -34,6 +34,7 @@ def test_the_study_of_the_page_is_planned_and_flown(study, tmp_path):
     assert parts.start.X_WB.p_m - plain.start.X_WB.p_m == pytest.approx([0.1, 0.0, 0.0]) and gathered == {}
     figures = fly_stage(trial.task.settings, tmp_path, no_progress)
     assert figures["within_2cm_s"] is None and figures["energy_kJ"] > 0.0
+    assert figures["hover_only"] == 1.0  # a second is less than the settling hover
     assert (tmp_path / "steps.parquet").is_file()
     (tmp_path / "hover.py").write_text((tmp_path / "hover.py").read_text() + "# changed\n")
     (again,) = planned_trials(check_campaign(study))
@@ -44,6 +45,13 @@ def test_what_cannot_be_loaded_is_refused_before_anything_is_flown(study):
     """In a line; setup and probes are of flights alone."""
     with pytest.raises(InputError, match=r"'hover:nothing'.*cannot be loaded"):
         planned_trials(check_campaign(study | {"probes": {"hover:nothing": {}}}))
+    for given, words in (({"north": 0.1}, "'?north"), ({}, "'north_m'")):
+        with pytest.raises(InputError, match=f"hover:shifted: .*{words}"):
+            planned_trials(check_campaign(study | {"setup": {"hover:shifted": given}}))
+    with pytest.raises(InputError, match=r"hover:Settling: .*'within_m'"):
+        planned_trials(check_campaign(study | {"probes": {"hover:Settling": {"within_m": 0.02}}}))
+    with pytest.raises(InputError, match=r"method dp.*duration_s: 0\.001, must be at least"):
+        planned_trials(check_campaign(study | {"duration_s": 0.001}))
     with pytest.raises(InputError, match="of `stages: fly`"):
         check_campaign(study | {"stages": "model"})
 

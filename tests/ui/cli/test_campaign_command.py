@@ -132,6 +132,19 @@ def test_people_see_tables_and_reasons(cheap_work: Path, capsys: pytest.CaptureF
     assert "small: 6 of 8 trials done, 0 at work, 0 waiting, 2 failed" in capsys.readouterr().out
 
 
+def test_one_hover_is_told_in_the_singular(cheap_work: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A trial is no trials, and a flight that ended before its first leg is said to be a hover."""
+    text = (cheap_work / "pretend.py").read_text().replace("'success': True", "'hover_only': 1.0")
+    (cheap_work / "pretend.py").write_text(text)
+    (cheap_work / "one.yaml").write_text("name: one\nstages: fly\nmethods: [dp]\nseeds: 1\nduration_s: 2\n")
+    assert command(["campaign", "run", "one.yaml"]) == 0
+    shown = capsys.readouterr().out
+    assert "1 of 1 trial; mean" in shown
+    assert "Hover only: all flights ended before the first leg (duration_s)." in shown
+    assert command(["campaign", "status", "runs/one"]) == 0
+    assert "1 of 1 trial done" in capsys.readouterr().out
+
+
 def test_a_page_says_who_won(cheap_work: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """In the folder that is asked for; what is no factor is refused before anything is written."""
     assert command(["campaign", "run", "small.yaml", "--workers", "2", "--json"]) == 0

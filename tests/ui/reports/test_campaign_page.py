@@ -1,6 +1,7 @@
 """A campaign's page answers at a glance, whatever its trials differ in."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -93,6 +94,17 @@ def test_what_is_not_finished_or_not_there_is_said(tmp_path):
     assert "they are kept of trials of" in campaign_page(campaign(), tmp_path)
     empty = campaign_page(campaign(seeds=0, names=("dp",)), tmp_path)
     assert "No trials that can be compared have ended yet." in empty
+
+
+def test_a_campaign_of_hovers_says_so(tmp_path):
+    """Flights that end before their first leg tell of the settling hover alone."""
+    found = campaign()
+    assert "Hover only" not in campaign_page(found, tmp_path)
+    hovers = tuple(replace(one, figures=dict(one.figures) | {"hover_only": 1.0}) for one in found.made)
+    page = campaign_page(replace(found, made=hovers), tmp_path)
+    assert "Hover only: all flights ended before the first leg (duration_s)." in page
+    some = campaign_page(replace(found, made=(*hovers[:1], *found.made[1:])), tmp_path)
+    assert "Hover only: 1 of 12 flights" in some
 
 
 def test_vehicles_are_compared_like_methods(tmp_path):

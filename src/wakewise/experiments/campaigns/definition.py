@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.util import find_spec
+from inspect import signature
 from itertools import product
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -30,6 +31,7 @@ from wakewise.experiments.campaigns.flights import FLY, MODEL
 from wakewise.experiments.campaigns.store import open_store, read_store
 from wakewise.experiments.campaigns.task import FLIES, PHOTOGRAPHS, Task, function_named, source_version
 from wakewise.experiments.trials.dataset.checksums import sha256_of
+from wakewise.operation.flying import check_duration
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
 from wakewise.scene.targets import procedural_kinds
 
@@ -232,11 +234,12 @@ def planned_trials(campaign: Campaign, source: str = "campaign") -> list[Planned
     Raises InputError if there are too many, or a combination is no scenario; the combination and the field are named.
     """
     outside: dict[str, str] = {}
-    for name in (*campaign.setup, *campaign.probes):
+    for name, given in (campaign.setup | campaign.probes).items():
         try:
-            function_named(name)
-        except InputError as fault:
-            raise InputError(f"{source}: {fault}") from None
+            # What a flight gives first: the parts, and to a probe its folder.
+            signature(function_named(name)).bind(*(None,) * (2 if name in campaign.probes else 1), **given)
+        except (InputError, TypeError) as fault:
+            raise InputError(f"{source}: {fault if isinstance(fault, InputError) else f'{name}: {fault}'}") from None
         outside[f"{name.partition(':')[0]} source"] = module_digest(name.partition(":")[0])
     cells = list(_cells(campaign))
     seeds = campaign.all_seeds
@@ -280,6 +283,8 @@ def _resolved(
     where = ", ".join(f"{key} {name}" for key, name in cell.names.items() if key != "variation" or name != AS_IS)
     try:
         scenario = load_scenario(campaign.preset, None, dict(cell.fields) | {"seed": seed})
+        if campaign.duration_s is not None:
+            check_duration(campaign.duration_s, scenario)
         loaded = f"{scenario.vehicle} {scenario.ballast} {scenario.target}"
         if loaded not in there:
             parts = scenario.parts()

@@ -30,6 +30,8 @@ from wakewise.operation.scenario import check_scenario
 from wakewise.scene.missions import SETTLING
 from wakewise.vision.evaluation import flight_figures
 
+HOVER_ONLY = "hover_only"
+"""Figure of a flight that ended before its first leg: what it gives is of the settling hover."""
 FLY = f"{__name__}:fly_stage"
 MODEL = f"{__name__}:model_stage"
 _FLIGHT = ("steps.parquet", "metrics.json", "scenario.yaml")
@@ -92,6 +94,8 @@ def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress)
     gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})
     if setup or probes:  # a study may show figures of a flight that tables of campaigns do not have
         gathered |= flown
+    if (flight.steps["leg"] == SETTLING).all():
+        gathered[HOVER_ONLY] = 1.0
     for probe in probes:
         gathered |= probe.figures(flight.steps)
     gathering.add({"wall_s": time.monotonic() - began, "cpu_s": time.process_time() - worked})

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wakewise.core.checks import counted
 from wakewise.ui.cli.console import ProgressBars, answer, format_value, interval, print_table
 from wakewise.ui.cli.options import Json, listed
 
@@ -105,8 +106,8 @@ def run_campaign(
     unmade = [one for one in outcomes if one.figures is None and one.how == "computer"]
     if unmade:
         raise EnvironmentFailure(
-            f"{folder}: {len(unmade)} of {len(outcomes)} trials could not be made, the first: {unmade[0].task.name}: "
-            f"{unmade[0].reason}; {RESUME_HINT}"
+            f"{folder}: {len(unmade)} of {counted(len(outcomes), 'trial')} could not be made, the first: "
+            f"{unmade[0].task.name}: {unmade[0].reason}; {RESUME_HINT}"
         )
     if found.count("done") == 0 and found.count("failed"):
         raise InputError(f"{file}: every trial failed, the first: {status(found)['failures'][0]['reason']}")
@@ -119,14 +120,14 @@ def show_status(folder: Folder, json: Json = False) -> None:
 
     told = status(results(_folder(folder)))
     counts = (
-        f"{told['name']}: {told['done']} of {told['trials']} trials done, {told['running']} at work, "
+        f"{told['name']}: {told['done']} of {counted(told['trials'], 'trial')} done, {told['running']} at work, "
         f"{told['waiting']} waiting, {told['failed']} failed"
     )
-    words = f"{told['attempts']} attempts; {told['drivers']} runs at it now"
+    words = f"{counted(told['attempts'], 'attempt')}; {counted(told['drivers'], 'run')} at it now"
     if told["trial_s"] is not None:
         words += f"; {told['trial_s']:.0f} s a trial"
     if told["others"]:
-        words += f"; {told['others']} trials in the folder are not the file's any more"
+        words += f"; in the folder, no more the file's: {counted(told['others'], 'trial')}"
     answer(json, told, counts, words, partial(_show_failures, told["failures"]))
 
 
@@ -231,7 +232,7 @@ def _folder(path: Path) -> Path:
 
 def _show_groups(found: Results, groups: list[dict[str, Any]]) -> None:
     """A row per group, then what failed."""
-    from wakewise.experiments.campaigns.table import failures
+    from wakewise.experiments.campaigns.table import failures, hover_words
     from wakewise.experiments.trials import UNITS
 
     factors = [key for key in groups[0] if key not in ("trials", "done", "failed", "figures")]
@@ -246,8 +247,10 @@ def _show_groups(found: Results, groups: list[dict[str, Any]]) -> None:
         lost = f" ({group['failed']} failed)" if group["failed"] else ""
         cells = [_cell(group["figures"][name]) for name in names]
         rows.append((*(str(group[f]) for f in factors), f"{group['done']}/{group['trials']}{lost}", *cells))
-    title = f"{found.plan.name}: {found.count('done')} of {len(found.made)} trials; mean and 95 % interval"
+    title = f"{found.plan.name}: {found.count('done')} of {counted(len(found.made), 'trial')}; mean and 95 % interval"
     print_table("T" * len(factors) + "n", (*factors, "trials", *heads), rows, title)
+    if hovers := hover_words(found):
+        typer.echo(hovers)
     _show_failures(failures(found))
 
 
@@ -258,6 +261,7 @@ def _cell(figure: dict[str, Any]) -> str:
 
 def _show_failures(failed: list[dict[str, Any]]) -> None:
     for one in failed[:20]:
-        typer.echo(f"failed: {one['name']}: {one['reason']} ({one['attempts']} attempts; trials/{one['key']}/log.txt)")
+        tried = counted(one["attempts"], "attempt")
+        typer.echo(f"failed: {one['name']}: {one['reason']} ({tried}; trials/{one['key']}/log.txt)")
     if len(failed) > 20:
         typer.echo(f"and {len(failed) - 20} more; --json lists all")

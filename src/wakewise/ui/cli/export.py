@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from wakewise.core.checks import counted
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import ProgressBars, answer, print_json
 from wakewise.ui.cli.options import Json, check_file, seed_option
@@ -45,8 +46,8 @@ def _dataset(folder: Path, out: Path | None, options: dict[str, Any], json: bool
     }
     kept = f", {built.trials - built.made} of them from before" if built.made < built.trials else ""
     lines = [
-        f"{built.path}: {built.trials} trials{kept}, {built.photographs} photographs, {built.files} files, "
-        f"{built.bytes / 1e6:.1f} MB",
+        f"{built.path}: {counted(built.trials, 'trial')}{kept}, {counted(built.photographs, 'photograph')}, "
+        f"{built.files} files, {built.bytes / 1e6:.1f} MB",
         *(f"left out        {name}: {why}" for name, why in list(built.left_out.items())[:LISTED]),
     ]
     if len(built.left_out) > LISTED:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from wakewise.core.checks import counted
 from wakewise.core.errors import InputError
 from wakewise.ui.cli.console import ProgressBars, print_json, print_table, write_page
 from wakewise.ui.cli.options import Json
@@ -129,7 +130,7 @@ def show_table(table: dict[str, Any]) -> None:
     """Rows as people read them: paper, ours, interval, met or not."""
     from wakewise_paper.reports.reproduction import sentences
 
-    counted = f"{table['made']} trials, {table['failed']} failed" if table["made"] else "not made"
+    made = f"{counted(table['made'], 'trial')}, {table['failed']} failed" if table["made"] else "not made"
     columns = ("world", "method", "target", "figure", "paper", "ours", "95 %", "n", "verdict")
     rows = [
         (
@@ -145,13 +146,13 @@ def show_table(table: dict[str, Any]) -> None:
         )
         for row in table["rows"]
     ]
-    print_table("ttttnnnnt", columns, rows, f"{table['table']}: {table['title']} ({counted})")
+    print_table("ttttnnnnt", columns, rows, f"{table['table']}: {table['title']} ({made})")
     if table["rows"]:
         typer.echo(sentences.met_of({table["table"]: table["rows"]}))
     for failure in table["failures"]:
         typer.echo(f"failed: {failure['trial']}: {failure['reason']}")
     if table["left_undone"]:
-        typer.echo(f"{table['left_undone']} trials had no room in the budget; the same command goes on")
+        typer.echo(f"{counted(table['left_undone'], 'trial')} had no room in the budget; the same command goes on")
     for reason in table["why"].values():
         typer.echo(reason)
 

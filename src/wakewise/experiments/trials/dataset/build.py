@@ -21,6 +21,7 @@ from typing import Any
 
 import polars as pl
 
+from wakewise.core.checks import counted
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file, write_json, write_text
 from wakewise.core.interfaces import no_progress
@@ -48,10 +49,10 @@ def description_of(parts: Sequence[TrialPart]) -> str:
     simulated = sum(part.facts["simulated"] for part in parts)
     where = "simulated" if simulated == len(parts) else "real" if not simulated else "real and simulated"
     return (
-        f"{_count(len(parts), 'flight')} of over-actuated underwater vehicles round delicate targets ({where}): states "
-        f"at every control step, {_count(photographs, 'photograph')} with camera poses, and, apart from what a "
-        f"controller could know, true states, the water at the target and the target's surface. {minutes:.1f} minutes "
-        "in all."
+        f"{counted(len(parts), 'flight')} of over-actuated underwater vehicles round delicate targets ({where}): "
+        f"states at every control step, {counted(photographs, 'photograph')} with camera poses, and, apart from what "
+        f"a controller could know, true states, the water at the target and the target's surface. {minutes:.1f} "
+        "minutes in all."
     )
 
 
@@ -62,7 +63,7 @@ def data_sheet(
     facts = [part.facts for part in parts]
     simulated = sum(fact["simulated"] for fact in facts)
     lacking = Counter(what for part in parts for what in part.lacks)
-    lacks = [f"{what} of {count} of {len(parts)} trials" for what, count in sorted(lacking.items())]
+    lacks = [f"{what} of {count} of {counted(len(parts), 'trial')}" for what, count in sorted(lacking.items())]
     reasons = "".join(f"\n- {name}: {why}" for name, why in sorted(left_out.items()))
     return (
         (files(__package__) / "sheet.md")
@@ -113,8 +114,9 @@ def _rows(parts: Sequence[TrialPart], sizes: Mapping[str, int]) -> list[tuple[st
 def _acquired(simulated: int, trials: int) -> str:
     if not simulated:
         return "By a real vehicle; there is no truth to compare with."
+    were = "was" if simulated == 1 else "were"
     return (
-        f"{simulated} of {trials} trials were flown in Wakewise's simulated tank, their photographs rendered; "
+        f"{simulated} of {counted(trials, 'trial')} {were} flown in Wakewise's simulated tank, photographs rendered; "
         "`scenario.yaml` says with what, and flies them again."
     )
 
@@ -122,7 +124,7 @@ def _acquired(simulated: int, trials: int) -> str:
 def _noise(simulated: int, trials: int) -> str:
     if not simulated:
         return "Those of the vehicle's own sensors."
-    some = "" if simulated == trials else f" of the {simulated} simulated trials"
+    some = "" if simulated == trials else f" of the {counted(simulated, 'simulated trial')}"
     return (
         f"Sensors{some} have the noise, biases, delays and dropouts that `scenario.yaml` states. Photographs of one "
         "orbit overlap on purpose."
@@ -132,10 +134,6 @@ def _noise(simulated: int, trials: int) -> str:
 def _counted(facts: Sequence[Mapping[str, Any]], key: str) -> str:
     counts = Counter(str(fact[key]) if fact[key] is not None else "unknown" for fact in facts)
     return ", ".join(f"{name} ({count})" for name, count in counts.most_common())
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}{'' if number == 1 else 's'}"
 
 
 _PARTS = ".parts"
@@ -175,7 +173,7 @@ def build_dataset(
         left_out |= dict.fromkeys(unfinished, "was not flown to its end")
         if not parts:
             name, why = next(iter(left_out.items()))
-            raise InputError(f"{folder}: none of {len(left_out)} trials can be taken; {name}: {why}")
+            raise InputError(f"{folder}: none of {counted(len(left_out), 'trial')} can be taken; {name}: {why}")
         columns_of(parts)  # refuses before anything is moved
         for path in (growing / _PARTS).iterdir():
             if path.name not in {part.trial for part in parts}:  # an attempt before took it
