@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
+import wakewise as ww
 from wakewise.robot.vehicles.vehicle import TiltJoint
+from wakewise.simulation.tank import Sensors
 from wakewise.simulation.tank.sensors import CameraJoint
 from wakewise.simulation.tank.settings import SensorSettings
 
@@ -14,6 +16,21 @@ JOINT = TiltJoint(low_rad=-0.8, high_rad=0.8, rate_rad_s=1.0)
 
 def camera(seed=0, joint=JOINT, start=0.0, **sensors):
     return CameraJoint(joint, start, SensorSettings(**sensors), np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("world", ["tank", "paper"])
+def test_the_joints_draws_do_not_depend_on_how_many_sensors_there_are(world, monkeypatch) -> None:
+    """A sensor that takes one more stream, as docs/extending.md says, leaves bias and noise of the joint alone."""
+    scenario = ww.Scenario.preset("quick", method="dp", world=world, **{"target.points": 60})
+    before = scenario.parts().world.begin()[0]._joint._bias_rad
+    whole = Sensors.__init__
+
+    def more(self, settings, rng):
+        whole(self, settings, rng)
+        rng.spawn(1)
+
+    monkeypatch.setattr(Sensors, "__init__", more)
+    assert scenario.parts().world.begin()[0]._joint._bias_rad == before
 
 
 def test_the_joint_turns_at_its_rate_to_the_desired_angle_or_its_stop() -> None:

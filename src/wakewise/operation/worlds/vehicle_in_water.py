@@ -48,7 +48,7 @@ class VehicleInWater(ABC):
             target_W_m=target.mesh.vertices_m,
         )
         self._sensors = Sensors(settings.sensors, rng)
-        self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, rng.spawn(1)[0])
+        self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, self._sensors.joint_rng)
         self._time = 0.0
 
     @property

@@ -68,7 +68,8 @@ class Sensors:
 
     def __init__(self, settings: SensorSettings, rng: np.random.Generator) -> None:
         self._settings = settings
-        self._pose_rng, imu_rng, self._depth_rng, self._tracking_rng, lasting_rng = rng.spawn(5)
+        # The stream of a new sensor comes last: each of these stays what it is, that of the camera's joint too.
+        self._pose_rng, imu_rng, self._depth_rng, self._tracking_rng, lasting_rng, self.joint_rng = rng.spawn(6)
         self._gyro_rng, self._force_rng = imu_rng.spawn(2)
         self._draw_lasting(settings, lasting_rng)
         self._gyro_bias_B = self._gyro_rng.normal(0.0, settings.gyro_bias_rad_s, 3)

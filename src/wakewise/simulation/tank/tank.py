@@ -169,7 +169,7 @@ class Tank:
             laws.threshold_Pa / settings.density_kg_m3, SHEAR_HEIGHT_M, laws.grain_m
         )
         self._sensors = Sensors(settings.sensors, sensor_rng)
-        self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, sensor_rng.spawn(1)[0])
+        self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, self._sensors.joint_rng)
         self._probes = TargetProbes(target, probe_rng)
         self._flakes: Flakes | None = None  # drawn when first asked for
         self._flake_rng = probe_rng.spawn(1)[0]
