@@ -200,3 +200,17 @@ def test_a_scenario_without_a_preset_is_gentle() -> None:
     )
     assert control.allocation.current_m_s is None
     assert all(load_scenario(preset, None, {}).control == control for preset in PRESETS)
+
+
+def test_a_vehicle_that_nothing_names_is_refused_where_it_is_set() -> None:
+    """With the nearest name; a path may be of another computer, and a given part is named as it is."""
+    with pytest.raises(InputError, match=r"vehicle: found 'rov', did you mean rexrov\? allowed are bluerov2"):
+        Scenario.preset(vehicle="rov")
+    assert Scenario.preset(vehicle="elsewhere/rov.yaml").vehicle == "elsewhere/rov.yaml"
+    assert Scenario.preset(vehicle="mine", overrides={"vehicle": "mine (lab.Rov)"}).vehicle == "mine"
+
+
+def test_a_word_in_place_of_a_group_is_told_how_one_field_is_set() -> None:
+    """A target by its kind is `target.kind`."""
+    with pytest.raises(InputError, match=r"fields kind, size_m, .*; one of them alone is set as target\.kind$"):
+        Scenario.preset(target="brain")

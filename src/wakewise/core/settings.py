@@ -91,7 +91,9 @@ def _words(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
     plain = isinstance(found, (str, int, float, bool, type(None)))
     shown = f"found {quoted(found)}, " if plain else ""
     if fault["type"] in {"model_type", "model_attributes_type"}:
-        return f"{shown}should be a group with the fields {', '.join(_owner(model, [*parents, name]).model_fields)}"
+        fields = list(_owner(model, [*parents, name]).model_fields)
+        one = ".".join([*parents, name, fields[0]])
+        return f"{shown}should be a group with the fields {', '.join(fields)}; one of them alone is set as {one}"
     message = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "should").replace("\n", " ")
     message = message.removesuffix(", unable to parse string as a number")
     field = _owner(model, parents).model_fields.get(name)

@@ -29,6 +29,7 @@ from wakewise.operation.scenario.randomization import FieldDistribution, sample_
 from wakewise.operation.worlds.library import load_world, own_file, world_names
 from wakewise.perception.settings import PerceptionSettings
 from wakewise.robot.vehicles.ballast import BallastBlock
+from wakewise.robot.vehicles.library import draft_names, is_path
 from wakewise.scene.missions import MissionSettings
 from wakewise.scene.targets import TISSUES, TissueProperties, is_mesh_file, procedural_kinds
 from wakewise.simulation.tank import TankSettings
@@ -196,9 +197,13 @@ class Scenario(Settings):
 
     @field_validator("vehicle")
     @classmethod
-    def _not_empty(cls, value: str) -> str:
+    def _is_named(cls, value: str, info: ValidationInfo) -> str:
         if not value.strip():
             raise ValueError("empty: give a library name or the path of a vehicle file")
+        known = draft_names()
+        given = value in known or is_path(value) or "vehicle" in info.data.get("overrides", {})
+        if not given and not path_of(value, "vehicle").exists():
+            raise ValueError(f"{guess(value, known)}allowed are {', '.join(known)} or the path of a file")
         return value
 
     @classmethod
