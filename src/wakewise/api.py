@@ -12,6 +12,7 @@ The module is long because each function checks its arguments and states them in
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -55,8 +56,11 @@ if TYPE_CHECKING:
     from wakewise.vision.evaluation import SurfaceScore
     from wakewise.vision.reconstruction import Model, ReconstructionSettings
 
+log = logging.getLogger(__name__)
+
 MAX_WRENCH = 1e9
 """Largest force (N), moment (N m) or thrust (N) that is accepted; squares of larger numbers may overflow."""
+_ROUNDING_N = 1e-6
 PoseLike = Pose | Sequence[float] | Array
 """Pose of the body in the world frame, or its x, y, z (m), roll, pitch, yaw (rad)."""
 _EXTRAS = ("photos", "reports", "logs")
@@ -301,7 +305,8 @@ def velocity(
 ) -> Array:
     """Water velocity of all jets at points of shape (n, 3): m/s in the world frame (north, east, down), shape (n, 3).
 
-    The sum of the squares is the disturbance D of the points with weight 1 (`disturbance`).
+    The sum of the squares is the disturbance D of the points with weight 1 (`disturbance`). Thrusts beyond the
+    vehicle's limits are logged as a warning.
 
     Raises
     ------
@@ -387,7 +392,14 @@ def _model(wake: WakeModel | str) -> WakeModel:
 
 
 def _thrusts(vehicle: Vehicle, thrusts_N: ArrayLike) -> Array:
-    return _bounded(frozen(thrusts_N, (len(_vehicle(vehicle).thrusters),), "thrusts_N"), "thrusts_N")
+    thrusts = _bounded(frozen(thrusts_N, (len(_vehicle(vehicle).thrusters),), "thrusts_N"), "thrusts_N")
+    lower, upper = vehicle.thrust_lower_N, vehicle.thrust_upper_N
+    beyond = np.flatnonzero((thrusts < lower - _ROUNDING_N) | (thrusts > upper + _ROUNDING_N))
+    if beyond.size:
+        k = beyond[0]
+        words = f"{vehicle.thrusters[k].name} {thrusts[k]:.4g} N, its limits are {lower[k]:.4g} and {upper[k]:.4g} N"
+        log.warning("thrusts_N: %s; the water is computed all the same", words)
+    return thrusts
 
 
 def _gram(view: InfluenceModel, X_WB: Pose) -> Array:

@@ -156,3 +156,12 @@ def test_where_nothing_is_made_the_share_is_nothing() -> None:
         assert ww.allocate(ROV, WRENCH, POSE, region).scale == 1.0
     sideways = ww.allocate(ROV, [0, 5, 0, 0, 0, 0], POSE, POINTS, failed=[0, 1, 2, 3])
     assert sideways.scale == 0.0 and sideways.given_up["Y"] == pytest.approx(5.0)
+
+
+def test_thrusts_beyond_the_limits_are_told(caplog: pytest.LogCaptureFixture) -> None:
+    """Named with the limits; thrusts at the limits are none."""
+    for thrusts, lines in ((ROV.thrust_upper_N, 0), (ROV.thrust_lower_N, 0), (np.full(8, 100.0), 1)):
+        caplog.clear()
+        ww.velocity(ROV, thrusts, POSE, POINTS)
+        assert len(caplog.records) == lines
+    assert f"thrusts_N: {ROV.thrusters[0].name} 100 N, its limits are" in caplog.text
