@@ -60,7 +60,6 @@ log = logging.getLogger(__name__)
 
 MAX_WRENCH = 1e9
 """Largest force (N), moment (N m) or thrust (N) that is accepted; squares of larger numbers may overflow."""
-_ROUNDING_N = 1e-6
 PoseLike = Pose | Sequence[float] | Array
 """Pose of the body in the world frame, or its x, y, z (m), roll, pitch, yaw (rad)."""
 _EXTRAS = ("photos", "reports", "logs")
@@ -394,11 +393,8 @@ def _model(wake: WakeModel | str) -> WakeModel:
 def _thrusts(vehicle: Vehicle, thrusts_N: ArrayLike) -> Array:
     thrusts = _bounded(frozen(thrusts_N, (len(_vehicle(vehicle).thrusters),), "thrusts_N"), "thrusts_N")
     lower, upper = vehicle.thrust_lower_N, vehicle.thrust_upper_N
-    beyond = np.flatnonzero((thrusts < lower - _ROUNDING_N) | (thrusts > upper + _ROUNDING_N))
-    if beyond.size:
-        k = beyond[0]
-        words = f"{vehicle.thrusters[k].name} {thrusts[k]:.4g} N, its limits are {lower[k]:.4g} and {upper[k]:.4g} N"
-        log.warning("thrusts_N: %s; the water is computed all the same", words)
+    for k in np.flatnonzero((thrusts < lower - 1e-6) | (thrusts > upper + 1e-6))[:1]:  # less is rounding
+        log.warning("thrusts_N: %s %g N, allowed %g to %g", vehicle.thrusters[k].name, thrusts[k], lower[k], upper[k])
     return thrusts
 
 

@@ -164,4 +164,4 @@ def test_thrusts_beyond_the_limits_are_told(caplog: pytest.LogCaptureFixture) ->
         caplog.clear()
         ww.velocity(ROV, thrusts, POSE, POINTS)
         assert len(caplog.records) == lines
-    assert f"thrusts_N: {ROV.thrusters[0].name} 100 N, its limits are" in caplog.text
+    assert f"thrusts_N: {ROV.thrusters[0].name} 100 N, allowed -" in caplog.text

@@ -13,6 +13,7 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns.definition import FACTORS
+from wakewise.experiments.campaigns.flights import HOVER_ONLY
 from wakewise.experiments.campaigns.statistics import WORST, compare_pairs, probability_of_improvement
 from wakewise.experiments.campaigns.table import MEASURES, ComparisonMetric, Results, varying_factors
 
@@ -159,6 +160,13 @@ def by_target(values: Mapping[tuple[str, int], float], which: Iterable[tuple[str
 
 _LEADING = ("rmse_mm", "target_speed_mean_m_s")
 """The first of these that trials have leads."""
+
+
+def hover_words(found: Results) -> str:
+    """Of how many flights the settling hover alone was flown, in words; empty where of none."""
+    hovers = sum(bool(one.figures.get(HOVER_ONLY)) for one in found.made)
+    which = "all" if hovers == found.count("done") else f"{hovers} of {found.count('done')}"
+    return f"Hover only: {which} flights ended before the first leg (duration_s)." if hovers else ""
 
 
 def paired_groups(found: Results, compare: str = "") -> list[Place]:

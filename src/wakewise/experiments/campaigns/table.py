@@ -16,7 +16,6 @@ from wakewise.core.files import whole_file
 from wakewise.experiments.campaigns import trial_lock
 from wakewise.experiments.campaigns.attempt_log import FINAL, RETRIED, Attempts
 from wakewise.experiments.campaigns.definition import FACTORS, CampaignPlan, PlanEntry, read_plan
-from wakewise.experiments.campaigns.flights import HOVER_ONLY
 from wakewise.experiments.campaigns.index import listing
 from wakewise.experiments.campaigns.run import active_drivers
 from wakewise.experiments.campaigns.statistics import mean_interval, share_interval
@@ -121,13 +120,6 @@ def status(found: Results) -> dict[str, Any]:
         "failures": failures(distinct),
         "why": {} if took else {"trial_s": "no trial is finished"},
     }
-
-
-def hover_words(found: Results) -> str:
-    """Of how many flights the settling hover alone was flown, in words; empty where of none."""
-    hovers = sum(bool(one.figures.get(HOVER_ONLY)) for one in found.made)
-    which = "all" if hovers == found.count("done") else f"{hovers} of {found.count('done')}"
-    return f"Hover only: {which} flights ended before the first leg (duration_s)." if hovers else ""
 
 
 def failures(found: Results) -> list[dict[str, Any]]:

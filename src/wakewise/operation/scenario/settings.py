@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -302,7 +301,7 @@ def read_scenario(path: Path) -> Scenario:
 
 def differences(a: BaseModel, b: BaseModel) -> list[str]:
     """Fields in which two settings differ, as 'name value, now value', in the words of a scenario's file."""
-    old, new = (dict(_fields(model.model_dump(mode="json"))) for model in (a, b))
+    old, new = (_fields(model.model_dump(mode="json")) for model in (a, b))
     return [
         f"{name} {_in_words(old.get(name))}, now {_in_words(new.get(name))}"
         for name in old | new
@@ -310,12 +309,12 @@ def differences(a: BaseModel, b: BaseModel) -> list[str]:
     ]
 
 
-def _fields(tree: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def _fields(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Values by dotted name."""
+    found: dict[str, Any] = {}
     for name, value in tree.items():
-        if isinstance(value, dict):
-            yield from _fields(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value
+        found |= _fields(value, f"{prefix}{name}.") if isinstance(value, dict) else {f"{prefix}{name}": value}
+    return found
 
 
 def _in_words(value: Any) -> str:

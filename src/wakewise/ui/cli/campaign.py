@@ -232,7 +232,8 @@ def _folder(path: Path) -> Path:
 
 def _show_groups(found: Results, groups: list[dict[str, Any]]) -> None:
     """A row per group, then what failed."""
-    from wakewise.experiments.campaigns.table import failures, hover_words
+    from wakewise.experiments.campaigns.summary import hover_words
+    from wakewise.experiments.campaigns.table import failures
     from wakewise.experiments.trials import UNITS
 
     factors = [key for key in groups[0] if key not in ("trials", "done", "failed", "figures")]

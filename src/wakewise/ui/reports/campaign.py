@@ -13,18 +13,12 @@ from wakewise.experiments.campaigns.summary import (
     FEWEST,
     MethodSummary,
     Place,
+    hover_words,
     measures,
     method_contrasts,
     paired_groups,
 )
-from wakewise.experiments.campaigns.table import (
-    ComparisonMetric,
-    Results,
-    failures,
-    group_table,
-    hover_words,
-    varying_factors,
-)
+from wakewise.experiments.campaigns.table import ComparisonMetric, Results, failures, group_table, varying_factors
 from wakewise.experiments.trials import UNITS
 from wakewise.ui.reports.methods_compared import cost_text, methods_compared, profiles, winner_text, worst_panels
 from wakewise.ui.reports.page import collapsible_section, framed_page, missing, parts, plot, section, template
@@ -68,11 +62,8 @@ def _header(found: Results, judged: Sequence[tuple[ComparisonMetric, MethodSumma
     summary = macros.summary(found.plan.name, done, total, failed, took)
     few = min((one.trials for _, one in judged), default=0)
     pairs = "" if not 0 < few < FEWEST else "One pair" if few == 1 else f"{few} pairs"
-    return str(
-        macros.header(
-            summary, _title(judged, compared), _cost(judged), total - done - failed, pairs, hover_words(found)
-        )
-    )
+    title, hovers = _title(judged, compared), hover_words(found)
+    return str(macros.header(summary, title, _cost(judged), total - done - failed, pairs, hovers))
 
 
 def _title(judged: Sequence[tuple[ComparisonMetric, MethodSummary]], compared: str) -> str:

@@ -27,15 +27,7 @@ from wakewise.core.files import whole_file, write_json, write_text
 from wakewise.core.interfaces import no_progress
 from wakewise.core.run_lock import LOCK, exclusive_run
 from wakewise.experiments.trials.dataset.checksums import SUMS, sha256_of, sums_text
-from wakewise.experiments.trials.dataset.metadata import (
-    FIGURES,
-    METADATA,
-    METADATA_SUM,
-    SHEET,
-    TRIALS,
-    columns_of,
-    metadata,
-)
+from wakewise.experiments.trials.dataset.metadata import FIGURES, METADATA, OWN_SUM, SHEET, TRIALS, columns_of, metadata
 from wakewise.experiments.trials.dataset.part import KNOWN, NOTE, TRUTH, TrialPart, TrialSource, part_of, trials_of
 from wakewise.experiments.trials.dataset.statement import QUESTIONS, DatasetStatement
 
@@ -240,7 +232,7 @@ def _finish(
     write_text(growing / SUMS, sums_text(sums))
     told = metadata(growing, words, description_of(parts), parts, figures)
     write_json(growing / METADATA, told)
-    write_text(growing / METADATA_SUM, sums_text({METADATA: sha256_of(growing / METADATA)}))
+    write_text(growing / OWN_SUM, sums_text({METADATA: sha256_of(growing / METADATA)}))
     (growing / KNOWN).mkdir()
     # From here on only names change. A part without its note is made again, should this be cut off.
     for part in parts:
@@ -248,6 +240,6 @@ def _finish(
         for side in (KNOWN, TRUTH):
             (growing / _PARTS / part.trial / side).replace(growing / side / part.trial)
     shutil.rmtree(growing / _PARTS)
-    for name in (SUMS, METADATA, METADATA_SUM):
+    for name in (SUMS, METADATA, OWN_SUM):
         sizes[name] = (growing / name).stat().st_size
     return sizes
