@@ -103,30 +103,18 @@ class ErrorStateFilter:
         self._drags = np.stack([compile_body(other).packed for other in with_each_drag(vehicle)])
         self._B = vehicle.allocation_matrix
         self._lag_s = np.maximum(vehicle.time_constants_s, 1e-9)
-        self._noise = np.array(
-            [
-                s.acceleration_noise_m_s2,
-                s.turning_noise_rad_s2,
-                s.force_walk_N,
-                s.moment_walk_N_m,
-                s.gyro_bias_walk_rad_s2,
-                s.accelerometer_bias_walk_m_s3,
-            ]
-        )
+        self._noise = np.array([
+            s.acceleration_noise_m_s2, s.turning_noise_rad_s2, s.force_walk_N, s.moment_walk_N_m,
+            s.gyro_bias_walk_rad_s2, s.accelerometer_bias_walk_m_s3,
+        ])  # fmt: skip
         # chdtri is the inverse of chi-squared's upper tail.
         self._gate = {
             n: float(chdtri(n, self.settings.gate)) if self.settings.gate > 0.0 else np.inf for n in (1, 3, 6)
         }
         spread = (
-            s.start_std_m,
-            s.start_std_rad,
-            s.start_std_m_s,
-            s.start_std_rad_s,
-            s.force_std_N,
-            s.moment_std_N_m,
-            s.gyro_bias_std_rad_s,
-            s.accelerometer_bias_std_m_s2,
-        )
+            s.start_std_m, s.start_std_rad, s.start_std_m_s, s.start_std_rad_s, s.force_std_N, s.moment_std_N_m,
+            s.gyro_bias_std_rad_s, s.accelerometer_bias_std_m_s2,
+        )  # fmt: skip
         n = self._B.shape[1]
         lasting = np.repeat([s.current_std_m_s, s.drag_std, s.inertia_std, s.gain_std], [3, 6, 6, n])
         time_constants_s = np.full(len(lasting), s.lasting_s)
@@ -219,22 +207,10 @@ class ErrorStateFilter:
         """Predict to a time, command by command."""
         if until_s - work.time_s > TICK_S:
             work.time_s = advance(
-                self._packed,
-                self._B,
-                self._lag_s,
-                work.mean,
-                work.P,
-                work.thrusts_N,
-                work.rest_q,
-                work.since_s,
-                work.commands_N,
-                work.time_s,
-                until_s,
-                self._noise_in_current(work.mean),
-                work.noise_scale,
-                self._lasting,
-                self._time_constants_s,
-            )
+                self._packed, self._B, self._lag_s, work.mean, work.P, work.thrusts_N, work.rest_q, work.since_s,
+                work.commands_N, work.time_s, until_s, self._noise_in_current(work.mean), work.noise_scale,
+                self._lasting, self._time_constants_s,
+            )  # fmt: skip
 
     def _noise_in_current(self, mean: Array) -> Array:
         """Process noise, shape (6,), with the walk of the load that a turbulent current makes."""

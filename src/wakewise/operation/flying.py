@@ -15,7 +15,7 @@ from typing import Any, TypedDict, cast
 
 import polars as pl
 
-from wakewise.core.checks import boolean, callable_of, finite_number, has_methods, quoted
+from wakewise.core.checks import boolean, callable_of, finite_number, quoted
 from wakewise.core.errors import InputError, StageError, WakewiseError
 from wakewise.core.interfaces import Plant, TruthProvider, no_progress
 from wakewise.core.jit.precompile import compile_kernels
@@ -212,7 +212,8 @@ def fly(
     else:
         check_initial_state(parts)
     progress(0, 1, "at the start")
-    plant, truth_provider = begin_world(parts)
+    with name_external_parts(parts):
+        plant, truth_provider = parts.world.begin()
     if parts.finds:
         pilot: Any = parts.pilot
         pilot.begin()
@@ -319,29 +320,11 @@ def loop_of(
     )
 
 
-def begin_world(parts: Parts) -> tuple[Plant, TruthProvider | None]:
-    """The vehicle in its water at the start of a flight, and the truth where it is known.
-
-    Raises InputError if the world is from outside and does not begin.
-    """
-    told = parts.external_parts.get("world")
-    try:
-        plant, truth_provider = parts.world.begin()
-    except (WakewiseError, MemoryError):
-        raise
-    except Exception as fault:
-        if told is None:
-            raise
-        words = "begin() must give a plant, and a truth provider or None"
-        raise InputError(f"world {told}: does not begin, {type(fault).__name__}: {fault}; {words}") from fault
-    return has_methods(plant, ("step",), f"world {told}: first of begin()", "plant"), truth_provider
-
-
 @contextmanager
-def name_external_parts(parts: Parts, recorder: FlightRecorder) -> Iterator[None]:
+def name_external_parts(parts: Parts, recorder: FlightRecorder | None = None) -> Iterator[None]:
     """Name the parts from outside, where there are any, as what may have ended a flight.
 
-    Raises StageError in place of what was raised.
+    Raises StageError in place of what was raised; InputError without a recorder, that is before the first step.
     """
     try:
         yield
@@ -352,6 +335,8 @@ def name_external_parts(parts: Parts, recorder: FlightRecorder) -> Iterator[None
         if not foreign:
             raise
         words = ", ".join(f"{name} {what}" for name, what in foreign.items())
+        if recorder is None:
+            raise InputError(f"fly: does not begin, {type(fault).__name__}: {fault}; from outside: {words}") from fault
         raise StageError(
             f"fly: ended after {recorder.duration_s:.1f} s by {type(fault).__name__}: {fault}; from outside: {words}"
         ) from fault

@@ -90,7 +90,7 @@ def test_a_folder_that_holds_another_trial_is_left_alone(capsys: Capsys) -> None
     assert Path("result/scenario.yaml").read_bytes() == before
     assert [path.name for path in Path("result").iterdir()] == ["scenario.yaml"]
     line = said(capsys, "scan", "--out", "result", "--set", "tank.current.velocity_m_s=[0.1, 0, 0]")
-    assert "randomize.tank.jets.half_width_growth.uniform [0.094, 0.177], now not set" in line
+    assert 'randomize.tank.jets.half_width_growth {"uniform": [0.094, 0.177]}, now not set' in line
 
 
 def test_comparing_nothing_or_the_same_twice_is_refused(capsys: Capsys) -> None:

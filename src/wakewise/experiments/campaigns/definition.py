@@ -13,6 +13,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from importlib.resources import files
 from importlib.util import find_spec
 from inspect import signature
 from itertools import product
@@ -314,28 +315,8 @@ def _trial(campaign: Campaign, cell: _Cell, scenario: Scenario, outside: dict[st
 
 def example() -> str:
     """A campaign file to begin with."""
-    return _EXAMPLE.format(presets=" or ".join(PRESETS), corals=", ".join(procedural_kinds()))
-
-
-_EXAMPLE = """\
-# A campaign: every method with every target in every world, each on the same seeds.
-# wakewise campaign run FILE makes what is missing, wakewise campaign table FOLDER shows what came of it.
-name: first-comparison
-preset: quick                     # {presets}
-stages: fly                       # fly: the flight and the water; model: photographs and the model, too
-methods: [dp, mpc, wake-aware]  # or package.module:make for a controller of your own
-targets: [branching, brain]       # {corals}, or mesh files
-worlds: [payload]                 # wakewise world list
-seeds: 3                          # seeds 1 to 3, or a list
-scenario:                         # fields of the scenario of all trials, by dotted names or nested (docs/scenario.md)
-  mission.clearance_m: 0.05
-  control: {{w_effort: 0.001}}
-variations:                       # fields of the scenario that a variation changes, in the same two ways
-  as-is: {{}}
-  closer: {{mission.standoff_m: 0.45}}
-timeout_s: 1800                   # a trial that takes longer is ended
-retries: 2                        # tries after a process that died or was ended
-"""
+    text = (files(__package__) / "example.yaml").read_text(encoding="utf-8")
+    return text.format(presets=" or ".join(PRESETS), corals=", ".join(procedural_kinds()))
 
 
 PLAN = "plan.json"

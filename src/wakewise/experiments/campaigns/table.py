@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import polars as pl
@@ -107,10 +107,7 @@ def status(found: Results) -> dict[str, Any]:
     return {
         "name": found.plan.name,
         "trials": len(distinct.made),
-        "done": distinct.count("done"),
-        "failed": distinct.count("failed"),
-        "running": distinct.count("running"),
-        "waiting": distinct.count("waiting"),
+        **{state: distinct.count(state) for state in get_args(State)},
         "attempts": sum(one.attempts for one in distinct.made),
         "others": found.others,
         "drivers": found.drivers,

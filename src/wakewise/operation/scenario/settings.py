@@ -299,23 +299,15 @@ def read_scenario(path: Path) -> Scenario:
     return check_scenario(read_tree(path), str(path))
 
 
-def differences(a: BaseModel, b: BaseModel) -> list[str]:
+def differences(a: BaseModel | dict[str, Any], b: BaseModel | dict[str, Any], prefix: str = "") -> list[str]:
     """Fields in which two settings differ, as 'name value, now value', in the words of a scenario's file."""
-    old, new = (_fields(model.model_dump(mode="json")) for model in (a, b))
-    return [
-        f"{name} {_in_words(old.get(name))}, now {_in_words(new.get(name))}"
-        for name in old | new
-        if old.get(name) != new.get(name)
-    ]
-
-
-def _fields(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Values by dotted name."""
-    found: dict[str, Any] = {}
-    for name, value in tree.items():
-        found |= _fields(value, f"{prefix}{name}.") if isinstance(value, dict) else {f"{prefix}{name}": value}
-    return found
-
-
-def _in_words(value: Any) -> str:
-    return "not set" if value is None else value if isinstance(value, str) else json.dumps(value)
+    old, new = (one if isinstance(one, dict) else one.model_dump(mode="json", exclude_none=True) for one in (a, b))
+    lines: list[str] = []
+    for name in old | new:
+        pair = old.get(name, "not set"), new.get(name, "not set")
+        if isinstance(pair[0], dict) and isinstance(pair[1], dict):
+            lines += differences(*pair, f"{prefix}{name}.")
+        elif pair[0] != pair[1]:
+            before, now = (value if isinstance(value, str) else json.dumps(value) for value in pair)
+            lines.append(f"{prefix}{name} {before}, now {now}")
+    return lines

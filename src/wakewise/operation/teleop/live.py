@@ -40,7 +40,7 @@ from wakewise.operation.flight_log import (
     parts_table,
     steps_of,
 )
-from wakewise.operation.flying import FLIGHT_JOBS, WATER_EVERY_S, begin_world, loop_of, name_external_parts, recorder_of
+from wakewise.operation.flying import FLIGHT_JOBS, WATER_EVERY_S, loop_of, name_external_parts, recorder_of
 from wakewise.operation.loop import Step
 from wakewise.operation.parts import Parts
 from wakewise.operation.recorder import write_record
@@ -327,7 +327,8 @@ class LiveFlight:
             write_or_check_scenario(folder, flown_by_hand(parts))
             write_truth(parts, folder)
         self._prepare(0, 1, "preparing the water")
-        plant, truth_provider = begin_world(parts)
+        with name_external_parts(parts):
+            plant, truth_provider = parts.world.begin()
         log = FlightLog(
             folder=None if folder is None else folder / PARTS, keep=folder is not None, beside=self._keep_controls
         )

@@ -75,12 +75,7 @@ class Sensors:
         self._gyro_bias_B = self._gyro_rng.normal(0.0, settings.gyro_bias_rad_s, 3)
         self._force_bias_B = self._force_rng.normal(0.0, settings.accelerometer_bias_m_s2, 3)
         self._samplers = (self._pose, self._imu, self._depth, self._tracking)
-        self._rates_hz = (
-            settings.pose_rate_hz,
-            settings.imu_rate_hz,
-            settings.depth_rate_hz,
-            settings.tracking_rate_hz,
-        )
+        self._rates_hz = settings.pose_rate_hz, settings.imu_rate_hz, settings.depth_rate_hz, settings.tracking_rate_hz
         self._taken = [0] * len(self._samplers)
         self._due_s = [1 / rate if rate > 0.0 else math.inf for rate in self._rates_hz]
         self._next_s = min(self._due_s)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -35,15 +36,7 @@ def _dataset(folder: Path, out: Path | None, options: dict[str, Any], json: bool
     )
     with ProgressBars().stage("trials") as progress:
         built = build_dataset(folder, path, words, progress)
-    facts: dict[str, Any] = {
-        "to": "dataset",
-        "path": str(built.path),
-        "trials": built.trials,
-        "photographs": built.photographs,
-        "files": built.files,
-        "bytes": built.bytes,
-        "left_out": built.left_out,
-    }
+    facts: dict[str, Any] = {"to": "dataset", **asdict(built), "path": str(built.path)}
     kept = f", {built.trials - built.made} of them from before" if built.made < built.trials else ""
     lines = [
         f"{built.path}: {counted(built.trials, 'trial')}{kept}, {counted(built.photographs, 'photograph')}, "
