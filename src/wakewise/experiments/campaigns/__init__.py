@@ -1,6 +1,6 @@
 """Campaigns: many trials, made on one computer or on many, each once, resumable after any interruption.
 
-- `definition.py`: the campaign file; its trials; plan.json, which says what a folder was made for.
+- `definition.py`: the campaign file (`example.yaml`); its trials; plan.json, which says what a folder was made for.
 - `flights.py`: what a trial does: a flight with setup functions and probes, or a whole scan.
 - `pictures.py`: what a trial keeps.
 - `study.py`: a campaign whose trials a program lists.
