@@ -144,7 +144,7 @@ def test_detectors_are_found_by_entry_point_and_by_module(outside, name):
         ("whale", "detector: 'whale' is unknown, allowed: whole, package.module:make, .+, did you mean whole"),
         ("outside_detectors:nothing", "detector 'outside_detectors:nothing': cannot be loaded, AttributeError"),
         ("no_such_module:make", "detector 'no_such_module:make': cannot be loaded, ModuleNotFoundError"),
-        ("outside_detectors:number", "'outside_detectors:number': 3, must be a function"),
+        ("outside_detectors:number", "'outside_detectors:number': cannot be made, TypeError"),
         ("outside_detectors:make_number", "3 has no detect, must be a detector with detect"),
         ("outside_detectors:broken", "'outside_detectors:broken': cannot be made, OSError: no weights"),
         ("outside_detectors:Nameless", "'outside_detectors:Nameless': name: None is a NoneType, must be a str"),

@@ -47,7 +47,7 @@ from wakewise.control.pipeline import Pipeline, TrackingStage
 from wakewise.control.settings import ControlSettings
 from wakewise.control.weighted_allocation import weighted_allocator
 from wakewise.core.interfaces import Controller, WakeModel
-from wakewise.core.plugins import find
+from wakewise.core.plugins import make
 from wakewise.planning import Surroundings
 from wakewise.planning.obstacles import around_target
 from wakewise.robot.vehicles import Vehicle
@@ -239,5 +239,5 @@ def make_controller(
     chosen = settings or ControlSettings()
     if method in MAKERS:
         return MAKERS[method](vehicle, region, wake, chosen, surroundings)
-    make = cast("Callable[[ControlTask], Controller[Any]]", find("method", method, MAKERS).maker)
-    return make(ControlTask(vehicle=vehicle, region=region, wake=wake, settings=chosen, surroundings=surroundings))
+    task = ControlTask(vehicle=vehicle, region=region, wake=wake, settings=chosen, surroundings=surroundings)
+    return cast("Controller[Any]", make("method", method, MAKERS, task))

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import difflib
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from wakewise.core.errors import InputError
+from wakewise.core.errors import InputError, WakewiseError
 
 T = TypeVar("T")
 
@@ -32,6 +32,9 @@ GROUPS = {
     "dive log": "wakewise.dive_logs",
 }
 """Entry point group of each kind of part."""
+
+_LONGEST_REASON = 300
+"""So many characters of a foreign error are quoted."""
 
 
 class ResolvedPlugin(NamedTuple, Generic[T]):
@@ -61,6 +64,27 @@ def find(kind: str, name: str, own: Mapping[str, T]) -> ResolvedPlugin[T]:
     close = difflib.get_close_matches(name, known, 1)
     hint = f"did you mean {close[0]}? " if close else ""
     raise InputError(f"{kind} '{name}': unknown, {hint}allowed: {', '.join(known)}, or package.module:name")
+
+
+def make(kind: str, name: str, own: Mapping[str, Callable[..., T]], *given: Any) -> T:
+    """What the maker of this name makes of what it is given.
+
+    Raises InputError as `find` does, and where a maker from outside raises anything; the reason is named.
+    """
+    maker, origin = find(kind, name, own)
+    try:
+        return maker(*given)
+    except Exception as fault:
+        if not origin or isinstance(fault, WakewiseError):
+            raise
+        source = "" if origin == name else f" (from {origin})"
+        raise InputError(f"{kind} '{name}'{source}: cannot be made, {reason_of(fault)}") from fault
+
+
+def reason_of(fault: Exception) -> str:
+    """Type and message of a foreign error on one line, cut short where it is long."""
+    text = " ".join(str(fault).split())
+    return f"{type(fault).__name__}: {text[:_LONGEST_REASON]}" if text else type(fault).__name__
 
 
 def names(kind: str, own: Mapping[str, Any]) -> list[str]:
@@ -96,5 +120,5 @@ def load(kind: str, name: str, target: str) -> Any:
     except InputError:
         raise
     except Exception as fault:  # whatever a foreign module raises while it is imported is the user's to see
-        raise InputError(f"{kind} '{name}': cannot be loaded, {type(fault).__name__}: {fault}") from fault
+        raise InputError(f"{kind} '{name}': cannot be loaded, {reason_of(fault)}") from fault
     return found

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Pilot
-from wakewise.core.plugins import find
+from wakewise.core.plugins import make
 from wakewise.operation.parts import Parts
 from wakewise.operation.teleop.assisted import assisted_pilot
 from wakewise.operation.teleop.human_pilot import HumanPilot, SimulatedOperatorInput
@@ -81,4 +81,4 @@ PILOTS: dict[str, Callable[[Parts], Pilot]] = {
 
 def make_pilot(parts: Parts) -> Pilot:
     """The pilot that the scenario names, ours or one from outside; raises InputError if there is none."""
-    return find("pilot", parts.scenario.pilot, PILOTS).maker(parts)
+    return make("pilot", parts.scenario.pilot, PILOTS, parts)

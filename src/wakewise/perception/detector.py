@@ -16,18 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.arrays import BoolArray
-from wakewise.core.checks import callable_of, has_methods, instance_of, one_of, quoted
+from wakewise.core.checks import has_methods, instance_of, one_of, quoted
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.optional_dependencies import need
-from wakewise.core.plugins import find, offered
+from wakewise.core.plugins import make, offered, reason_of
 
 Image = NDArray[np.uint8]
 """RGB picture, shape (h, w, 3)."""
 
 KIND = "detector"
 ONNX_SUFFIX = ".onnx"
-_LONGEST_REASON = 300
-"""So many characters of a foreign error are quoted."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,11 +93,8 @@ def find_detector(name: str) -> Detector:
     if ":" not in name:
         one_of(name, (*offered(KIND), "package.module:make", f"a path that ends in {ONNX_SUFFIX}"), KIND)
     where = f"{KIND} '{name}'"
-    make: Callable[[], Detector] = callable_of(find(KIND, name, {}).maker, where)
-    try:
-        made = make()
-    except Exception as fault:
-        raise InputError(f"{where}: cannot be made, {reason_of(fault)}") from fault
+    makers: dict[str, Callable[[], Detector]] = {}
+    made = make(KIND, name, makers)
     has_methods(made, ("detect",), where, KIND)
     instance_of(getattr(made, "name", None), str, f"{where}: name")
     return made
@@ -113,12 +108,6 @@ def checked_image(image: Image) -> Image:
     if given.dtype != np.uint8 or given.ndim != 3 or given.shape[2] != 3 or not given.size:
         raise InputError(f"picture: {given.dtype} of shape {given.shape}, must be uint8 of shape (h, w, 3)")
     return image
-
-
-def reason_of(fault: Exception) -> str:
-    """Type and message of a foreign error on one line, cut short where it is long."""
-    text = " ".join(str(fault).split())
-    return f"{type(fault).__name__}: {text[:_LONGEST_REASON]}" if text else type(fault).__name__
 
 
 def _check_detection(one: object, shape: tuple[int, int], where: str) -> None:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from wakewise.core.checks import one_of
 from wakewise.core.errors import InputError
-from wakewise.perception.detector import Image, reason_of
+from wakewise.core.plugins import reason_of
+from wakewise.perception.detector import Image
 
 PREFIX = "wakewise."
 KEYS = ("layout", "mean", "std", "values", "threshold", "least_area", "classes")

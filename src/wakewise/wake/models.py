@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, cast
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -28,7 +28,7 @@ from pydantic import Field, model_validator
 from wakewise.core.checks import quoted
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import WakeModel
-from wakewise.core.plugins import find, names, offered
+from wakewise.core.plugins import make, names, offered
 from wakewise.core.settings import Settings
 from wakewise.wake.cones import PaperJet, PowerJet
 from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
@@ -195,5 +195,4 @@ def _bed(which: WakeSettings, bed_z_m: float | None) -> float | None:
 def _from_outside(name: str) -> WakeModel:
     """A model that an installed package offers (entry points `wakewise.wake_models`), or `package.module:make`."""
     own: dict[str, Any] = dict.fromkeys((*_RECIPES, *RIVALS))
-    make: Callable[[], WakeModel] = find("wake model", name, own).maker
-    return make()
+    return cast("WakeModel", make("wake model", name, own))

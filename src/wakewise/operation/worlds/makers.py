@@ -10,7 +10,7 @@ import numpy as np
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.core.interfaces import BodyState, World
-from wakewise.core.plugins import find
+from wakewise.core.plugins import make
 from wakewise.operation.parts import Parts
 from wakewise.operation.worlds.lattice_world import LatticeWater, box_half_size_m
 from wakewise.operation.worlds.quasi_steady_world import (
@@ -117,4 +117,4 @@ WORLDS: dict[str, Callable[[Parts], World]] = {
 
 def make_world(parts: Parts) -> World:
     """The world that the scenario names, ours or one from outside; raises InputError if there is none."""
-    return find("world", parts.scenario.flow_name, WORLDS).maker(parts)
+    return make("world", parts.scenario.flow_name, WORLDS, parts)

@@ -12,7 +12,7 @@ import numpy as np
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.checks import finite_number, path_of, quoted
 from wakewise.core.errors import InputError
-from wakewise.core.plugins import find, offered
+from wakewise.core.plugins import make, offered
 from wakewise.core.settings import guess, seed_number
 from wakewise.scene.targets.corals import coral, coral_kinds
 from wakewise.scene.targets.mesh import Mesh, load_mesh
@@ -99,8 +99,8 @@ def find_mesh(kind: str | Path, seed: int = 0, size_m: float | None = None) -> t
             raise InputError(f"target '{kind}': size_m {size_m:g} scales a mesh file, this one has its own size")
         if kind in procedural_kinds():
             return kind, reef_patch(individual) if kind == REEF else coral(kind, individual)
-        maker: MeshMaker = find("target", kind, {}).maker
-        return kind.rpartition(":")[2], maker(individual)
+        makers: dict[str, MeshMaker] = {}
+        return kind.rpartition(":")[2], make("target", kind, makers, individual)
     if not path.exists() and path.name == kind and not path.suffix:
         known = [*procedural_kinds(), *offered("target")]
         raise InputError(

@@ -10,7 +10,7 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Current
-from wakewise.core.plugins import find, offered
+from wakewise.core.plugins import make, offered
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
 from wakewise.simulation.tank.settings import EDDY_M, MAX_PARCELS, TankSettings
@@ -73,8 +73,8 @@ def _current(settings: TankSettings) -> Current:
     """What the settings name in place of a steady current: a series' file, or a current from outside."""
     named = settings.current.file or ""
     if not Path(named).expanduser().exists() and (named in offered("current") or ":" in named):
-        make: Callable[[], Current] = find("current", named, {}).maker
-        return make()
+        makers: dict[str, Callable[[], Current]] = {}
+        return make("current", named, makers)
     return _series(settings)
 
 
