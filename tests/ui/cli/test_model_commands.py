@@ -122,6 +122,10 @@ def test_the_bed_of_a_trial_is_that_of_its_scenario(capsys: Capsys) -> None:
     assert run(arguments) == 0
     found = capsys.readouterr()
     assert json.loads(found.out) == given and "1 m, from scenario.yaml" in found.err
+    Path("scenario.yaml").write_text("tank: {size_m: [3.0, 3.0, 2.5]}\n")
+    assert run(arguments) == 0
+    found = capsys.readouterr()
+    assert json.loads(found.out) == without and "2.5 m, not in this model: not used" in found.err
     Path("scenario.yaml").write_text("tank: {size_m: [3.0, 3.0, 0.05]}\n")
     assert run(arguments) == 2
     assert "--bed-z" in capsys.readouterr().err

@@ -199,7 +199,7 @@ def test_surface_over_the_colony_that_is_not_joined_to_it_is_told(radius_m: floa
     assert found.height_mm == pytest.approx(50.0, rel=0.01)
     lines = measuring_warnings(mesh, MeasuringRule(), found, plane)
     assert [line.partition(" above")[0] for line in lines] == (
-        ["the surface is broken: 50 cm2 about the colony, up to 90 mm"] * told
+        ["50 cm2 of surface about the colony, up to 90 mm"] * told
     )
 
 

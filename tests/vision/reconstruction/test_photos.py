@@ -19,6 +19,7 @@ from wakewise.vision.reconstruction.photos.photo_folder import (
     decode,
     digests,
     jpeg_is_whole,
+    photo_files,
     png_is_whole,
     refuse_other_photos,
     without_duplicates,
@@ -240,3 +241,16 @@ def test_a_model_of_other_photos_is_not_replaced_unasked(tmp_path):
     refuse_other_photos(tmp_path, more)
     with pytest.raises(InputError, match="holds a model of other photos"):
         refuse_other_photos(tmp_path, other)
+    for damaged in ("", "3", "[[1]]"):
+        (tmp_path / PHOTOS_FILE).write_text(damaged)
+        refuse_other_photos(tmp_path, other)
+
+
+def test_a_model_among_a_rigs_folders_gives_no_photos(tmp_path):
+    """Pictures that a reconstruction wrote beside the folders of two cameras are not taken for a third one's."""
+    for name in ("left", "right", "model"):
+        (tmp_path / name).mkdir()
+    put(tmp_path, "left/a.png", "right/a.png", "model/orthophoto.png")
+    assert len(photo_files(tmp_path)) == 3
+    (tmp_path / "model" / "reconstruction.json").write_text("{}")
+    assert [path.parent.name for path in photo_files(tmp_path)] == ["left", "right"]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wakewise.core.checks import finite_number
 from wakewise.core.errors import InputError, StageError
 from wakewise.ui.cli.console import answer, print_table
 from wakewise.ui.cli.options import Json
@@ -93,6 +94,8 @@ MeshSamples = Annotated[
 Figures = tuple[dict[str, Any], dict[str, tuple[str, str]]]
 """Values and what they are: unit and definition by key."""
 SPACING_M = 0.4e-3
+BED_REACH_M = 0.02
+"""Distance of a scenario's bed from a model's points above which the model has other axes, or is of something else."""
 """Of the points that stand for a Gaussian: half of the cell that a model is thinned to."""
 
 
@@ -146,7 +149,7 @@ def evaluate(
     if reference is None:
         figures, definitions = _against_depths(points, depth_maps, cameras)
     else:
-        bed_z = _bed_of_trial(cloud) if bed_z is None else bed_z
+        bed_z = _bed_of_trial(cloud, points) if bed_z is None else finite_number(bed_z, "--bed-z")
         try:
             figures, definitions, aligned, error_mm = _against_reference(
                 cloud, points, reference, cameras, bed_z, unit_m, thresholds, not no_icp
@@ -157,7 +160,7 @@ def evaluate(
             if isinstance(fault, ScaleError):
                 raise InputError(f"{fault} The reference's unit: --unit-m; a model must be in metres") from None
             hint = "; if the model holds the bed that the object stands on, say where: --bed-z" if bed_z is None else ""
-            raise StageError(f"{fault}{hint}; model and reference must be in metres") from None
+            raise StageError(f"{fault}{hint}; model and reference must be in metres and have the same axes") from None
         if colours is not None:
             _write_errors(colours, aligned, error_mm)
     _remark(figures)
@@ -176,17 +179,25 @@ def evaluate(
     _print_figures(json, f"{cloud} against {reference or depth_maps}", figures, why, definitions, {}, *shares)
 
 
-def _bed_of_trial(model: Path) -> float | None:
-    """Depth of the bed by the scenario beside a trial's model, None without one."""
+def _bed_of_trial(model: Path, points_m: Array) -> float | None:
+    """Depth of the bed by the scenario beside a trial's model, None without one or where the model ends above it."""
     scenario = model.parent / "scenario.yaml"
     if not scenario.is_file():
         return None
+    import numpy as np
+
     from wakewise.operation import read_scenario
 
     try:
         bed_z = read_scenario(scenario).tank.size_m[2]
     except InputError as fault:
         raise InputError(f"{fault}; --bed-z gives the bed's depth instead") from None
+    low, high = np.percentile(points_m[:, 2], (0.1, 99.9))
+    if not low - BED_REACH_M <= bed_z <= high + BED_REACH_M:
+        typer.echo(
+            f"wakewise: {scenario} has its bed at z = {bed_z:g} m, not in this model: not used (--bed-z)", err=True
+        )
+        return None
     typer.echo(f"wakewise: bed at z = {bed_z:g} m, from {scenario} (--bed-z)", err=True)
     return bed_z
 

@@ -179,7 +179,7 @@ def reconstruct_photos(
     lenses, patterns = _lenses(camera), pairs("--lens", "NAME=PATTERN such as left='L_*'", lens) or None
     references = read_reference_cameras(reference_cameras) if reference_cameras else None
     known = read_known_cameras(cameras) if cameras else None
-    out = out or Path("runs") / photos.resolve().stem
+    out = out or Path("runs") / (photos.resolve().name if photos.is_dir() else photos.stem)
     photos = frames_of(photos, out)
     if look:
         look_first(photos, out, settings.threads, json)
@@ -247,6 +247,8 @@ def output_folder(photos: Path) -> list[str]:
 
 def remarks(model: Model) -> list[str]:
     """What a user should know besides the figures, a line each."""
+    from wakewise.vision.reconstruction.outputs.meshing import FINER
+
     out = []
     if model.duplicates:
         out.append(f"{model.duplicates} photos are copies of others and were left out")
@@ -274,7 +276,7 @@ def remarks(model: Model) -> list[str]:
     if model.mesh_cell_mm and model.point_spacing_mm and model.mesh_cell_mm > COARSE_CELL * model.point_spacing_mm:
         out.append(
             f"the mesh has cells of {model.mesh_cell_mm:.2g} mm, the points are {model.point_spacing_mm:.2g} mm apart: "
-            "thin parts are broken or lost; give --region about the subject"
+            f"thin parts are broken or lost; {FINER}"
         )
     return out
 

@@ -90,6 +90,8 @@ def frames_of(photos: Path, out: Path) -> Path:
 
     if not is_film(photos):
         return photos
+    if (out / "reconstruction.json").is_file() and not (out / "frames").is_dir():
+        raise InputError(f"{out}: holds a model of photos, frames of a film need a folder of their own (--out)")
     with ProgressBars().stage("frames") as progress:
         folder, said = take_frames(photos, out, progress)
     for line in said.lines():

@@ -171,8 +171,8 @@ def measuring_warnings(mesh: Mesh, rule: MeasuringRule, size: ColonySize, bed: B
     if (area := float(part.face_areas_m2[loose].sum())) > MOST_LOOSE * float(colony.face_areas_m2.sum()):
         reach_mm = 1e3 * float(bed.to_plane(part.vertices_m)[:, 2][part.faces[loose]].max())
         out.append(
-            f"the surface is broken: {1e4 * area:.0f} cm2 about the colony, up to {reach_mm:.0f} mm above the bed, are "
-            "not joined to it and not in the figures; a model made with --region about it is finer"
+            f"{1e4 * area:.0f} cm2 of surface about the colony, up to {reach_mm:.0f} mm above the bed, are not joined "
+            "to it, nor in the figures: a neighbour or a broken surface; look, or give --box, which measures all in it"
         )
     ends_m = open_edges_m(part, bed, 1.5 * cut_m, faces)
     if ends_m > MOST_OPEN * length[0]:

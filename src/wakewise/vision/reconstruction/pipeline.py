@@ -331,7 +331,7 @@ def reconstruct(
     """
     start = time.perf_counter()
     if out.resolve() == photos.resolve():
-        raise InputError(f"{out}: is the folder of the photos, the model must go elsewhere")
+        raise InputError(f"{out}: is the folder of the photos, the model must go elsewhere (--out)")
     settings = settings or ReconstructionSettings()
     if settings.dense == "patch-match":
         require_cuda()
@@ -471,6 +471,6 @@ def _region(region: tuple[Array, float] | None, references: dict[str, Array] | N
     if references is None:
         raise InputError("region of interest: needs reference positions, else the model has no frame to place it in")
     centre, radius = region
-    if not (np.isfinite(radius) and radius > 0):
-        raise InputError(f"region of interest: radius {radius:g} m, must be above 0")
+    if not (np.isfinite(radius) and radius > 0 and np.isfinite(centre).all()):
+        raise InputError(f"region of interest: {centre}, radius {radius:g} m, must be finite and the radius above 0")
     return RegionOfInterest(centre_W_m=np.asarray(centre, dtype=np.float64), radius_m=float(radius))

@@ -166,7 +166,7 @@ def test_check_sums_are_what_sha256sum_and_hashlib_say(campaign: Path, tmp_path:
         (lambda d: (d / "croissant.json").write_text("{}"), "is no Croissant metadata"),
         (lambda d: (d / "croissant.json").unlink(), "is no data set"),
         (lambda d: _one_byte(d / "croissant.json", b"sc:Dataset", b"sc:dataset"), "croissant.json changed"),
-        (lambda d: (d / "croissant.json.sha256").unlink(), "croissant.json not in the list"),
+        (lambda d: (d / "croissant.json.sha256").unlink(), "croissant.json.sha256 missing or empty"),
     ],
 )
 def test_whatever_is_changed_is_noticed(campaign: Path, tmp_path: Path, change: Any, said: str, capsys: Capsys) -> None:

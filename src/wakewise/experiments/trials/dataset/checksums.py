@@ -46,7 +46,7 @@ def read_sums(path: Path) -> dict[str, str]:
     Raises InputError if a line is none, a path leads out of the folder, or stands there twice.
     """
     found: dict[str, str] = {}
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
         match = _LINE.match(line)
         if match is None:
             raise InputError(f"{path}: line {number} is no check sum; the file was changed")

@@ -155,7 +155,9 @@ def check_dataset(folder: Path, progress: Callable[..., None] = no_progress) -> 
         return ChecksumReport(files=0, bytes=0, differences=(ChecksumMismatch(SUMS, "changed"),))
     own = folder / OWN_SUM
     sums = (read_sums(own) if own.is_file() else {}) | read_sums(folder / SUMS)
-    found = differences(folder, sums, frozenset({OWN_SUM, SUMS}), progress)
+    found = differences(folder, sums, frozenset({OWN_SUM, SUMS, *({METADATA} - set(sums))}), progress)
+    if METADATA not in sums:
+        found.insert(0, ChecksumMismatch(OWN_SUM, "missing or empty"))
     told_wrong = [ChecksumMismatch(name, "other check sum in croissant.json") for name, digest in sorted(wanted.items())
                   if name != SUMS and sums.get(name) != digest]  # fmt: skip
     size = sum((folder / name).stat().st_size for name in sums if (folder / name).is_file())

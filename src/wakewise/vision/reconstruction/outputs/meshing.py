@@ -35,6 +35,7 @@ CLUSTER_SHARE = 0.005
 """Share of the largest cluster's points that a cluster must have."""
 LEAST_EXTENT = 10.0
 """Extent of a component of the surface, in point spacings, below which it is noise."""
+FINER = "give --region about the subject, or --crop where no cameras are known"
 MOST_BARE_PCT = 1.0
 """Share of the points without surface above which the surface is in doubt."""
 
@@ -98,7 +99,7 @@ def mesh_warnings(figures: dict[str, Any]) -> list[str]:
     bare = figures["mesh_bare_pct"]
     if bare is None or bare <= MOST_BARE_PCT:
         return []
-    return [f"{bare:.1f} % of the dense points have no surface, parts of the subject may be missing: give --region"]
+    return [f"{bare:.1f} % of the dense points have no surface, parts of the subject may be missing: {FINER}"]
 
 
 def mesh_model(

@@ -101,9 +101,12 @@ def digests(photos: Sequence[Photo]) -> list[str]:
 
 def refuse_other_photos(out: Path, photos: Sequence[Photo]) -> None:
     """Raise InputError if a folder holds a finished model of photos none of which is among these."""
-    path = out / PHOTOS_FILE
-    if path.is_file() and set(json.loads(path.read_bytes())).isdisjoint(digests(photos)):
-        raise InputError(f"{out}: holds a model of other photos, these need a folder of their own; give another")
+    try:
+        before = set(json.loads((out / PHOTOS_FILE).read_bytes()))
+    except (OSError, ValueError, TypeError):  # none is there, or it was damaged: as with the stamps of stages
+        return
+    if before and before.isdisjoint(digests(photos)):
+        raise InputError(f"{out}: holds a model of other photos, these need a folder of their own (--out)")
 
 
 class PhotoStore:
@@ -174,8 +177,12 @@ def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2)
 
 
 def photo_files(folder: Path) -> list[Path]:
-    """Files of a folder that are taken for photographs by their names: its own, or else those of the folders in it."""
-    below = (path for inside in _folders(folder) for path in _files(inside))
+    """Files of a folder that are taken for photographs by their names: its own, or else those of the folders in it.
+
+    Folders that hold a model are passed over.
+    """
+    inside = (path for path in _folders(folder) if not (path / "reconstruction.json").is_file())
+    below = (path for each in inside for path in _files(each))
     return [path for path in _files(folder) if path.suffix.lower() in SUFFIXES] or [
         path for path in below if path.suffix.lower() in SUFFIXES
     ]
