@@ -141,7 +141,8 @@ def densify(
             spacing = _all_depths(maps, given, views, partners, region, settings, scale, progress)
         cloud, spacing = _fuse_all(maps, partners, settings, spacing, progress)
     if len(cloud) < 100:
-        raise StageError(f"dense: {len(cloud)} points survive from {len(maps)} depth maps, at least 100 must")
+        where = "" if region is None else f"; is the region right, {region.radius_m:g} m about {region.centre_W_m}?"
+        raise StageError(f"dense: {len(cloud)} points survive from {len(maps)} depth maps, at least 100 must{where}")
     normals = facing_normals(cloud[:, :3], cloud[:, 6:9], settings.threads)
     write_cloud(out, OrientedPointCloud(points_m=cloud[:, :3], normals=normals, colours=cloud[:, 3:6]))
     return {"dense_points": len(cloud), "depth_maps": len(maps), "point_spacing_mm": 1e3 * spacing}
