@@ -13,6 +13,7 @@ from wakewise.core.errors import InputError
 from wakewise.operation.parts import Parts
 from wakewise.operation.recorder import LOAD
 from wakewise.operation.scenario import read_scenario
+from wakewise.operation.trial_folder import changed_files
 from wakewise.robot.vehicles import Vehicle
 
 LEARNING_S = 4.0
@@ -66,7 +67,10 @@ def folder_trim(folder: Path) -> tuple[Parts, HoverTrim]:
     """
     if not (folder / "steps.parquet").is_file() or not (folder / "scenario.yaml").is_file():
         raise InputError(f"{folder}: not the folder of a trial that was flown, needs scenario.yaml and steps.parquet")
-    parts = read_scenario(folder / "scenario.yaml").parts()
+    scenario = read_scenario(folder / "scenario.yaml")
+    if changed := changed_files(folder / "scenario.yaml", scenario):
+        raise InputError(f"{folder}: {changed[0]} since it was flown; give what was flown, or fly again")
+    parts = scenario.parts()
     try:
         steps = pl.read_parquet(folder / "steps.parquet")
     except (OSError, pl.exceptions.PolarsError) as fault:

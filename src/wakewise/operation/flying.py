@@ -249,7 +249,8 @@ def check_duration(duration_s: float, scenario: Scenario) -> float:
 def _say_trim(parts: Parts, recorder: FlightRecorder) -> None:
     """Log the ballast that the settling hover asks for, before the first photograph; the flight goes on."""
     if (words := ballast_proposal(parts.vehicle, recorder.frame())) is not None:
-        log.warning("settling hover: out of trim, %s; after a trial `wakewise vehicle trim` writes it down", words)
+        advice = "after a trial `wakewise vehicle trim --flight FOLDER --write FILE` writes it down"
+        log.warning("settling hover: out of trim, %s; %s", words, advice)
 
 
 def parts_of(flight: Parts | Scenario) -> Parts:

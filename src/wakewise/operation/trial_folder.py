@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 from collections.abc import Iterable
 from importlib.metadata import version
@@ -42,7 +43,7 @@ def check_place(folder: Path, scenario: Scenario) -> None:
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {folder}: is a file, must be a folder or not exist")
     if path.exists():
-        changed = differences(read_scenario(path), scenario)
+        changed = differences(read_scenario(path), scenario) + changed_files(path, scenario)
         if changed:
             raise InputError(
                 f"--out {folder}: holds another trial ({'; '.join(changed[:3])}); give another --out or remove it"
@@ -57,7 +58,26 @@ def write_or_check_scenario(folder: Path, scenario: Scenario) -> None:
         return
     packages = ("wakewise", "numpy", "numba", "pycolmap", "opencv-python-headless", "embreex")
     versions = {"python": platform.python_version()} | {name: version(name) for name in packages}
-    write_scenario(path, scenario, versions)
+    write_scenario(path, scenario, versions | _check_sums(scenario))
+
+
+def changed_files(path: Path, scenario: Scenario) -> list[str]:
+    """Which files that a trial's scenario.yaml names have other contents than its comments say, in words."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    named = {name: f"# {name} {found}" for name, found in _check_sums(scenario).items()}
+    return [
+        f"the contents of {name} have changed"
+        for name, now in named.items()
+        if now not in lines and any(line.startswith(f"# {name} sha256 ") for line in lines)
+    ]
+
+
+def _check_sums(scenario: Scenario) -> dict[str, str]:
+    """Check sum of each file of vehicle, target, current and control log by its name in the scenario."""
+    named = (scenario.vehicle, scenario.target.kind, scenario.tank.current.file, scenario.control_log)
+    files = {name: Path(name).expanduser() for name in named if name}
+    found = {name: file.read_bytes() for name, file in files.items() if file.is_file()}
+    return {name: f"sha256 {hashlib.sha256(content).hexdigest()}" for name, content in found.items()}
 
 
 def flown_by_hand(parts: Parts) -> Scenario:

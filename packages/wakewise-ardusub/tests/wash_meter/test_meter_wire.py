@@ -143,5 +143,10 @@ def test_a_record_goes_on_and_keeps_another_crafts_rows(tmp_path: Path) -> None:
     assert len(rows) == 3
     assert rows[1].startswith("1.500,1e-06,1e-06,0,0.2,0.1,1,-2")
     DiveRecord(tmp_path / "dive", six).close({})
-    assert len((tmp_path / "dive" / "meter-1.csv").read_text().splitlines()) == 3
+    (aside,) = (tmp_path / "dive").glob("meter-*.csv")
+    assert len(aside.read_text().splitlines()) == 3
+    DiveRecord(tmp_path / "dive", six).close({"messages": 7})
+    DiveRecord(tmp_path / "dive", six).close({})
+    summaries = [path.read_text() for path in sorted((tmp_path / "dive").glob("meter-*.json"))]
+    assert any('"messages": 7' in text for text in summaries)
     assert (tmp_path / "dive" / "meter.csv").read_text().startswith("time_s,")

@@ -256,7 +256,8 @@ def ardusub(
     if session.fault is not None:
         raise session.fault
     if json:
-        print_json({"folder": str(folder), "engagements": session.gate.engagement.entries, **session.figures()})
+        kept = str(folder) if folder.is_dir() else None
+        print_json({"folder": kept, "engagements": session.gate.engagement.entries, **session.figures()})
 
 
 @contextmanager

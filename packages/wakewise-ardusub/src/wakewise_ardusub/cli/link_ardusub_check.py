@@ -69,16 +69,14 @@ def check_vehicle(
     """Print every row and the verdict; end with 1 unless it is go, with 2 where motors were not seen to turn."""
     from wakewise.robot.importers import any_vehicle
     from wakewise_ardusub.link.checks import CheckInputs, check, read_results, verdict
-    from wakewise_ardusub.link.parameters import SYSTEM_NAMES, first_of, read_parameter_file
+    from wakewise_ardusub.link.parameters import read_parameter_file
     from wakewise_ardusub.link.vehicle_survey import survey
 
     chosen = any_vehicle(vehicle)
     results = read_results(motor_results) if motor_results.exists() else None
     if params is not None:
         parameters = read_parameter_file(params)
-        own = first_of(parameters, SYSTEM_NAMES)
-        named = round(own[1]) if own else system
-        facts = CheckInputs(vehicle=chosen, parameters=parameters, system=named, results=results, buttons=buttons)
+        facts = CheckInputs(vehicle=chosen, parameters=parameters, system=system, results=results, buttons=buttons)
     else:
         with _connected(connection, system, "--check") as link, ProgressBars().stage("asking") as advance:
             facts = survey(link, chosen, results=results, buttons=buttons, progress=advance)

@@ -156,8 +156,9 @@ def fly_survey(
             end_status_line()
             if not session.known.messages:
                 journal.discard()
-    figures = {"folder": str(folder), **session.figures()}
+    figures = session.figures()
     if session.known.messages:
+        figures = {"folder": str(folder), **figures}
         write_json(folder / "figures.json", figures)
     if given.json:
         print_json(figures)

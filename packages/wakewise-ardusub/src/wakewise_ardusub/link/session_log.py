@@ -47,7 +47,7 @@ class SessionLog:
     ) -> None:
         self.path, self._clock, self._wall = path, clock, wall
         self._lock = threading.Lock()
-        self._is_new = not path.exists()
+        self._is_new, self._made_folder = not path.exists(), not path.parent.exists()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file: int | None = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
@@ -88,12 +88,13 @@ class SessionLog:
                 self._file = None
 
     def discard(self) -> None:
-        """End, and remove a file that was begun here, with its folder where nothing else is in it."""
+        """End, and remove a file that was begun here, with its folder if that was, too, and is empty."""
         self.close()
         if self._is_new:
             with suppress(OSError):
                 self.path.unlink()
-                self.path.parent.rmdir()
+                if self._made_folder:
+                    self.path.parent.rmdir()
 
 
 def read_journal(path: Path) -> tuple[list[dict[str, Any]], int]:

@@ -292,7 +292,8 @@ class DiveRecord:
     Parameters
     ----------
     folder : Path
-        Made where it is not there; a record in it is gone on with where its columns are the same, else put aside.
+        Made where it is not there; rows in it are gone on with where their columns are the same, else put aside, as an
+        earlier summary is.
     craft : VehicleSummary
     """
 
@@ -303,10 +304,13 @@ class DiveRecord:
         names += [f"{share}_{i + 1}_N" for share in ("flown", "gentle") for i in range(craft.count)]
         path = folder / ROWS
         before = path.read_text(encoding="utf-8").partition("\n")[0] if path.is_file() else ""
+        taken = {one.stem for one in folder.glob("meter-*.*")}
+        number = next(n for n in count(1) if f"meter-{n}" not in taken)
         if before not in ("", ",".join(names)):
-            numbers = (n for n in count(1) if not (folder / f"meter-{n}.csv").exists())
-            path.rename(folder / f"meter-{next(numbers)}.csv")
+            path.rename(folder / f"meter-{number}.csv")
             before = ""
+        if (folder / SUMMARY).is_file():
+            (folder / SUMMARY).rename(folder / f"meter-{number}.json")
         self._file: IO[str] = path.open("a", encoding="utf-8", newline="", buffering=1)
         self._rows = csv.writer(self._file, lineterminator="\n")
         if not before:
