@@ -62,6 +62,12 @@ def test_what_the_file_says_is_told_apart_from_estimates(file: Path) -> None:
     assert [row[-1] for row in _cells(told) if row[0] == "left"] == ["~0.0287"]
     rows = {row[0].partition(",")[0]: row[2] for row in _cells(run(file)) if len(row) == 3}
     assert rows["added_mass.translation_kg"] == "missing"
+    whole = file.with_name("whole.yaml")
+    run(file, "--like", "bluerov2-heavy", "--out", whole)
+    again = run(whole)  # the file that was written says itself what of it is an estimate
+    rows = {row[0].partition(",")[0]: row[2] for row in _cells(again) if len(row) == 3}
+    assert rows["body.mass_kg"] == "file" and rows["added_mass.translation_kg"] == "estimate"
+    assert [row[-1][:1] for row in _cells(again) if row[0] == "left"] == ["~"]
 
 
 def _cells(told: str) -> list[list[str]]:

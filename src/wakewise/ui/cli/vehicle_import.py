@@ -178,13 +178,21 @@ def _row(values: Any) -> str:
     return "  ".join(f"{value:.5g}" for value in values)
 
 
+def _is_estimate(draft: VehicleDraft, field: str) -> bool:
+    """Whether the file's own record of sources calls a field an estimate; a record that names fields means those."""
+    group, _, name = field.partition(".")
+    sources = [origin.source for origin in draft.provenance if origin.estimate and origin.group == group]
+    return any(": an estimate" not in one or name in one.partition(": an estimate")[0] for one in sources)
+
+
 def _show(found: VehicleDraft, draft: VehicleDraft, comparison: MatrixComparison | None, out: Path | None) -> None:
     from wakewise.robot.vehicles.draft import THRUSTER_FIELDS, VEHICLE_WORDS
 
     typer.echo(f"{draft.title}\n")
     fields = []
     for name, value, text in _numbers(draft):
-        whence = "missing" if value is None else "estimate" if getattr(found, name) is None else "file"
+        guessed = getattr(found, name) is None or _is_estimate(draft, VEHICLE_WORDS[name][1][0])
+        whence = "missing" if value is None else "estimate" if guessed else "file"
         fields.append((", ".join(VEHICLE_WORDS[name][1]), text, whence))
     print_table("t", ("field", "value", "from"), fields, "vehicle (body frame: x forward, y right, z down)")
     if draft.thrusters:
@@ -192,12 +200,15 @@ def _show(found: VehicleDraft, draft: VehicleDraft, comparison: MatrixComparison
         for t, own in zip(draft.thrusters, found.thrusters or (None,) * len(draft.thrusters), strict=True):
             axis = " ".join(f"{value:+z.3f}" for value in t.axis_B)
             limits = [
-                f"~{format_value(value)}" if value is not None and getattr(own, name, None) is None else value
+                f"~{format_value(value)}"
+                if value is not None
+                and (getattr(own, name, None) is None or _is_estimate(draft, THRUSTER_FIELDS[name]))
+                else value
                 for name, value in ((name, getattr(t, name)) for name in THRUSTER_FIELDS)
             ]
             rows.append((t.name, *(f"{v:z.3f}" for v in t.p_BT_m), axis, *limits))
         columns = ("name", "x m", "y m", "z m", "force axis", "forward N", "reverse N", "disk m2", "lag s")
-        print_table("tnnntn", columns, rows, "thrusters (~: estimate)" if found is not draft else "thrusters")
+        print_table("tnnntn", columns, rows, "thrusters (~: estimate)")
     for note in draft.notes:
         typer.echo(f"  {note}")
     typer.echo(f"missing: {', '.join(draft.missing) or 'nothing'}")
