@@ -66,19 +66,24 @@ def find(kind: str, name: str, own: Mapping[str, T]) -> ResolvedPlugin[T]:
     raise InputError(f"{kind} '{name}': unknown, {hint}allowed: {', '.join(known)}, or package.module:name")
 
 
-def make(kind: str, name: str, own: Mapping[str, Callable[..., T]], *given: Any) -> T:
-    """What the maker of this name makes of what it is given.
+def make(
+    kind: str, name: str, own: Mapping[str, Callable[..., T]], *given: Any, checked: Callable[[T], T] | None = None
+) -> T:
+    """What the maker of this name makes of what it is given; from outside, what `checked` gives for that.
 
-    Raises InputError as `find` does, and where a maker from outside raises anything; the reason is named.
+    Raises InputError as `find` does, and where a maker from outside or `checked` raises anything; the reason is named.
     """
     maker, origin = find(kind, name, own)
     try:
-        return maker(*given)
+        made = maker(*given)
+        return checked(made) if origin and checked is not None else made
     except Exception as fault:
-        if not origin or isinstance(fault, WakewiseError):
+        refused = isinstance(fault, InputError)
+        if not origin or (isinstance(fault, WakewiseError) and not refused):
             raise
         source = "" if origin == name else f" (from {origin})"
-        raise InputError(f"{kind} '{name}'{source}: cannot be made, {reason_of(fault)}") from fault
+        words = fault if refused else f"cannot be made, {reason_of(fault)}"
+        raise InputError(f"{kind} '{name}'{source}: {words}") from fault
 
 
 def reason_of(fault: Exception) -> str:

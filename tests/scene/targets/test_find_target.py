@@ -23,6 +23,34 @@ def made(seed: int) -> Mesh:
     return Mesh(BOX.vertices_m * (1.0 + seed), BOX.faces)
 
 
+def none(seed: int) -> None:
+    """Forgets to return its mesh."""
+
+
+def unknown_place(seed: int) -> Mesh:
+    return Mesh(np.full((4, 3), np.nan), BOX.faces)
+
+
+def faceless(seed: int) -> Mesh:
+    return Mesh(BOX.vertices_m, np.zeros((0, 3), dtype=np.int64))
+
+
+@pytest.mark.parametrize(
+    ("maker", "words"),
+    [
+        ("none", "what it gave: None is a NoneType, must be a Mesh"),
+        ("unknown_place", "vertices_m: holds NaN or infinity"),
+        ("faceless", "faces: none, allowed"),
+    ],
+)
+def test_a_target_from_outside_that_is_no_mesh_is_refused_by_name(maker: str, words: str) -> None:
+    kind = f"{__name__}:{maker}"
+    with pytest.raises(InputError) as caught:
+        find_target(kind, 1.5)
+    assert str(caught.value).startswith(f"target '{kind}': {words}")
+    assert "\n" not in str(caught.value)
+
+
 @pytest.fixture
 def box(tmp_path: Path) -> str:
     path = tmp_path / "box.ply"

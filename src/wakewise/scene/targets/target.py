@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
-from wakewise.core.checks import finite_number, path_of, quoted
+from wakewise.core.checks import finite_number, instance_of, path_of, quoted
 from wakewise.core.errors import InputError
 from wakewise.core.plugins import make, offered
 from wakewise.core.settings import guess, seed_number
@@ -100,7 +100,8 @@ def find_mesh(kind: str | Path, seed: int = 0, size_m: float | None = None) -> t
         if kind in procedural_kinds():
             return kind, reef_patch(individual) if kind == REEF else coral(kind, individual)
         makers: dict[str, MeshMaker] = {}
-        return kind.rpartition(":")[2], make("target", kind, makers, individual)
+        mesh = make("target", kind, makers, individual, checked=lambda made: instance_of(made, Mesh, "what it gave"))
+        return kind.rpartition(":")[2], mesh
     if not path.exists() and path.name == kind and not path.suffix:
         known = [*procedural_kinds(), *offered("target")]
         raise InputError(
