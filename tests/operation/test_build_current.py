@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wakewise.core.errors import InputError
+from wakewise import fly
+from wakewise.core.errors import InputError, StageError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.operation import load_scenario, preflight
 from wakewise.operation.preflight import check_current
 from wakewise.robot.vehicles import load_vehicle
+from wakewise.simulation.tank import build_ambient
 
 
 def _check(vehicle="bluerov2-heavy", **tank):
@@ -37,6 +39,92 @@ def test_a_series_shorter_than_the_flight_is_refused(tmp_path):
     path.write_text("time_s,u,v\n0,0.1,0\n10,0.1,0\n")
     with pytest.raises(InputError, match="10 s of series are left, the flight takes"):
         _check(**{"current.file": str(path)})
+
+
+class Theirs:
+    """A current from outside, which answers what it is told to."""
+
+    end_s = 1e6
+
+    def __init__(self, answer, begins_s=0.0):
+        self.answer, self.begins_s = answer, begins_s
+
+    def velocity(self, points_W_m, time_s):
+        return self.answer(points_W_m) if time_s >= self.begins_s else np.zeros((len(points_W_m), 3))
+
+
+def no_current():
+    """Forgets to return its current."""
+
+
+def no_water():
+    return Theirs(lambda points_W_m: None)
+
+
+def one_row():
+    return Theirs(lambda points_W_m: np.zeros(3))
+
+
+def unknown():
+    return Theirs(lambda points_W_m: points_W_m * np.nan)
+
+
+def raises():
+    return Theirs(lambda points_W_m: points_W_m["north"])
+
+
+def refuses():
+    current = Theirs(np.zeros_like)
+    current.stirred_bed = lambda: [[0.0, 0.0]]
+    return current
+
+
+def ends():
+    return Theirs(lambda points_W_m: None, begins_s=0.1)
+
+
+def never_known():
+    current = Theirs(np.zeros_like)
+    current.end_s = "the ebb"
+    return current
+
+
+@pytest.mark.parametrize(
+    ("maker", "words"),
+    [
+        (no_current, "what it gave: None has no velocity, must be a current with velocity"),
+        (never_known, "cannot be made, ValueError: could not convert string to float: 'the ebb'"),
+        (no_water, "velocity: what it gave: holds objects, allowed: real numbers"),
+        (one_row, "velocity: what it gave: shape (3,), allowed (1, 3)"),
+        (unknown, "velocity: what it gave: holds NaN"),
+        (raises, "velocity: raised IndexError: only integers"),
+    ],
+)
+def test_a_current_from_outside_that_is_of_no_use_is_refused_by_name(maker, words):
+    """In one line, before the flight: its name, what was asked of it, and why that cannot be used."""
+    name = f"{__name__}:{maker.__name__}"
+    with pytest.raises(InputError) as caught:
+        _check(**{"current.file": name})
+    assert str(caught.value).startswith(f"current '{name}': {words}")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_current_from_outside_that_fails_later_ends_the_flight_by_name():
+    """The error is that of a stage, and gives the instant, too."""
+    name = f"{__name__}:ends"
+    changes = {"tank.current.file": name, "target.kind": "brain", "target.points": 60, "method": "dp"}
+    with pytest.raises(StageError, match=rf"^fly: ended after 0\.\d s, current '{name}': velocity: what it gave"):
+        fly(load_scenario("quick", None, changes), duration_s=0.4, checked=False)
+
+
+def test_circles_of_a_current_from_outside_are_checked():
+    """Those that it has none of are none."""
+    parts = load_scenario("quick", None, {"tank.current.file": f"{__name__}:refuses"}).parts()
+    with pytest.raises(InputError, match=r"refuses': stirred_bed: what it gave: shape \(1, 2\), allowed \(n, 3\)"):
+        build_ambient(parts.scenario.tank, parts.seeds.tank()).stirred_bed()
+    parts = load_scenario("quick", None, {"tank.current.file": f"{__name__}:ends"}).parts()
+    ambient = build_ambient(parts.scenario.tank, parts.seeds.tank())
+    assert (len(ambient.stirred_bed()), ambient.end_s, ambient.steady) == (0, 1e6, False)
 
 
 @pytest.mark.parametrize("seed", [1, 7])

@@ -329,8 +329,10 @@ def name_external_parts(parts: Parts, recorder: FlightRecorder | None = None) ->
     """
     try:
         yield
-    except (WakewiseError, MemoryError):  # for memory that ran out no part is to blame
-        raise
+    except (WakewiseError, MemoryError) as fault:  # for memory that ran out no part is to blame
+        if recorder is None or not isinstance(fault, InputError) or "current" not in parts.external_parts:
+            raise
+        raise StageError(f"fly: ended after {recorder.duration_s:.1f} s, {fault}") from fault
     except Exception as fault:
         foreign = parts.external_parts
         if not foreign:

@@ -24,6 +24,7 @@ from wakewise.simulation.water import (
 )
 from wakewise.simulation.water.blockage import Blockage
 from wakewise.simulation.water.current_series import CurrentSeries
+from wakewise.simulation.water.currents import NamedCurrent
 from wakewise.simulation.water.round_jet_closure import SWIRLING, JetSpreading
 from wakewise.simulation.water.water import Water
 
@@ -74,7 +75,7 @@ def _current(settings: TankSettings) -> Current:
     named = settings.current.file or ""
     if not Path(named).expanduser().exists() and (named in offered("current") or ":" in named):
         makers: dict[str, Callable[[], Current]] = {}
-        return make("current", named, makers)
+        return make("current", named, makers, checked=lambda made: NamedCurrent(made, named))
     return _series(settings)
 
 

@@ -9,15 +9,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from wakewise.core.arrays import Array, freeze
+from wakewise.core.arrays import Array, freeze, frozen
+from wakewise.core.checks import has_methods
 from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Current
 from wakewise.core.jit.njit import njit
+from wakewise.core.plugins import reason_of
 from wakewise.simulation.water.faces import TankFaces
 from wakewise.simulation.water.induction import impulse_velocity
 from wakewise.simulation.water.round_jet_closure import PLAIN
@@ -245,6 +247,32 @@ class BackgroundTurbulence:
         """Add the velocity of the water to `out`, shape (n, 3)."""
         waves, cosines, sines = self._columns
         add_modes(np.ascontiguousarray(points_W_m), waves, self.frequencies_rad_s * time_s, cosines, sines, out)
+
+
+class NamedCurrent:
+    """A current from outside: what it answers is checked, and InputError gives its name and the reason."""
+
+    def __init__(self, current: Current, name: str) -> None:
+        self._current, self._name = has_methods(current, ("velocity",), "what it gave", "current"), name
+        self.steady, self.uniform = (bool(getattr(current, word, False)) for word in ("steady", "uniform"))
+        self.end_s = float(getattr(current, "end_s", math.inf))
+
+    def velocity(self, points_W_m: Array, time_s: float) -> Array:
+        """Velocity of the water, shape (n, 3)."""
+        return self._asked("velocity", len(points_W_m), points_W_m, time_s)
+
+    def stirred_bed(self) -> Array:
+        """Circles, shape (n, 3), as `Current`; none where it says nothing of them."""
+        return self._asked("stirred_bed", None) if hasattr(self._current, "stirred_bed") else np.zeros((0, 3))
+
+    def _asked(self, method: str, rows: int | None, *given: Any) -> Array:
+        try:
+            return frozen(getattr(self._current, method)(*given), (rows, 3), "what it gave")
+        except MemoryError:
+            raise
+        except Exception as fault:
+            words = fault if isinstance(fault, InputError) else f"raised {reason_of(fault)}"
+            raise InputError(f"current '{self._name}': {method}: {words}") from fault
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
