@@ -95,6 +95,36 @@ def test_thrusts_beyond_the_limits_are_cut_and_counted():
     assert "beyond their limits, cut" in flight.steps["fallback"][5]
 
 
+def no_controller(task):
+    """Forgets to return what it made."""
+
+
+def one_without_step(task):
+    broken = Foreign(nan)
+    broken.step = None
+    return broken
+
+
+def one_without_a_name(task):
+    return Foreign(nan, name="")
+
+
+@pytest.mark.parametrize(
+    ("maker", "words"),
+    [
+        (no_controller, "controller: None has no init, step, must be a controller with init, step"),
+        (one_without_step, "controller: Foreign(.*) has no step, must be a controller with init, step"),
+        (one_without_a_name, "controller: Foreign(.*) has no name for tables, must have a text"),
+    ],
+)
+def test_what_a_method_from_outside_gives_must_be_a_controller(maker, words):
+    """It is refused in one line that names the method, as a controller given in Python is; `dp` is not flown for it."""
+    name = f"{__name__}:{maker.__name__}"
+    with pytest.raises(InputError, match=f"^method '{name}': {words}") as caught:
+        ww.fly(parts().replace(method=name), duration_s=0.1)
+    assert "\n" not in str(caught.value)
+
+
 def slow_flight(clock, patience_s=5.0):
     pipeline = with_failsafe(Foreign(lambda good: good, name="slow"), parts().vehicle, parts().control, foreign=True)
     pipeline.failsafe.clock, pipeline.failsafe.patience_s = clock, patience_s
@@ -115,11 +145,13 @@ def test_two_seconds_a_step_are_counted_and_after_some_patience_not_asked_for_ag
     assert said[-1].startswith("slow: given up, 6 s late in all, last 2.00 s for 0.02 s; PID and least thrusts")
 
 
-def test_an_init_that_raises_leaves_the_flight_to_the_pid():
-    """Nothing of the controller is asked after that."""
+def test_an_init_that_raises_leaves_the_flight_to_the_pid(caplog):
+    """Nothing of the controller is asked after that; a warning says so, once."""
     broken = Foreign(raises)
     broken.init = lambda: 1 / 0
     flight = ww.fly(parts().replace(controller=broken), duration_s=0.1)
+    warned = [line.getMessage() for line in caplog.records if "init" in line.getMessage()]
+    assert len(warned) == 1 and warned[0].startswith("control: theirs: init raised ZeroDivisionError: division by zero")
     assert set(flight.steps["fallback"]) == {
         line for line in flight.steps["fallback"] if line.startswith("theirs: init raised ZeroDivisionError")
     }

@@ -221,7 +221,8 @@ class Failsafe:
         except Exception as fault:  # whatever a controller from outside raises must not end the flight
             if not self.foreign or (self.strict and not isinstance(fault, WakewiseError)):
                 raise
-            state, gave_up = pipeline.blank(), f"{pipeline.name}: init raised {_said(fault)}"
+            words = f"{pipeline.name}: init raised {_said(fault)}"
+            state, gave_up = pipeline.blank(), self.incidents.count("given up", words)
         return replace(state, sent_N=state.thrusts_N, gave_up=gave_up)
 
     def step(

@@ -46,6 +46,7 @@ from wakewise.control.pid import make_pid
 from wakewise.control.pipeline import Pipeline, TrackingStage
 from wakewise.control.settings import ControlSettings
 from wakewise.control.weighted_allocation import weighted_allocator
+from wakewise.core.checks import protocol_part
 from wakewise.core.interfaces import Controller, WakeModel
 from wakewise.core.plugins import make
 from wakewise.planning import Surroundings
@@ -240,4 +241,5 @@ def make_controller(
     if method in MAKERS:
         return MAKERS[method](vehicle, region, wake, chosen, surroundings)
     task = ControlTask(vehicle=vehicle, region=region, wake=wake, settings=chosen, surroundings=surroundings)
-    return cast("Controller[Any]", make("method", method, MAKERS, task))
+    made = make("method", method, MAKERS, task, checked=partial(protocol_part, name="controller"))
+    return cast("Controller[Any]", made)

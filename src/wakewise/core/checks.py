@@ -18,6 +18,14 @@ _SHOWN = 60
 """Longest value that a message quotes whole."""
 _LONGEST_NAME = 255
 """So many bytes file systems let the name of a file or folder have."""
+_METHODS: dict[str, tuple[str, ...]] = {
+    "pilot": ("goal",),
+    "wake": ("unit_velocity",),
+    "controller": ("init", "step"),
+    "estimator": ("init", "step"),
+    "world": ("begin",),
+}
+"""Methods that a part of a Protocol must have (see `wakewise.core.interfaces`)."""
 
 
 def quoted(value: object) -> str:
@@ -151,4 +159,15 @@ def has_methods(value: T, methods: Sequence[str], name: str, kind: str) -> T:
     if missing or isinstance(value, type):
         lacks = "is a class, not one made of it" if isinstance(value, type) else f"has no {', '.join(missing)}"
         raise InputError(f"{name}: {quoted(value)} {lacks}, must be a {kind} with {', '.join(methods)}")
+    return value
+
+
+def protocol_part(value: T, name: str) -> T:
+    """The value itself, if it can be the part of that name, such as controller or world: methods, a name for tables.
+
+    Raises InputError naming what is missing.
+    """
+    has_methods(value, _METHODS[name], name, name)
+    if name in ("controller", "world") and not (isinstance(word := getattr(value, "name", None), str) and word):
+        raise InputError(f"{name}: {quoted(value)} has no name for tables, must have a text as its attribute name")
     return value

@@ -21,7 +21,7 @@ import numpy as np
 from wakewise.control import ControlSettings, Pipeline, make_controller
 from wakewise.control.settings import flown_by
 from wakewise.core.arrays import Array
-from wakewise.core.checks import has_methods, instance_of, quoted
+from wakewise.core.checks import instance_of, protocol_part, quoted
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
 from wakewise.estimation import ErrorStateFilter
@@ -388,14 +388,6 @@ _RECORDS: dict[str, type] = {
     "start": BodyState,
     "surroundings": Surroundings,
 }
-_METHODS: dict[str, tuple[str, ...]] = {
-    "pilot": ("goal",),
-    "wake": ("unit_velocity",),
-    "controller": ("init", "step"),
-    "estimator": ("init", "step"),
-    "world": ("begin",),
-}
-"""Methods that a part of a Protocol must have (see `wakewise.core.interfaces`)."""
 
 
 def check_part(name: str, given: object) -> None:
@@ -403,9 +395,7 @@ def check_part(name: str, given: object) -> None:
     if name in _RECORDS:
         instance_of(given, _RECORDS[name], name)
     else:
-        has_methods(given, _METHODS[name], name, name)
-    if name in ("controller", "world") and not (isinstance(word := getattr(given, "name", None), str) and word):
-        raise InputError(f"{name}: {quoted(given)} has no name for tables, must have a text as its attribute name")
+        protocol_part(given, name)
 
 
 def tank_bounds(scenario: Scenario) -> TankBounds:
