@@ -210,6 +210,42 @@ def test_a_world_that_does_not_begin_is_refused_by_name(begin, words):
         ww.fly(parts().replace(world=world, method="dp"), duration_s=0.1)
 
 
+def nothing(*_):
+    """Forgets to return what it made."""
+
+
+class DryWorld:
+    """A world made from parts, which does not begin."""
+
+    name = "dry"
+
+    def __init__(self, parts):
+        self.begin = broken_begin
+
+
+@pytest.mark.parametrize(
+    ("field", "what", "needed"),
+    [
+        ("world", "world 'NAME': world", "begin"),
+        ("pilot", "pilot 'NAME': pilot", "goal"),
+        ("control.wake.model", "wake model 'NAME': wake", "unit_velocity"),
+    ],
+)
+def test_a_maker_that_gives_nothing_is_refused_by_name(field, what, needed):
+    """One line says whose it is and which methods are needed."""
+    name = f"{__name__}:nothing"
+    words = f"^{what.replace('NAME', name)}: None has no {needed}, must be a [a-z]+ with {needed}$"
+    with pytest.raises(InputError, match=words):
+        ww.fly(parts().requested.replace(method="dp", **{field: name}), duration_s=0.1)
+
+
+def test_a_world_of_the_scenario_that_does_not_begin_is_named_once():
+    """Its place says what it is; the same place again as its origin says no more."""
+    name = f"{__name__}:DryWorld"
+    with pytest.raises(InputError, match=rf"does not begin, RuntimeError: no water; from outside: world {name}$"):
+        ww.fly(parts().requested.replace(method="dp", world=name), duration_s=0.1)
+
+
 def test_a_world_that_does_not_wait_has_the_deadline_enforced():
     """It says so by `waits`; a world that says nothing waits."""
 

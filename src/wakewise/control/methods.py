@@ -241,5 +241,5 @@ def make_controller(
     if method in MAKERS:
         return MAKERS[method](vehicle, region, wake, chosen, surroundings)
     task = ControlTask(vehicle=vehicle, region=region, wake=wake, settings=chosen, surroundings=surroundings)
-    made = make("method", method, MAKERS, task, checked=partial(protocol_part, name="controller"))
+    made = make("method", method, MAKERS, task, checked=lambda made: protocol_part(made, "controller"))
     return cast("Controller[Any]", made)

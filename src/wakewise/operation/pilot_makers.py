@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from wakewise.core.checks import protocol_part
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Pilot
 from wakewise.core.plugins import make
@@ -81,4 +82,4 @@ PILOTS: dict[str, Callable[[Parts], Pilot]] = {
 
 def make_pilot(parts: Parts) -> Pilot:
     """The pilot that the scenario names, ours or one from outside; raises InputError if there is none."""
-    return make("pilot", parts.scenario.pilot, PILOTS, parts)
+    return make("pilot", parts.scenario.pilot, PILOTS, parts, checked=lambda made: protocol_part(made, "pilot"))

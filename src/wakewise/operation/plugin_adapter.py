@@ -48,7 +48,8 @@ def external_parts(scenario: Scenario, given: Mapping[str, Any]) -> dict[str, st
         is_file = Path(name).expanduser().exists()
         if part in given or name in builtin or is_file or not (name in offered(kind) or ":" in name):
             continue
-        found[part] = f"{name} (from {find(kind, name, {}).origin})"
+        origin = find(kind, name, {}).origin
+        found[part] = name if origin == name else f"{name} (from {origin})"
     ending = Path(scenario.vehicle).suffix.removeprefix(".").lower()
     if "vehicle" not in given and ending in offered("vehicle format"):
         found["vehicle"] = f"{scenario.vehicle} (read by {find('vehicle format', ending, {}).origin})"

@@ -25,7 +25,7 @@ from typing import Any, Literal, Self, cast
 import numpy as np
 from pydantic import Field, model_validator
 
-from wakewise.core.checks import quoted
+from wakewise.core.checks import protocol_part, quoted
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import WakeModel
 from wakewise.core.plugins import make, names, offered
@@ -195,4 +195,4 @@ def _bed(which: WakeSettings, bed_z_m: float | None) -> float | None:
 def _from_outside(name: str) -> WakeModel:
     """A model that an installed package offers (entry points `wakewise.wake_models`), or `package.module:make`."""
     own: dict[str, Any] = dict.fromkeys((*_RECIPES, *RIVALS))
-    return cast("WakeModel", make("wake model", name, own))
+    return cast("WakeModel", make("wake model", name, own, checked=lambda made: protocol_part(made, "wake")))

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from wakewise.core.checks import protocol_part
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.core.interfaces import BodyState, World
@@ -117,4 +118,4 @@ WORLDS: dict[str, Callable[[Parts], World]] = {
 
 def make_world(parts: Parts) -> World:
     """The world that the scenario names, ours or one from outside; raises InputError if there is none."""
-    return make("world", parts.scenario.flow_name, WORLDS, parts)
+    return make("world", parts.scenario.flow_name, WORLDS, parts, checked=lambda made: protocol_part(made, "world"))
