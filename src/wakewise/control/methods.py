@@ -57,8 +57,7 @@ from wakewise.wake import bed_of, free_jet, wake_model
 
 FILTER_S = 0.77
 """Time over which `mpc-smooth` filters its thrusts: of those flown the longest whose position error is within a tenth
-of
-that of `mpc` (docs/research-log/0036)."""
+of that of `mpc` (docs/research-log/0036)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

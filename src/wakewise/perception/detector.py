@@ -5,7 +5,6 @@ Detectors come from an ONNX file, an entry point of the group `wakewise.detector
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
@@ -93,9 +92,7 @@ def find_detector(name: str) -> Detector:
     if ":" not in name:
         one_of(name, (*offered(KIND), "package.module:make", f"a path that ends in {ONNX_SUFFIX}"), KIND)
     where = f"{KIND} '{name}'"
-    makers: dict[str, Callable[[], Detector]] = {}
-    made = make(KIND, name, makers)
-    has_methods(made, ("detect",), where, KIND)
+    made: Detector = has_methods(make(KIND, name, {}), ("detect",), where, KIND)
     instance_of(getattr(made, "name", None), str, f"{where}: name")
     return made
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -68,15 +68,12 @@ def place_on_bed(name: str, mesh_up: Mesh, bed_z_m: float, xy_m: Sequence[float]
     )
 
 
-MeshMaker = Callable[[int], Mesh]
-"""What a target from outside is made by: a seed to a mesh in a z-up frame, in metres, whose bed is at z = 0."""
-
-
 def find_target(kind: str | Path, bed_z_m: float, seed: int = 0, size_m: float | None = None) -> Target:
     """The target of that name, standing on the bed.
 
     - `kind`: a procedural coral, the path of a mesh file, a name that an installed package offers (entry points
-      `wakewise.scene.targets`), or ``package.module:make``; see `MeshMaker`.
+      `wakewise.targets`), or ``package.module:make``. The last two stand for what makes a `Mesh` from a seed, with z
+      up, in metres, and its bed at z = 0.
     - `bed_z_m`: depth of the bed, more than 0.
     - `seed`: which individual of a procedural one, 0 to 2^63 - 1.
     - `size_m`: scale a mesh file's largest extent to this; a procedural one has its own size.
@@ -99,8 +96,7 @@ def find_mesh(kind: str | Path, seed: int = 0, size_m: float | None = None) -> t
             raise InputError(f"target '{kind}': size_m {size_m:g} scales a mesh file, this one has its own size")
         if kind in procedural_kinds():
             return kind, reef_patch(individual) if kind == REEF else coral(kind, individual)
-        makers: dict[str, MeshMaker] = {}
-        mesh = make("target", kind, makers, individual, checked=lambda made: instance_of(made, Mesh, "what it gave"))
+        mesh = make("target", kind, {}, individual, checked=lambda made: instance_of(made, Mesh, "what it gave"))
         return kind.rpartition(":")[2], mesh
     if not path.exists() and path.name == kind and not path.suffix:
         known = [*procedural_kinds(), *offered("target")]

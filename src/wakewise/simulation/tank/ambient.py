@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -74,8 +73,7 @@ def _current(settings: TankSettings) -> Current:
     """What the settings name in place of a steady current: a series' file, or a current from outside."""
     named = settings.current.file or ""
     if not Path(named).expanduser().exists() and (named in offered("current") or ":" in named):
-        makers: dict[str, Callable[[], Current]] = {}
-        return make("current", named, makers, checked=lambda made: NamedCurrent(made, named))
+        return make("current", named, {}, checked=lambda made: NamedCurrent(made, named))
     return _series(settings)
 
 
