@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import invalidate_caches
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +94,37 @@ def test_a_trial_with_another_detector_has_another_key(tmp_path: Path, monkeypat
         (changed,) = _planned(methods=["dp"], scenario={"perception.detector": name}, seeds=1)
         assert keys[1] == keys[2]
         assert len({*keys, changed.task.key}) == 3
+
+
+@pytest.mark.parametrize(
+    ("file", "fields"),
+    [
+        ("my_campaign_pyramid.py", {"targets": ["my_campaign_pyramid:make"]}),
+        ("cur.csv", {"scenario": {"tank.current.file": "cur.csv"}}),
+        ("my_campaign_current.py", {"scenario": {"tank.current.file": "my_campaign_current:make"}}),
+    ],
+)
+def test_a_target_or_current_of_ones_own_is_flown_anew_when_it_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str, fields: dict[str, Any]
+) -> None:
+    """A module by its source, a series by its bytes; a name that leads nowhere is told before the first trial."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InputError, match=r"^campaign: method dp, .*(no such file|cannot be loaded)"):
+        _planned(methods=["dp"], seeds=1, **fields)
+    texts = {
+        "my_campaign_pyramid.py": "from wakewise.scene.targets import find_mesh\n\n"
+        'make = lambda *_: find_mesh("branching")[1]\n',
+        "cur.csv": "time_s,u,v\n0,0.01,0.0\n300,0.02,0.0\n",
+        "my_campaign_current.py": "from wakewise.simulation.water import SteadyCurrent\nimport numpy as np\n\n"
+        "make = lambda: SteadyCurrent(velocity_W_m_s=np.zeros(3))\n",
+    }
+    (tmp_path / file).write_text(texts[file])
+    invalidate_caches()
+    keys = [_planned(methods=["dp"], seeds=1, **fields)[0].task.key for _ in range(2)]
+    (tmp_path / file).write_text(texts[file] + ("# changed\n" if file.endswith("py") else "600,0.02,0.0\n"))
+    (changed,) = _planned(methods=["dp"], seeds=1, **fields)
+    assert keys[0] == keys[1] != changed.task.key
 
 
 def test_the_example_is_a_campaign(tmp_path: Path) -> None:

@@ -35,6 +35,7 @@ from wakewise.experiments.trials.dataset.checksums import sha256_of
 from wakewise.operation.flying import check_duration
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
 from wakewise.scene.targets import procedural_kinds
+from wakewise.simulation.tank import tank_ambient
 
 
 def external_parts(scenario: Scenario) -> dict[str, str]:
@@ -45,25 +46,16 @@ def external_parts(scenario: Scenario) -> dict[str, str]:
     found = dict(scenario.parts().external_parts)
     if scenario.method not in MAKERS:
         find("method", scenario.method, MAKERS)
-    for name, named in (
-        ("vehicle", scenario.vehicle),
-        ("target", scenario.target.kind),
-        ("control_log", scenario.control_log or ""),
-        ("detector", scenario.perception.detector or ""),
-    ):
-        path = Path(named).expanduser()
-        if named and path.is_file():
+    method, world, flow, pilot = scenario.method, scenario.world, scenario.flow, scenario.pilot
+    both = {"target": scenario.target.kind, "current": scenario.tank.current.file}
+    both["detector"] = scenario.perception.detector
+    for name, named in {"vehicle": scenario.vehicle, "control_log": scenario.control_log, **both}.items():
+        if (path := Path(named or "").expanduser()).is_file():
             found[f"{name} file"] = digest(path)
-    for name, named in (
-        ("method", scenario.method),
-        ("world", scenario.world),
-        ("flow", scenario.flow or ""),
-        ("pilot", scenario.pilot),
-        ("wake", scenario.control.wake.model),
-        ("detector", scenario.perception.detector or ""),
-    ):
-        if ":" in named:
-            found[f"{name} source"] = module_digest(named.partition(":")[0])
+    modules = {"method": method, "world": world, "flow": flow, "pilot": pilot, "wake": scenario.control.wake.model}
+    for name, named in (modules | both).items():
+        if ":" in (named or "") and f"{name} file" not in found:
+            found[f"{name} source"] = module_digest(str(named).partition(":")[0])
     return found
 
 
@@ -279,17 +271,17 @@ def _resolved(
 ) -> tuple[Scenario, dict[str, str]]:
     """The scenario of a combination, and what of it comes from outside the package; all of it can be found.
 
-    `there` holds vehicles with targets that have been loaded once.
+    `there` holds vehicles with targets and currents that have been loaded once.
     """
     where = ", ".join(f"{key} {name}" for key, name in cell.names.items() if key != "variation" or name != AS_IS)
     try:
         scenario = load_scenario(campaign.preset, None, dict(cell.fields) | {"seed": seed})
         if campaign.duration_s is not None:
             check_duration(campaign.duration_s, scenario)
-        loaded = f"{scenario.vehicle} {scenario.ballast} {scenario.target}"
+        loaded = f"{scenario.vehicle} {scenario.ballast} {scenario.target} {scenario.tank.current}"
         if loaded not in there:
             parts = scenario.parts()
-            _ = parts.vehicle, parts.target
+            _ = parts.vehicle, parts.target, tank_ambient(parts.scenario.tank, parts.seeds.tank())
             there.add(loaded)
         return scenario, external_parts(scenario)
     except InputError as fault:
