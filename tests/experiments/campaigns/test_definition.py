@@ -183,6 +183,45 @@ def test_a_combination_that_cannot_be_flown_is_named(fields: dict[str, Any], wor
     assert "\n" not in str(fault.value)
 
 
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"variations": {"far": {"method": "mpc"}}}, "variation far: method must be given under methods"),
+        ({"variations": {"far": {"seed": 4}}}, "variation far: seed must be given under seeds"),
+        ({"variations": {"far": {"world": "mud"}}}, "variation far: world must be given under worlds"),
+        ({"variations": {"far": {"vehicle": "paper"}}}, "variation far: vehicle must be given under vehicles"),
+        ({"variations": {"far": {"target": {"kind": "brain"}}}}, "far: target.kind must be given under targets"),
+        ({"targets": [], "variations": {"b": {"target.kind": "brain"}}}, "target.kind must be given under targets"),
+        (
+            {"targets": {"a": {"kind": "brain", "seed": 2}, "b": {}}, "variations": {"c": {"target.seed": 3}}},
+            "variation c: target.seed must be given under targets",
+        ),
+        ({"scenario": {"seed": 7}}, "scenario: seed must be given under seeds"),
+        ({"scenario": {"method": "mpc"}}, "scenario: method must be given under methods"),
+        ({"scenario": {"world": "mud"}, "worlds": ["payload"]}, "scenario: world must be given under worlds"),
+        ({"scenario": {"target": {"kind": "brain"}}}, "scenario: target.kind must be given under targets"),
+    ],
+)
+def test_what_a_factor_sets_is_said_once(fields: dict[str, Any], words: str) -> None:
+    """Else a trial would be named by what it is not."""
+    with pytest.raises(InputError) as fault:
+        _planned(**{"methods": ["dp"]} | fields)
+    assert words in str(fault.value)
+    assert "\n" not in str(fault.value)
+
+
+def test_fields_that_no_factor_sets_are_the_scenarios() -> None:
+    """What is not listed, and what only some of the targets say; groups of fields are merged."""
+    scenario = {"world": "mud", "target": {"kind": "brain", "seed": 5}, "mission": {"standoff_m": 0.6}}
+    targets = {"five": {}, "six": {"seed": 6}}
+    variations = {"slow": {"mission": {"clearance_m": 0.07}}}
+    trials = _planned(methods="dp", targets=targets, scenario=scenario, variations=variations, seeds=1)
+    flown = [scenario_of(trial.task.settings) for trial in trials]
+    assert [one.target.seed for one in flown] == [5, 6]
+    assert {(one.world, one.target.kind) for one in flown} == {("mud", "brain")}
+    assert {(one.mission.standoff_m, one.mission.clearance_m) for one in flown} == {(0.6, 0.07)}
+
+
 def test_what_is_no_mapping_is_refused(tmp_path: Path) -> None:
     """A list is no campaign, nor is a file that is not there."""
     path = tmp_path / "c.yaml"

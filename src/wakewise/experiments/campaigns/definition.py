@@ -12,6 +12,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.util import find_spec
@@ -34,6 +35,7 @@ from wakewise.experiments.campaigns.task import FLIES, PHOTOGRAPHS, Task, functi
 from wakewise.experiments.trials.dataset.checksums import sha256_of
 from wakewise.operation.flying import check_duration
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
+from wakewise.operation.scenario.layers import merged, nested
 from wakewise.scene.targets import procedural_kinds
 from wakewise.simulation.tank import tank_ambient
 
@@ -234,6 +236,7 @@ def planned_trials(campaign: Campaign, source: str = "campaign") -> list[Planned
         except (InputError, TypeError) as fault:
             raise InputError(f"{source}: {fault if isinstance(fault, InputError) else f'{name}: {fault}'}") from None
         outside[f"{name.partition(':')[0]} source"] = module_digest(name.partition(":")[0])
+    _check_factors(campaign, source)
     cells = list(_cells(campaign))
     seeds = campaign.all_seeds
     count = len(cells) * len(seeds)
@@ -244,12 +247,32 @@ def planned_trials(campaign: Campaign, source: str = "campaign") -> list[Planned
     return [_trial(campaign, cell, scenario, outside | own, seed) for seed in seeds for cell, scenario, own in resolved]
 
 
+def _check_factors(campaign: Campaign, source: str) -> None:
+    """Refuse what scenario or variations say in place of a factor: trials are named by factors."""
+    given = campaign.targets.values() if isinstance(campaign.targets, dict) else [{"kind": ""}] * bool(campaign.targets)
+    aimed = [{f"target.{key}" for key in one} for one in given]
+    fixed = {"method", "seed", *(one for one in ("world", "vehicle") if getattr(campaign, f"{one}s"))}
+    layers = {"scenario": (campaign.scenario, fixed.union(set.intersection(*aimed) if aimed else ()))}
+    named = {"method", "seed", "world", "vehicle"}.union(*aimed or [{"target.kind"}])
+    layers |= {f"variation {name}": (fields, named) for name, fields in campaign.variations.items()}
+    for where, (fields, taken) in layers.items():
+        for key, own in product(_dotted(fields), taken):
+            if f"{key}.".startswith(f"{own}."):
+                right = f"must be given under {own.partition('.')[0]}s, which name the trials"
+                raise InputError(f"{source}: {where}: {key} {right}")
+
+
+def _dotted(fields: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    for key, value in fields.items():
+        yield from _dotted(value, f"{prefix}{key}.") if isinstance(value, dict) else (f"{prefix}{key}",)
+
+
 @dataclass(frozen=True)
 class _Cell:
     """A combination, but for the seed: names of its factors, and the scenario's fields in the order they are laid."""
 
     names: Mapping[str, str]
-    fields: Mapping[str, Any]
+    fields: dict[str, Any]
 
 
 def _cells(campaign: Campaign) -> Iterator[_Cell]:
@@ -261,9 +284,10 @@ def _cells(campaign: Campaign) -> Iterator[_Cell]:
     variations = campaign.variations or {AS_IS: {}}
     for variation, target, world, vehicle, method in product(variations, targets, worlds, vehicles, campaign.methods):
         names = {"method": method, "target": target, "world": world, "vehicle": vehicle, "variation": variation}
-        told = {f"target.{key}": value for key, value in targets[target].items()}
-        fields = {**campaign.scenario, **told, "world": world, "vehicle": vehicle, "method": method}
-        yield _Cell(names, fields | variations[variation])
+        aimed = {f"target.{key}": value for key, value in targets[target].items()}
+        fields = {**campaign.scenario, **aimed, "world": world, "vehicle": vehicle, "method": method}
+        told = (nested(*one) for layer in (fields, variations[variation]) for one in layer.items())
+        yield _Cell(names, reduce(merged, told))
 
 
 def _resolved(
@@ -275,7 +299,7 @@ def _resolved(
     """
     where = ", ".join(f"{key} {name}" for key, name in cell.names.items() if key != "variation" or name != AS_IS)
     try:
-        scenario = load_scenario(campaign.preset, None, dict(cell.fields) | {"seed": seed})
+        scenario = load_scenario(campaign.preset, None, cell.fields | {"seed": seed})
         if campaign.duration_s is not None:
             check_duration(campaign.duration_s, scenario)
         loaded = f"{scenario.vehicle} {scenario.ballast} {scenario.target} {scenario.tank.current}"

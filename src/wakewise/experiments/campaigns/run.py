@@ -115,8 +115,7 @@ class _Driver:
         self._met: Counter[str] = Counter()  # failures of the computer, by trial
         self.pending: deque[Task] = deque()
         self._began = time.monotonic()
-        self._made_s = 0.0
-        self._made = 0
+        self._made, self._made_s = 0, 0.0
         unique = {task.key: task for task in tasks}
         self._total = len(unique)
         listed = listing(store)
@@ -128,14 +127,10 @@ class _Driver:
             if kept is None or not (kept.figures is not None or kept.attempts.is_failure(retries)):
                 self.pending.append(task)
                 continue
-            told = kept.attempts
+            figures, told = kept.figures, kept.attempts
+            reason = None if figures is not None else told.reason
             self._done[key] = TrialOutcome(
-                task=task,
-                figures=kept.figures,
-                reason=None if kept.figures is not None else told.reason,
-                attempts=told.begun,
-                took_s=kept.took_s,
-                known=True,
+                task=task, figures=figures, reason=reason, attempts=told.begun, took_s=kept.took_s, known=True
             )
 
     def work(self, crew: WorkerPool, driver: Path, stop: Callable[[], bool]) -> None:

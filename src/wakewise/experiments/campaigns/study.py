@@ -60,15 +60,8 @@ def flight_trial(
 
     `sources` are those of the study itself, beside all that can change a flight.
     """
-    settings = {
-        "scenario": dict(scenario),
-        "preset": preset,
-        "setup": dict(setup or {}),
-        "probes": dict(probes or {}),
-        "duration_s": duration_s,
-        "water_every_s": WATER_EVERY_S,
-        "keep": "none",
-    }
+    settings: dict[str, Any] = {"scenario": dict(scenario), "preset": preset, "duration_s": duration_s, "keep": "none"}
+    settings |= {"setup": dict(setup or {}), "probes": dict(probes or {}), "water_every_s": WATER_EVERY_S}
     name = "/".join(str(part) for part in (variation, world, method, seed) if part)
     task = Task(name=name, work=FLY, settings=settings, sources=(*FLIGHT_SOURCES, *sources))
     return study_trial(world, method, seed, task, variation)

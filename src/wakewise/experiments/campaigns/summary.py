@@ -20,7 +20,6 @@ from wakewise.experiments.campaigns.table import MEASURES, ComparisonMetric, Res
 Place = Mapping[str, Any]
 """A trial: world, method, target, seed, folder below the store, figures, and reason if it failed."""
 
-
 FEWEST = 6
 """Pairs from which on a difference can be told apart from none: five agree by chance alone once in sixteen times."""
 ENOUGH = 20

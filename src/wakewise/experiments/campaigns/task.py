@@ -115,13 +115,8 @@ class Task:
 
     def plain(self) -> dict[str, Any]:
         """As JSON, to be handed to a worker and kept in the trial's folder."""
-        return {
-            "name": self.name,
-            "work": self.work,
-            "settings": dict(self.settings),
-            "sources": list(self.sources),
-            "key": self.key,
-        }
+        told = {"name": self.name, "work": self.work, "settings": dict(self.settings)}
+        return told | {"sources": list(self.sources), "key": self.key}
 
 
 @dataclass(frozen=True, kw_only=True)
