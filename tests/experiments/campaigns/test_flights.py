@@ -1,6 +1,7 @@
 """A flight of a campaign: setup functions change its parts, probes watch it and add figures."""
 
 import re
+import sys
 from pathlib import Path
 
 import polars as pl
@@ -61,6 +62,80 @@ def test_a_setup_that_gives_no_parts_is_refused(study):
     (trial,) = planned_trials(check_campaign(study))
     with pytest.raises(InputError, match="gave str, must give the parts of a flight"):
         flight_parts(trial.task.settings | {"setup": {f"{__name__}:wrong": {}}})
+
+
+@pytest.mark.parametrize(
+    ("part", "words"),
+    [
+        ("setup hover:boom", "ValueError: a b"),
+        ("setup hover:none", "gave far ndarray"),
+        ("probe hover:Made", "KeyError: 'x'"),
+        ("probe hover:Stepped", "ZeroDivisionError: division by zero"),
+        ("probe hover:Ended", "gave NoneType; must give figures by name, each a number, a word or None"),
+        ("probe hover:Array", "gave mean ndarray; must give figures by name, each a number, a word or None"),
+        ("probe hover:Bare", "gave ndarray; must give figures by name"),
+        ("probe hover:Energy", "gave energy_kJ, hover_only, which are there already; give other names"),
+    ],
+)
+def test_a_setup_or_probe_that_fails_is_named(study, tmp_path, part, words):
+    """In one line, with what is needed."""
+    (tmp_path / "hover.py").write_text((tmp_path / "hover.py").read_text() + _FAILING)
+    sys.modules.pop("hover", None)
+    kind, name = part.split()
+    (trial,) = planned_trials(check_campaign(study | {"setup": {}, "probes": {}}))
+    settings = trial.task.settings | {"duration_s": 0.2, {"setup": "setup", "probe": "probes"}[kind]: {name: {}}}
+    with pytest.raises(InputError) as fault:
+        fly_stage(settings, tmp_path, no_progress)
+    assert str(fault.value).startswith(f"{part}: {words}")
+    assert "\n" not in str(fault.value)
+
+
+_FAILING = """
+
+def boom(parts):
+    raise ValueError("a\\nb")
+
+
+def none(parts):
+    return parts, {"far": np.zeros(3)}
+
+
+class Made(FlightProbe):
+    def __init__(self, parts, folder):
+        {}["x"]
+
+
+class Stepped(FlightProbe):
+    def step(self, step, truth_provider):
+        1 / 0
+
+
+class Ended(FlightProbe):
+    def figures(self, steps):
+        pass
+
+
+class Array(FlightProbe):
+    def figures(self, steps):
+        return {"mean": np.zeros(2), "last": np.float32(1.0), "word": "a", "none": None}
+
+
+class Bare(FlightProbe):
+    def figures(self, steps):
+        return np.zeros(2)
+
+
+class Energy(FlightProbe):
+    def figures(self, steps):
+        return {"hover_only": 0.0, "energy_kJ": 0.0, "own": 1.0}
+"""
+
+
+def test_a_name_without_a_function_says_what_it_is_for(study):
+    """A setup or a probe."""
+    for kind, field in (("setup", "setup"), ("probe", "probes")):
+        with pytest.raises(InputError, match=f"^campaign: {kind} 'hover': must be package.module:name"):
+            planned_trials(check_campaign(study | {field: {"hover": {}}}))
 
 
 def wrong(parts):

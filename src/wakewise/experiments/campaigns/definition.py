@@ -230,11 +230,13 @@ def planned_trials(campaign: Campaign, source: str = "campaign") -> list[Planned
     """
     outside: dict[str, str] = {}
     for name, given in (campaign.setup | campaign.probes).items():
+        # What a flight gives first: the parts, and to a probe its folder.
+        kind, first = ("probe", (None, None)) if name in campaign.probes else ("setup", (None,))
         try:
-            # What a flight gives first: the parts, and to a probe its folder.
-            signature(function_named(name)).bind(*(None,) * (2 if name in campaign.probes else 1), **given)
-        except (InputError, TypeError) as fault:
-            raise InputError(f"{source}: {fault if isinstance(fault, InputError) else f'{name}: {fault}'}") from None
+            signature(function_named(name, kind)).bind(*first, **given)
+        except (InputError, TypeError, ValueError) as fault:
+            said = fault if isinstance(fault, InputError) else f"{kind} {name}: {fault}"
+            raise InputError(f"{source}: {said}") from None
         outside[f"{name.partition(':')[0]} source"] = module_digest(name.partition(":")[0])
     _check_factors(campaign, source)
     cells = list(_cells(campaign))

@@ -9,23 +9,25 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sized
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsFloat
 
 import numpy as np
 import polars as pl
 
-from wakewise.core.errors import InputError
+from wakewise.core.errors import InputError, WakewiseError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import TruthProvider
+from wakewise.core.plugins import reason_of
 from wakewise.experiments.campaigns.task import Figures, WorkProgress, function_named
 from wakewise.experiments.trials.metrics import UNITS, MetricsCollector, add_reference_values
 from wakewise.operation import Parts, Scenario, fly
 from wakewise.operation.flight_log import timings_of
 from wakewise.operation.flying import WATER_EVERY_S
 from wakewise.operation.loop import Step
+from wakewise.operation.plugin_adapter import is_builtin
 from wakewise.operation.scenario import check_scenario
 from wakewise.scene.missions import SETTLING
 from wakewise.vision.evaluation import flight_figures
@@ -69,11 +71,13 @@ def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress)
     began, worked = time.monotonic(), time.process_time()
     parts, gathered = flight_parts(settings)
     setup = settings.get("setup") or {}
-    probes = [function_named(name)(parts, folder, **own) for name, own in (settings.get("probes") or {}).items()]
+    probes: dict[str, FlightProbe] = {}
+    for name, own in (settings.get("probes") or {}).items():
+        probes[f"probe {name}"] = _called(f"probe {name}", function_named(name, "probe"), parts, folder, **own)
 
     def watch(step: Step, truth_provider: TruthProvider | None) -> None:
-        for probe in probes:
-            probe.step(step, truth_provider)
+        for who, probe in probes.items():
+            _called(who, probe.step, step, truth_provider)
 
     flight = fly(
         parts,
@@ -96,8 +100,12 @@ def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress)
         gathered |= flown
     if (flight.steps["leg"] == SETTLING).all():
         gathered[HOVER_ONLY] = 1.0
-    for probe in probes:
-        gathered |= probe.figures(flight.steps)
+    for who, probe in probes.items():
+        more = _figures(who, _called(who, probe.figures, flight.steps))
+        taken = more.keys() & {HOVER_ONLY, "wall_s", "cpu_s", *gathering.figures, *gathered}
+        if taken and not is_builtin(probe):  # studies of our own packages measure some of a flight's figures anew
+            raise InputError(f"{who}: gave {', '.join(sorted(taken))}, which are there already; give other names")
+        gathered |= more
     gathering.add({"wall_s": time.monotonic() - began, "cpu_s": time.process_time() - worked})
     if settings.get("keep") != "none":
         with whole_file(folder / "steps.parquet") as path:
@@ -110,12 +118,31 @@ def flight_parts(settings: Mapping[str, Any]) -> tuple[Parts, dict[str, Any]]:
     gathered: dict[str, Any] = {}
     parts = scenario_of(settings).parts()
     for name, arguments in (settings.get("setup") or {}).items():
-        changed = function_named(name)(parts, **arguments)
-        parts, more = changed if isinstance(changed, tuple) else (changed, {})
+        changed = _called(f"setup {name}", function_named(name, "setup"), parts, **arguments)
+        parts, more = changed if isinstance(changed, tuple) and len(changed) == 2 else (changed, {})
         if not isinstance(parts, Parts):
             raise InputError(f"setup {name}: gave {type(parts).__name__}, must give the parts of a flight")
-        gathered |= more
+        gathered |= _figures(f"setup {name}", more)
     return parts, gathered
+
+
+def _called(who: str, function: Callable[..., Any], /, *given: Any, **own: Any) -> Any:
+    """What a setup function or a probe gives; what it raises is told with its name."""
+    try:
+        return function(*given, **own)
+    except Exception as fault:
+        raise InputError(f"{who}: {fault if isinstance(fault, WakewiseError) else reason_of(fault)}") from fault
+
+
+def _figures(who: str, given: Any) -> dict[str, Any]:
+    """Figures that a setup function or a probe gave, which a trial can keep."""
+    named = given if isinstance(given, Mapping) else {"": given}
+    for name, value in named.items():
+        is_number = isinstance(value, SupportsFloat) and not isinstance(value, Sized)
+        if not name or not (is_number or isinstance(value, str | None)):
+            found = f"{name} {type(value).__name__}".strip()
+            raise InputError(f"{who}: gave {found}; must give figures by name, each a number, a word or None")
+    return dict(named)
 
 
 def settled(steps: pl.DataFrame) -> pl.DataFrame:

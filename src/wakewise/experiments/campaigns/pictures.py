@@ -48,12 +48,9 @@ def _keep_model(target: Target, place: Path, folder: Path) -> None:
     except (StageError, InputError, OSError):
         return
     every = max(1, len(compared.points_W_m) // POINTS)
+    points_m, error_mm = (column[::every].astype(np.float32) for column in (compared.points_W_m, compared.error_mm))
     with whole_file(folder / MODEL) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(
-            file,
-            points_m=compared.points_W_m[::every].astype(np.float32),
-            error_mm=compared.error_mm[::every].astype(np.float32),
-        )
+        np.savez_compressed(file, points_m=points_m, error_mm=error_mm)
 
 
 def _keep_photographs(place: Path, folder: Path) -> None:

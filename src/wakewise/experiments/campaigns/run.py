@@ -182,20 +182,18 @@ class _Driver:
 
     def _take_back(self, task: Task, future: Future[AttemptReport], crew: WorkerPool) -> None:
         """What came of an attempt."""
-        key = task.key
+        key, place = task.key, self._store.place(task.key)
         try:
             report = future.result()
         except (Exception, CancelledError) as fault:  # the engine lost its worker, with whatever exception it has
             crew.check()
             report = AttemptReport(key=key, how="died", reason=" ".join(f"{type(fault).__name__}: {fault}".split()))
-            place = self._store.place(key)
             place.mkdir(parents=True, exist_ok=True)
             attempt_log.end(place, "died", report.reason, 0.0)
         if report.reason == FULL:
             raise OSError(errno.ENOSPC, FULL)
         self._met[key] += report.how == "computer"
         if report.how == "held":
-            place = self._store.place(key)
             self._held[key] = _Held(task, trial_lock.heartbeat_of(place), time.monotonic())
             return
         if self._is_settled(task):

@@ -18,7 +18,7 @@ Arrays in, plain records out.
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isnan, sqrt
 from typing import Any, Literal, NamedTuple
 
@@ -289,18 +289,9 @@ def paired_test(ours: Sequence[float] | Array, theirs: Sequence[float] | Array) 
         return PairedTest(n=n, mean=mean, low=mean, high=mean, p_t=p_t, p_wilcoxon=p_wilcoxon)
     test = stats.ttest_rel(a, b)
     ends = test.confidence_interval(0.95)
-    d_z = mean / spread
-    return PairedTest(
-        n=n,
-        mean=mean,
-        low=float(ends.low),
-        high=float(ends.high),
-        t=float(test.statistic),
-        p_t=float(test.pvalue),
-        p_wilcoxon=p_wilcoxon,
-        d_z=d_z,
-        g_z=d_z * hedges_correction(n - 1),
-    )
+    d_z, t, p_t = mean / spread, float(test.statistic), float(test.pvalue)
+    found = PairedTest(n=n, mean=mean, low=float(ends.low), high=float(ends.high), t=t, p_t=p_t)
+    return replace(found, p_wilcoxon=p_wilcoxon, d_z=d_z, g_z=d_z * hedges_correction(n - 1))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -53,15 +53,12 @@ class CampaignStore:
     def outcome(self, task: Task, known: bool = False) -> TrialOutcome:
         """What has become of a trial so far."""
         place = self.place(task.key)
-        kept = read_figures(place)
-        told = attempt_log.read_attempts(place)
-        if kept is not None:
-            return TrialOutcome(
-                task=task, figures=kept[0], attempts=max(1, told.begun), took_s=kept[1], known=known, how="done"
-            )
-        reason, begun = told.reason or "not finished", told.begun
+        kept, told = read_figures(place), attempt_log.read_attempts(place)
+        figures, took_s = (None, told.took_s) if kept is None else kept
+        reason, how = (told.reason or "not finished", told.how) if kept is None else (None, "done")
+        begun = told.begun if kept is None else max(1, told.begun)
         return TrialOutcome(
-            task=task, figures=None, reason=reason, attempts=begun, took_s=told.took_s, known=known, how=told.how
+            task=task, figures=figures, reason=reason, attempts=begun, took_s=took_s, known=known, how=how
         )
 
     def forget(self, key: str) -> None:

@@ -105,18 +105,9 @@ def summarize(measure: ComparisonMetric, world: str, places: Sequence[Place]) ->
         told["improvement"] = probability_of_improvement(*groups, less_is_better=less)
         told["energy_ratio"] = _ratio(here, "energy_kJ", winner, rival, both)
         told["silt_ratio"] = _ratio(here, "ray_optical_depth", winner, rival, both)
-    return MethodSummary(
-        world=world,
-        figure=figure,
-        words=words,
-        means={method: means[method] for method in ranked},
-        winner=winner,
-        rival=rival,
-        failed=failed,
-        trials=len(both),
-        less_is_better=less,
-        **told,
-    )
+    told |= {"world": world, "figure": figure, "words": words, "winner": winner, "rival": rival, "failed": failed}
+    in_order = {method: means[method] for method in ranked}
+    return MethodSummary(means=in_order, trials=len(both), less_is_better=less, **told)
 
 
 def _ratio(

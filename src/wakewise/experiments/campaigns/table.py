@@ -130,11 +130,8 @@ def failures(found: Results) -> list[dict[str, Any]]:
 
 def varying_factors(plan: CampaignPlan) -> tuple[str, ...]:
     """Factors that differ in a campaign, seeds aside: what its table is grouped by by default."""
-    return tuple(
-        factor
-        for factor in FACTORS
-        if factor != "seed" and len({entry.factors.get(factor) for entry in plan.trials}) > 1
-    ) or ("method",)
+    found = {factor: {entry.factors.get(factor) for entry in plan.trials} for factor in FACTORS if factor != "seed"}
+    return tuple(factor for factor, values in found.items() if len(values) > 1) or ("method",)
 
 
 def group_table(found: Results, by: Sequence[str] = (), figures: Sequence[str] = ()) -> list[dict[str, Any]]:

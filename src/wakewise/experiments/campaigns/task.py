@@ -137,10 +137,10 @@ class TrialOutcome:
     how: str | None = None
 
 
-def function_named(name: str) -> Callable[..., Any]:
-    """The function, or class, that ``package.module:function`` names.
+def function_named(name: str, kind: str = "work") -> Callable[..., Any]:
+    """The function, or class, that ``package.module:function`` names; `kind` says what it is for.
 
     Raises InputError if it cannot be imported.
     """
-    found: Callable[..., Any] = load("work", name, name)
+    found: Callable[..., Any] = load(kind, name, name)
     return found
