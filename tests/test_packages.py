@@ -42,14 +42,14 @@ def test_a_public_class_name_has_one_meaning() -> None:
 
 def test_the_library_does_not_grow() -> None:
     """At most 441 modules and 85,767 lines, 6,850 for finding, mapping and tracking the target and for patches,
-    1,720 for measuring models, 1,475 for picking photographs along a dive, 960 for environments for learning, and 270
+    1,720 for measuring models, 1,475 for picking photographs along a dive, 960 for environments for learning, and 228
     for faults that first readers found: surfaces that leave points out, files that would be replaced, parts without a
     name. The goal without these is 80,000; the bound is what is reached, and only ever lowered.
     """
     library = [path for path in MODULES if path.is_relative_to(ROOT / "src")]
     assert len([path for path in library if path.name != "__init__.py"]) <= 441
     lines = sum(len(path.read_text(encoding="utf-8").splitlines()) for path in library)
-    assert lines <= 85_767 + 6_850 + 1_720 + 1_475 + 960 + 270
+    assert lines <= 85_767 + 6_850 + 1_720 + 1_475 + 960 + 228
 
 
 def test_every_distribution_holds_a_readme_and_the_licence_and_names_the_same_authors() -> None:

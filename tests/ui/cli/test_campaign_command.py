@@ -140,7 +140,7 @@ def test_one_hover_is_told_in_the_singular(cheap_work: Path, capsys: pytest.Capt
     assert command(["campaign", "run", "one.yaml"]) == 0
     shown = capsys.readouterr().out
     assert "1 of 1 trial; mean" in shown
-    assert "Hover only: all flights ended before the first leg (duration_s)." in shown
+    assert "Hover only: the flight ended before the first leg (duration_s)." in shown
     assert command(["campaign", "status", "runs/one"]) == 0
     assert "1 of 1 trial done" in capsys.readouterr().out
 

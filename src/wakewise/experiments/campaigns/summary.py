@@ -155,8 +155,9 @@ _LEADING = ("rmse_mm", "target_speed_mean_m_s")
 def hover_words(found: Results) -> str:
     """Of how many flights the settling hover alone was flown, in words; empty where of none."""
     hovers = sum(bool(one.figures.get(HOVER_ONLY)) for one in found.made)
-    which = "all" if hovers == found.count("done") else f"{hovers} of {found.count('done')}"
-    return f"Hover only: {which} flights ended before the first leg (duration_s)." if hovers else ""
+    done = found.count("done")
+    which = f"{hovers} of {done} flights" if hovers < done else "all flights" if done > 1 else "the flight"
+    return f"Hover only: {which} ended before the first leg (duration_s)." if hovers else ""
 
 
 def paired_groups(found: Results, compare: str = "") -> list[Place]:
