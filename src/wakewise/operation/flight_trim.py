@@ -13,7 +13,6 @@ from wakewise.core.errors import InputError
 from wakewise.operation.parts import Parts
 from wakewise.operation.recorder import LOAD
 from wakewise.operation.scenario import read_scenario
-from wakewise.operation.trial_folder import changed_files
 from wakewise.robot.vehicles import Vehicle
 
 LEARNING_S = 4.0
@@ -65,6 +64,8 @@ def folder_trim(folder: Path) -> tuple[Parts, HoverTrim]:
 
     Raises InputError if it is no trial's folder, or as `flight_trim`.
     """
+    from wakewise.operation.trial_folder import changed_files  # it needs OpenCV, and a flight, which needs none, this
+
     if not (folder / "steps.parquet").is_file() or not (folder / "scenario.yaml").is_file():
         raise InputError(f"{folder}: not the folder of a trial that was flown, needs scenario.yaml and steps.parquet")
     scenario = read_scenario(folder / "scenario.yaml")

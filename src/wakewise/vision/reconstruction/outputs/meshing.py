@@ -90,8 +90,7 @@ def mesh_points(
     left_out = len(whole.points_m) - len(cloud.points_m)
     bare = np.asarray(KDTree(vertices[used]).query(cloud.points_m, workers=-1)[0]) > REACH * spacing_m
     cell_mm = 1e3 * 1.1 * float(np.ptp(cloud.points_m, axis=0).max()) / 2.0**options.depth
-    figures = (len(used), len(faces), left_out, cell_mm, 100.0 * float(bare.mean()))
-    return dict(zip(FIGURES, figures, strict=True))
+    return dict(zip(FIGURES, (len(used), len(faces), left_out, cell_mm, 100.0 * float(bare.mean())), strict=True))
 
 
 def mesh_warnings(figures: dict[str, Any]) -> list[str]:
