@@ -29,6 +29,15 @@ def test_a_maker_from_outside_that_fails_is_named(source, words, tmp_path, monke
     assert "\n" not in str(refused.value)
 
 
+def test_memory_that_runs_out_is_no_fault_of_a_part(tmp_path, monkeypatch):
+    """It keeps its type, as in a flight."""
+    (tmp_path / "theirs_of_test.py").write_text("def part():\n    raise MemoryError")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "theirs_of_test", raising=False)
+    with pytest.raises(MemoryError):
+        make("target", ORIGIN, {})
+
+
 def test_a_fault_of_our_own_maker_passes_as_it_is():
     """What is ours is not blamed on the input: the error keeps its type and its trace."""
 

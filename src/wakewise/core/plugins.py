@@ -77,9 +77,9 @@ def make(
     try:
         made = maker(*given)
         return checked(made) if origin and checked is not None else made
-    except Exception as fault:
+    except Exception as fault:  # whatever a foreign maker raises is named; memory that ran out is no fault of its
         refused = isinstance(fault, InputError)
-        if not origin or (isinstance(fault, WakewiseError) and not refused):
+        if not origin or (isinstance(fault, WakewiseError | MemoryError) and not refused):
             raise
         source = "" if origin == name else f" (from {origin})"
         words = fault if refused else f"cannot be made, {reason_of(fault)}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import platform
 from collections.abc import Iterable
 from importlib.metadata import version
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.core.errors import EnvironmentFailure, InputError
-from wakewise.core.files import write_rows
+from wakewise.core.files import sha256_of, write_rows
 from wakewise.core.geometry import Pose
 from wakewise.operation.parts import Parts, build
 from wakewise.operation.photography import photo_name, pose_cells
@@ -76,8 +75,7 @@ def _check_sums(scenario: Scenario) -> dict[str, str]:
     """Check sum of each file of vehicle, target, current and control log by its name in the scenario."""
     named = (scenario.vehicle, scenario.target.kind, scenario.tank.current.file, scenario.control_log)
     files = {name: Path(name).expanduser() for name in named if name}
-    found = {name: file.read_bytes() for name, file in files.items() if file.is_file()}
-    return {name: f"sha256 {hashlib.sha256(content).hexdigest()}" for name, content in found.items()}
+    return {name: f"sha256 {sha256_of(file)}" for name, file in files.items() if file.is_file()}
 
 
 def flown_by_hand(parts: Parts) -> Scenario:

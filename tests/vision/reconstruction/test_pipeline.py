@@ -165,6 +165,10 @@ def test_photos_of_different_things_are_a_failure(tmp_path):
 def test_bad_input_is_named_before_anything_runs(relief_photos, tmp_path):
     """Region without references, a focal length of zero, references and pairs of other photos: each is said."""
     folder, _ = relief_photos
+    places = {f"{k:02d}.png": np.zeros(3) for k in range(6)}
+    for centre, radius in (([np.nan, 0.0, 1.0], 0.1), (CENTRE, np.inf)):
+        with pytest.raises(InputError, match=r"region of interest.*must be finite"):
+            reconstruct(folder, tmp_path, SETTINGS, reference_positions=places, region=(np.array(centre), radius))
     with pytest.raises(InputError, match="region of interest"):
         reconstruct(folder, tmp_path / "a", SETTINGS, region=REGION)
     with pytest.raises(InputError, match="focal length"):

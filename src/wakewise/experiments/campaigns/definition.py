@@ -25,14 +25,13 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from wakewise.control import MAKERS
 from wakewise.core.errors import InputError
-from wakewise.core.files import name_fault, write_json
+from wakewise.core.files import name_fault, sha256_of, write_json
 from wakewise.core.plugins import find
 from wakewise.core.safe_yaml import yaml_file
 from wakewise.core.settings import Seed, Settings
 from wakewise.experiments.campaigns.flights import FLY, MODEL
 from wakewise.experiments.campaigns.store import open_store, read_store
 from wakewise.experiments.campaigns.task import FLIES, PHOTOGRAPHS, Task, function_named, source_version
-from wakewise.experiments.trials.dataset.checksums import sha256_of
 from wakewise.operation.flying import check_duration
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
 from wakewise.operation.scenario.layers import merged, nested

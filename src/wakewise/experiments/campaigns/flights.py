@@ -130,7 +130,7 @@ def _called(who: str, function: Callable[..., Any], /, *given: Any, **own: Any) 
     """What a setup function or a probe gives; what it raises is told with its name."""
     try:
         return function(*given, **own)
-    except Exception as fault:
+    except Exception as fault:  # whatever foreign code raises; failures of the computer stay its cause
         raise InputError(f"{who}: {fault if isinstance(fault, WakewiseError) else reason_of(fault)}") from fault
 
 

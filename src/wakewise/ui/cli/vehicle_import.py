@@ -181,8 +181,8 @@ def _row(values: Any) -> str:
 def _is_estimate(draft: VehicleDraft, field: str) -> bool:
     """Whether the file's own record of sources calls a field an estimate; a record that names fields means those."""
     group, _, name = field.partition(".")
-    sources = [origin.source for origin in draft.provenance if origin.estimate and origin.group == group]
-    return any(": an estimate" not in one or name in one.partition(": an estimate")[0] for one in sources)
+    told = [o.source.partition(": an estimate") for o in draft.provenance if o.estimate and o.group == group]
+    return any(not colon or name in fields.rpartition("; ")[2].split(", ") for fields, colon, _ in told)
 
 
 def _show(found: VehicleDraft, draft: VehicleDraft, comparison: MatrixComparison | None, out: Path | None) -> None:

@@ -1,6 +1,7 @@
 """Photogrammetry pipeline: a folder of photographs to a 3D model in stages that take files and leave files.
 
-match -> map -> scale -> dense -> mesh. Each stage is skipped if its files were made from the same input.
+match -> map -> scale -> dense -> mesh. Each stage is skipped if its files were made from the same input. The module is
+long because the record of a model has all figures of all stages.
 """
 
 from __future__ import annotations

@@ -167,6 +167,7 @@ def test_check_sums_are_what_sha256sum_and_hashlib_say(campaign: Path, tmp_path:
         (lambda d: (d / "croissant.json").unlink(), "is no data set"),
         (lambda d: _one_byte(d / "croissant.json", b"sc:Dataset", b"sc:dataset"), "croissant.json changed"),
         (lambda d: (d / "croissant.json.sha256").unlink(), "croissant.json.sha256 missing or empty"),
+        (lambda d: (d / "croissant.json.sha256").write_bytes(b"\xff\xfe"), "line 1 is no check sum"),
     ],
 )
 def test_whatever_is_changed_is_noticed(campaign: Path, tmp_path: Path, change: Any, said: str, capsys: Capsys) -> None:

@@ -23,10 +23,10 @@ import polars as pl
 
 from wakewise.core.checks import counted
 from wakewise.core.errors import InputError
-from wakewise.core.files import whole_file, write_json, write_text
+from wakewise.core.files import sha256_of, whole_file, write_json, write_text
 from wakewise.core.interfaces import no_progress
 from wakewise.core.run_lock import LOCK, exclusive_run
-from wakewise.experiments.trials.dataset.checksums import SUMS, sha256_of, sums_text
+from wakewise.experiments.trials.dataset.checksums import SUMS, sums_text
 from wakewise.experiments.trials.dataset.metadata import FIGURES, METADATA, OWN_SUM, SHEET, TRIALS, columns_of, metadata
 from wakewise.experiments.trials.dataset.part import KNOWN, NOTE, TRUTH, TrialPart, TrialSource, part_of, trials_of
 from wakewise.experiments.trials.dataset.statement import QUESTIONS, DatasetStatement

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 import shutil
 from collections.abc import Callable, Mapping
@@ -10,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wakewise.core.errors import InputError
+from wakewise.core.files import sha256_of
 
 SUMS = "SHA256SUMS"
 _LINE = re.compile(r"([0-9a-f]{64})  ([^\0\n]+)\Z")
@@ -21,12 +21,6 @@ class ChecksumMismatch:
 
     path: str
     what: str
-
-
-def sha256_of(path: Path) -> str:
-    """Check sum of a file, as 64 hexadecimal digits."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def copied(source: Path, target: Path) -> str:

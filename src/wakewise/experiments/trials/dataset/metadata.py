@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.core.errors import InputError
+from wakewise.core.files import sha256_of
 from wakewise.core.interfaces import no_progress
-from wakewise.experiments.trials.dataset.checksums import SUMS, ChecksumMismatch, differences, read_sums, sha256_of
+from wakewise.experiments.trials.dataset.checksums import SUMS, ChecksumMismatch, differences, read_sums
 from wakewise.experiments.trials.dataset.part import TrialPart, meaning
 from wakewise.experiments.trials.dataset.statement import DatasetStatement
 from wakewise.experiments.trials.metrics import DEFINITIONS, UNITS

@@ -24,9 +24,9 @@ import polars as pl
 import yaml
 
 from wakewise.core.errors import InputError
-from wakewise.core.files import whole_folder
+from wakewise.core.files import sha256_of, whole_folder
 from wakewise.core.safe_yaml import YamlError, read_yaml
-from wakewise.experiments.trials.dataset.checksums import copied, sha256_of
+from wakewise.experiments.trials.dataset.checksums import copied
 from wakewise.scene.targets import read_mesh
 
 _KNOWN = re.compile(

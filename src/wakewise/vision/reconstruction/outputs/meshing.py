@@ -54,8 +54,9 @@ def mesh_points(
     if the disk is full.
     """
     whole = read_cloud(dense)
-    cloud = whole.only(near_subject(whole.points_m))
-    cloud = cloud.only(in_large_cluster(cloud.points_m, REACH * spacing_m))
+    kept = near_subject(whole.points_m)
+    kept[kept] = in_large_cluster(whole.points_m[kept], REACH * spacing_m)
+    cloud = whole if kept.all() else whole.only(kept)
     options = pycolmap.PoissonMeshingOptions()
     options.depth = octree_depth(cloud.points_m, spacing_m, settings.mesh_depth)
     options.trim = 0.0
@@ -140,8 +141,7 @@ def in_large_cluster(points_m: Array, reach_m: float) -> BoolArray:
     graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(len(cubes), len(cubes)))
     label = connected_components(graph, directed=False)[1]
     size = np.bincount(label, count)
-    large: BoolArray = (size >= CLUSTER_SHARE * size.max())[label][of_point.ravel()]
-    return large
+    return np.asarray((size >= CLUSTER_SHARE * size.max())[label][of_point.ravel()])
 
 
 def drop_small_components(faces: IntArray, vertices_m: Array, extent_m: float) -> IntArray:
